@@ -1,0 +1,43 @@
+"""The exceptions of the solver: one root, and one class for each thing a caller can mend."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+class SolverError(Exception):
+    """Root of every error the solver raises on purpose."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Issue:
+    """One thing wrong with a scene.
+
+    Attributes
+    ----------
+    pointer : str
+        RFC 6901 JSON pointer of the bad field, for example ``/contacts/0/mu``.
+    message : str
+        Names the key, quotes the value and says what would be right.
+    """
+
+    pointer: str
+    message: str
+
+
+class SceneError(SolverError):
+    """A scene that cannot be used; `issues` lists everything that is wrong with it."""
+
+    def __init__(self, issues: Sequence[Issue]) -> None:
+        self.issues = tuple(issues)
+        super().__init__("; ".join(issue.message for issue in self.issues))
+
+
+class SettingError(SolverError):
+    """A bad argument of a computation (a frequency, a number of harmonics, a parameter path)."""
+
+    def __init__(self, name: str, value: object, wanted: str) -> None:
+        self.name = name
+        self.value = value
+        super().__init__(f"`{name}` {wanted}, got {value!r}")
