@@ -1,0 +1,257 @@
+"""The parts of a scene: structure, contacts, excitation, what to observe. Frozen, checked, SI units."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, NamedTuple, cast
+
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, field_validator, model_validator
+from pydantic_core import CoreSchema, core_schema
+
+GROUND = "ground"
+NEXT = "next"
+LARGEST = 1e15
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+\z", max_length=100)]
+MemberName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(@[0-9]+)?\z", max_length=100)]
+EndName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(@([0-9]+|next))?\z", max_length=105)]
+Between = tuple[EndName, EndName]
+Positive = Annotated[float, Field(strict=True, gt=0.0, le=LARGEST, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(strict=True, ge=0.0, le=LARGEST, allow_inf_nan=False)]
+Signed = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+Friction = Annotated[float, Field(strict=True, ge=0.0, le=100.0, allow_inf_nan=False)]
+Angle = Annotated[float, Field(strict=True, ge=-1e4, le=1e4, allow_inf_nan=False)]
+Sectors = Annotated[int, Field(strict=True, ge=1, le=10_000)]
+Order = Annotated[int, Field(strict=True, ge=0, le=10_000)]
+HarmonicIndex = Annotated[int, Field(strict=True, ge=0, le=1_000)]
+
+
+class End(NamedTuple):
+    """One end of a spring, dashpot or contact: a DOF (None = ground), here or in the next sector."""
+
+    dof: str | None
+    next: bool
+
+
+def parse_end(text: str) -> End:
+    """Read ``"tip"``, ``"tip@next"``, ``"tip@3"`` (a DOF of an annulus) or ``"ground"``."""
+    if text == GROUND:
+        return End(None, False)
+    base, at, suffix = text.partition("@")
+    return End(base, True) if at and suffix == NEXT else End(text, False)
+
+
+class Part(BaseModel):
+    """Root of everything in a scene: frozen, no unknown keys, no NaN."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class _Element(Part):
+    """Something that joins two ends."""
+
+    between: Between
+
+    @property
+    def ends(self) -> tuple[End, End]:
+        """The two ends, read."""
+        return parse_end(self.between[0]), parse_end(self.between[1])
+
+
+class Mass(Part):
+    """A point mass: one degree of freedom.
+
+    Attributes
+    ----------
+    dof : str
+        The degree of freedom it makes.
+    m : float
+        Mass [kg].
+    name : str or None
+        Makes it a parameter ``structure.<name>``.
+    """
+
+    dof: str
+    m: Positive
+    name: MemberName | None = None
+
+
+class Spring(_Element):
+    """A spring, with an optional dashpot beside it: `k` [N/m], `c` [N s/m]."""
+
+    k: NonNegative
+    c: NonNegative = 0.0
+    name: MemberName | None = None
+
+
+class Damper(_Element):
+    """A dashpot: `c` [N s/m]."""
+
+    c: NonNegative
+    name: MemberName | None = None
+
+
+class _MassEntry(Part):
+    """A mass as a scene file gives it: a number, or a table with `m` and an optional `name`."""
+
+    m: Positive
+    name: MemberName | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _number_is_mass(cls, data: object) -> object:
+        return data if isinstance(data, dict) else {"m": data}
+
+
+class _MassTable:
+    """Reads a table ``{dof: mass}`` into a tuple of `Mass`, and writes it back as a table."""
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        table = handler.generate_schema(Annotated[dict[MemberName, _MassEntry], Field(min_length=1)])
+        masses = core_schema.no_info_after_validator_function(cls._read, table)
+        write = core_schema.plain_serializer_function_ser_schema(cls._write)
+        return core_schema.no_info_before_validator_function(cls._as_table, masses, serialization=write)
+
+    @classmethod
+    def _as_table(cls, data: object) -> object:
+        ready = isinstance(data, tuple) and all(isinstance(mass, Mass) for mass in data)
+        return cls._write(cast(tuple[Mass, ...], data)) if ready else data
+
+    @staticmethod
+    def _read(table: dict[str, _MassEntry]) -> tuple[Mass, ...]:
+        return tuple(
+            Mass.model_construct(dof=dof, m=entry.m, name=entry.name) for dof, entry in table.items()
+        )
+
+    @staticmethod
+    def _write(masses: tuple[Mass, ...]) -> dict[str, object]:
+        return {
+            mass.dof: mass.m if mass.name is None else {"m": mass.m, "name": mass.name} for mass in masses
+        }
+
+
+class _Structure(Part):
+    """Masses, springs and dashpots."""
+
+    stiffness_proportional_damping: NonNegative = 0.0
+    masses: Annotated[tuple[Mass, ...], _MassTable]
+    springs: tuple[Spring, ...] = ()
+    dampers: tuple[Damper, ...] = ()
+
+    @property
+    def dofs(self) -> tuple[str, ...]:
+        """Names of the degrees of freedom, in the order of the masses."""
+        return tuple(mass.dof for mass in self.masses)
+
+
+class LumpedStructure(_Structure):
+    """A structure of point masses."""
+
+    kind: Literal["lumped"]
+
+
+class CyclicStructure(_Structure):
+    """One sector of a disk of `sectors` equal sectors; ``X@next`` is DOF X of the next one."""
+
+    kind: Literal["cyclic"]
+    sectors: Sectors
+
+
+Structure = LumpedStructure | CyclicStructure
+KINDS: tuple[str, ...] = ("lumped", "cyclic")
+
+
+class Contact(_Element):
+    """A friction contact: elastic Coulomb with a normal load N(t) = N0 + N1 cos(omega t + N1_phase).
+
+    Attributes
+    ----------
+    name : str
+        Name in parameter paths.
+    between : (str, str)
+        Its ends; the slip is x(first) - x(second).
+    kt : float
+        Tangential contact stiffness [N/m].
+    mu : float
+        Friction coefficient.
+    N0 : float
+        Mean normal load [N].
+    N1, N1_ratio : float or None
+        Amplitude of the load [N], or that amplitude as a multiple of N0; one of them or neither (no
+        variation). `N1_value` is the amplitude whichever was given. Where N1 > N0 the contact opens.
+    N1_phase : float
+        Phase of the load [rad].
+    group : str or None
+        A name that sets several contacts at once in parameter paths.
+    """
+
+    name: MemberName
+    kt: Positive
+    mu: Friction
+    N0: NonNegative
+    N1: Signed | None = None
+    N1_ratio: Signed | None = None
+    N1_phase: Angle = 0.0
+    group: Name | None = None
+
+    @model_validator(mode="after")
+    def _one_of_n1(self) -> Contact:
+        if self.N1 is not None and self.N1_ratio is not None:
+            raise ValueError(
+                f"`N1` and `N1_ratio` of contact `{self.name}` exclude each other: give one, "
+                f"got N1 = {self.N1!r} and N1_ratio = {self.N1_ratio!r}"
+            )
+        return self
+
+    @property
+    def N1_value(self) -> float:
+        """Amplitude of the normal load [N], from `N1` or `N1_ratio`."""
+        if self.N1_ratio is not None:
+            return self.N1_ratio * self.N0
+        return 0.0 if self.N1 is None else self.N1
+
+
+class Excitation(Part):
+    """A force amplitude * cos(harmonic * omega t + phase) on a DOF; harmonic 0 is a static load.
+
+    Attributes
+    ----------
+    dof : str
+        Where it acts.
+    amplitude : float
+        Force [N].
+    phase : float
+        Phase [rad]; 0 for a static load.
+    harmonic : int
+        Multiple of the excitation frequency.
+    engine_order : int or None
+        Cyclic structures only: sector j has harmonic * engine_order * j * 2 pi / sectors added to the phase.
+    """
+
+    dof: MemberName
+    amplitude: Signed
+    phase: Angle = 0.0
+    harmonic: HarmonicIndex = 1
+    engine_order: Order | None = None
+
+    @model_validator(mode="after")
+    def _static_has_no_phase(self) -> Excitation:
+        if self.harmonic == 0 and self.phase != 0.0:
+            raise ValueError(f"`phase` of a static load (harmonic = 0) must be 0, got {self.phase!r}")
+        return self
+
+
+class Observe(Part):
+    """The observed DOF and the frequency band of interest [Hz]."""
+
+    dof: MemberName
+    band: tuple[Positive, Positive]
+
+    @field_validator("band")
+    @classmethod
+    def _ordered(cls, band: tuple[float, float]) -> tuple[float, float]:
+        low, high = band
+        if not low < high or not math.isfinite(high - low):
+            raise ValueError(f"`band` must be [low, high] in Hz with low < high, got [{low!r}, {high!r}]")
+        return band

@@ -1,0 +1,182 @@
+"""Parameter paths of a scene: read and set ``shroud.N0``, ``excitation.amplitude``, ``structure.k1``, …"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, TypeVar, cast
+
+from pydantic import ValidationError
+
+from solver.errors import SettingError
+from solver.scene_checks import listing, nearest
+from solver.scene_parts import Contact, Damper, Excitation, Mass, Part, Spring, Structure
+
+if TYPE_CHECKING:
+    from solver.scene import Scene
+
+FREQUENCY = "frequency"
+AMPLITUDE = "excitation.amplitude"
+PHASE = "excitation.phase"
+CONTACT_KEYS = ("N0", "N1", "N1_ratio", "N1_phase", "kt", "mu")
+_RANGES = {
+    "N0": "must be a number >= 0 and <= 1e15 [N]",
+    "N1": "must be a number from -1e15 to 1e15 [N]",
+    "N1_ratio": "must be a number from -1e15 to 1e15",
+    "N1_phase": "must be a number from -1e4 to 1e4 [rad]",
+    "kt": "must be a number > 0 and <= 1e15 [N/m]",
+    "mu": "must be a number >= 0 and <= 100",
+    "m": "must be a number > 0 and <= 1e15 [kg]",
+    "k": "must be a number >= 0 and <= 1e15 [N/m]",
+    "c": "must be a number >= 0 and <= 1e15 [N s/m]",
+    "amplitude": "must be a number from -1e15 to 1e15 [N]",
+    "phase": "must be a number from -1e4 to 1e4 [rad]",
+}
+_PartT = TypeVar("_PartT", bound=Part)
+_Named = Mass | Spring | Damper
+
+
+def parameter_paths(scene: Scene) -> tuple[str, ...]:
+    """Every path that has a value in the scene."""
+    members = [contact.name for contact in scene.contacts]
+    groups = dict.fromkeys(contact.group for contact in scene.contacts if contact.group is not None)
+    contacts = [f"{name}.{key}" for name in [*groups, *members] for key in CONTACT_KEYS]
+    return (AMPLITUDE, PHASE, *contacts, *(f"structure.{name}" for name in structure_names(scene.structure)))
+
+
+def structure_names(structure: Structure) -> tuple[str, ...]:
+    """Names of the springs, dashpots and masses that are parameters, in the order of the tables."""
+    parts: tuple[_Named, ...] = (*structure.masses, *structure.springs, *structure.dampers)
+    return tuple(part.name for part in parts if part.name is not None)
+
+
+def check_path(scene: Scene, path: str) -> None:
+    """Raise SettingError unless `path` is ``frequency`` or a path of the scene."""
+    if path != FREQUENCY and path not in parameter_paths(scene):
+        raise _unknown(scene, path)
+
+
+def value(scene: Scene, path: str) -> float:
+    """Value of a path; of a group, its first member's."""
+    if path == AMPLITUDE:
+        return scene.excitation[0].amplitude
+    if path == PHASE:
+        return next((force.phase for force in scene.excitation if force.harmonic), 0.0)
+    owner, _, key = path.rpartition(".") if isinstance(path, str) else ("", "", "")
+    if owner == "structure":
+        part = _structure_part(scene, key)
+        if part is None:
+            raise _unknown(scene, path)
+        return cast(float, getattr(part, _quantity(part)))
+    contact = next((c for c in scene.contacts if owner in (c.name, c.group)), None)
+    if contact is None or key not in CONTACT_KEYS:
+        raise _unknown(scene, path)
+    return _contact_value(contact, key)
+
+
+def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
+    """The scene with other values; only what changes is checked again."""
+    for path, new in values.items():
+        if not isinstance(path, str):
+            raise _unknown(scene, path)
+        scene = _with_value(scene, path, _number(path, new))
+    return scene
+
+
+def _with_value(scene: Scene, path: str, new: float) -> Scene:
+    if path in (AMPLITUDE, PHASE):
+        change = _with_amplitude if path == AMPLITUDE else _with_phase
+        return scene.model_copy(update={"excitation": change(scene.excitation, new)})
+    owner, _, key = path.rpartition(".")
+    if owner == "structure":
+        return scene.model_copy(update={"structure": _with_structure(scene, path, key, new)})
+    if key not in CONTACT_KEYS or not any(owner in (c.name, c.group) for c in scene.contacts):
+        raise _unknown(scene, path)
+    update: dict[str, object] = {key: new}
+    if key in ("N1", "N1_ratio"):
+        update = {"N1": None, "N1_ratio": None, key: new}
+    contacts = tuple(
+        _changed(contact, update, path, new) if owner in (contact.name, contact.group) else contact
+        for contact in scene.contacts
+    )
+    return scene.model_copy(update={"contacts": contacts})
+
+
+def _with_structure(scene: Scene, path: str, name: str, new: float) -> Structure:
+    part = _structure_part(scene, name)
+    if part is None:
+        raise _unknown(scene, path)
+    changed = _changed(part, {_quantity(part): new}, path, new)
+    table = {Mass: "masses", Spring: "springs", Damper: "dampers"}[type(part)]
+    parts = tuple(changed if old is part else old for old in getattr(scene.structure, table))
+    return scene.structure.model_copy(update={table: parts})
+
+
+def _with_amplitude(forces: tuple[Excitation, ...], new: float) -> tuple[Excitation, ...]:
+    first = forces[0].amplitude
+    if first == 0.0 and len(forces) > 1:
+        raise SettingError(AMPLITUDE, new, "scales all forces by one factor, but the first one is 0")
+    scaled = [new, *(force.amplitude * (new / first) for force in forces[1:])]
+    return tuple(_changed(f, {"amplitude": a}, AMPLITUDE, new) for f, a in zip(forces, scaled, strict=True))
+
+
+def _with_phase(forces: tuple[Excitation, ...], new: float) -> tuple[Excitation, ...]:
+    """Shift every force but static ones so that the first has the phase `new`."""
+    moving = [force for force in forces if force.harmonic]
+    if not moving:
+        raise SettingError(PHASE, new, "has no meaning: every force of this scene is static")
+    shift = new - moving[0].phase
+    phases = {id(force): force.phase + shift for force in moving} | {id(moving[0]): new}
+    return tuple(
+        _changed(force, {"phase": phases[id(force)]}, PHASE, new) if force.harmonic else force
+        for force in forces
+    )
+
+
+def _changed(part: _PartT, update: Mapping[str, object], path: str, new: float) -> _PartT:
+    try:
+        return type(part).model_validate({**part.__dict__, **update})
+    except ValidationError as error:
+        key = next((k for k in update if update[k] is not None), "")
+        raise SettingError(path, new, _RANGES[key]) from error
+
+
+def _contact_value(contact: Contact, key: str) -> float:
+    if key == "N1":
+        return contact.N1_value
+    if key != "N1_ratio":
+        return cast(float, getattr(contact, key))
+    if contact.N1_ratio is not None:
+        return contact.N1_ratio
+    if contact.N0 == 0.0 and contact.N1_value != 0.0:
+        raise SettingError(
+            f"{contact.name}.N1_ratio", None, f"is undefined with N0 = 0 and N1 = {contact.N1_value:g}"
+        )
+    return contact.N1_value / contact.N0 if contact.N0 else 0.0
+
+
+def _structure_part(scene: Scene, name: str) -> _Named | None:
+    structure = scene.structure
+    parts: tuple[_Named, ...] = (*structure.springs, *structure.dampers, *structure.masses)
+    return next((part for part in parts if part.name == name), None)
+
+
+def _quantity(part: _Named) -> str:
+    return {Mass: "m", Spring: "k", Damper: "c"}[type(part)]
+
+
+def _number(path: str, new: object) -> float:
+    try:
+        number = float(new)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SettingError(str(path), new, "must be a number") from error
+    if isinstance(new, str | bool) or not math.isfinite(number):
+        raise SettingError(str(path), new, "must be a finite number")
+    return number
+
+
+def _unknown(scene: Scene, path: object) -> SettingError:
+    if path == FREQUENCY:
+        return SettingError("path", path, "must name a value of the scene; the frequency belongs to the run")
+    known = (FREQUENCY, *parameter_paths(scene))
+    return SettingError("path", path, f"must be one of {listing(known)}{nearest(str(path), known)}")
