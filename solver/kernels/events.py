@@ -1,0 +1,220 @@
+"""The event march of one elastic Coulomb contact: where it sticks, slips and separates over one period.
+
+With ``w_ξ(τ) = ξ kt u(τ) − μ N(τ)`` for ξ = ±1 everything is a root or an extremum of two trigonometric
+polynomials: a stuck contact with force kt u + c reaches the limit ξ where ``w_ξ + ξ c`` crosses 0 upward, and
+a slipping one sticks again where ``w_ξ'`` crosses 0 downward, with ``c = −ξ w_ξ`` there.
+
+Where the march starts. The offset c moves only when a limit pushes it: ``c ≥ w_−`` and ``c ≤ −w_+`` (a
+catching-up process). If max w_− + max w_+ ≤ 0 nothing ever pushes once c lies between the two extremes: the
+contact sticks for ever, and from the unloaded state c is 0 clipped to them (the shakedown of a one-sided
+slip, with the extremum as its onset). Otherwise c equals max w_− at the place of that maximum whatever came
+before, so the periodic state is found by one march over one period from there, with no transient. Where N
+becomes negative, every contact interval starts from a known force, 0.
+
+Reference for the law: Yang, Chu, Menq, J. Sound Vib. 217 (1998) 909, doi:10.1006/jsvi.1998.1829 (variable
+normal load); Petrov, Ewins, J. Turbomach. 125 (2003) 364, doi:10.1115/1.1539868 (multi-harmonic form).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.fourier import Real
+from solver.kernels.compiled import compiled
+from solver.kernels.trigpoly import at_point, bracketed_root
+
+# What a contact does over the period.
+SEPARATED, STUCK, SLIPPING, LIFTING, FAILED = 0, 1, 2, 3, 4
+# A segment's motion and what its stick began after; columns of the segment table.
+STICK, SLIP = 0.0, 1.0
+UNLOADED, AFTER_SLIP, AFTER_SEPARATION = 0.0, 1.0, 2.0
+MOTION, DIRECTION, BEGIN, END, ONSET, BEGAN = 0, 1, 2, 3, 4, 5
+SEGMENT_COLUMNS = 6
+
+ROUNDING = 2e-14  # relative to kt max|u| + μ max|N|: below it a limit is not crossed
+
+
+@compiled
+def largest(c: Real, s: Real, degree: int, value: Real, slope: Real) -> tuple[float, float]:
+    """Return the maximum of a polynomial over the period and its place, from its values on the grid.
+
+    Every interval whose cubic through values and slopes comes near the best is refined.
+    """
+    n = value.size
+    delta = 2.0 * math.pi / n
+    top, bottom = value[0], value[0]
+    for j in range(n):
+        top = max(top, value[j])
+        bottom = min(bottom, value[j])
+    near = top - 1e-3 * (top - bottom)
+    best, place = -np.inf, 0.0
+    for j in range(n):
+        after = j + 1 if j + 1 < n else 0
+        if slope[j] >= 0.0 and slope[after] <= 0.0:
+            above = min(value[j] + delta * slope[j], value[after] - delta * slope[after])
+            if max(above, max(value[j], value[after])) < near:
+                continue
+            fall = slope[j] - slope[after]
+            guess = delta * (j + (slope[j] / fall if fall > 0.0 else 0.5))
+            tau = bracketed_root(c, s, degree, 1, 0.0, delta * j, delta * (j + 1), guess, False)
+            here = at_point(c, s, degree, tau)[0]
+            if here > best:
+                best, place = here, tau
+    if best < top:
+        for j in range(n):
+            if value[j] == top:
+                best, place = top, delta * j
+    return best, place
+
+
+@compiled
+def _crosses(
+    c: Real, s: Real, degree: int, shift: float, tol: float,
+    lo: float, hi: float, g_lo: float, slope_lo: float, g_hi: float, slope_hi: float,
+) -> float:  # fmt: skip
+    """Return the first place in (lo, hi] where (polynomial + shift) exceeds 0, or infinity.
+
+    A value at `lo` of 0 (the limit just left) is not a crossing: the function first has to become negative.
+    """
+    end = hi
+    if g_hi <= tol:
+        width = hi - lo
+        if slope_lo <= 0.0 or slope_hi >= 0.0:
+            return np.inf
+        if min(g_lo + slope_lo * width, g_hi - slope_hi * width) <= tol:
+            return np.inf
+        guess = lo + width * slope_lo / (slope_lo - slope_hi)
+        end = bracketed_root(c, s, degree, 1, 0.0, lo, hi, guess, False)
+        g_hi = at_point(c, s, degree, end)[0] + shift
+        if g_hi <= tol:
+            return np.inf
+    begin = lo
+    if g_lo >= -tol:
+        begin = -1.0
+        for part in range(1, 16):
+            tau = lo + (end - lo) * part / 16.0
+            if at_point(c, s, degree, tau)[0] + shift < -tol:
+                begin = tau
+                break
+        if begin < 0.0:
+            return lo
+    rise = g_hi - g_lo
+    guess = begin + (end - begin) * (-g_lo / rise if rise > 0.0 else 0.5)
+    return bracketed_root(c, s, degree, 0, shift, begin, end, guess, True)
+
+
+@compiled
+def leave_stick(
+    c: Real, s: Real, degree: int, value: Real, slope: Real, offset: float, start: float, end: float, tol: float
+) -> tuple[float, int]:
+    """Return when a stuck contact reaches a limit, and which (0: ξ = +1, 1: ξ = −1), or (end, −1)."""
+    n = value.shape[1]
+    delta = 2.0 * math.pi / n
+    j = int(math.floor(start / delta)) + 1
+    lo = start
+    g_lo, slope_lo = np.empty(2), np.empty(2)
+    for x in range(2):
+        q, dq, _, _ = at_point(c[x], s[x], degree, start)
+        g_lo[x] = q + (1 - 2 * x) * offset
+        slope_lo[x] = dq
+        if g_lo[x] > -tol and dq > tol * degree:
+            return start, x
+    while lo < end:
+        hi = j * delta
+        last = hi >= end
+        if last:
+            hi = end
+        first, which = np.inf, -1
+        for x in range(2):
+            if last:
+                q, dq, _, _ = at_point(c[x], s[x], degree, end)
+            else:
+                q, dq = value[x, j % n], slope[x, j % n]
+            shift = (1 - 2 * x) * offset
+            g_hi = q + shift
+            tau = _crosses(c[x], s[x], degree, shift, tol, lo, hi, g_lo[x], slope_lo[x], g_hi, dq)
+            if tau < first:
+                first, which = tau, x
+            g_lo[x], slope_lo[x] = g_hi, dq
+        if which >= 0:
+            return first, which
+        lo = hi
+        j += 1
+    return end, -1
+
+
+@compiled
+def leave_slip(c: Real, s: Real, degree: int, slope: Real, start: float, end: float, tol: float) -> float:
+    """Return when a slipping contact sticks (w' crosses 0 downward), or `end`.
+
+    Between grid points a dip of w' below 0 is looked for where the grid has a local minimum.
+    """
+    n = slope.size
+    delta = 2.0 * math.pi / n
+    j = int(math.floor(start / delta)) + 1
+    lo = start
+    _, rate, curve, _ = at_point(c, s, degree, start)
+    if rate < -tol * degree or (rate < tol * degree and curve < 0.0):
+        return start
+    while lo < end:
+        hi = j * delta
+        last = hi >= end
+        if last:
+            hi = end
+            rate_hi = at_point(c, s, degree, end)[1]
+        else:
+            rate_hi = slope[j % n]
+        if rate_hi < 0.0:
+            fall = rate - rate_hi
+            guess = lo + (hi - lo) * (rate / fall if fall > 0.0 else 0.5)
+            return bracketed_root(c, s, degree, 1, 0.0, lo, hi, guess, False)
+        if not last and j * delta - start > delta:
+            before, after = slope[(j - 1) % n], slope[(j + 1) % n]
+            if rate_hi <= before and rate_hi <= after:
+                bend = before + after - 2.0 * rate_hi
+                drop = (before - after) ** 2 / (8.0 * bend) if bend > 0.0 else 0.0
+                if rate_hi < 4.0 * drop + 0.05 * bend:
+                    dip = bracketed_root(c, s, degree, 2, 0.0, hi - delta, hi + delta, hi, True)
+                    if dip < end and at_point(c, s, degree, dip)[1] < 0.0:
+                        return bracketed_root(c, s, degree, 1, 0.0, lo, dip, 0.5 * (lo + dip), False)
+        rate = rate_hi
+        lo = hi
+        j += 1
+    return end
+
+
+@compiled
+def march(
+    c: Real, s: Real, degree: int, value: Real, slope: Real, begin: float, end: float,
+    stuck: bool, direction: int, offset: float, began: float, tol: float, segments: Real, count: int,
+) -> int:  # fmt: skip
+    """Append the segments of the contact interval [begin, end] to the table; return their number or −1.
+
+    Parameters
+    ----------
+    c, s : (2, degree + 1) the polynomials w_+ and w_−.
+    value, slope : (2, n) their values and slopes on the grid.
+    stuck, direction, offset, began : the state at `begin` (index of ξ; offset of the stick force).
+    """
+    tau = begin
+    while tau < end:
+        if count >= segments.shape[0]:
+            return -1
+        row = segments[count]
+        row[BEGIN] = tau
+        row[ONSET] = tau
+        if stuck:
+            row[MOTION], row[BEGAN], row[DIRECTION] = STICK, began, 1.0 - 2.0 * direction
+            tau, hit = leave_stick(c, s, degree, value, slope, offset, tau, end, tol)
+            if hit >= 0:
+                direction, stuck = hit, False
+        else:
+            row[MOTION], row[BEGAN], row[DIRECTION] = SLIP, AFTER_SLIP, 1.0 - 2.0 * direction
+            tau = leave_slip(c[direction], s[direction], degree, slope[direction], tau, end, tol)
+            offset = -(1.0 - 2.0 * direction) * at_point(c[direction], s[direction], degree, tau)[0]
+            stuck, began = True, AFTER_SLIP
+        row[END] = tau
+        count += 1
+    return count

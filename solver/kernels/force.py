@@ -1,0 +1,395 @@
+"""Force of one elastic Coulomb contact, its Jacobian and its parameter derivatives, in closed form.
+
+On a segment the force is ``kt (u − u(τs)) + ξ μ N(τs)`` (stick after slip), ``kt (u − u(τs))`` (stick after
+separation), ``kt u`` (stuck since the unloaded state) or ``ξ μ N`` (slip). All integrals against the basis
+are moments of cosines and sines over the segments, so nothing is sampled and the Jacobian is the true
+derivative of the force. Because the force is homogeneous, ``F = kt ∂F/∂kt + μ ∂F/∂μ``: the two parameter
+derivatives are computed and the force is their sum.
+
+Event times drop out of every derivative except where the slope of the force jumps, at separation → stick:
+there the offset −kt u(τs) moves with dτs/dN_j = −e_j(τs)/Ṅ(τs).
+
+Formulas: Petrov, Ewins, J. Turbomach. 125 (2003) 364, doi:10.1115/1.1539868; the paper this project starts
+from, doi:10.1177/1461348419834759, equations 24–31; design derivation of ∂F/∂N by ourselves.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.fourier import Integer, Real, coefficient_count
+from solver.kernels.compiled import compiled
+from solver.kernels.events import (
+    AFTER_SEPARATION,
+    AFTER_SLIP,
+    BEGAN,
+    BEGIN,
+    DIRECTION,
+    END,
+    FAILED,
+    LIFTING,
+    MOTION,
+    ONSET,
+    ROUNDING,
+    SEGMENT_COLUMNS,
+    SEPARATED,
+    SLIP,
+    SLIPPING,
+    STICK,
+    STUCK,
+    UNLOADED,
+    largest,
+    march,
+)
+from solver.kernels.trigpoly import at_point, bracketed_root, on_grid, unpack
+
+
+@compiled
+def segment_capacity(degree: int) -> int:
+    """Return how many segments a period may have: each event is a root of a polynomial of this degree."""
+    return 16 * degree + 32
+
+
+@compiled
+def _contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, out: Real) -> int:
+    """Fill `out` with [begin, end] of every interval with N > 0, when N < 0 somewhere; return their number.
+
+    The intervals are unwrapped: an end may exceed 2π. −1 means N never becomes negative.
+    """
+    n = value.size
+    delta = 2.0 * math.pi / n
+    negative = -1
+    for j in range(n):
+        if value[j] < 0.0:
+            negative = j
+            break
+    low = 0.0
+    if negative < 0:
+        below, place = largest(-c, -s, degree, -value, -slope)
+        if below <= 0.0:
+            return -1
+        low = place
+    else:
+        low = negative * delta
+    count = 0
+    before, at = -1.0, low
+    j = int(math.floor(low / delta)) + 1
+    end = low + 2.0 * math.pi
+    rising_at = 0.0
+    in_contact = False
+    while at < end:
+        hi = min(j * delta, end)
+        now = value[j % n] if hi < end else -1.0
+        if before < 0.0 <= now or before >= 0.0 > now:
+            span = now - before
+            tau = bracketed_root(c, s, degree, 0, 0.0, at, hi, at - (hi - at) * before / span, now >= 0.0)
+            if now >= 0.0:
+                rising_at, in_contact = tau, True
+            elif in_contact:
+                if count < out.shape[0]:
+                    out[count, 0], out[count, 1] = rising_at, tau
+                    count += 1
+                in_contact = False
+        elif before < 0.0 and now < 0.0:
+            tau, top = _bump(c, s, degree, at, hi)
+            if top > 0.0 and count < out.shape[0]:
+                out[count, 0] = bracketed_root(c, s, degree, 0, 0.0, at, tau, 0.5 * (at + tau), True)
+                out[count, 1] = bracketed_root(c, s, degree, 0, 0.0, tau, hi, 0.5 * (hi + tau), False)
+                count += 1
+        before = now
+        at = hi
+        j += 1
+    return count
+
+
+@compiled
+def _bump(c: Real, s: Real, degree: int, lo: float, hi: float) -> tuple[float, float]:
+    """Return place and value of a maximum between `lo` and `hi`, or (lo, −inf) if the slopes show none."""
+    if at_point(c, s, degree, lo)[1] <= 0.0 or at_point(c, s, degree, hi)[1] >= 0.0:
+        return lo, -np.inf
+    tau = bracketed_root(c, s, degree, 1, 0.0, lo, hi, 0.5 * (lo + hi), False)
+    return tau, at_point(c, s, degree, tau)[0]
+
+
+@compiled
+def find_segments(
+    U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, cos_table: Real, sin_table: Real,
+    segments: Real,
+) -> tuple[int, int]:  # fmt: skip
+    """March one period and fill the segment table.
+
+    Parameters
+    ----------
+    U : coefficients of the slip motion u [m] for harmonics `ks`; N : of the normal load [N] for `load_ks`.
+    cos_table, sin_table : of `solver.kernels.trigpoly.grid_tables`.
+    segments : (capacity, SEGMENT_COLUMNS), overwritten.
+
+    Returns
+    -------
+    (state, number of segments); the state is SEPARATED, STUCK, SLIPPING, LIFTING or FAILED.
+    """
+    degree = max(ks[-1], load_ks[-1])
+    n_grid = 2 * (cos_table.shape[1] - 1)
+    uc, us = np.empty(degree + 1), np.empty(degree + 1)
+    nc, ns = np.empty(degree + 1), np.empty(degree + 1)
+    unpack(U, ks, uc, us)
+    unpack(N, load_ks, nc, ns)
+    u, du, load, dload = np.empty(n_grid), np.empty(n_grid), np.empty(n_grid), np.empty(n_grid)
+    on_grid(nc, ns, load_ks[-1], cos_table, sin_table, load, dload)
+    on_grid(uc, us, ks[-1], cos_table, sin_table, u, du)
+    value, slope = np.empty((2, n_grid)), np.empty((2, n_grid))
+    u_max, load_max = 0.0, 0.0
+    for j in range(n_grid):
+        a, b = kt * u[j], mu * load[j]
+        value[0, j], value[1, j] = a - b, -a - b
+        a, b = kt * du[j], mu * dload[j]
+        slope[0, j], slope[1, j] = a - b, -a - b
+        u_max, load_max = max(u_max, abs(u[j])), max(load_max, load[j])
+    if not (math.isfinite(u_max) and math.isfinite(load_max)):
+        return FAILED, 0
+    tol = ROUNDING * (kt * u_max + mu * load_max)
+    c, s = np.empty((2, degree + 1)), np.empty((2, degree + 1))
+    for k in range(degree + 1):
+        c[0, k], c[1, k] = kt * uc[k] - mu * nc[k], -kt * uc[k] - mu * nc[k]
+        s[0, k], s[1, k] = kt * us[k] - mu * ns[k], -kt * us[k] - mu * ns[k]
+    intervals = np.empty((load_ks[-1] + 1, 2))
+    n_intervals = -1
+    if load_ks[-1] > 0 or nc[0] <= 0.0:
+        n_intervals = _contact_intervals(nc, ns, load_ks[-1], load, dload, intervals)
+    if n_intervals == 0 or (n_intervals < 0 and load_max <= 0.0):
+        return SEPARATED, 0
+    if n_intervals < 0:
+        return _march_circle(c, s, degree, value, slope, tol, segments)
+    count = 0
+    for i in range(n_intervals):
+        begin, end = intervals[i, 0], intervals[i, 1]
+        rate_plus = at_point(c[0], s[0], degree, begin)[1]
+        rate_minus = at_point(c[1], s[1], degree, begin)[1]
+        stuck = rate_plus < 0.0 and rate_minus < 0.0
+        direction = 0 if rate_plus >= rate_minus else 1
+        offset = -kt * at_point(uc, us, ks[-1], begin)[0]
+        count = march(
+            c, s, degree, value, slope, begin, end, stuck, direction, offset, AFTER_SEPARATION, tol, segments, count
+        )
+        if count < 0:
+            return FAILED, 0
+    return LIFTING, count
+
+
+@compiled
+def _march_circle(
+    c: Real, s: Real, degree: int, value: Real, slope: Real, tol: float, segments: Real
+) -> tuple[int, int]:
+    """March a contact that never separates: stuck for ever, or one period from the largest w_−."""
+    high_minus, at_minus = largest(c[1], s[1], degree, value[1], slope[1])
+    high_plus, at_plus = largest(c[0], s[0], degree, value[0], slope[0])
+    if high_minus + high_plus <= tol:
+        row = segments[0]
+        row[MOTION], row[BEGIN], row[END] = STICK, 0.0, 2.0 * math.pi
+        if high_minus > 0.0:
+            row[DIRECTION], row[ONSET], row[BEGAN] = -1.0, at_minus, AFTER_SLIP
+        elif high_plus > 0.0:
+            row[DIRECTION], row[ONSET], row[BEGAN] = 1.0, at_plus, AFTER_SLIP
+        else:
+            row[DIRECTION], row[ONSET], row[BEGAN] = 1.0, 0.0, UNLOADED
+        return STUCK, 1
+    begin, end = at_minus, at_minus + 2.0 * math.pi
+    count = march(c, s, degree, value, slope, begin, end, True, 1, high_minus, AFTER_SLIP, tol, segments, 0)
+    return (SLIPPING, count) if count >= 0 else (FAILED, 0)
+
+
+@compiled
+def add_moments(begin: float, end: float, weight: float, cosines: Real, sines: Real) -> None:
+    """Add weight·∫cos qτ and weight·∫sin qτ over [begin, end] for q = 0 … len − 1.
+
+    Written with half-length and middle, ∫cos qτ = (2/q) sin(q·half) cos(q·middle), which keeps full relative
+    precision on the very short segments of stiff contacts.
+    """
+    half, middle = 0.5 * (end - begin), 0.5 * (end + begin)
+    cm1, sm1 = math.cos(middle), math.sin(middle)
+    ch1, sh1 = math.cos(half), math.sin(half)
+    cm, sm, ch, sh = cm1, sm1, ch1, sh1
+    cosines[0] += weight * (end - begin)
+    for q in range(1, cosines.size):
+        factor = weight * 2.0 * sh / q
+        cosines[q] += factor * cm
+        sines[q] += factor * sm
+        cm, sm = cm * cm1 - sm * sm1, sm * cm1 + cm * sm1
+        ch, sh = ch * ch1 - sh * sh1, sh * ch1 + ch * sh1
+
+
+@compiled
+def _basis_at(tau: float, ks: Integer, out: Real) -> None:
+    """Fill `out` with the basis for the harmonics `ks` at `tau`."""
+    here = 0
+    for i in range(ks.size):
+        k = ks[i]
+        if k == 0:
+            out[here] = 1.0
+            here += 1
+        else:
+            out[here] = math.cos(k * tau)
+            out[here + 1] = math.sin(k * tau)
+            here += 2
+
+
+@compiled
+def _moment_rows(cosines: Real, sines: Real, ks: Integer, out: Real) -> None:
+    """Fill `out` with ∫e divided by π (2π for the mean row) from the moments q = 0 … ."""
+    here = 0
+    for i in range(ks.size):
+        k = ks[i]
+        if k == 0:
+            out[here] = cosines[0] / (2.0 * math.pi)
+            here += 1
+        else:
+            out[here] = cosines[k] / math.pi
+            out[here + 1] = sines[k] / math.pi
+            here += 2
+
+
+@compiled
+def _products(cosines: Real, sines: Real, row_ks: Integer, column_ks: Integer, scale: float, out: Real) -> None:
+    """Fill `out` with scale·∫e_row e_column/π (2π for the mean row): Toeplitz plus Hankel of the moments."""
+    half = 0.5 * scale / math.pi
+    row = 0
+    for a in range(row_ks.size):
+        i = row_ks[a]
+        factor = half if i > 0 else 0.5 * half
+        column = 0
+        for b in range(column_ks.size):
+            j = column_ks[b]
+            plus, minus = i + j, abs(i - j)
+            sign = 1.0 if i >= j else -1.0
+            cc = factor * (cosines[minus] + cosines[plus])
+            if i == 0:
+                out[row, column] = cc
+                if j > 0:
+                    out[row, column + 1] = factor * 2.0 * sines[j]
+            else:
+                sc = factor * (sines[plus] + sign * sines[minus])
+                out[row, column] = cc
+                out[row + 1, column] = sc
+                if j > 0:
+                    out[row, column + 1] = factor * (sines[plus] - sign * sines[minus])
+                    out[row + 1, column + 1] = factor * (cosines[minus] - cosines[plus])
+            column += 2 if j > 0 else 1
+        row += 2 if i > 0 else 1
+
+
+@compiled
+def contact_force(
+    U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, cos_table: Real, sin_table: Real,
+    segments: Real, dF_dU: Real, dF_dkt: Real, dF_dmu: Real, dF_dN: Real, F: Real,
+) -> tuple[int, int]:  # fmt: skip
+    """Compute force coefficients and every derivative of one contact.
+
+    Parameters
+    ----------
+    U : (n,) slip motion [m] for harmonics `ks`; N : (m,) normal load [N] for harmonics `load_ks`.
+    segments : scratch table (capacity, SEGMENT_COLUMNS); on return the segments found.
+    dF_dU (n, n), dF_dkt (n,), dF_dmu (n,), dF_dN (n, m), F (n,) : filled.
+
+    Returns
+    -------
+    (state, number of segments), see `find_segments`; on FAILED the outputs are NaN.
+    """
+    state, count = find_segments(U, ks, N, load_ks, kt, mu, cos_table, sin_table, segments)
+    n = coefficient_count(ks)
+    dF_dkt[:] = 0.0
+    if state == SEPARATED or state == FAILED:
+        fill = 0.0 if state == SEPARATED else np.nan
+        F[:], dF_dkt[:], dF_dmu[:] = fill, fill, fill
+        dF_dU[:, :], dF_dN[:, :] = fill, fill
+        return state, count
+    if state == STUCK and segments[0, BEGAN] == UNLOADED:
+        dF_dU[:, :], dF_dN[:, :], dF_dmu[:] = 0.0, 0.0, 0.0
+        for i in range(n):
+            dF_dU[i, i], dF_dkt[i], F[i] = kt, U[i], kt * U[i]
+        return state, count
+    top = ks[-1] + max(ks[-1], load_ks[-1])
+    stick_cos, stick_sin = np.zeros(top + 1), np.zeros(top + 1)
+    slip_cos, slip_sin = np.zeros(top + 1), np.zeros(top + 1)
+    for i in range(count):
+        row = segments[i]
+        if row[MOTION] == STICK:
+            add_moments(row[BEGIN], row[END], 1.0, stick_cos, stick_sin)
+        else:
+            add_moments(row[BEGIN], row[END], row[DIRECTION], slip_cos, slip_sin)
+    _products(slip_cos, slip_sin, ks, load_ks, 1.0, dF_dN)
+    _products(stick_cos, stick_sin, ks, ks, 1.0, dF_dU)
+    for i in range(n):
+        total = 0.0
+        for j in range(N.size):
+            total += dF_dN[i, j] * N[j]
+        dF_dmu[i] = total
+        total = 0.0
+        for j in range(n):
+            total += dF_dU[i, j] * U[j]
+        dF_dkt[i] = total
+        for j in range(N.size):
+            dF_dN[i, j] *= mu
+        for j in range(n):
+            dF_dU[i, j] *= kt
+    _add_onsets(segments[:count], U, ks, N, load_ks, kt, mu, dF_dU, dF_dkt, dF_dmu, dF_dN)
+    for i in range(n):
+        F[i] = kt * dF_dkt[i] + mu * dF_dmu[i]
+    return state, count
+
+
+@compiled
+def _add_onsets(
+    segments: Real, U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float,
+    dF_dU: Real, dF_dkt: Real, dF_dmu: Real, dF_dN: Real,
+) -> None:  # fmt: skip
+    """Add the rank-one terms of every stick segment: its offset, fixed at its onset."""
+    n, m = U.size, N.size
+    cosines, sines = np.empty(ks[-1] + 1), np.empty(ks[-1] + 1)
+    moment, e_u, e_n, de_u, de_n = np.empty(n), np.empty(n), np.empty(m), np.empty(n), np.empty(m)
+    for index in range(segments.shape[0]):
+        row = segments[index]
+        if row[MOTION] == SLIP or row[BEGAN] == UNLOADED:
+            continue
+        cosines[:], sines[:] = 0.0, 0.0
+        add_moments(row[BEGIN], row[END], 1.0, cosines, sines)
+        _moment_rows(cosines, sines, ks, moment)
+        tau = row[ONSET]
+        _basis_at(tau, ks, e_u)
+        _basis_at(tau, load_ks, e_n)
+        u_onset, load_onset = np.dot(e_u, U), np.dot(e_n, N)
+        slipped = row[BEGAN] == AFTER_SLIP
+        rate = 0.0
+        if not slipped:
+            _basis_slope(tau, ks, de_u)
+            _basis_slope(tau, load_ks, de_n)
+            rate = kt * np.dot(de_u, U) / np.dot(de_n, N)
+        for i in range(n):
+            here = moment[i]
+            dF_dkt[i] -= u_onset * here
+            step = kt * here
+            for j in range(n):
+                dF_dU[i, j] -= step * e_u[j]
+            if slipped:
+                dF_dmu[i] += row[DIRECTION] * load_onset * here
+                step = row[DIRECTION] * mu * here
+            else:
+                step = rate * here
+            for j in range(m):
+                dF_dN[i, j] += step * e_n[j]
+
+
+@compiled
+def _basis_slope(tau: float, ks: Integer, out: Real) -> None:
+    """Fill `out` with the τ-derivative of the basis for the harmonics `ks` at `tau`."""
+    here = 0
+    for i in range(ks.size):
+        k = ks[i]
+        if k == 0:
+            out[here] = 0.0
+            here += 1
+        else:
+            out[here] = -k * math.sin(k * tau)
+            out[here + 1] = k * math.cos(k * tau)
+            here += 2
