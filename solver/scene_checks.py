@@ -51,6 +51,7 @@ _WANTED = {
     "tuple_type": "must be a list",
     "dict_type": "must be a table",
     "too_short": "must not be empty",
+    "too_long": "has too many entries",
     "model_type": "must be a table",
     "model_attributes_type": "must be a table",
 }
@@ -100,7 +101,9 @@ def _field_issue(found: ErrorDetails, raw: dict[str, Any]) -> Issue:
     steps, last = _walk(found["loc"], raw)
     kind, context = found["type"], found.get("ctx", {})
     key = _key(steps)
-    if kind == "missing":
+    if kind == "missing" and isinstance(found["loc"][-1], int):
+        message = f"`{key}` has too few entries, got {quoted(last)}"
+    elif kind == "missing":
         steps, key = [*steps, str(found["loc"][-1])], str(found["loc"][-1])
         message = f"`{key}` is missing: {_table(found['loc'])[0]} needs it"
     elif kind == "extra_forbidden":
