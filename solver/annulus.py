@@ -20,15 +20,17 @@ from solver.scene import (
 )
 
 _JoinT = TypeVar("_JoinT", Spring, Damper, Contact)
+_NamedT = TypeVar("_NamedT", Spring, Damper, Mass)
 
 
 def annulus(scene: Scene) -> Scene:
     """Write a cyclic scene out as a lumped one, sector by sector.
 
-    DOF ``tip`` of sector j is ``tip@j``, contact ``shroud`` becomes ``shroud@j`` in the group ``shroud`` (or in
-    the group it had), a named spring ``k`` becomes ``k@j``. Sector j has harmonic * engine_order * j * 2 pi /
-    sectors added to the phase of its forces and engine_order * j * 2 pi / sectors to that of its loads. What
-    joins a sector to itself (one sector only) never moves and is left out. Observed is sector 0.
+    DOF ``tip`` of sector j is ``tip@j``, contact ``shroud`` becomes ``shroud@j`` in the group ``shroud``
+    (or in the group it had), a named spring ``k`` becomes ``k@j``. Sector j has
+    harmonic * engine_order * j * 2 pi / sectors added to the phase of its forces and
+    engine_order * j * 2 pi / sectors to that of its loads. What joins a sector to itself (one sector only)
+    never moves and is left out. Observed is sector 0.
 
     Raises
     ------
@@ -71,13 +73,12 @@ def _joining(parts: tuple[_JoinT, ...], j: int, n: int) -> tuple[_JoinT, ...]:
     return tuple(part.model_copy(update={"between": ends}) for part, ends in placed if ends[0] != ends[1])
 
 
-def _renamed(part: Spring | Damper, j: int) -> Spring | Damper:
+def _renamed(part: _NamedT, j: int) -> _NamedT:
     return part if part.name is None else part.model_copy(update={"name": _in_sector(part.name, j)})
 
 
 def _mass(mass: Mass, j: int) -> Mass:
-    name = None if mass.name is None else _in_sector(mass.name, j)
-    return mass.model_copy(update={"dof": _in_sector(mass.dof, j), "name": name})
+    return _renamed(mass, j).model_copy(update={"dof": _in_sector(mass.dof, j)})
 
 
 def _contact(contact: Contact, j: int, order: int, n: int) -> Contact:
