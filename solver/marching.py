@@ -1,0 +1,286 @@
+"""Time marching: the independent referee of the harmonic balance.
+
+It shares nothing with the balance but the scene: matrices are assembled here, the whole annulus is marched
+instead of one sector, and the friction law is followed in time. See `solver.kernels.march` for the scheme.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from numbers import Integral, Real
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array
+
+from solver.annulus import annulus
+from solver.errors import SettingError
+from solver.kernels import march as kernel
+from solver.march_result import MarchResult, MarchStatus, describe
+from solver.scene import CyclicStructure, End, Excitation, Scene
+
+FloatArray = NDArray[np.float64]
+LEAST_STEPS = 64
+MOST_STEPS = 1_000_000
+SAMPLES_PER_PERIOD = 2048
+MOST_PERIODS, WORK = 50, 2e6  # between two looks at progress and stop: periods, and their rough work
+_STATUS = {
+    kernel.SETTLED: MarchStatus.CONVERGED,
+    kernel.CHATTER: MarchStatus.CHATTER,
+    kernel.NOT_FINITE: MarchStatus.NOT_FINITE,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Plan:
+    """What stays the same during a march."""
+
+    system: kernel.System
+    dof: int
+    tolerance: float
+    max_periods: int
+    on_progress: Callable[[float, int], None] | None
+    should_stop: Callable[[], bool] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Run:
+    """One march with one step size."""
+
+    state: kernel.State
+    record: kernel.Record
+    status: MarchStatus
+    steps: int
+    changes: FloatArray
+
+    @property
+    def settled(self) -> bool:
+        """The motion repeats."""
+        return self.status is MarchStatus.CONVERGED
+
+
+def march(
+    scene: Scene,
+    *,
+    frequency_hz: float,
+    steps_per_period: int | None = None,
+    tolerance: float = 1e-10,
+    max_periods: int = 20_000,
+    on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> MarchResult:
+    """March a scene in time from rest, contacts without force, until the motion repeats.
+
+    A cyclic scene is marched as its whole annulus. The march is made twice, the second time with half the
+    step and from where the first one ended; the difference gives the error estimate. In full stick the
+    contact forces keep a mean that depends on the history: `mean` and `max_abs` are then those of the start
+    from rest, only `half_peak_to_peak` is a property of the scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to march.
+    frequency_hz : float
+        Excitation frequency [Hz].
+    steps_per_period : int, optional
+        Steps of the finer run; chosen from the fastest motion of the structure when left out.
+    tolerance : float
+        Largest change of displacements, velocities and contact forces over a period, relative to their
+        largest values.
+    max_periods : int
+        Limit of the periods for each step size.
+    on_progress : callable, optional
+        Called with the fraction done (0 to 1, on the scale of the logarithm of the change) and the periods.
+    should_stop : callable, optional
+        Asked now and then; True ends the march with the status STOPPED.
+
+    Raises
+    ------
+    SettingError
+        An argument is out of its range.
+    """
+    begin = time.perf_counter()
+    _check(frequency_hz, tolerance, max_periods)
+    whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
+    omega = 2.0 * math.pi * frequency_hz
+    system = _system(whole, omega)
+    steps = _steps(system, scene.excitation, steps_per_period)
+    plan = _Plan(
+        system=system,
+        dof=whole.structure.dofs.index(whole.observe.dof),
+        tolerance=tolerance,
+        max_periods=max_periods,
+        on_progress=on_progress,
+        should_stop=should_stop,
+    )
+    coarse = _run(plan, _at_rest(plan.system), steps // 2, done=0)
+    fine = _run(plan, coarse.state, steps, done=coarse.changes.size) if coarse.settled else coarse
+    periods = coarse.changes.size + (fine.changes.size if coarse.settled else 0)
+    if on_progress is not None and fine.settled:
+        on_progress(1.0, periods)
+    return describe(
+        record=fine.record,
+        coarse=coarse.record,
+        order=kernel.ORDER,
+        transient=_left_to_decay(coarse.changes, fine.changes),
+        periods=periods,
+        contacts=tuple(contact.name for contact in whole.contacts),
+        frequency_hz=frequency_hz,
+        steps_per_period=fine.steps,
+        status=fine.status,
+        seconds=time.perf_counter() - begin,
+    )
+
+
+def _check(frequency_hz: float, tolerance: float, max_periods: int) -> None:
+    if not (isinstance(frequency_hz, Real) and 0.0 < frequency_hz <= 1e9):
+        raise SettingError("frequency_hz", frequency_hz, "must be a number > 0 and <= 1e9 [Hz]")
+    if not (isinstance(tolerance, Real) and 1e-13 <= tolerance <= 1e-2):
+        raise SettingError("tolerance", tolerance, "must be a number from 1e-13 to 1e-2")
+    if not (isinstance(max_periods, Integral) and 1 <= max_periods <= 100_000_000):
+        raise SettingError("max_periods", max_periods, "must be a whole number from 1 to 1e8")
+
+
+def _steps(system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None) -> int:
+    """Steps of the finer run: the fastest motion turns less than 0.375 rad in one of them."""
+    turns = 2.0 * math.pi * _fastest(system)
+    least = max(LEAST_STEPS, 2 * math.ceil(turns / 1.5), 16 * max(force.harmonic for force in forces))
+    chosen = max(2 * LEAST_STEPS, 2 * least) if wanted is None else wanted
+    if isinstance(chosen, Integral) and chosen % 2 == 0 and least <= chosen <= MOST_STEPS:
+        return int(chosen)
+    needs = f"structure and forces need at least {least} steps per period at this frequency"
+    raise SettingError("steps_per_period", chosen, f"must be an even number up to {MOST_STEPS}; {needs}")
+
+
+def _fastest(system: kernel.System) -> float:
+    """Bound of the largest rate of the motion with every contact stuck, per omega: vibration or decay."""
+    stiffness = _row_sums(system.A_start, system.A_value)
+    damping = _row_sums(system.B_start, system.B_value)
+    for ends in (system.first, system.second):
+        moving = ends >= 0
+        np.add.at(stiffness, ends[moving], 2.0 * system.kt[moving] * system.inverse_mass[ends[moving]])
+    return float(max(math.sqrt(stiffness.max()), damping.max()))
+
+
+def _row_sums(start: NDArray[np.int64], value: FloatArray) -> FloatArray:
+    sums = np.concatenate([[0.0], np.cumsum(np.abs(value))])
+    return np.asarray(sums[start[1:]] - sums[start[:-1]])
+
+
+def _rows(scene: Scene, ends: Sequence[tuple[End, End]]) -> csr_array:
+    """Relative displacement x(first) - x(second) of each pair of ends as rows."""
+    index = {dof: i for i, dof in enumerate(scene.structure.dofs)}
+    signed = [
+        (row, index[end.dof], sign)
+        for row, pair in enumerate(ends)
+        for end, sign in zip(pair, (1.0, -1.0), strict=True)
+        if end.dof is not None
+    ]
+    row, column, sign = np.array(signed, dtype=float).reshape(-1, 3).T
+    places = (row.astype(np.int64), column.astype(np.int64))
+    return csr_array((sign, places), shape=(len(ends), len(index)))
+
+
+def _matrices(scene: Scene) -> tuple[FloatArray, csr_array, csr_array]:
+    """Masses [kg], damping and stiffness of a lumped scene."""
+    structure = scene.structure
+    M = np.array([mass.m for mass in structure.masses])
+    k = np.array([spring.k for spring in structure.springs])
+    c = np.array([spring.c for spring in structure.springs]) + structure.stiffness_proportional_damping * k
+    dashpots = np.array([damper.c for damper in structure.dampers])
+    springs = _rows(scene, [spring.ends for spring in structure.springs])
+    dampers = _rows(scene, [damper.ends for damper in structure.dampers])
+    K = springs.T @ diags_array(k) @ springs
+    C = springs.T @ diags_array(c) @ springs + dampers.T @ diags_array(dashpots) @ dampers
+    return M, csr_array(C), csr_array(K)
+
+
+def _system(scene: Scene, omega: float) -> kernel.System:
+    """The equations of a lumped scene in the angle tau = omega t."""
+    M, C, K = _matrices(scene)
+    A = csr_array(diags_array(1.0 / (M * omega**2)) @ K)
+    B = csr_array(diags_array(1.0 / (M * omega)) @ C)
+    index = {dof: i for i, dof in enumerate(scene.structure.dofs)}
+    forces, contacts = scene.excitation, scene.contacts
+    places = [[-1 if end.dof is None else index[end.dof] for end in contact.ends] for contact in contacts]
+    first, second = np.array(places, dtype=np.int64).reshape(-1, 2).T
+    return kernel.System(
+        A_start=A.indptr.astype(np.int64),
+        A_column=A.indices.astype(np.int64),
+        A_value=A.data,
+        B_start=B.indptr.astype(np.int64),
+        B_column=B.indices.astype(np.int64),
+        B_value=B.data,
+        inverse_mass=1.0 / (M * omega**2),
+        force_dof=np.array([index[force.dof] for force in forces], dtype=np.int64),
+        force_amplitude=np.array([force.amplitude for force in forces]),
+        force_phase=np.array([force.phase for force in forces]),
+        force_harmonic=np.array([force.harmonic for force in forces], dtype=np.int64),
+        first=first.copy(),
+        second=second.copy(),
+        kt=np.array([contact.kt for contact in contacts]),
+        mu=np.array([contact.mu for contact in contacts]),
+        N0=np.array([contact.N0 for contact in contacts]),
+        N1=np.array([contact.N1_value for contact in contacts]),
+        N1_phase=np.array([contact.N1_phase for contact in contacts]),
+    )
+
+
+def _at_rest(system: kernel.System) -> kernel.State:
+    """No motion, no contact force; open where the load pulls at tau = 0 or friction never acts."""
+    n, n_contacts = system.inverse_mass.size, system.kt.size
+    load = system.mu * (system.N0 + system.N1 * np.cos(system.N1_phase))
+    mode = np.where(load > 0.0, kernel.STICK, kernel.SEPARATED).astype(np.int64)
+    return kernel.State(np.zeros(n), np.zeros(n), np.zeros(n_contacts), mode)
+
+
+def _run(plan: _Plan, start: kernel.State, steps: int, *, done: int) -> _Run:
+    """March until the motion repeats, then one period more with a record."""
+    state = kernel.State(start.x.copy(), start.v.copy(), start.force.copy(), start.mode.copy())
+    nothing = _record(plan, 0)
+    status, changes, fraction = MarchStatus.MAX_PERIODS, np.empty(0), 0.9 if done else 0.0
+    many = max(1, min(MOST_PERIODS, int(WORK / (steps * (state.x.size + 8 * state.force.size)))))
+    while changes.size < plan.max_periods:
+        chunk = np.empty(min(many, plan.max_periods - changes.size))
+        code, periods = kernel.run_periods(
+            plan.system, state, steps, plan.tolerance, plan.dof, nothing, chunk
+        )
+        changes = np.append(changes, chunk[:periods])
+        if code != kernel.RAN:
+            status = _STATUS[code]
+            break
+        if plan.on_progress is not None:
+            fraction = max(fraction, _fraction(changes[-1], plan.tolerance))
+            plan.on_progress(fraction, done + changes.size)
+        if plan.should_stop is not None and plan.should_stop():
+            status = MarchStatus.STOPPED
+            break
+    record = _record(plan, steps * math.ceil(SAMPLES_PER_PERIOD / steps))
+    if status not in (MarchStatus.CHATTER, MarchStatus.NOT_FINITE):
+        code, _ = kernel.run_periods(plan.system, state, steps, 0.0, plan.dof, record, np.empty(1))
+        status = _STATUS.get(code, status) if code in (kernel.CHATTER, kernel.NOT_FINITE) else status
+    return _Run(state=state, record=record, status=status, steps=steps, changes=changes)
+
+
+def _record(plan: _Plan, n: int) -> kernel.Record:
+    rows = plan.system.kt.size
+    one, many = (n,), (rows, n)
+    shapes = (one, one, many, many, many)
+    return kernel.Record(*(np.full(shape, np.nan) for shape in shapes))
+
+
+def _fraction(change: float, tolerance: float) -> float:
+    """Progress of the first run on the scale of the logarithm of the change; it counts as nine tenths."""
+    return 0.9 * min(max(math.log(max(change, tolerance)) / math.log(tolerance), 0.0), 1.0)
+
+
+def _left_to_decay(coarse: FloatArray, fine: FloatArray) -> float:
+    """What decay as fast as at the end of the coarse run leaves after the last change; at most 1."""
+    if coarse.size == 0 or fine.size == 0:
+        return 1.0
+    tail = coarse[-20:]
+    decay = float(tail[-1] / tail[0]) ** (1.0 / max(tail.size - 1, 1)) if tail[0] > 0.0 else 0.0
+    return min(float(fine[-1]) * decay / (1.0 - decay), 1.0) if decay < 1.0 else 1.0
