@@ -1,0 +1,160 @@
+"""The balance of a scene: its `System` for the compiled loops, for any parameter that may be continued in."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.errors import SettingError
+from solver.fourier import Integer, Real, all_harmonics
+from solver.kernels.system import System
+from solver.kernels.trigpoly import grid_size, grid_tables
+from solver.parameter import Kind, Parameter, resolve
+from solver.parametric import linear_model, structure_derivative
+from solver.scene import Scene
+from solver.structure import reduce_model
+
+MOST_HARMONICS = 1000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Balance:
+    """A scene with its harmonics and the parameter λ of a run.
+
+    Attributes
+    ----------
+    scene : Scene
+        What is solved.
+    parameter : Parameter
+        What λ is; its unit inside is that of `Parameter.inside`.
+    system : System
+        The arrays the compiled loops work on.
+    """
+
+    scene: Scene
+    parameter: Parameter
+    system: System
+
+    @property
+    def n_harmonics(self) -> int:
+        """Highest harmonic kept."""
+        return int(self.system.ks[-1])
+
+    @property
+    def n_coefficients(self) -> int:
+        """Real coefficients kept of each motion."""
+        return 2 * self.system.ks.size - int(self.system.ks[0] == 0)
+
+    @property
+    def n_unknowns(self) -> int:
+        """Unknowns of the condensed balance."""
+        return self.system.contacts.shape[0] * self.n_coefficients
+
+
+def check_harmonics(harmonics: int) -> int:
+    """Return `harmonics` if it is a usable highest harmonic.
+
+    Raises
+    ------
+    SettingError
+        Not an integer from 0 to `MOST_HARMONICS`.
+    """
+    if isinstance(harmonics, bool) or not isinstance(harmonics, (int, np.integer)):
+        raise SettingError("harmonics", harmonics, "must be a whole number")
+    if not 0 <= harmonics <= MOST_HARMONICS:
+        raise SettingError("harmonics", harmonics, f"must be from 0 to {MOST_HARMONICS}")
+    return int(harmonics)
+
+
+def check_frequency(name: str, frequency_hz: float) -> float:
+    """Return `frequency_hz` as a float if it is a usable frequency.
+
+    Raises
+    ------
+    SettingError
+        Not a finite number above 0.
+    """
+    good = isinstance(frequency_hz, (int, float, np.number)) and not isinstance(frequency_hz, bool)
+    if not good or not math.isfinite(frequency_hz) or frequency_hz <= 0.0:
+        raise SettingError(name, frequency_hz, "must be a frequency > 0 Hz")
+    return float(frequency_hz)
+
+
+def build(
+    scene: Scene, path: str = "frequency", *, harmonics: int = 11, frequency_hz: float | None = None
+) -> Balance:
+    """Set up the balance of a scene for continuation in `path`.
+
+    Parameters
+    ----------
+    scene : the scene, with the values that stay fixed.
+    path : the parameter that λ is.
+    harmonics : highest harmonic kept; 0 … H are.
+    frequency_hz : the excitation frequency [Hz], needed unless λ is the frequency.
+
+    Raises
+    ------
+    SettingError
+        Unknown path, a missing or bad frequency, or a bad number of harmonics.
+    """
+    parameter = resolve(scene, path)
+    ks = all_harmonics(check_harmonics(harmonics))
+    omega = 0.0
+    if parameter.kind is not Kind.FREQUENCY:
+        if frequency_hz is None:
+            raise SettingError("frequency_hz", None, f"is needed when the parameter is `{path}`")
+        omega = 2.0 * math.pi * check_frequency("frequency_hz", frequency_hz)
+    if parameter.kind is Kind.LEVEL and scene.value("excitation.amplitude") == 0.0:
+        scene = scene.with_values({"excitation.amplitude": 1.0})
+    return Balance(scene=scene, parameter=parameter, system=_system(scene, parameter, ks, omega))
+
+
+def for_parameter(balance: Balance, path: str, frequency_hz: float) -> Balance:
+    """Return the same balance with another λ, at a fixed frequency."""
+    parameter = resolve(balance.scene, path)
+    omega = 2.0 * math.pi * frequency_hz
+    if parameter.kind is Kind.STRUCTURE or balance.parameter.kind is Kind.STRUCTURE:
+        system = _system(balance.scene, parameter, balance.system.ks, omega)
+    else:
+        system = balance.system._replace(
+            kind=int(parameter.kind), active=parameter.active, omega=omega,
+            level_reference=_level(balance.scene), phase_reference=balance.scene.value("excitation.phase"),
+        )  # fmt: skip
+    return replace(balance, parameter=parameter, system=system)
+
+
+def _level(scene: Scene) -> float:
+    """Return the excitation amplitude the unit excitation stands for (1 where it is zero: nothing scales)."""
+    return scene.value("excitation.amplitude") or 1.0
+
+
+def contact_table(scene: Scene) -> Real:
+    """Return the contacts as the compiled loops read them: kt, mu, N0, N1, N1_ratio (NaN: untied), N1_phase."""
+    rows = [
+        (c.kt, c.mu, c.N0, c.N1_value, math.nan if c.N1_ratio is None else c.N1_ratio, c.N1_phase)
+        for c in scene.contacts
+    ]
+    return np.array(rows, dtype=np.float64).reshape(len(rows), 6)
+
+
+def _system(scene: Scene, parameter: Parameter, ks: Integer, omega: float) -> System:
+    """Put the arrays of the compiled loops together."""
+    model = linear_model(scene)
+    derivative = structure_derivative(scene, parameter.name) if parameter.kind is Kind.STRUCTURE else None
+    contacts = contact_table(scene)
+    reduced = reduce_model(model, ks, contacts[:, 0].copy(), derivative)
+    highest = max(int(ks[-1]), 1)
+    cos_table, sin_table = grid_tables(grid_size(highest), highest)
+    return System(
+        ks=ks, which=reduced.which, cos_table=cos_table, sin_table=sin_table, contacts=contacts,
+        active=parameter.active, shift=reduced.shift, kind=int(parameter.kind), omega=omega,
+        level_reference=_level(scene), phase_reference=scene.value("excitation.phase"),
+        parameter_reference=scene.value(parameter.path) if derivative is not None else 0.0,
+        form=reduced.form, eigenvalues=reduced.eigenvalues, dampings=reduced.dampings,
+        contact_modes=reduced.contact_modes, contact_duals=reduced.contact_duals,
+        observe_modes=reduced.observe_modes, modal_forces=reduced.modal_forces, K=reduced.K, C=reduced.C,
+        M=reduced.M, dK=reduced.dK, dC=reduced.dC, dM=reduced.dM, L=reduced.L, observe=reduced.observe,
+        forces=reduced.forces,
+    )  # fmt: skip

@@ -1,0 +1,111 @@
+"""From a solution to what a user looks at: the motion of the observed DOF, its amplitude and its slopes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.fourier import Real, coefficient_count, cosine_position
+from solver.kernels.compiled import compiled
+from solver.kernels.events import largest
+from solver.kernels.system import Evaluation, Receptance, System
+from solver.kernels.trigpoly import on_grid, unpack
+
+# Columns of the measures of a point.
+MAX_ABS, HALF_RANGE, MEAN, SLOPE, RANGE_SLOPE, RESIDUAL = 0, 1, 2, 3, 4, 5
+MEASURES = 6
+
+
+@compiled
+def observed_motion(system: System, linear: Receptance, u: Real, point: Evaluation, x: Real) -> None:
+    """Fill `x` (n,) with the coefficients of the observed DOF [m]: x̂ = x̂_linear − B (F̂ − shift û)."""
+    nc, n = system.contacts.shape[0], coefficient_count(system.ks)
+    for i in range(system.ks.size):
+        here = cosine_position(system.ks, i)
+        value = linear.x_linear[0, i]
+        for c in range(nc):
+            at = c * n + here
+            fc = point.F[c, here] - system.shift[c] * u[at]
+            fs = point.F[c, here + 1] - system.shift[c] * u[at + 1] if system.ks[i] > 0 else 0.0
+            value -= linear.B[0, i, c] * complex(fc, -fs)
+        x[here] = value.real
+        if system.ks[i] > 0:
+            x[here + 1] = -value.imag
+
+
+@compiled
+def observed_slope(
+    system: System, linear: Receptance, u: Real, point: Evaluation, du: Real, dp: float, dx: Real
+) -> None:
+    """Fill `dx` with the change of the observed coefficients for a change (du, dλ) of the solution."""
+    nc, n = system.contacts.shape[0], coefficient_count(system.ks)
+    dF = np.empty((nc, n))
+    for c in range(nc):
+        for i in range(n):
+            total = dp * point.dF_dp[c, i] - system.shift[c] * du[c * n + i]
+            for j in range(n):
+                total += point.dF_dU[c, i, j] * du[c * n + j]
+            dF[c, i] = total
+    for i in range(system.ks.size):
+        here = cosine_position(system.ks, i)
+        has_sine = system.ks[i] > 0
+        value = dp * linear.x_linear[1, i]
+        for c in range(nc):
+            at = c * n + here
+            fc, dfc = point.F[c, here] - system.shift[c] * u[at], dF[c, here]
+            fs, dfs = 0.0, 0.0
+            if has_sine:
+                fs, dfs = point.F[c, here + 1] - system.shift[c] * u[at + 1], dF[c, here + 1]
+            value -= linear.B[0, i, c] * complex(dfc, -dfs) + dp * linear.B[1, i, c] * complex(fc, -fs)
+        dx[here] = value.real
+        if has_sine:
+            dx[here + 1] = -value.imag
+
+
+@compiled
+def extremes(system: System, x: Real) -> tuple[float, float, float, float]:
+    """Return max x and its place, min x and its place, over the period."""
+    degree = system.ks[-1]
+    n_grid = 2 * (system.cos_table.shape[1] - 1)
+    c, s = np.empty(degree + 1), np.empty(degree + 1)
+    value, slope = np.empty(n_grid), np.empty(n_grid)
+    unpack(x, system.ks, c, s)
+    on_grid(c, s, degree, system.cos_table, system.sin_table, value, slope)
+    high, at_high = largest(c, s, degree, value, slope)
+    low, at_low = largest(-c, -s, degree, -value, -slope)
+    return high, at_high, -low, at_low
+
+
+@compiled
+def _along(system: System, x: Real, tau: float) -> float:
+    """Return the value at `tau` of the motion with coefficients `x`."""
+    total = 0.0
+    for i in range(system.ks.size):
+        k, here = system.ks[i], cosine_position(system.ks, i)
+        if k == 0:
+            total += x[here]
+        else:
+            total += x[here] * math.cos(k * tau) + x[here + 1] * math.sin(k * tau)
+    return total
+
+
+@compiled
+def measure(
+    system: System, linear: Receptance, u: Real, point: Evaluation, du: Real, dp: float, x: Real, out: Real
+) -> None:
+    """Fill `x` with the observed coefficients and `out` with the measures and their slopes along (du, dλ).
+
+    The place of an extremum is stationary, so a slope is the change of the motion at that place.
+    """
+    observed_motion(system, linear, u, point, x)
+    high, at_high, low, at_low = extremes(system, x)
+    dx = np.empty_like(x)
+    observed_slope(system, linear, u, point, du, dp, dx)
+    rise, sink = _along(system, dx, at_high), _along(system, dx, at_low)
+    out[HALF_RANGE], out[RANGE_SLOPE] = 0.5 * (high - low), 0.5 * (rise - sink)
+    out[MEAN] = x[0] if system.ks[0] == 0 else 0.0
+    if high >= -low:
+        out[MAX_ABS], out[SLOPE] = high, rise
+    else:
+        out[MAX_ABS], out[SLOPE] = -low, -sink

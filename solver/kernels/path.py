@@ -1,0 +1,301 @@
+"""Continuation: pseudo-arc-length steps along r(u, λ) = 0, with folds passed and kinks stepped over.
+
+Orientation. At a kink the branch turns, and the turn may exceed a right angle. Across a facet between two
+smooth pieces the sign of det [dr/du dr/dλ; tᵀ] stays the same for tangents t that cross the facet in the same
+direction (Eaves, Scarf, Math. Oper. Res. 1 (1976) 1, for piecewise linear paths), so a sharp turn is oriented
+by that sign; a gentle one by the angle, because at a branch point of a smooth branch the sign does flip.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.fourier import Integer, Real
+from solver.kernels.compiled import compiled
+from solver.kernels.linear import solve
+from solver.kernels.newton import arc_newton, border, newton, start
+from solver.kernels.observe import RESIDUAL, measure
+from solver.kernels.system import Evaluation, Receptance, System, evaluate, receptance
+
+# How a stretch of continuation ended.
+RUNNING, FINISHED, NO_START, STALLED, LEFT_RANGE = 0, 1, 2, 3, 4
+TANGENT, SECANT = 0, 1
+
+
+class Control(NamedTuple):
+    """Settings of a continuation; lengths are relative: to the range of λ and to the size of u."""
+
+    start: float
+    stop: float
+    first_step: float
+    largest_step: float
+    smallest_step: float
+    wanted_iterations: int
+    most_iterations: int
+    predictor: int
+    largest_turn: float  # relative distance corrector/predictor beyond which a step is halved
+    range_weight: float  # the range of λ counts as this many units of arc length
+
+
+class Walk(NamedTuple):
+    """The state between two steps; `numbers` is indexed by the names below (P, STEP, …).
+
+    Whenever a point is accepted, the evaluation and the receptance the steps share belong to that point.
+    """
+
+    u: Real  # (nt,)
+    before: Real  # (nt + 1,) the point before, λ last
+    tangent: Real  # (nt + 1,)
+    numbers: Real  # (8,)
+
+
+P, STEP, ORIENTATION, ITERATIONS, REJECTED, STEPPED_OVER, COUNT, NORM = 0, 1, 2, 3, 4, 5, 6, 7
+
+
+@compiled
+def begin_walk(
+    system: System, linear: Receptance, point: Evaluation, control: Control, guess: Real
+) -> tuple[int, Walk]:
+    """Find the first point of a branch (from `guess` if it is not empty) and its tangent."""
+    nt = system.contacts.shape[0] * (2 * system.ks.size - (1 if system.ks[0] == 0 else 0))
+    walk = Walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(8))
+    p = control.start
+    good, iterations = False, 0
+    if guess.size == nt:
+        receptance(system, p, linear)
+        walk.u[:] = guess
+        good, iterations, _ = newton(system, linear, walk.u, p, 0.0, point, 20)
+    if not good:
+        good, more, _ = start(system, linear, walk.u, p, point)
+        iterations += more
+    walk.numbers[ITERATIONS] = iterations
+    if not good:
+        return NO_START, walk
+    walk.numbers[P] = p
+    walk.numbers[STEP] = control.first_step
+    walk.tangent[nt] = 1.0 if control.stop >= control.start else -1.0
+    receptance(system, p, linear)
+    walk.numbers[NORM] = evaluate(system, linear, walk.u, p, 0.0, point)
+    if not _turn(walk, point, control, True):
+        return NO_START, walk
+    walk.before[:nt] = walk.u - control.first_step * walk.tangent[:nt]
+    walk.before[nt] = p - control.first_step * walk.tangent[nt]
+    return RUNNING, walk
+
+
+@compiled
+def _weights(u: Real, control: Control) -> tuple[float, float]:
+    """Return the weights of the scalar product: u relative to its size, λ relative to its range."""
+    size = 0.0
+    for i in range(u.size):
+        size = max(size, abs(u[i]))
+    span = abs(control.stop - control.start) / control.range_weight
+    weight_u = 1.0 / (size * size) if size > 0.0 else 1.0
+    return weight_u, 1.0 / (span * span) if span > 0.0 else 1.0
+
+
+@compiled
+def _turn(walk: Walk, point: Evaluation, control: Control, first: bool) -> bool:
+    """Replace the tangent by the one at the new point (`point` is evaluated there), oriented onward."""
+    n = walk.u.size
+    weight_u, weight_p = _weights(walk.u, control)
+    matrix, rhs = np.empty((n + 1, n + 1)), np.zeros((1, n + 1))
+    border(point, walk.tangent, weight_u, weight_p, matrix)
+    rhs[0, n] = 1.0
+    sign = solve(matrix, rhs)
+    if sign == 0.0 or not math.isfinite(rhs[0, n]):
+        return False
+    old = weight_p * walk.tangent[n] ** 2
+    new = weight_p * rhs[0, n] ** 2
+    for i in range(n):
+        old += weight_u * walk.tangent[i] ** 2
+        new += weight_u * rhs[0, i] ** 2
+    length = math.sqrt(new)
+    if first:
+        walk.numbers[ORIENTATION] = sign
+    elif sign != walk.numbers[ORIENTATION]:
+        if 1.0 / (length * math.sqrt(old)) > 0.3:
+            walk.numbers[ORIENTATION] = sign
+        else:
+            length = -length
+    for i in range(n + 1):
+        walk.tangent[i] = rhs[0, i] / length
+    return True
+
+
+@compiled
+def _predict(walk: Walk, control: Control, step: float, guess: Real) -> float:
+    """Fill `guess` with the predicted u at arc length `step`; return the predicted λ."""
+    n = walk.u.size
+    p = walk.numbers[P]
+    if control.predictor == SECANT and walk.numbers[COUNT] > 0:
+        weight_u, weight_p = _weights(walk.u, control)
+        length = weight_p * (p - walk.before[n]) ** 2
+        for i in range(n):
+            length += weight_u * (walk.u[i] - walk.before[i]) ** 2
+        if length > 0.0:
+            scale = step / math.sqrt(length)
+            guess[:] = walk.u + scale * (walk.u - walk.before[:n])
+            return p + scale * (p - walk.before[n])
+    guess[:] = walk.u + step * walk.tangent[:n]
+    return p + step * walk.tangent[n]
+
+
+@compiled
+def _distance(u: Real, p: float, v: Real, q: float, weight_u: float, weight_p: float) -> float:
+    """Return the weighted distance of two points."""
+    total = weight_p * (p - q) ** 2
+    for i in range(u.size):
+        total += weight_u * (u[i] - v[i]) ** 2
+    return math.sqrt(total)
+
+
+@compiled
+def _accept(walk: Walk, trial: Real, p: float, norm: float) -> None:
+    """Move the walk to a converged point."""
+    n = trial.size
+    walk.before[:n] = walk.u
+    walk.before[n] = walk.numbers[P]
+    walk.u[:] = trial
+    walk.numbers[P] = p
+    walk.numbers[COUNT] += 1
+    walk.numbers[NORM] = norm
+
+
+@compiled
+def _step(
+    system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk
+) -> int:
+    """Make one step; return RUNNING, FINISHED, STALLED or LEFT_RANGE."""
+    n = walk.u.size
+    guess, trial = np.empty(n), np.empty(n)
+    forward = 1.0 if control.stop >= control.start else -1.0
+    weight_u, weight_p = _weights(walk.u, control)
+    while walk.numbers[STEP] >= control.smallest_step:
+        step = walk.numbers[STEP]
+        p_guess = _predict(walk, control, step, guess)
+        last = (p_guess - control.stop) * forward >= 0.0
+        if last:
+            share = (control.stop - walk.numbers[P]) / (p_guess - walk.numbers[P])
+            guess[:] = walk.u + share * (guess - walk.u)
+            p_guess = control.stop
+            step *= share
+            trial[:] = guess
+            receptance(system, p_guess, linear)
+            good, iterations, norm = newton(system, linear, trial, p_guess, 0.0, point, control.most_iterations)
+            p = p_guess
+        else:
+            trial[:] = guess
+            good, iterations, p, norm = arc_newton(
+                system, linear, trial, p_guess, guess, p_guess, walk.tangent, weight_u, weight_p, point,
+                control.most_iterations,
+            )  # fmt: skip
+        walk.numbers[ITERATIONS] += iterations
+        if good:
+            off = _distance(trial, p, guess, p_guess, weight_u, weight_p)
+            turned = off / (step + 1e-300)
+            if turned > control.largest_turn and step > 64.0 * control.smallest_step:
+                good = False
+        if not good:
+            walk.numbers[REJECTED] += 1
+            walk.numbers[STEP] *= 0.5
+            continue
+        growth = (control.wanted_iterations + 0.5) / (iterations + 0.5)
+        growth = min(growth, math.sqrt(0.3 * control.largest_turn / (turned + 1e-12)))
+        walk.numbers[STEP] = min(control.largest_step, step * min(max(growth, 0.5), 2.0)) if not last else step
+        _accept(walk, trial, p, norm)
+        if last:
+            _turn(walk, point, control, False)
+            return FINISHED
+        if (p - control.start) * forward < -1e-9 * abs(control.stop - control.start):
+            return LEFT_RANGE
+        return RUNNING if _turn(walk, point, control, False) else STALLED
+    return STALLED
+
+
+@compiled
+def _step_over(
+    system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk
+) -> int:
+    """Get past a kink: look for a solution a little further in λ, in the direction of the last advance."""
+    n = walk.u.size
+    span = control.stop - control.start
+    forward = math.copysign(1.0, span)
+    heading = walk.numbers[P] - walk.before[n]
+    direction = math.copysign(1.0, heading if heading != 0.0 else walk.tangent[n])
+    trial = np.empty(n)
+    for rung in range(24):
+        away = direction * abs(span) * 1e-7 * 2.0**rung
+        p = walk.numbers[P] + away
+        last = (p - control.stop) * forward >= 0.0
+        if last:
+            p = control.stop
+        if (p - control.start) * forward < 0.0 or abs(away) > 0.05 * abs(span):
+            break
+        receptance(system, p, linear)
+        trial[:] = walk.u
+        good, iterations, norm = newton(system, linear, trial, p, 0.0, point, 30)
+        walk.numbers[ITERATIONS] += iterations
+        if not good:
+            continue
+        weight_u, weight_p = _weights(walk.u, control)
+        if _distance(trial, p, walk.u, walk.numbers[P], weight_u, weight_p) > 4.0 * control.largest_step:
+            continue
+        walk.numbers[STEPPED_OVER] += 1
+        _accept(walk, trial, p, norm)
+        for i in range(n):
+            walk.tangent[i] = walk.u[i] - walk.before[i]
+        walk.tangent[n] = p - walk.before[n]
+        walk.numbers[STEP] = max(control.first_step * 0.1, 256.0 * control.smallest_step)
+        turned = _turn(walk, point, control, True)
+        if last:
+            return FINISHED
+        return RUNNING if turned else STALLED
+    return STALLED
+
+
+@compiled
+def walk_on(
+    system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk,
+    most_points: int, points: Real, tangents: Real, states: Integer, observed: Real, measures: Real,
+) -> tuple[int, int]:  # fmt: skip
+    """Append up to `most_points` converged points of the branch.
+
+    Parameters
+    ----------
+    points, tangents : (most_points, nt + 1), λ last; states : (most_points, nc); observed : (most_points, n)
+        coefficients of the observed DOF; measures : (most_points, MEASURES), slopes along the tangent; filled.
+
+    Returns
+    -------
+    (RUNNING or how it ended, number of points appended).
+    """
+    n = walk.u.size
+    count = 0
+    status = RUNNING
+    while status == RUNNING and count < most_points:
+        seen = walk.numbers[COUNT]
+        status = _step(system, linear, point, control, walk)
+        if status == STALLED:
+            status = _step_over(system, linear, point, control, walk)
+        if walk.numbers[COUNT] > seen:
+            record(system, linear, point, walk, count, points, tangents, states, observed, measures)
+            count += 1
+    return status, count
+
+
+@compiled
+def record(
+    system: System, linear: Receptance, point: Evaluation, walk: Walk, row: int,
+    points: Real, tangents: Real, states: Integer, observed: Real, measures: Real,
+) -> None:  # fmt: skip
+    """Write the walk's present point, with what is observed there, into one row of the result."""
+    n = walk.u.size
+    points[row, :n], points[row, n] = walk.u, walk.numbers[P]
+    tangents[row] = walk.tangent
+    states[row] = point.states
+    measure(system, linear, walk.u, point, walk.tangent[:n], walk.tangent[n], observed[row], measures[row])
+    measures[row, RESIDUAL] = walk.numbers[NORM]
