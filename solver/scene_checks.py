@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain, islice
 from typing import Any, cast
 
 from pydantic import BaseModel, ValidationError
@@ -27,6 +28,7 @@ from solver.scene_parts import (
     parse_end,
 )
 
+MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
 RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe")
 _SCENE_KEYS = ("name", "structure", "contacts", "excitation", "observe")
 _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
@@ -57,20 +59,20 @@ _WANTED = {
 }
 
 
-def plain(data: object) -> object:
-    """Models inside `data` replaced by the tables they stand for."""
+def plain(data: object, depth: int = 0) -> object:
+    """Models inside `data` replaced by the tables they stand for (a scene is five levels deep, not fifty)."""
     if isinstance(data, BaseModel):
         return data.model_dump(exclude_none=True)
-    if isinstance(data, Mapping):
-        return {key: plain(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [plain(value) for value in data]
+    if depth < 50 and isinstance(data, Mapping):
+        return {key: plain(value, depth + 1) for key, value in data.items()}
+    if depth < 50 and isinstance(data, list | tuple):
+        return [plain(value, depth + 1) for value in data]
     return data
 
 
 def nearest(name: str, known: Sequence[str]) -> str:
     """A hint ``; did you mean `x`?``, or nothing when no known name is near (or there are too many)."""
-    few = len(known) <= 1000 and len(name) <= 200
+    few = len(known) <= 300 and len(name) <= 200
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.5) if few else []
     return f"; did you mean `{near[0]}`?" if near else ""
 
@@ -94,7 +96,7 @@ def quoted(value: object) -> str:
 
 def field_issues(error: ValidationError, raw: dict[str, Any]) -> list[Issue]:
     """Pydantic's findings as issues: pointers into the tables the user wrote, messages in our words."""
-    return [_field_issue(found, raw) for found in error.errors(include_url=False)]
+    return [_field_issue(found, raw) for found in error.errors(include_url=False)[:MOST_ISSUES]]
 
 
 def _field_issue(found: ErrorDetails, raw: dict[str, Any]) -> Issue:
@@ -163,27 +165,29 @@ def cross_issues(raw: dict[str, Any]) -> list[Issue]:
     structure = raw.get("structure")
     structure = structure if isinstance(structure, dict) else {}
     masses = structure.get("masses")
-    dofs = tuple(str(dof) for dof in masses) if isinstance(masses, dict) else None
+    dofs = dict.fromkeys(map(str, masses)) if isinstance(masses, dict) else None
     cyclic = structure.get("kind") == "cyclic"
-    return [
-        *_reserved_dofs(dofs or (), cyclic),
-        *_end_issues(raw, structure, dofs, cyclic),
-        *_dof_issues(raw, dofs),
-        *_duplicates(_structure_names(structure), "structure"),
-        *_contact_name_issues(raw, cyclic),
-        *_engine_order_issues(raw, structure.get("kind")),
-    ]
+    found = chain(
+        _reserved_dofs(dofs or (), cyclic),
+        _end_issues(raw, structure, dofs, cyclic),
+        _dof_issues(raw, dofs),
+        _duplicates(_structure_names(structure), "structure"),
+        _contact_name_issues(raw, cyclic),
+        _engine_order_issues(raw, structure.get("kind")),
+    )
+    return list(islice(found, MOST_ISSUES))
 
 
-def _reserved_dofs(dofs: Sequence[str], cyclic: bool) -> Iterator[Issue]:
+_Known = dict[str, None]
+
+
+def _reserved_dofs(dofs: Iterable[str], cyclic: bool) -> Iterator[Issue]:
     for dof in dofs:
         pointer = _pointer(["structure", "masses", dof])
         if dof == GROUND:
             yield Issue(pointer=pointer, message=f"`{GROUND}` is reserved: give the mass another name")
         if cyclic and "@" in dof:
-            yield Issue(
-                pointer=pointer, message=f"`{dof}`: '@' is not allowed in a DOF of a cyclic structure"
-            )
+            yield Issue(pointer=pointer, message=f"`{dof}`: no '@' in a DOF of a cyclic structure")
 
 
 def _rows(table: dict[str, Any], key: str) -> Iterator[tuple[list[int | str], dict[str, Any]]]:
@@ -197,7 +201,7 @@ def _rows(table: dict[str, Any], key: str) -> Iterator[tuple[list[int | str], di
 
 
 def _end_issues(
-    raw: dict[str, Any], structure: dict[str, Any], dofs: Sequence[str] | None, cyclic: bool
+    raw: dict[str, Any], structure: dict[str, Any], dofs: _Known | None, cyclic: bool
 ) -> Iterator[Issue]:
     elements = [
         (["structure", *steps], row) for key in ("springs", "dampers") for steps, row in _rows(structure, key)
@@ -219,7 +223,7 @@ def _end_issues(
             yield from _one_end([*here, i], end, dofs, cyclic)
 
 
-def _one_end(steps: list[int | str], text: str, dofs: Sequence[str] | None, cyclic: bool) -> Iterator[Issue]:
+def _one_end(steps: list[int | str], text: str, dofs: _Known | None, cyclic: bool) -> Iterator[Issue]:
     end = parse_end(text)
     if end.next and not cyclic:
         message = f"`between`: {text!r} needs a cyclic structure; a lumped one has no next sector"
@@ -232,13 +236,13 @@ def _unknown_dof(key: str, text: str, dof: str, known: Sequence[str]) -> str:
     return f"`{key}`: there is no DOF {quoted(text)}; known: {listing(known)}{nearest(dof, known)}"
 
 
-def _dof_issues(raw: dict[str, Any], dofs: Sequence[str] | None) -> Iterator[Issue]:
+def _dof_issues(raw: dict[str, Any], dofs: _Known | None) -> Iterator[Issue]:
     if dofs is None:
         return
     for steps, row in [*_rows(raw, "excitation"), *_rows(raw, "observe")]:
         dof = row.get("dof")
         if isinstance(dof, str) and dof not in dofs:
-            yield Issue(pointer=_pointer([*steps, "dof"]), message=_unknown_dof("dof", dof, dof, dofs))
+            yield Issue(pointer=_pointer([*steps, "dof"]), message=_unknown_dof("dof", dof, dof, list(dofs)))
 
 
 _Named = list[tuple[list[int | str], str]]

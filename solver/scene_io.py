@@ -54,6 +54,8 @@ def _parse(text: str, source: str, suffix: str) -> dict[str, object]:
         raise _refusal(f"{source!r} is not valid TOML: {error}") from error
     except json.JSONDecodeError as error:
         raise _refusal(f"{source!r} is not valid JSON: {error}") from error
+    except ValueError as error:
+        raise _refusal(f"{source!r} holds a number that cannot be read: {error}") from error
     except RecursionError as error:
         raise _refusal(f"{source!r} is nested too deeply for a scene") from error
     if not isinstance(raw, dict):
