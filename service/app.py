@@ -1,0 +1,56 @@
+"""The HTTP application."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from fastapi import FastAPI
+from starlette.concurrency import run_in_threadpool
+
+from service import problems
+from service.core import SOLVER_VERSION, Service
+from service.http import HostCheck
+from service.jobs import Registry
+from service.kinds import SHIPPED
+from service.routes import health, jobs, scenes, sweeps
+from service.settings import Settings, load_settings
+
+_DESCRIPTION = "Designs friction dampers: jobs, their results, and every frequency response computed."
+
+
+def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -> FastAPI:
+    """The application of one service; its lifespan starts and stops database, queue and workers.
+
+    Parameters
+    ----------
+    settings : Settings, optional
+        Its settings; from the environment if not given.
+    registry : Registry, optional
+        The kinds of job; those shipped if not given.
+    """
+    service = Service(settings or load_settings(), registry)
+
+    @asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        await run_in_threadpool(service.start)
+        try:
+            yield
+        finally:
+            await run_in_threadpool(service.stop)
+
+    app = FastAPI(
+        title="stickslip",
+        description=_DESCRIPTION,
+        version=SOLVER_VERSION,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        telemetry={"tracing": False, "metrics": False, "logs": False, "auto_configure": False},
+    )
+    app.state.service = service
+    problems.install(app)
+    app.add_middleware(HostCheck, hosts=service.settings.hosts)
+    for module in (jobs, sweeps, scenes, health):
+        app.include_router(module.router)
+    return app

@@ -1,0 +1,232 @@
+"""The service itself, without HTTP: what the routes, the embedded handle and the tests call."""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from service import revisions
+from service.db import Database
+from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
+from service.executors.local import LocalExecutor
+from service.jobs import Registry
+from service.kinds import SHIPPED
+from service.models import JobState
+from service.queue import JobQueue
+from service.repository import JobRepository, JobRow, NewJob, SceneRepository, SweepRepository, SweepRow
+from service.scene_store import SceneStore
+from service.settings import Settings
+from service.strict_json import digest
+from service.validation import validated
+from service.waiters import Event, Waiters
+from solver.errors import Issue
+
+log = logging.getLogger("stickslip.service")
+
+OnProgress = Callable[[float, int], None]
+
+SOLVER_VERSION = version("stickslip")
+
+_LOOK_AGAIN_SECONDS = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Results:
+    """What a finished job left."""
+
+    job: JobRow
+    result: dict[str, Any]
+    sweeps: list[SweepRow]
+
+
+class Service:
+    """Database, queue and workers of one service.
+
+    Parameters
+    ----------
+    settings : Settings
+        Its settings.
+    registry : Registry
+        The kinds of job it runs.
+    """
+
+    def __init__(self, settings: Settings, registry: Registry = SHIPPED) -> None:
+        self.settings = settings
+        self.registry = registry
+        self.database = Database(settings.database)
+        self.jobs = JobRepository(self.database)
+        self.sweeps = SweepRepository(self.database)
+        self.scenes = SceneStore(SceneRepository(self.database))
+        self.waiters = Waiters()
+        executor = LocalExecutor(
+            registry.runs(),
+            registry.preload,
+            workers=settings.workers,
+            grace_seconds=settings.grace_seconds,
+            progress_seconds=settings.progress_seconds,
+        )
+        self.queue = JobQueue(self.jobs, executor, settings, self.waiters)
+        self.stopping = threading.Event()
+        self._open = False
+
+    def open(self) -> None:
+        """Lock the database and check or make its tables; nothing happens if that was done before.
+
+        Raises
+        ------
+        DatabaseInUseError
+            If another service has the file.
+        WrongRevisionError
+            If the tables are not this version's.
+        DatabaseError
+            If the file cannot be used.
+        """
+        if self._open:
+            return
+        self.database.acquire()
+        try:
+            revisions.prepare(self.settings.database)
+        except BaseException:
+            self.database.close()
+            raise
+        self._open = True
+
+    def start(self) -> None:
+        """Open the database, start queue and workers; `open` lists the errors."""
+        self.open()
+        try:
+            self.queue.start()
+        except BaseException:
+            self.database.close()
+            raise
+        log.info("database %s, %d workers", self.database.path, self.settings.workers)
+
+    def stop(self) -> None:
+        """End the workers, give running jobs back to the queue, close the database."""
+        self.stop_waiting()
+        self.queue.stop()
+        self.database.close()
+        self._open = False
+
+    def stop_waiting(self) -> None:
+        """Send everybody home who waits for a job."""
+        self.stopping.set()
+        self.waiters.wake_all()
+
+    def submit(self, body: Mapping[str, Any], idempotency_key: str | None = None) -> tuple[JobRow, bool]:
+        """Accept a job; whether it is new (it is not if its idempotency key was used for it before).
+
+        Raises
+        ------
+        InvalidRequestError
+            Lists everything that is wrong with the body.
+        IdempotencyError, QueueFullError
+            See `JobRepository.submit`.
+        """
+        if "kind" not in body:
+            raise InvalidRequestError([Issue(pointer="/kind", message="`kind` is missing")])
+        kind = self.registry.get(body["kind"])
+        request = validated(kind.request, {key: value for key, value in body.items() if key != "kind"})
+        resolved = kind.resolve(request, self.scenes)
+        new = NewJob(
+            kind=kind.name,
+            request=dict(body),
+            spec=resolved.spec,
+            spec_hash=digest({"kind": kind.name, "spec": resolved.spec, "version": SOLVER_VERSION}),
+            request_hash=digest(body),
+            max_attempts=self.settings.max_attempts,
+            scene_name=resolved.scene_name,
+            scene_hash=resolved.scene_hash,
+            priority=request.priority,
+            fresh=request.fresh,
+            idempotency_key=idempotency_key,
+        )
+        row, inserted = self.jobs.submit(new, self.settings.queue_limit)
+        if row.state is JobState.ACCEPTED:
+            self.queue.wake()
+        return row, inserted
+
+    def job(self, job_id: str) -> JobRow:
+        """The job.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of this id.
+        """
+        row = self.jobs.get(job_id)
+        if row is None:
+            raise NotFoundError(f"there is no job {job_id!r}")
+        return row
+
+    def dismiss(self, job_id: str) -> JobRow:
+        """Cancel a job. A running one ends within the grace; the row given back may say `running` still.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of this id.
+        ConflictError
+            If it ended before.
+        """
+        row = self.jobs.cancel(job_id)
+        if row is None:
+            raise NotFoundError(f"there is no job {job_id!r}")
+        if row.state in (JobState.SUCCESSFUL, JobState.FAILED):
+            raise ConflictError(f"job {job_id} ended before ({row.state.value}), there is nothing to dismiss")
+        if row.state is JobState.RUNNING:
+            self.queue.cancel_running(job_id)
+        else:
+            self.waiters.ended(job_id)
+        return row
+
+    def results(self, job_id: str) -> Results:
+        """What a job computed; of a failed one, what it computed all the same.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such job.
+        ConflictError
+            If it has not ended, or was dismissed.
+        JobFailedError
+            If it failed and computed nothing.
+        """
+        row = self.job(job_id)
+        source = row.result_of or row.id
+        result = self.jobs.result(source)
+        if result is not None:
+            return Results(job=row, result=result, sweeps=self.sweeps.of_job(source))
+        if row.state is JobState.FAILED:
+            error = row.error or {}
+            raise JobFailedError(f"job {job_id} failed: {error.get('detail', 'for no known reason')}", error)
+        if row.state is JobState.DISMISSED:
+            raise ConflictError(f"job {job_id} was dismissed, it has no results")
+        raise ConflictError(f"job {job_id} is {row.state.value}, it has no results yet")
+
+    def wait(
+        self, job_id: str, timeout: float | None = None, on_progress: OnProgress | None = None
+    ) -> JobRow:
+        """Wait in this thread until a job has ended, the time [s] is over or the service stops."""
+        events: SimpleQueue[Event] = SimpleQueue()
+        end = math.inf if timeout is None else time.monotonic() + timeout
+        with self.waiters.listening(job_id, events.put):
+            row = self.job(job_id)
+            while not (row.state.finished or self.stopping.is_set() or time.monotonic() >= end):
+                try:
+                    event = events.get(timeout=max(0.0, min(end - time.monotonic(), _LOOK_AGAIN_SECONDS)))
+                except Empty:
+                    row = self.job(job_id)
+                    continue
+                if event.ended:
+                    row = self.job(job_id)
+                elif on_progress is not None:
+                    on_progress(event.fraction, event.points)
+        return row

@@ -1,0 +1,124 @@
+"""The exceptions of the service: one root, and one class for each thing a caller can mend.
+
+What each of them becomes over HTTP is decided in one place, `service.problems`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from solver.errors import Issue
+
+
+class ServiceError(Exception):
+    """Root of every error the service raises on purpose."""
+
+    def __init__(self, detail: str) -> None:
+        self.detail = detail
+        super().__init__(detail)
+
+
+class ConfigurationError(ServiceError):
+    """A setting the service cannot start with."""
+
+
+class DatabaseError(ServiceError):
+    """A database the service must not or cannot use: wrong revision, in use, damaged."""
+
+
+class DatabaseInUseError(DatabaseError):
+    """Another service holds this SQLite file."""
+
+
+class WrongRevisionError(DatabaseError):
+    """The database's tables are not the ones this version works with."""
+
+
+class InvalidRequestError(ServiceError):
+    """A request that cannot be carried out; `issues` lists everything that is wrong with it.
+
+    Attributes
+    ----------
+    issues : tuple of Issue
+        Each with the RFC 6901 pointer of the bad field.
+    source : str
+        What the pointers point into: ``body``, ``query`` or ``header``.
+    """
+
+    def __init__(self, issues: Sequence[Issue], source: str = "body") -> None:
+        self.issues = tuple(issues)
+        self.source = source
+        super().__init__("; ".join(issue.message for issue in self.issues))
+
+
+class MalformedBodyError(ServiceError):
+    """A request body that is not JSON."""
+
+
+class UnsupportedMediaError(ServiceError):
+    """A request body of another media type than JSON."""
+
+
+class BodyTooLargeError(ServiceError):
+    """A request body larger than the service accepts."""
+
+
+class HostRefusedError(ServiceError):
+    """A request for a host name this service does not answer to."""
+
+
+class NotFoundError(ServiceError):
+    """Nothing has this id or name."""
+
+
+class ConflictError(ServiceError):
+    """The request does not fit the present state of what it is about."""
+
+
+class IdempotencyError(ServiceError):
+    """An `Idempotency-Key` used again for a different request."""
+
+
+class QueueFullError(ServiceError):
+    """The queue takes no more jobs at present.
+
+    Attributes
+    ----------
+    retry_after : int
+        Time after which asking again makes sense [s].
+    """
+
+    def __init__(self, detail: str, retry_after: int) -> None:
+        self.retry_after = retry_after
+        super().__init__(detail)
+
+
+class JobFailedError(ServiceError):
+    """The results of a job that failed were asked for.
+
+    Attributes
+    ----------
+    error : mapping
+        The error of the job: `type`, `detail` and, for a bad scene, `issues`.
+    """
+
+    def __init__(self, detail: str, error: Mapping[str, object]) -> None:
+        self.error = error
+        super().__init__(detail)
+
+
+class ServiceProblem(ServiceError):  # noqa: N818 - named after RFC 9457's "problem"
+    """A problem document (RFC 9457) that a service answered with.
+
+    Attributes
+    ----------
+    status : int
+        The HTTP status.
+    problem : mapping
+        The whole document: `type`, `title`, `status`, `detail`, `instance`, `errors`.
+    """
+
+    def __init__(self, status: int, problem: Mapping[str, object]) -> None:
+        self.status = status
+        self.problem = problem
+        super().__init__(str(problem.get("detail") or problem.get("title") or f"HTTP status {status}"))

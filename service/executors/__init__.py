@@ -1,0 +1,1 @@
+"""Where attempts run: worker processes on this machine (and later a cluster), behind one contract."""

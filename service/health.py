@@ -1,0 +1,69 @@
+"""How the service is."""
+
+from __future__ import annotations
+
+import sqlite3
+
+from pydantic import BaseModel, ConfigDict
+from sqlalchemy.exc import SQLAlchemyError
+
+from service import revisions
+from service.core import SOLVER_VERSION, Service
+from service.db import sqlite_note
+
+
+class Health(BaseModel):
+    """How the service is.
+
+    Attributes
+    ----------
+    ready : bool
+        Whether it takes and runs jobs.
+    trouble : list of str
+        Why not.
+    notes : list of str
+        What its keeper should know although it works.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    ready: bool
+    trouble: list[str]
+    notes: list[str]
+    version: str
+    database: str
+    database_version: str
+    revision: str
+    workers: int
+    workers_ready: int
+    workers_busy: int
+    jobs: dict[str, int]
+
+
+def check(service: Service) -> Health:
+    """Look at database, queue and workers."""
+    trouble: list[str] = []
+    counts: dict[str, int] = {}
+    try:
+        counts = {state.value: number for state, number in service.jobs.count().items()}
+    except SQLAlchemyError as error:
+        trouble.append(f"the database does not answer: {type(error).__name__}")
+    if not service.queue.alive:
+        trouble.append("the queue takes no jobs")
+    workers = service.queue.status()
+    if not workers.ready:
+        trouble.append(workers.trouble or "the worker processes are starting")
+    notes = [sqlite_note(), workers.trouble if workers.ready else None]
+    return Health(
+        ready=not trouble,
+        trouble=trouble,
+        notes=[note for note in notes if note is not None],
+        version=SOLVER_VERSION,
+        database="sqlite",
+        database_version=sqlite3.sqlite_version,
+        revision=revisions.head_revision(),
+        workers=workers.workers,
+        workers_ready=workers.ready,
+        workers_busy=workers.busy,
+        jobs=counts,
+    )

@@ -1,0 +1,140 @@
+"""What the routes share: reading bodies strictly, waiting without holding a thread, the host check."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import Depends, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from service import strict_json
+from service.core import Service
+from service.errors import (
+    BodyTooLargeError,
+    HostRefusedError,
+    InvalidRequestError,
+    MalformedBodyError,
+    UnsupportedMediaError,
+)
+from service.problems import service_problem
+from service.repository import JobRow
+from service.waiters import Event
+from solver.errors import Issue
+
+_PREFER_WAIT = re.compile(r"(?:^|[,;\s])wait\s*=\s*\"?(\d{1,6})\"?(?:$|[,;\s])", re.IGNORECASE)
+_KEY = re.compile(r"[\x21-\x7e]{1,200}")
+_LOOK_AGAIN_SECONDS = 2.0
+
+
+def service_of(request: Request) -> Service:
+    """The service behind the app."""
+    service: Service = request.app.state.service
+    return service
+
+
+ServiceDependency = Annotated[Service, Depends(service_of)]
+
+
+async def json_body(request: Request) -> dict[str, Any]:
+    """The body of a request as a JSON object, no larger than the settings allow.
+
+    Raises
+    ------
+    UnsupportedMediaError, BodyTooLargeError, MalformedBodyError, InvalidRequestError
+        For a body that is not that.
+    """
+    kind = request.headers.get("content-type", "").split(";")[0].strip().lower()
+    if kind != "application/json" and not kind.endswith("+json"):
+        raise UnsupportedMediaError(f"`Content-Type` must be application/json, got {kind or 'none'}")
+    value = strict_json.loads(await _read(request, service_of(request).settings.max_body_bytes))
+    if not isinstance(value, dict):
+        raise MalformedBodyError(f"the body must be a JSON object, got {type(value).__name__}")
+    return value
+
+
+JsonBody = Annotated[dict[str, Any], Depends(json_body)]
+
+
+async def _read(request: Request, limit: int) -> bytes:
+    declared = request.headers.get("content-length", "")
+    if declared.isdigit() and int(declared) > limit:
+        raise BodyTooLargeError(f"the body may have {limit} bytes, this one has {declared}")
+    chunks, size = [], 0
+    async for chunk in request.stream():
+        size += len(chunk)
+        if size > limit:
+            raise BodyTooLargeError(f"the body may have {limit} bytes, this one has more")
+        chunks.append(chunk)
+    return b"".join(chunks)
+
+
+def preferred_wait(headers: Mapping[str, str], longest: float) -> float | None:
+    """Seconds of ``Prefer: wait=N`` (RFC 7240), at most `longest`; None without it."""
+    found = _PREFER_WAIT.search(headers.get("prefer", ""))
+    return None if found is None else min(float(found.group(1)), longest)
+
+
+def idempotency_key(headers: Mapping[str, str]) -> str | None:
+    """The Idempotency-Key of a request, or None.
+
+    Raises
+    ------
+    InvalidRequestError
+        If it is empty, longer than 200 characters or not printable ASCII.
+    """
+    key = headers.get("idempotency-key")
+    if key is None or _KEY.fullmatch(key):
+        return key
+    message = (
+        f"`Idempotency-Key` must be 1 to 200 printable ASCII characters without spaces, got {key[:80]!r}"
+    )
+    raise InvalidRequestError([Issue(pointer="/Idempotency-Key", message=message)], source="header")
+
+
+async def wait_for_end(service: Service, job_id: str, seconds: float) -> JobRow:
+    """The job when it has ended, the time is over or the service stops; holds no thread meanwhile."""
+    loop = asyncio.get_running_loop()
+    changed = asyncio.Event()
+
+    def listen(event: Event) -> None:
+        if event.ended:
+            loop.call_soon_threadsafe(changed.set)
+
+    end = loop.time() + seconds
+    with service.waiters.listening(job_id, listen):
+        while True:
+            row = await run_in_threadpool(service.job, job_id)
+            left = end - loop.time()
+            if row.state.finished or service.stopping.is_set() or left <= 0.0:
+                return row
+            try:
+                await asyncio.wait_for(changed.wait(), min(left, _LOOK_AGAIN_SECONDS))
+            except TimeoutError:
+                continue
+            changed.clear()
+
+
+class HostCheck:
+    """Refuses requests for host names that are not this service's.
+
+    Without it, a web page could reach a service on loopback under a name that its owner points there.
+    """
+
+    def __init__(self, app: ASGIApp, hosts: tuple[str, ...]) -> None:
+        self._app = app
+        self._hosts = frozenset(host.lower() for host in hosts)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on, or answer it with a problem."""
+        if scope["type"] == "http" and "*" not in self._hosts:
+            request = Request(scope, receive)
+            host = re.sub(r":\d+$", "", request.headers.get("host", "").lower())
+            if host not in self._hosts:
+                error = HostRefusedError(f"the host {host!r} is not one of {', '.join(sorted(self._hosts))}")
+                await service_problem(request, error)(scope, receive, send)
+                return
+        await self._app(scope, receive, send)

@@ -1,0 +1,221 @@
+"""What a kind of job is: a request model, a resolution of the request, a function that computes.
+
+A new kind is one module in `service.kinds` and one entry in its registry; queue, database, HTTP and
+command know kinds only through this contract.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.errors import InvalidRequestError
+from service.strict_json import pointer
+from solver.errors import Issue
+
+Progress = Callable[[float, int], None]
+ShouldStop = Callable[[], bool]
+
+
+class JobRequest(BaseModel):
+    """What every kind of job takes; the models of the kinds derive from it.
+
+    Attributes
+    ----------
+    fresh : bool
+        Compute again even if the same thing was computed before.
+    priority : int
+        Jobs of a higher priority run first; equal ones in the order they came.
+    """
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, validate_by_name=True)
+
+    fresh: bool = Field(
+        default=False, strict=True, description="Compute again even if a stored result exists."
+    )
+    priority: int = Field(default=0, strict=True, ge=-100, le=100, description="Higher ones run first.")
+
+
+class SceneSource(Protocol):
+    """Where the scenes that requests name come from."""
+
+    def scene_body(self, name: str) -> Mapping[str, object] | None:
+        """Tables and lists of a shipped or stored scene, or None."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resolved:
+    """A request with everything looked up: what a worker computes, from this alone.
+
+    Attributes
+    ----------
+    spec : dict
+        JSON; equal specs of one kind give equal results.
+    scene_name, scene_hash : str or None
+        Of the scene as computed, for lists and filters.
+    """
+
+    spec: dict[str, Any]
+    scene_name: str | None = None
+    scene_hash: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactValues:
+    """The values of a contact during a sweep; None where the value is swept."""
+
+    name: str
+    kt: float | None
+    mu: float | None
+    N0: float | None
+    N1: float | None
+    N1_phase: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoredArray:
+    """An array as it is stored: npy bytes and their SHA-256 in hexadecimal."""
+
+    sha256: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepRecord:
+    """One branch as it is stored; the fields are the columns people filter by."""
+
+    scene_name: str
+    scene_hash: str
+    parameter: str
+    from_value: float
+    to_value: float
+    frequency_hz: float | None
+    excitation_amplitude: float | None
+    harmonics: int
+    points: int
+    peak: float | None
+    peak_at: float | None
+    limit: float | None
+    band_hz: float | None
+    newton_iterations: int
+    rejected_steps: int
+    seconds: float
+    completed: bool
+    status: str
+    contacts: tuple[ContactValues, ...] = ()
+    arrays: Mapping[str, StoredArray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobOutput:
+    """What a run gives back.
+
+    Attributes
+    ----------
+    result : dict
+        JSON, with the keys of the command's ``--json``.
+    sweeps : tuple of SweepRecord
+        Every branch computed on the way.
+    shortfall : str or None
+        If the computation did not reach its goal: the status, a sentence that says what to try. The job
+        then fails with it; result and sweeps are kept.
+    """
+
+    result: dict[str, Any]
+    sweeps: tuple[SweepRecord, ...] = ()
+    shortfall: str | None = None
+
+
+class FailureKind(enum.StrEnum):
+    """Why a job failed."""
+
+    SCENE = "scene"
+    SETTING = "setting"
+    GOAL = "goal-not-reached"
+    WORKER_LOST = "worker-lost"
+    TIME_LIMIT = "time-limit"
+    INTERNAL = "internal"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobFailure:
+    """Why a job failed, as its row keeps it."""
+
+    kind: FailureKind
+    detail: str
+    issues: tuple[Issue, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """The error of a job, as JSON."""
+        body: dict[str, Any] = {"type": self.kind.value, "detail": self.detail}
+        if self.issues:
+            body["issues"] = [{"pointer": issue.pointer, "detail": issue.message} for issue in self.issues]
+        return body
+
+
+Run = Callable[[Mapping[str, Any], Progress, ShouldStop], JobOutput]
+Resolve = Callable[[Any, SceneSource], Resolved]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobKind:
+    """A kind of job. `run` is sent to workers by name: a function at the top level of a module.
+
+    Attributes
+    ----------
+    name : str
+        As in ``"kind": …`` of a request.
+    summary : str
+        One line for people.
+    request : type of JobRequest
+        Validates what was asked.
+    resolve : callable
+        From request to spec; raises InvalidRequestError. Runs in the service.
+    run : callable
+        From spec to output; raises SolverError for what is wrong for good. Runs in a worker.
+    """
+
+    name: str
+    summary: str
+    request: type[JobRequest]
+    resolve: Resolve
+    run: Run
+
+
+class Registry:
+    """The kinds of job a service knows, and the modules its workers load before the first one."""
+
+    def __init__(self, kinds: Iterable[JobKind], preload: tuple[str, ...] = ()) -> None:
+        self._kinds = {kind.name: kind for kind in kinds}
+        self.preload = preload
+
+    def __getitem__(self, name: str) -> JobKind:
+        return self._kinds[name]
+
+    def __iter__(self) -> Iterator[JobKind]:
+        return iter(self._kinds.values())
+
+    def get(self, name: object) -> JobKind:
+        """The kind of this name.
+
+        Raises
+        ------
+        InvalidRequestError
+            If there is none, listing those there are.
+        """
+        if isinstance(name, str) and name in self._kinds:
+            return self._kinds[name]
+        message = f"`kind` must be one of {', '.join(self._kinds)}, got {name!r}"
+        raise InvalidRequestError([Issue(pointer=pointer("kind"), message=message)])
+
+    def extended(self, *kinds: JobKind) -> Registry:
+        """This registry with further kinds."""
+        return Registry([*self, *kinds], self.preload)
+
+    def runs(self) -> dict[str, Run]:
+        """The functions workers call, by kind."""
+        return {kind.name: kind.run for kind in self}

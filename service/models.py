@@ -1,0 +1,228 @@
+"""The tables, each with the names of its constraints, as SQLAlchemy and Alembic see them."""
+
+from __future__ import annotations
+
+import enum
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import (
+    JSON,
+    CheckConstraint,
+    DateTime,
+    Dialect,
+    Enum,
+    ForeignKey,
+    Index,
+    LargeBinary,
+    MetaData,
+    String,
+    Text,
+    TypeDecorator,
+)
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+NAMING_CONVENTION = {
+    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+    "ck": "ck_%(table_name)s_%(constraint_name)s",
+    "fk": "fk_%(table_name)s_%(column_0_N_name)s_%(referred_table_name)s",
+    "pk": "pk_%(table_name)s",
+}
+
+ID_LENGTH = 36
+
+
+class JobState(enum.StrEnum):
+    """The states of a job, in the words of OGC API Processes."""
+
+    ACCEPTED = "accepted"
+    RUNNING = "running"
+    SUCCESSFUL = "successful"
+    FAILED = "failed"
+    DISMISSED = "dismissed"
+
+    @property
+    def finished(self) -> bool:
+        """Whether a job in this state stays in it."""
+        return self in (JobState.SUCCESSFUL, JobState.FAILED, JobState.DISMISSED)
+
+
+class UtcDateTime(TypeDecorator[datetime]):
+    """A point in time; aware in Python, kept as UTC (SQLite has no time zones)."""
+
+    impl = DateTime(timezone=True)
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """To UTC; a naive time is an error of the program."""
+        if value is None:
+            return None
+        if value.tzinfo is None:
+            raise ValueError(f"a time must carry its zone, got {value!r}")
+        value = value.astimezone(UTC)
+        return value.replace(tzinfo=None) if dialect.name == "sqlite" else value
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002
+        """Aware again."""
+        if value is None:
+            return None
+        return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
+
+
+def _values(members: type[enum.Enum]) -> list[str]:
+    return [str(member.value) for member in members]
+
+
+class Base(DeclarativeBase):
+    """Root of the tables."""
+
+    metadata = MetaData(naming_convention=NAMING_CONVENTION)
+    type_annotation_map = {  # noqa: RUF012 - SQLAlchemy reads it from the class
+        datetime: UtcDateTime(),
+        dict[str, Any]: JSON(none_as_null=True),
+        JobState: Enum(
+            JobState,
+            name="state",
+            native_enum=False,
+            create_constraint=True,
+            length=16,
+            values_callable=_values,
+        ),
+    }
+
+
+class Job(Base):
+    """A job, and with its state `accepted` the queue."""
+
+    __tablename__ = "job"
+
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    kind: Mapped[str] = mapped_column(String(32))
+    state: Mapped[JobState]
+    priority: Mapped[int] = mapped_column(default=0)
+    scene_name: Mapped[str | None] = mapped_column(String(200))
+    scene_hash: Mapped[str | None] = mapped_column(String(64))
+    spec_hash: Mapped[str] = mapped_column(String(64))
+    request_hash: Mapped[str] = mapped_column(String(64))
+    idempotency_key: Mapped[str | None] = mapped_column(String(200), unique=True)
+    attempt: Mapped[int] = mapped_column(default=0)
+    max_attempts: Mapped[int]
+    lease_owner: Mapped[str | None] = mapped_column(String(200))
+    lease_until: Mapped[datetime | None]
+    cancel_requested: Mapped[bool] = mapped_column(default=False)
+    progress: Mapped[float] = mapped_column(default=0.0)
+    points: Mapped[int] = mapped_column(default=0)
+    created: Mapped[datetime]
+    started: Mapped[datetime | None]
+    finished: Mapped[datetime | None]
+    result_of: Mapped[str | None] = mapped_column(String(ID_LENGTH), ForeignKey("job.id"))
+    error: Mapped[dict[str, Any] | None]
+    request: Mapped[dict[str, Any]]
+    spec: Mapped[dict[str, Any]]
+
+    __table_args__ = (
+        Index(None, "state", "priority", "id"),
+        Index(None, "spec_hash", "state"),
+        Index(None, "kind", "id"),
+        Index(None, "scene_name", "id"),
+        Index(None, "result_of"),
+        CheckConstraint("attempt >= 0 AND max_attempts >= 1", name="attempts"),
+        CheckConstraint("(state = 'running') = (lease_owner IS NOT NULL)", name="lease"),
+    )
+
+
+class JobResult(Base):
+    """What a job computed, apart from its sweeps; in a table of its own so that lists of jobs stay light."""
+
+    __tablename__ = "job_result"
+
+    job_id: Mapped[str] = mapped_column(
+        String(ID_LENGTH), ForeignKey("job.id", ondelete="CASCADE"), primary_key=True
+    )
+    body: Mapped[dict[str, Any]]
+
+
+class Scene(Base):
+    """A scene stored under a name; never changed, so that a name means one thing for ever."""
+
+    __tablename__ = "scene"
+
+    name: Mapped[str] = mapped_column(String(200), primary_key=True)
+    scene_hash: Mapped[str] = mapped_column(String(64))
+    created: Mapped[datetime]
+    body: Mapped[dict[str, Any]]
+
+
+class Sweep(Base):
+    """One branch that a job computed: what people filter by."""
+
+    __tablename__ = "sweep"
+
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    job_id: Mapped[str] = mapped_column(String(ID_LENGTH), ForeignKey("job.id", ondelete="CASCADE"))
+    position: Mapped[int]
+    scene_name: Mapped[str] = mapped_column(String(200))
+    scene_hash: Mapped[str] = mapped_column(String(64))
+    parameter: Mapped[str] = mapped_column(String(200))
+    from_value: Mapped[float]
+    to_value: Mapped[float]
+    frequency_hz: Mapped[float | None]
+    excitation_amplitude: Mapped[float | None]
+    harmonics: Mapped[int]
+    points: Mapped[int]
+    peak: Mapped[float | None]
+    peak_at: Mapped[float | None]
+    limit: Mapped[float | None]
+    band_hz: Mapped[float | None]
+    newton_iterations: Mapped[int]
+    rejected_steps: Mapped[int]
+    seconds: Mapped[float]
+    completed: Mapped[bool]
+    status: Mapped[str] = mapped_column(Text())
+    created: Mapped[datetime]
+
+    __table_args__ = (
+        Index(None, "job_id", "position"),
+        Index(None, "scene_name", "peak", "id"),
+        Index(None, "scene_name", "id"),
+        Index(None, "parameter", "id"),
+        Index(None, "peak", "id"),
+        Index(None, "peak_at", "id"),
+        Index(None, "band_hz", "id"),
+        Index(None, "points", "id"),
+        Index(None, "seconds", "id"),
+        Index(None, "harmonics", "id"),
+    )
+
+
+class SweepContact(Base):
+    """The values of one contact during a sweep; the value that was swept is NULL, it has no single value."""
+
+    __tablename__ = "sweep_contact"
+
+    sweep_id: Mapped[str] = mapped_column(
+        String(ID_LENGTH), ForeignKey("sweep.id", ondelete="CASCADE"), primary_key=True
+    )
+    name: Mapped[str] = mapped_column(String(200), primary_key=True)
+    position: Mapped[int]
+    kt: Mapped[float | None]
+    mu: Mapped[float | None]
+    N0: Mapped[float | None] = mapped_column("N0")
+    N1: Mapped[float | None] = mapped_column("N1")
+    N1_phase: Mapped[float | None] = mapped_column("N1_phase")
+
+    __table_args__ = (Index(None, "N0", "name", "sweep_id"), Index(None, "name", "N0", "sweep_id"))
+
+
+class SweepArray(Base):
+    """One array of a sweep in NumPy's npy format, with the SHA-256 of its bytes."""
+
+    __tablename__ = "sweep_array"
+
+    sweep_id: Mapped[str] = mapped_column(
+        String(ID_LENGTH), ForeignKey("sweep.id", ondelete="CASCADE"), primary_key=True
+    )
+    name: Mapped[str] = mapped_column(String(64), primary_key=True)
+    sha256: Mapped[str] = mapped_column(String(64))
+    data: Mapped[bytes] = mapped_column(LargeBinary())

@@ -1,0 +1,141 @@
+"""Every error as a problem document (RFC 9457): the one place where exceptions meet HTTP."""
+
+from __future__ import annotations
+
+import logging
+import secrets
+from collections.abc import Mapping
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+
+from service import errors
+from service.validation import issues_of
+from solver.errors import Issue
+
+log = logging.getLogger("stickslip.http")
+
+MEDIA_TYPE = "application/problem+json"
+
+_STATUS: dict[type[errors.ServiceError], tuple[int, str, str]] = {
+    errors.InvalidRequestError: (422, "invalid-request", "The request is not valid"),
+    errors.MalformedBodyError: (400, "malformed-body", "The body cannot be read"),
+    errors.UnsupportedMediaError: (415, "unsupported-media-type", "The body must be JSON"),
+    errors.BodyTooLargeError: (413, "body-too-large", "The body is too large"),
+    errors.HostRefusedError: (421, "host-refused", "This service does not answer to this host name"),
+    errors.NotFoundError: (404, "not-found", "Not found"),
+    errors.ConflictError: (409, "conflict", "The request does not fit the present state"),
+    errors.IdempotencyError: (
+        422,
+        "idempotency-key-reused",
+        "The idempotency key belongs to another request",
+    ),
+    errors.QueueFullError: (503, "queue-full", "The queue is full"),
+    errors.JobFailedError: (409, "job-failed", "The job failed"),
+    errors.DatabaseError: (500, "database", "The database cannot be used"),
+}
+
+
+def problem(
+    request: Request,
+    status: int,
+    slug: str,
+    title: str,
+    detail: str,
+    issues: list[dict[str, str]] | None = None,
+    headers: Mapping[str, str] | None = None,
+) -> JSONResponse:
+    """A problem document about a request."""
+    body: dict[str, Any] = {
+        "type": f"urn:stickslip:problem:{slug}",
+        "title": title,
+        "status": status,
+        "detail": detail,
+        "instance": request.url.path,
+        "errors": issues or [],
+    }
+    return JSONResponse(body, status_code=status, headers=headers, media_type=MEDIA_TYPE)
+
+
+def install(app: FastAPI) -> None:
+    """Have every error of `app` answered with a problem document."""
+    app.add_exception_handler(errors.ServiceError, _service_error)
+    app.add_exception_handler(RequestValidationError, _validation_error)
+    app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(Exception, _unexpected_error)
+
+
+def service_problem(request: Request, error: errors.ServiceError) -> JSONResponse:
+    """The problem document of one of the service's own errors."""
+    known = next((_STATUS[kind] for kind in type(error).__mro__ if kind in _STATUS), None)
+    if known is None:
+        return _unexpected(request, error)
+    status, slug, title = known
+    if status >= HTTPStatus.INTERNAL_SERVER_ERROR and slug != "queue-full":
+        log.error("%s %s: %s", request.method, request.url.path, error.detail)
+    issues: list[dict[str, str]] = []
+    headers: dict[str, str] = {}
+    if isinstance(error, errors.InvalidRequestError):
+        issues = [_entry(issue, error.source) for issue in error.issues]
+    elif isinstance(error, errors.QueueFullError):
+        headers["Retry-After"] = str(error.retry_after)
+    elif isinstance(error, errors.JobFailedError):
+        found = error.error.get("issues")
+        issues = list(found) if isinstance(found, list) else []
+    return problem(request, status, slug, title, error.detail, issues, headers)
+
+
+def _entry(issue: Issue, source: str) -> dict[str, str]:
+    entry = {"pointer": issue.pointer, "detail": issue.message}
+    return entry if source == "body" else {**entry, "in": source}
+
+
+async def _service_error(request: Request, error: Exception) -> JSONResponse:
+    if not isinstance(error, errors.ServiceError):
+        return _unexpected(request, error)
+    return service_problem(request, error)
+
+
+async def _validation_error(request: Request, error: Exception) -> JSONResponse:
+    """What FastAPI refuses: bad query, path or header parameters; bodies are checked by the routes."""
+    if not isinstance(error, RequestValidationError):
+        return _unexpected(request, error)
+    entries: list[dict[str, str]] = []
+    for item in error.errors():
+        source, *rest = item["loc"]
+        issue = issues_of([{**item, "loc": rest}])[0]
+        entries.append(_entry(issue, str(source)))
+    detail = "; ".join(entry["detail"] for entry in entries)
+    status, slug, title = _STATUS[errors.InvalidRequestError]
+    return problem(request, status, slug, title, detail, entries)
+
+
+async def _http_error(request: Request, error: Exception) -> JSONResponse:
+    """What Starlette refuses: unknown routes, wrong methods."""
+    if not isinstance(error, HTTPException):
+        return _unexpected(request, error)
+    title = HTTPStatus(error.status_code).phrase
+    detail = str(error.detail)
+    if error.status_code == HTTPStatus.NOT_FOUND:
+        detail = f"there is nothing at {request.url.path}"
+    elif error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
+        allowed = (error.headers or {}).get("Allow", "other methods")
+        detail = f"{request.method} is not possible at {request.url.path}, use {allowed}"
+    slug = title.lower().replace(" ", "-").replace("'", "")
+    return problem(request, error.status_code, slug, title, detail, headers=error.headers)
+
+
+async def _unexpected_error(request: Request, error: Exception) -> JSONResponse:
+    return _unexpected(request, error)
+
+
+def _unexpected(request: Request, error: Exception) -> JSONResponse:
+    """An error of the program: details to the log, a reference to the client."""
+    reference = secrets.token_hex(6)
+    log.error("%s %s failed, reference %s", request.method, request.url.path, reference, exc_info=error)
+    detail = f"an unexpected error; the service's log has the details under {reference}"
+    return problem(request, 500, "internal", "Internal error", detail)

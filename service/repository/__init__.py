@@ -1,0 +1,19 @@
+"""All SQL of the service: each method is one transaction, each change of a job's state is guarded."""
+
+from service.repository.jobs import Attempt, JobRepository, JobRow, NewJob, Recovered
+from service.repository.scenes import SceneRepository, SceneRow
+from service.repository.sweeps import SWEEP_SORTS, SweepFilter, SweepRepository, SweepRow
+
+__all__ = [
+    "SWEEP_SORTS",
+    "Attempt",
+    "JobRepository",
+    "JobRow",
+    "NewJob",
+    "Recovered",
+    "SceneRepository",
+    "SceneRow",
+    "SweepFilter",
+    "SweepRepository",
+    "SweepRow",
+]

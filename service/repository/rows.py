@@ -1,0 +1,116 @@
+"""What the repository takes and gives: frozen rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from service.models import JobState
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobRow:
+    """A job as lists show it: without its spec and its result."""
+
+    id: str
+    kind: str
+    state: JobState
+    priority: int
+    scene_name: str | None
+    scene_hash: str | None
+    spec_hash: str
+    request_hash: str
+    idempotency_key: str | None
+    attempt: int
+    max_attempts: int
+    cancel_requested: bool
+    progress: float
+    points: int
+    created: datetime
+    started: datetime | None
+    finished: datetime | None
+    result_of: str | None
+    error: dict[str, Any] | None
+    request: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewJob:
+    """A job to be inserted."""
+
+    kind: str
+    request: dict[str, Any]
+    spec: dict[str, Any]
+    spec_hash: str
+    request_hash: str
+    max_attempts: int
+    scene_name: str | None = None
+    scene_hash: str | None = None
+    priority: int = 0
+    fresh: bool = False
+    idempotency_key: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attempt:
+    """One attempt at a job: what a worker needs, and what guards the write of its outcome."""
+
+    job_id: str
+    kind: str
+    spec: dict[str, Any]
+    attempt: int
+    max_attempts: int
+    lease_owner: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recovered:
+    """What became of running jobs whose owner is gone."""
+
+    accepted: int = 0
+    failed: int = 0
+    dismissed: int = 0
+
+    @property
+    def total(self) -> int:
+        """All of them."""
+        return self.accepted + self.failed + self.dismissed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneRow:
+    """A stored scene."""
+
+    name: str
+    scene_hash: str
+    created: datetime
+    body: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepRow:
+    """A stored sweep without its arrays and contacts."""
+
+    id: str
+    job_id: str
+    position: int
+    scene_name: str
+    scene_hash: str
+    parameter: str
+    from_value: float
+    to_value: float
+    frequency_hz: float | None
+    excitation_amplitude: float | None
+    harmonics: int
+    points: int
+    peak: float | None
+    peak_at: float | None
+    limit: float | None
+    band_hz: float | None
+    newton_iterations: int
+    rejected_steps: int
+    seconds: float
+    completed: bool
+    status: str
+    created: datetime

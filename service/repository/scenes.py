@@ -1,0 +1,48 @@
+"""The stored scenes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sqlalchemy import insert, select
+
+from service.db import Database
+from service.models import Scene
+from service.repository.jobs import utc_now
+from service.repository.rows import SceneRow
+
+__all__ = ["SceneRepository", "SceneRow"]
+
+_COLUMNS = (Scene.name, Scene.scene_hash, Scene.created, Scene.body)
+
+
+class SceneRepository:
+    """Scenes of one database; a stored scene never changes."""
+
+    def __init__(self, database: Database) -> None:
+        self._db = database
+
+    def add(self, name: str, scene_hash: str, body: dict[str, Any]) -> tuple[SceneRow, bool]:
+        """Store a scene, or find the one of this name; whether it was stored."""
+        with self._db.writing() as connection:
+            query = select(*_COLUMNS).where(Scene.name == name)
+            known = connection.execute(query).mappings().one_or_none()
+            if known is not None:
+                return SceneRow(**known), False
+            created = utc_now()
+            connection.execute(
+                insert(Scene).values(name=name, scene_hash=scene_hash, created=created, body=body)
+            )
+        return SceneRow(name=name, scene_hash=scene_hash, created=created, body=body), True
+
+    def get(self, name: str) -> SceneRow | None:
+        """The scene, or None."""
+        with self._db.reading() as connection:
+            row = connection.execute(select(*_COLUMNS).where(Scene.name == name)).mappings().one_or_none()
+        return None if row is None else SceneRow(**row)
+
+    def all(self) -> list[SceneRow]:
+        """All of them, by name."""
+        with self._db.reading() as connection:
+            rows = connection.execute(select(*_COLUMNS).order_by(Scene.name)).mappings().all()
+        return [SceneRow(**row) for row in rows]

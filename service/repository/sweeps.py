@@ -1,0 +1,196 @@
+"""The stored sweeps: written with their job's result, listed by what people filter by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from datetime import datetime
+
+from sqlalchemy import ColumnElement, Connection, Select, insert, literal, select, tuple_
+from sqlalchemy.orm import InstrumentedAttribute
+
+from service.db import Database
+from service.ids import new_id
+from service.jobs import ContactValues, StoredArray, SweepRecord
+from service.models import Sweep, SweepArray, SweepContact
+from service.repository.rows import SweepRow
+
+__all__ = ["SWEEP_SORTS", "SweepFilter", "SweepRepository", "SweepRow", "insert_sweeps"]
+
+Range = tuple[float | None, float | None]
+
+_COLUMNS = [getattr(Sweep, item.name) for item in fields(SweepRow)]
+_CHILD_FIELDS = ("contacts", "arrays")
+_CONTACT_COLUMNS: dict[str, InstrumentedAttribute[float | None]] = {
+    "kt": SweepContact.kt,
+    "mu": SweepContact.mu,
+    "N0": SweepContact.N0,
+    "N1": SweepContact.N1,
+}
+
+SWEEP_SORTS: dict[str, InstrumentedAttribute[float | None] | InstrumentedAttribute[float]] = {
+    "peak": Sweep.peak,
+    "peak_at": Sweep.peak_at,
+    "band_hz": Sweep.band_hz,
+    "points": Sweep.points,
+    "harmonics": Sweep.harmonics,
+    "seconds": Sweep.seconds,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepFilter:
+    """Which sweeps to list; every condition must hold.
+
+    Attributes
+    ----------
+    equal : mapping
+        Column name to value: scene_name, scene_hash, parameter, harmonics, job_id, completed.
+    ranges : mapping
+        Column name to (lowest, highest), each None for open: peak, peak_at, band_hz, points, seconds.
+    contact_ranges : mapping
+        ``kt``, ``mu``, ``N0`` or ``N1`` to (lowest, highest); one contact must meet all of them.
+    contact : str or None
+        Name of that contact; None for any.
+    sort : str
+        ``created`` or a key of SWEEP_SORTS; sweeps that have no such value are left out.
+    descending : bool
+        Largest or newest first.
+    """
+
+    equal: Mapping[str, object] = field(default_factory=dict)
+    ranges: Mapping[str, Range] = field(default_factory=dict)
+    contact_ranges: Mapping[str, Range] = field(default_factory=dict)
+    contact: str | None = None
+    sort: str = "created"
+    descending: bool = True
+
+
+class SweepRepository:
+    """Sweeps of one database."""
+
+    def __init__(self, database: Database) -> None:
+        self._db = database
+
+    def page(
+        self, wanted: SweepFilter, limit: int, after: tuple[float | None, str] | None = None
+    ) -> list[SweepRow]:
+        """A page of sweeps; `after` is the sort value and id of the last one of the page before."""
+        with self._db.reading() as connection:
+            query = _query(wanted, after).limit(limit)
+            return [SweepRow(**row) for row in connection.execute(query).mappings()]
+
+    def get(self, sweep_id: str) -> SweepRow | None:
+        """The sweep, or None."""
+        with self._db.reading() as connection:
+            row = connection.execute(select(*_COLUMNS).where(Sweep.id == sweep_id)).mappings().one_or_none()
+        return None if row is None else SweepRow(**row)
+
+    def of_job(self, job_id: str) -> list[SweepRow]:
+        """The sweeps of a job in the order they were computed."""
+        query = select(*_COLUMNS).where(Sweep.job_id == job_id).order_by(Sweep.position)
+        with self._db.reading() as connection:
+            return [SweepRow(**row) for row in connection.execute(query).mappings()]
+
+    def contacts(self, sweep_ids: Sequence[str]) -> dict[str, list[ContactValues]]:
+        """The contact values of several sweeps, by sweep."""
+        columns = [getattr(SweepContact, item.name) for item in fields(ContactValues)]
+        query = (
+            select(SweepContact.sweep_id, *columns)
+            .where(SweepContact.sweep_id.in_(sweep_ids))
+            .order_by(SweepContact.sweep_id, SweepContact.position)
+        )
+        found: dict[str, list[ContactValues]] = {sweep_id: [] for sweep_id in sweep_ids}
+        with self._db.reading() as connection:
+            for row in connection.execute(query):
+                found[row.sweep_id].append(
+                    ContactValues(**{item.name: getattr(row, item.name) for item in fields(ContactValues)})
+                )
+        return found
+
+    def arrays(self, sweep_id: str) -> dict[str, StoredArray]:
+        """The arrays of a sweep, by name."""
+        query = select(SweepArray.name, SweepArray.sha256, SweepArray.data).where(
+            SweepArray.sweep_id == sweep_id
+        )
+        with self._db.reading() as connection:
+            return {
+                row.name: StoredArray(sha256=row.sha256, data=row.data) for row in connection.execute(query)
+            }
+
+
+def insert_sweeps(
+    connection: Connection, job_id: str, sweeps: Sequence[SweepRecord], created: datetime
+) -> None:
+    """Write the sweeps of a job inside the transaction that writes its result."""
+    names = [item.name for item in fields(SweepRecord) if item.name not in _CHILD_FIELDS]
+    for position, sweep in enumerate(sweeps):
+        sweep_id = new_id()
+        values = {name: getattr(sweep, name) for name in names}
+        connection.execute(
+            insert(Sweep).values(id=sweep_id, job_id=job_id, position=position, created=created, **values)
+        )
+        contacts = [
+            {"sweep_id": sweep_id, "position": index}
+            | {item.name: getattr(contact, item.name) for item in fields(ContactValues)}
+            for index, contact in enumerate(sweep.contacts)
+        ]
+        arrays = [
+            {"sweep_id": sweep_id, "name": name, "sha256": stored.sha256, "data": stored.data}
+            for name, stored in sweep.arrays.items()
+        ]
+        if contacts:
+            connection.execute(insert(SweepContact), contacts)
+        if arrays:
+            connection.execute(insert(SweepArray), arrays)
+
+
+def _query(wanted: SweepFilter, after: tuple[float | None, str] | None) -> Select[tuple[object, ...]]:
+    query: Select[tuple[object, ...]] = select(*_COLUMNS)
+    for name, value in wanted.equal.items():
+        query = query.where(getattr(Sweep, name) == value)
+    for name, bounds in wanted.ranges.items():
+        query = _within(query, getattr(Sweep, name), bounds)
+    if wanted.contact is not None or wanted.contact_ranges:
+        query = query.where(_has_contact(wanted))
+    return _ordered(query, wanted, after)
+
+
+def _within(
+    query: Select[tuple[object, ...]], column: InstrumentedAttribute[float | None], bounds: Range
+) -> Select[tuple[object, ...]]:
+    low, high = bounds
+    if low is not None:
+        query = query.where(column >= low)
+    return query if high is None else query.where(column <= high)
+
+
+def _ordered(
+    query: Select[tuple[object, ...]], wanted: SweepFilter, after: tuple[float | None, str] | None
+) -> Select[tuple[object, ...]]:
+    """Order by the sort value, then by id (which is the time), and go on behind `after`."""
+    column = SWEEP_SORTS.get(wanted.sort)
+    keys = [Sweep.id] if column is None else [column, Sweep.id]
+    query = query.order_by(*(key.desc() if wanted.descending else key.asc() for key in keys))
+    if column is not None:
+        query = query.where(column.is_not(None))
+    if after is None:
+        return query
+    value, sweep_id = after
+    here = tuple_(*keys)
+    there = tuple_(*(literal(item) for item in ((sweep_id,) if column is None else (value, sweep_id))))
+    return query.where(here < there if wanted.descending else here > there)
+
+
+def _has_contact(wanted: SweepFilter) -> ColumnElement[bool]:
+    """True for a sweep one of whose contacts has the name and all the values."""
+    query = select(SweepContact.sweep_id)
+    if wanted.contact is not None:
+        query = query.where(SweepContact.name == wanted.contact)
+    for name, (low, high) in wanted.contact_ranges.items():
+        column = _CONTACT_COLUMNS[name]
+        if low is not None:
+            query = query.where(column >= low)
+        if high is not None:
+            query = query.where(column <= high)
+    return Sweep.id.in_(query)

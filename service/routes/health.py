@@ -1,0 +1,24 @@
+"""``/health``: whether the process lives, and whether it can work."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response
+
+from service.health import Health, check
+from service.http import ServiceDependency
+
+router = APIRouter(prefix="/health", tags=["health"])
+
+
+@router.get("/live")
+async def live() -> dict[str, str]:
+    """The process answers."""
+    return {"status": "live"}
+
+
+@router.get("/ready", responses={503: {"model": Health, "description": "It cannot work now."}})
+def ready(service: ServiceDependency, response: Response) -> Health:
+    """Database, queue and workers are up."""
+    health = check(service)
+    response.status_code = 200 if health.ready else 503
+    return health

@@ -1,0 +1,31 @@
+"""``/v1/scenes``: what sweeps and designs are about."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response
+
+from service.answers import SceneAnswer, SceneDetail, SceneList
+from service.http import JsonBody, ServiceDependency
+
+router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
+
+
+@router.get("")
+def list_scenes(service: ServiceDependency) -> SceneList:
+    """Shipped and stored scenes."""
+    return SceneList(items=[SceneAnswer.of(scene) for scene in service.scenes.all()])
+
+
+@router.get("/{name}")
+def get_scene(name: str, service: ServiceDependency) -> SceneDetail:
+    """A scene with its tables."""
+    return SceneDetail.of(service.scenes.get(name))
+
+
+@router.post("", status_code=201, responses={200: {"description": "The same scene was stored before."}})
+def store_scene(body: JsonBody, service: ServiceDependency, response: Response) -> SceneDetail:
+    """Store a scene under its `name`; a name keeps its meaning for ever."""
+    scene, added = service.scenes.add(body)
+    response.status_code = 201 if added else 200
+    response.headers["Location"] = f"/v1/scenes/{scene.name}"
+    return SceneDetail.of(scene)

@@ -1,0 +1,107 @@
+"""The scenes a service knows: those that come with the package and those stored in its database."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+
+from service.errors import ConflictError, NotFoundError
+from service.kinds.scenes import read_scene
+from service.repository import SceneRepository
+from service.strict_json import digest
+from solver.scene import load_scene, shipped_scenes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KnownScene:
+    """A scene by name.
+
+    Attributes
+    ----------
+    shipped : bool
+        Whether it comes with the package.
+    created : datetime or None
+        When it was stored; None for a shipped one.
+    """
+
+    name: str
+    shipped: bool
+    scene_hash: str
+    body: Mapping[str, object]
+    created: datetime | None = None
+
+
+class SceneStore:
+    """Scenes by name; implements `service.jobs.SceneSource`."""
+
+    def __init__(self, repository: SceneRepository) -> None:
+        self._repository = repository
+
+    def scene_body(self, name: str) -> Mapping[str, object] | None:
+        """Tables and lists of the scene, or None."""
+        try:
+            return self.get(name).body
+        except NotFoundError:
+            return None
+
+    def get(self, name: str) -> KnownScene:
+        """The scene of this name; only names are looked up, never paths.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none.
+        """
+        if name in shipped_scenes():
+            return _shipped(name)
+        row = self._repository.get(name)
+        if row is None:
+            known = ", ".join(shipped_scenes())
+            raise NotFoundError(f"there is no scene {name!r}: shipped are {known}, GET /v1/scenes lists all")
+        return KnownScene(
+            name=name, shipped=False, scene_hash=row.scene_hash, body=row.body, created=row.created
+        )
+
+    def all(self) -> list[KnownScene]:
+        """Shipped scenes, then stored ones, each by name."""
+        stored = [
+            KnownScene(
+                name=row.name, shipped=False, scene_hash=row.scene_hash, body=row.body, created=row.created
+            )
+            for row in self._repository.all()
+        ]
+        return [_shipped(name) for name in shipped_scenes()] + stored
+
+    def add(self, body: Mapping[str, object]) -> tuple[KnownScene, bool]:
+        """Store a scene under its own name; whether it is new.
+
+        Raises
+        ------
+        InvalidRequestError
+            If it is not a scene.
+        ConflictError
+            If another scene has the name: a name means one scene for ever.
+        """
+        scene = read_scene(body)
+        tables = scene.to_dict()
+        scene_hash = digest(tables)
+        if scene.name in shipped_scenes():
+            known, added = _shipped(scene.name), False
+        else:
+            row, added = self._repository.add(scene.name, scene_hash, tables)
+            known = KnownScene(
+                name=row.name, shipped=False, scene_hash=row.scene_hash, body=row.body, created=row.created
+            )
+        if known.scene_hash != scene_hash:
+            kind = "shipped" if known.shipped else "stored"
+            raise ConflictError(
+                f"another scene is {kind} under the name {scene.name!r} and a name keeps its meaning: "
+                "give this one another `name`"
+            )
+        return known, added
+
+
+def _shipped(name: str) -> KnownScene:
+    body = load_scene(name).to_dict()
+    return KnownScene(name=name, shipped=True, scene_hash=digest(body), body=body)

@@ -1,0 +1,164 @@
+"""Every setting of the service, from arguments or from the environment as `STICKSLIP_…`."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+from typing import Self
+
+from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+from sqlalchemy.engine import make_url
+from sqlalchemy.exc import ArgumentError
+
+from service.errors import ConfigurationError
+
+_LOOPBACK_NAMES = ("localhost",)
+
+
+def _cpu_count() -> int:
+    """Number of processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach a server bound to `host`."""
+    if host in _LOOPBACK_NAMES:
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+class Settings(BaseSettings):
+    """The settings of one service; frozen. `STICKSLIP_PORT` in the environment sets `port`, and so on."""
+
+    model_config = SettingsConfigDict(
+        env_prefix="STICKSLIP_", frozen=True, extra="forbid", allow_inf_nan=False
+    )
+
+    database: str = Field(
+        default="sqlite:///./stickslip.db",
+        description="Where jobs and results are kept: sqlite:///relative/path or sqlite:////absolute/path.",
+    )
+    host: str = Field(default="127.0.0.1", description="Address to listen on.")
+    port: int = Field(default=8000, ge=0, le=65535, description="Port to listen on; 0 takes any free one.")
+    allow_remote: bool = Field(
+        default=False,
+        description="Allow a `host` that other machines can reach. There are no keys yet: "
+        "everyone who reaches the port may submit, read and cancel.",
+    )
+    allowed_hosts: tuple[str, ...] | None = Field(
+        default=None,
+        description="Host names answered to (the `Host` header without its port), `*` for all. Unset: "
+        "the names of loopback when bound to loopback, so that a web page elsewhere cannot reach the service "
+        "by a name of its own; all when bound to another address.",
+    )
+
+    workers: int = Field(
+        default_factory=_cpu_count, ge=1, le=256, description="Worker processes; one for each processor."
+    )
+    max_attempts: int = Field(
+        default=3, ge=1, le=100, description="Attempts at a job before it fails because its worker died."
+    )
+    lease_seconds: float = Field(
+        default=60.0,
+        ge=1.0,
+        le=86400.0,
+        description="How long a running job stays its owner's without a sign of life [s].",
+    )
+    grace_seconds: float = Field(
+        default=0.5,
+        ge=0.0,
+        le=60.0,
+        description="Time between asking a worker to stop and killing it [s].",
+    )
+    poll_seconds: float = Field(
+        default=5.0,
+        ge=0.05,
+        le=3600.0,
+        description="Safety poll of the queue [s]; new jobs wake it at once, this finds what was missed.",
+    )
+    progress_seconds: float = Field(
+        default=0.1, ge=0.01, le=60.0, description="Least time between two reports of a job's progress [s]."
+    )
+    job_seconds: float = Field(
+        default=3600.0, ge=0.1, le=1e7, description="Longest time one attempt at a job may take [s]."
+    )
+
+    queue_limit: int = Field(
+        default=1000, ge=1, le=1_000_000, description="Jobs waiting at most; further ones are answered 503."
+    )
+    max_body_bytes: int = Field(
+        default=4 * 1024 * 1024, ge=1024, le=1024**3, description="Largest request body accepted [bytes]."
+    )
+    max_wait_seconds: float = Field(
+        default=60.0, ge=0.0, le=3600.0, description="Longest `Prefer: wait=N` honoured [s]."
+    )
+    page_limit: int = Field(default=1000, ge=1, le=10_000, description="Most rows one page of a list has.")
+    shutdown_seconds: float = Field(
+        default=2.0, ge=0.1, le=60.0, description="Time open requests have to end when the service stops [s]."
+    )
+
+    @property
+    def hosts(self) -> tuple[str, ...]:
+        """Host names answered to, `*` for all."""
+        if self.allowed_hosts is not None:
+            return self.allowed_hosts
+        return ("localhost", "127.0.0.1", "[::1]") if is_loopback(self.host) else ("*",)
+
+    @field_validator("database")
+    @classmethod
+    def _known_database(cls, url: str) -> str:
+        try:
+            parsed = make_url(url)
+        except ArgumentError as error:
+            raise ValueError(
+                f"`database` must be a URL such as sqlite:///./stickslip.db, got {url!r}"
+            ) from error
+        if parsed.get_backend_name() != "sqlite":
+            raise ValueError(f"`database` must be an SQLite URL in this version, got {url!r}")
+        if parsed.drivername not in ("sqlite", "sqlite+pysqlite") or parsed.query:
+            raise ValueError(
+                f"`database` must be a plain sqlite:/// URL without a driver or options, got {url!r}"
+            )
+        if parsed.database in (None, "", ":memory:"):
+            raise ValueError(f"`database` must name a file: one in memory would lose every job, got {url!r}")
+        return url
+
+    @model_validator(mode="after")
+    def _loopback_unless_allowed(self) -> Self:
+        if not self.allow_remote and not is_loopback(self.host):
+            raise ValueError(
+                f"`host` {self.host!r} can be reached from other machines and the service has no keys yet: "
+                "use 127.0.0.1, or set STICKSLIP_ALLOW_REMOTE=true (`allow_remote`) if everyone "
+                "who can reach it may use it"
+            )
+        return self
+
+
+def load_settings(**values: object) -> Settings:
+    """Settings from `values`, then the environment, then the defaults.
+
+    Raises
+    ------
+    ConfigurationError
+        Naming each bad setting, its value and what would be right.
+    """
+    try:
+        return Settings(**values)  # type: ignore[arg-type]
+    except ValidationError as error:
+        raise ConfigurationError("; ".join(_sentence(dict(item)) for item in error.errors())) from error
+
+
+def _sentence(item: dict[str, object]) -> str:
+    """One of pydantic's errors as a sentence that names the setting."""
+    message = str(item["msg"]).removeprefix("Value error, ")
+    location = item["loc"]
+    if not isinstance(location, tuple) or not location or message.startswith("`"):
+        return message
+    name = ".".join(str(part) for part in location)
+    return f"`{name}` (STICKSLIP_{name.upper()}): {message}, got {item.get('input')!r}"

@@ -1,0 +1,102 @@
+"""JSON without its loopholes: no NaN or infinity, no key twice, one canonical form to hash."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+
+from service.errors import InvalidRequestError, MalformedBodyError
+from solver.errors import Issue
+
+
+def pointer(*parts: object) -> str:
+    """RFC 6901 pointer from keys and indices."""
+    return "".join("/" + str(part).replace("~", "~0").replace("/", "~1") for part in parts)
+
+
+def loads(data: bytes) -> object:
+    """Parse a request body.
+
+    Raises
+    ------
+    MalformedBodyError
+        Not UTF-8, not JSON, nested too deeply, or a key given twice.
+    InvalidRequestError
+        A number that is not finite (``NaN``, ``Infinity``, ``1e999``), with its pointer.
+    """
+    try:
+        value: object = json.loads(data.decode("utf-8"), object_pairs_hook=_without_duplicates)
+    except UnicodeDecodeError as error:
+        raise MalformedBodyError(f"the body must be UTF-8, byte {error.start} is not") from error
+    except json.JSONDecodeError as error:
+        raise MalformedBodyError(
+            f"the body is not JSON: {error.msg} in line {error.lineno}, column {error.colno}"
+        ) from error
+    except RecursionError as error:
+        raise MalformedBodyError("the body is nested too deeply") from error
+    except ValueError as error:
+        raise MalformedBodyError(f"the body is not JSON: {error}") from error
+    issues = [
+        Issue(pointer=where, message=f"`{where}` must be a finite number, got {found!r}")
+        for where, found in _not_finite(value)
+    ]
+    if issues:
+        raise InvalidRequestError(issues)
+    return value
+
+
+def _without_duplicates(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    table: dict[str, object] = {}
+    for key, value in pairs:
+        if key in table:
+            raise MalformedBodyError(f"the key {key!r} is given twice in one object")
+        table[key] = value
+    return table
+
+
+def _not_finite(value: object) -> list[tuple[str, float]]:
+    """Pointers of the numbers that are not finite; without recursion, the parser has its own limit."""
+    found: list[tuple[str, float]] = []
+    pending: list[tuple[str, object]] = [("", value)]
+    while pending:
+        where, item = pending.pop()
+        if isinstance(item, dict):
+            pending.extend((where + pointer(key), inner) for key, inner in item.items())
+        elif isinstance(item, list):
+            pending.extend((where + pointer(index), inner) for index, inner in enumerate(item))
+        elif isinstance(item, float) and not math.isfinite(item):
+            found.append((where, item))
+    return sorted(found, key=lambda pair: pair[0])
+
+
+def dumps(value: object) -> str:
+    """Compact JSON for storage and hashing: sorted keys, no NaN."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+
+
+def digest(value: object) -> str:
+    """SHA-256 of the canonical form, in hexadecimal; 1 and 1.0 are the same number."""
+    return hashlib.sha256(dumps(_one_number(value)).encode()).hexdigest()
+
+
+def _one_number(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {str(key): _one_number(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_one_number(inner) for inner in value]
+    if isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    return value
+
+
+def finite(value: object) -> object:
+    """The same value for JSON: a number that is not finite becomes null (it has no value to report)."""
+    if isinstance(value, Mapping):
+        return {str(key): finite(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(inner) for inner in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value

@@ -1,0 +1,70 @@
+"""Who waits for a job, and how they are told: callbacks of threads and of event loops alike."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+log = logging.getLogger("stickslip.queue")
+
+Listener = Callable[["Event"], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """Something happened to a job; `ended` also when it went back to the queue, look at its row."""
+
+    job_id: str
+    ended: bool
+    fraction: float = 0.0
+    points: int = 0
+
+
+class Waiters:
+    """Listeners by job. They are called from the service's threads and must not block."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._listeners: dict[str, list[Listener]] = {}
+
+    @contextmanager
+    def listening(self, job_id: str, listener: Listener) -> Iterator[None]:
+        """Call `listener` for every event of the job inside the block."""
+        with self._lock:
+            self._listeners.setdefault(job_id, []).append(listener)
+        try:
+            yield
+        finally:
+            with self._lock:
+                left = [known for known in self._listeners[job_id] if known is not listener]
+                if left:
+                    self._listeners[job_id] = left
+                else:
+                    del self._listeners[job_id]
+
+    def progress(self, job_id: str, fraction: float, points: int) -> None:
+        """The job got this far."""
+        self._tell(job_id, Event(job_id=job_id, ended=False, fraction=fraction, points=points))
+
+    def ended(self, job_id: str) -> None:
+        """The job's state changed."""
+        self._tell(job_id, Event(job_id=job_id, ended=True))
+
+    def wake_all(self) -> None:
+        """The service stops: nobody should wait any longer."""
+        with self._lock:
+            ids = list(self._listeners)
+        for job_id in ids:
+            self.ended(job_id)
+
+    def _tell(self, job_id: str, event: Event) -> None:
+        with self._lock:
+            listeners = list(self._listeners.get(job_id, ()))
+        for listener in listeners:
+            try:
+                listener(event)
+            except Exception:
+                log.exception("job %s: a listener failed", job_id)

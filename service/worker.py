@@ -1,0 +1,191 @@
+"""A worker process: gets attempts through a pipe, computes, sends progress and results back.
+
+It never opens the database, ignores the terminal's Ctrl-C (the service decides when to stop) and ends
+itself when its parent dies. This module imports nothing heavy: the numerical packages are loaded by
+`main`, after the environment that limits their threads is in place.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import logging
+import multiprocessing as mp
+import os
+import pickle
+import signal
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from types import FrameType
+from typing import Any
+
+from service.jobs import FailureKind, JobFailure, JobOutput, Run
+from solver.errors import SceneError, SettingError, SolverError
+
+THREAD_LIMITS = dict.fromkeys(
+    (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "BLIS_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+        "NUMEXPR_NUM_THREADS",
+        "NUMBA_NUM_THREADS",
+    ),
+    "1",
+)
+
+_PARENT_DIED = 70
+_TERMINATION_SECONDS = 3.0
+
+log = logging.getLogger("stickslip.worker")
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """To a worker: compute this. `token` is larger than that of every task before."""
+
+    token: int
+    job_id: str
+    kind: str
+    spec: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """From a worker: everything is loaded."""
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """From a worker: how far it got."""
+
+    fraction: float
+    points: int
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """From a worker: the output, the failure, or neither if it was told to stop."""
+
+    output: JobOutput | None = None
+    failure: JobFailure | None = None
+    retry: str | None = None
+
+
+class StopFlag:
+    """Shared memory in which the parent writes the token of the task that is to stop.
+
+    A plain number: reading it costs nothing, and a process killed while it looks cannot hold a lock.
+    """
+
+    def __init__(self, number: ctypes.c_longlong) -> None:
+        self._number = number
+
+    def ask(self, token: int) -> None:
+        """Ask the task with this token to stop; later ones are not meant."""
+        self._number.value = token
+
+    def asked(self, token: int) -> bool:
+        """Whether this task is to stop."""
+        return self._number.value == token
+
+
+class _Stop:
+    """`should_stop` of one task; remembers that it answered yes."""
+
+    def __init__(self, flag: StopFlag, token: int) -> None:
+        self._flag = flag
+        self._token = token
+        self.obeyed = False
+
+    def __call__(self) -> bool:
+        if self._flag.asked(self._token):
+            self.obeyed = True
+        return self.obeyed
+
+
+class _Throttle:
+    """`on_progress` of one task; sends at most one report every `interval` seconds."""
+
+    def __init__(self, send: Callable[[Report], None], interval: float) -> None:
+        self._send = send
+        self._interval = interval
+        self._next = 0.0
+
+    def __call__(self, fraction: float, points: int) -> None:
+        now = time.monotonic()
+        if now >= self._next:
+            self._next = now + self._interval
+            self._send(Report(min(max(float(fraction), 0.0), 1.0), int(points)))
+
+
+def main(
+    connection: Connection,
+    number: ctypes.c_longlong,
+    runs: Mapping[str, Run],
+    preload: tuple[str, ...],
+    progress_seconds: float,
+) -> None:
+    """The life of a worker process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _leave_soon)
+    threading.Thread(target=_die_with_parent, name="parent watch", daemon=True).start()
+    for name in preload:
+        importlib.import_module(name)
+    flag = StopFlag(number)
+    connection.send(Ready())
+    while True:
+        try:
+            task = connection.recv()
+        except (EOFError, OSError):
+            return
+        if task is None:
+            return
+        stop = _Stop(flag, task.token)
+        done = _compute(runs, task, _Throttle(connection.send, progress_seconds), stop)
+        try:
+            connection.send(done)
+        except (pickle.PicklingError, TypeError, AttributeError) as error:
+            connection.send(Done(failure=_failure(task, error)))
+
+
+def _leave_soon(_signal: int, _frame: FrameType | None) -> None:
+    """On SIGTERM: leave the service, which got it too, the time to give the job back to its queue."""
+    timer = threading.Timer(_TERMINATION_SECONDS, os._exit, (0,))
+    timer.daemon = True
+    timer.start()
+
+
+def _die_with_parent() -> None:
+    parent = mp.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(_PARENT_DIED)
+
+
+def _compute(runs: Mapping[str, Run], task: Task, progress: _Throttle, stop: _Stop) -> Done:
+    """Run one task; every error becomes an answer, the process lives on."""
+    try:
+        output = runs[task.kind](task.spec, progress, stop)
+    except MemoryError as error:
+        return Done(retry=f"the worker ran out of memory ({error})")
+    except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
+        return Done() if stop.obeyed else Done(failure=_failure(task, error))
+    return Done() if stop.obeyed else Done(output=output)
+
+
+def _failure(task: Task, error: Exception) -> JobFailure:
+    """A deterministic error, as the job keeps it."""
+    if isinstance(error, SceneError):
+        return JobFailure(kind=FailureKind.SCENE, detail=str(error), issues=error.issues)
+    if isinstance(error, SettingError):
+        return JobFailure(kind=FailureKind.SETTING, detail=str(error))
+    if isinstance(error, SolverError):
+        return JobFailure(kind=FailureKind.GOAL, detail=str(error))
+    log.error("job %s (%s) met an unexpected error", task.job_id, task.kind, exc_info=error)
+    detail = f"unexpected {type(error).__name__}: {error}"
+    return JobFailure(kind=FailureKind.INTERNAL, detail=f"{detail}; the service's log has the details")

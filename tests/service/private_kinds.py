@@ -1,0 +1,143 @@
+"""Kinds of job for these tests only: real computations whose length and obedience a test can choose."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from service.arrays import encode
+from service.jobs import (
+    ContactValues,
+    JobKind,
+    JobOutput,
+    JobRequest,
+    Progress,
+    Registry,
+    Resolved,
+    ShouldStop,
+    SweepRecord,
+)
+from solver.errors import Issue, SceneError, SettingError
+
+
+class IterationRequest(JobRequest):
+    """Power iteration on a symmetric matrix."""
+
+    size: int = Field(default=20, strict=True, ge=2, le=500)
+    seed: int = Field(default=0, strict=True, ge=0)
+    seconds: float = Field(default=0.0, strict=True, ge=0.0, le=600.0)
+    pid_file: str | None = None
+    sweeps: int = Field(default=0, strict=True, ge=0, le=10)
+
+
+def as_it_is(request: IterationRequest, _source: object) -> Resolved:
+    spec = request.model_dump(mode="json", exclude={"fresh", "priority"})
+    return Resolved(spec=spec, scene_name="matrix")
+
+
+def power_iteration(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
+    """The largest eigenvalue; goes on for at least `seconds` and looks at `should_stop` in every step."""
+    if spec["pid_file"]:
+        with Path(spec["pid_file"]).open("a") as file:
+            file.write(f"{os.getpid()}\n")
+    generator = np.random.default_rng(spec["seed"])
+    matrix = generator.standard_normal((spec["size"], spec["size"]))
+    matrix = matrix + matrix.T + 10.0 * np.sqrt(spec["size"]) * np.eye(spec["size"])
+    vector = np.ones(spec["size"])
+    start, steps, value = time.monotonic(), 0, 0.0
+    while steps < 500 or time.monotonic() - start < spec["seconds"]:
+        if should_stop():
+            break
+        image = matrix @ vector
+        value = float(vector @ image / (vector @ vector))
+        vector = image / np.linalg.norm(image)
+        steps += 1
+        progress(min(1.0, (time.monotonic() - start) / max(spec["seconds"], 1e-9)), steps)
+    records = tuple(_record(vector, value, steps, index) for index in range(spec["sweeps"]))
+    return JobOutput(result={"eigenvalue": value, "steps": steps}, sweeps=records)
+
+
+def _record(vector: np.ndarray, value: float, steps: int, index: int) -> SweepRecord:
+    return SweepRecord(
+        scene_name="matrix",
+        scene_hash="0" * 64,
+        parameter="frequency",
+        from_value=1.0,
+        to_value=2.0,
+        frequency_hz=None,
+        excitation_amplitude=1.0,
+        harmonics=1,
+        points=vector.size,
+        peak=value + index,
+        peak_at=1.5,
+        limit=None,
+        band_hz=None,
+        newton_iterations=steps,
+        rejected_steps=0,
+        seconds=0.1,
+        completed=True,
+        status="complete",
+        contacts=(ContactValues(name="damper", kt=1.0, mu=0.3, N0=100.0 * index, N1=0.0, N1_phase=0.0),),
+        arrays={"parameter": encode(np.linspace(1.0, 2.0, vector.size)), "amplitude": encode(vector)},
+    )
+
+
+def deaf(spec: Mapping[str, Any], progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    """The same, but it never looks whether it should stop."""
+    return power_iteration(spec, progress, lambda: False)
+
+
+def bad_scene(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    raise SceneError([Issue(pointer="/contacts/0/mu", message="`mu` must be >= 0, got -0.1")])
+
+
+def bad_setting(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    raise SettingError("harmonics", 0, "must be at least 1")
+
+
+def falls_short(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
+    """Computes, and says that it did not get where it should."""
+    done = power_iteration(spec, progress, should_stop)
+    return JobOutput(result=done.result, sweeps=done.sweeps, shortfall="no limit was met: raise `limit`")
+
+
+def broken(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    raise ZeroDivisionError("a mistake in the program")
+
+
+def unsendable(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    return JobOutput(result={"function": lambda: None})
+
+
+def out_of_memory(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    raise MemoryError("this much is not there")
+
+
+def threads(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    """What the environment of a worker says about threads."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+    return JobOutput(result={name: os.environ.get(name) for name in names})
+
+
+_RUNS = {
+    "iteration": power_iteration,
+    "deaf": deaf,
+    "bad-scene": bad_scene,
+    "bad-setting": bad_setting,
+    "falls-short": falls_short,
+    "broken": broken,
+    "unsendable": unsendable,
+    "out-of-memory": out_of_memory,
+    "threads": threads,
+}
+
+PRIVATE = Registry(
+    JobKind(name=name, summary=name, request=IterationRequest, resolve=as_it_is, run=run)
+    for name, run in _RUNS.items()
+)

@@ -1,0 +1,211 @@
+"""Jobs survive the death of workers; what is cancelled stops; nobody writes what is not theirs."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from conftest import MakeSettings, pids, until
+from private_kinds import PRIVATE
+
+from service.embedded import EmbeddedService
+from service.errors import ConflictError, JobFailedError
+from service.models import JobState
+
+
+def gone(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return True
+    return False
+
+
+def test_a_job_runs_and_keeps_its_result(embedded: EmbeddedService) -> None:
+    seen: list[tuple[float, int]] = []
+    job = embedded.submit("iteration", {"seconds": 0.5, "sweeps": 2})
+    done = embedded.wait(job, on_progress=lambda fraction, points: seen.append((fraction, points)))
+    assert done.status is JobState.SUCCESSFUL
+    assert done.attempt == 1
+    assert done.progress == 1.0
+    results = embedded.results(job)
+    assert results.result["eigenvalue"] > 0.0
+    assert [sweep.peak.value for sweep in results.sweeps] == pytest.approx(
+        [results.result["eigenvalue"] + index for index in range(2)]
+    )
+    assert seen == sorted(seen)
+    assert 2 <= len(seen) <= 7, "progress at most ten times a second"
+
+
+def test_a_killed_worker_costs_an_attempt_and_the_job_is_done_once(
+    embedded: EmbeddedService, tmp_path: Path
+) -> None:
+    file = tmp_path / "pids"
+    job = embedded.submit("iteration", {"seconds": 0.6, "sweeps": 1, "pid_file": str(file)})
+    until(lambda: pids(file))
+    os.kill(pids(file)[0], signal.SIGKILL)
+    done = embedded.wait(job, timeout=30.0)
+    assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 2)
+    assert len(pids(file)) == 2
+    assert len(embedded.sweeps(job=job)) == 1
+
+
+def test_a_job_that_loses_every_worker_fails_with_the_reason(
+    embedded: EmbeddedService, tmp_path: Path
+) -> None:
+    file = tmp_path / "pids"
+    job = embedded.submit("iteration", {"seconds": 20.0, "pid_file": str(file)})
+    for attempt in range(3):
+        until(lambda attempt=attempt: len(pids(file)) > attempt)
+        os.kill(pids(file)[attempt], signal.SIGKILL)
+    done = embedded.wait(job, timeout=30.0)
+    assert (done.status, done.attempt) == (JobState.FAILED, 3)
+    assert done.error["type"] == "worker-lost"
+    assert "signal 9 (SIGKILL" in done.error["detail"]
+    assert "attempt 3 of 3" in done.error["detail"]
+    with pytest.raises(JobFailedError, match="SIGKILL"):
+        embedded.results(job)
+    after = embedded.wait(embedded.submit("iteration", {}), timeout=30.0)
+    assert after.status is JobState.SUCCESSFUL, "the next job gets a new worker"
+
+
+@pytest.mark.parametrize(("kind", "killed"), [("iteration", False), ("deaf", True)])
+def test_a_cancelled_job_stops_within_a_second(
+    embedded: EmbeddedService, tmp_path: Path, kind: str, killed: bool
+) -> None:
+    file = tmp_path / "pids"
+    job = embedded.submit(kind, {"seconds": 60.0, "pid_file": str(file)})
+    until(lambda: pids(file))
+    asked = time.monotonic()
+    after = embedded.dismiss(job)
+    seconds = time.monotonic() - asked
+    assert after.status is JobState.DISMISSED
+    assert after.cancel_requested
+    assert seconds < 1.0
+    if killed:
+        assert gone(pids(file)[0])
+    else:
+        assert seconds < 0.3
+        assert not gone(pids(file)[0]), "a worker that obeys is kept warm"
+    with pytest.raises(ConflictError, match="dismissed"):
+        embedded.results(job)
+
+
+def test_a_waiting_job_is_dismissed_at_once_and_an_ended_one_not(embedded: EmbeddedService) -> None:
+    blocker = embedded.submit("iteration", {"seconds": 30.0})
+    waiting = embedded.submit("iteration", {"seed": 1})
+    assert embedded.dismiss(waiting).status is JobState.DISMISSED
+    assert embedded.dismiss(waiting).status is JobState.DISMISSED, "twice is once"
+    assert embedded.dismiss(blocker).status is JobState.DISMISSED
+    done = embedded.submit("iteration", {"seed": 2})
+    embedded.wait(done)
+    with pytest.raises(ConflictError, match="ended before"):
+        embedded.dismiss(done)
+
+
+def test_higher_priority_first_then_in_order(embedded: EmbeddedService) -> None:
+    blocker = embedded.submit("iteration", {"seconds": 0.5})
+    until(lambda: embedded.job(blocker).status is JobState.RUNNING)
+    low = embedded.submit("iteration", {"seed": 1, "priority": -1})
+    first = embedded.submit("iteration", {"seed": 2})
+    second = embedded.submit("iteration", {"seed": 3})
+    high = embedded.submit("iteration", {"seed": 4, "priority": 5})
+    started = {job: embedded.wait(job, timeout=30.0).started for job in (low, first, second, high)}
+    assert sorted(started, key=started.__getitem__) == [high, first, second, low]
+
+
+@pytest.mark.parametrize(
+    ("kind", "error", "words"),
+    [
+        ("bad-scene", "scene", "`mu` must be >= 0"),
+        ("bad-setting", "setting", "`harmonics` must be at least 1"),
+        ("broken", "internal", "ZeroDivisionError"),
+        ("unsendable", "internal", "unexpected"),
+        ("falls-short", "goal-not-reached", "raise `limit`"),
+    ],
+)
+def test_a_deterministic_error_is_not_tried_again(
+    embedded: EmbeddedService, kind: str, error: str, words: str
+) -> None:
+    done = embedded.wait(embedded.submit(kind, {"sweeps": 1}), timeout=30.0)
+    assert (done.status, done.attempt) == (JobState.FAILED, 1)
+    assert done.error["type"] == error
+    assert words in done.error["detail"]
+    if kind == "bad-scene":
+        assert done.error["issues"][0]["pointer"] == "/contacts/0/mu"
+    if kind == "falls-short":
+        kept = embedded.results(done.id)
+        assert kept.status is JobState.FAILED
+        assert kept.result["eigenvalue"] > 0.0
+        assert len(kept.sweeps) == 1
+
+
+def test_memory_that_runs_out_is_tried_again(embedded: EmbeddedService) -> None:
+    done = embedded.wait(embedded.submit("out-of-memory", {}), timeout=30.0)
+    assert (done.status, done.attempt) == (JobState.FAILED, 3)
+    assert "ran out of memory" in done.error["detail"]
+
+
+def test_a_job_that_takes_too_long_fails(make_settings: MakeSettings) -> None:
+    with EmbeddedService(make_settings(job_seconds=0.3), PRIVATE) as service:
+        done = service.wait(service.submit("deaf", {"seconds": 60.0}), timeout=10.0)
+    assert done.status is JobState.FAILED
+    assert done.error["type"] == "time-limit"
+    assert "0.3 s" in done.error["detail"]
+
+
+def test_workers_compute_with_one_thread_and_this_process_keeps_its_own(
+    make_settings: MakeSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    with EmbeddedService(make_settings(), PRIVATE) as service:
+        job = service.submit("threads", {})
+        service.wait(job)
+        assert set(service.results(job).result.values()) == {"1"}
+    assert os.environ["OMP_NUM_THREADS"] == "7"
+    assert "MKL_NUM_THREADS" not in os.environ
+
+
+def test_stopping_gives_running_jobs_back_without_an_attempt(
+    make_settings: MakeSettings, tmp_path: Path
+) -> None:
+    file = tmp_path / "pids"
+    spec = {"seconds": 1.0, "pid_file": str(file)}
+    with EmbeddedService(make_settings(), PRIVATE) as service:
+        jobs = [service.submit(kind, spec) for kind in ("deaf", "iteration")]
+        until(lambda: pids(file))
+        stopping = time.monotonic()
+    assert time.monotonic() - stopping < 3.0
+    assert all(gone(pid) for pid in pids(file))
+    with EmbeddedService(make_settings(), PRIVATE) as service:
+        done = [service.wait(job, timeout=30.0) for job in jobs]
+    assert [(job.status, job.attempt) for job in done] == [(JobState.SUCCESSFUL, 1)] * 2
+
+
+def test_a_worker_killed_while_idle_costs_nothing(embedded: EmbeddedService, tmp_path: Path) -> None:
+    file = tmp_path / "pids"
+    embedded.wait(embedded.submit("iteration", {"pid_file": str(file)}))
+    os.kill(pids(file)[0], signal.SIGKILL)
+    until(lambda: gone(pids(file)[0]))
+    time.sleep(0.05)
+    done = embedded.wait(embedded.submit("iteration", {"seed": 1}), timeout=30.0)
+    assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 1)
+
+
+def test_a_spec_computed_before_is_answered_at_once(embedded: EmbeddedService, tmp_path: Path) -> None:
+    file = tmp_path / "pids"
+    spec = {"pid_file": str(file), "sweeps": 1}
+    first = embedded.submit("iteration", spec)
+    embedded.wait(first)
+    again = embedded.submit("iteration", spec)
+    job = embedded.job(again)
+    assert (job.status, job.result_of) == (JobState.SUCCESSFUL, first)
+    assert embedded.results(again).result == embedded.results(first).result
+    assert [s.id for s in embedded.results(again).sweeps] == [s.id for s in embedded.results(first).sweeps]
+    fresh = embedded.submit("iteration", {**spec, "fresh": True})
+    assert embedded.wait(fresh).result_of is None
+    assert len(pids(file)) == 2
