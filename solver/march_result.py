@@ -63,7 +63,7 @@ class MarchResult:
         Steps of the finer run.
     error_estimate : float
         Estimated error of `max_abs` relative to it: Richardson's from two step sizes, and what the transient
-        has left to decay.
+        has left to decay. It does not see the history a stuck contact remembers (its mean).
     seconds : float
         Time taken [s].
     """

@@ -22,13 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.kernels.compiled import compiled
+from solver.kernels.falls import NONE, first_fall, value_at
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 ORDER = 8  # of the Taylor series; stable on the imaginary axis for h |lambda| < 3.4
-PARTS = 4  # of a step, each looked through for a change of state
-NONE = 2.0  # no root in the step, which is 0..1
 # What a contact does; a slipping one has its direction, +1 or -1.
 STICK, SEPARATED = 0, 2
 # How a run of periods ended.
@@ -87,68 +86,6 @@ class Record(NamedTuple):
 
 
 @compiled
-def _value(q: Real, s: float) -> float:
-    total = 0.0
-    for k in range(q.size - 1, -1, -1):
-        total = total * s + q[k]
-    return total
-
-
-@compiled
-def _slope(q: Real, s: float) -> float:
-    total = 0.0
-    for k in range(q.size - 1, 0, -1):
-        total = total * s + k * q[k]
-    return total
-
-
-@compiled
-def _root(q: Real, slope: bool, a: float, b: float) -> float:
-    """Return where q falls (or q' rises) through 0 in [a, b]: regula falsi (Illinois), halved if slow."""
-    fa = -_slope(q, a) if slope else _value(q, a)
-    fb = -_slope(q, b) if slope else _value(q, b)
-    if fa <= 0.0:
-        return a
-    for i in range(100):
-        width = b - a
-        middle = a + width * fa / (fa - fb) if i % 3 < 2 else 0.5 * (a + b)
-        if width <= 1e-16 or middle <= a or middle >= b:
-            break
-        f = -_slope(q, middle) if slope else _value(q, middle)
-        if f >= 0.0:
-            a, fa = middle, f
-            fb *= 0.5
-        else:
-            b, fb = middle, f
-            fa *= 0.5
-    return b
-
-
-@compiled
-def _first_fall(q: Real) -> float:
-    """Return the first s in [0, 1] where the polynomial q falls below 0, or NONE."""
-    rest = 0.0
-    for k in range(1, q.size):
-        rest += abs(q[k])
-    if q[0] > rest:
-        return NONE
-    if q[0] <= 0.0 and q[1] < 0.0:
-        return 0.0
-    a, slope_a = 0.0, q[1]
-    for part in range(1, PARTS + 1):
-        b = part / PARTS
-        slope_b = _slope(q, b)
-        if _value(q, b) < 0.0:
-            return _root(q, False, a, b)
-        if slope_a < 0.0 < slope_b:
-            lowest = _root(q, True, a, b)
-            if _value(q, lowest) < 0.0:
-                return _root(q, False, a, lowest)
-        a, slope_a = b, slope_b
-    return NONE
-
-
-@compiled
 def _product(start: Whole, column: Whole, value: Real, x: Real, row: int) -> float:
     total = 0.0
     for j in range(start[row], start[row + 1]):
@@ -198,8 +135,9 @@ def _contact_series(system: System, state: State, series: Series, k: int) -> Non
 def _expand(system: System, state: State, tau: float, h: float, series: Series) -> None:
     """Fill the Taylor series of motion and contact forces from `tau` over a step `h`."""
     n = state.x.size
-    series.x[0, :] = state.x
-    series.v[0, :] = state.v
+    for i in range(n):
+        series.x[0, i] = state.x[i]
+        series.v[0, i] = state.v[i]
     _load_series(system, tau, h, series)
     _contact_series(system, state, series, 0)
     scale = 1.0  # h^k / k!
@@ -228,6 +166,32 @@ def _expand(system: System, state: State, tau: float, h: float, series: Series) 
 
 
 @compiled
+def _limit(system: System, series: Series, c: int, direction: int, q: Real) -> None:
+    """Put the distance mu N - direction * f of contact c to its limit into q."""
+    for k in range(q.size):
+        q[k] = system.mu[c] * series.load[k, c] - direction * series.force[k, c]
+
+
+@compiled
+def _drive(system: System, series: Series, h: float, c: int, direction: int, q: Real) -> None:
+    """Put direction * kt u' - mu N' of contact c into q: while positive, it goes on slipping."""
+    first, second = system.first[c], system.second[c]
+    for k in range(q.size - 1):
+        speed = series.v[k, first] if first >= 0 else 0.0
+        speed -= series.v[k, second] if second >= 0 else 0.0
+        rise = (k + 1) * series.load[k + 1, c] / h
+        q[k] = direction * system.kt[c] * speed - system.mu[c] * rise
+    q[q.size - 1] = 0.0
+
+
+@compiled
+def _load(series: Series, c: int, sign: int, q: Real) -> None:
+    """Put the normal load of contact c, or its negative, into q."""
+    for k in range(q.size):
+        q[k] = sign * series.load[k, c]
+
+
+@compiled
 def _next_change(
     system: System, state: State, series: Series, h: float, c: int, q: Real
 ) -> tuple[float, int]:
@@ -237,30 +201,25 @@ def _next_change(
     """
     mode, mu = state.mode[c], system.mu[c]
     margin = 1e-13 * (system.N0[c] + abs(system.N1[c]))
-    load = series.load[:, c]
     when, target = NONE, mode
     if mode == SEPARATED:
-        q[:] = -load
+        _load(series, c, -1, q)
         q[0] += margin
-        return _first_fall(q), STICK
+        return first_fall(q), STICK
     if mode == STICK:
         for direction in (1, -1):
-            q[:] = mu * load - direction * series.force[:, c]
+            _limit(system, series, c, direction, q)
             q[0] += mu * margin
-            s = _first_fall(q)
+            s = first_fall(q)
             if s < when:
                 when, target = s, direction
         return when, target
-    first, second = system.first[c], system.second[c]
-    for k in range(q.size):
-        speed = (series.v[k, first] if first >= 0 else 0.0) - (series.v[k, second] if second >= 0 else 0.0)
-        push = (k + 1) * load[k + 1] / h if k < ORDER else 0.0
-        q[k] = mode * system.kt[c] * speed - mu * push if k < ORDER else 0.0
+    _drive(system, series, h, c, mode, q)
     q[0] += mu * margin
-    when, target = _first_fall(q), STICK
-    q[:] = load
+    when, target = first_fall(q), STICK
+    _load(series, c, 1, q)
     q[0] += margin
-    s = _first_fall(q)
+    s = first_fall(q)
     return (s, SEPARATED) if s < when else (when, target)
 
 
@@ -268,10 +227,10 @@ def _next_change(
 def _advance(system: System, state: State, series: Series, s: float) -> None:
     """Move the state to the place s of the step."""
     for i in range(state.x.size):
-        state.x[i] = _value(series.x[:, i], s)
-        state.v[i] = _value(series.v[:, i], s)
+        state.x[i] = value_at(series.x[:, i], s)
+        state.v[i] = value_at(series.v[:, i], s)
     for c in range(system.kt.size):
-        state.force[c] = _value(series.force[:, c], s)
+        state.force[c] = value_at(series.force[:, c], s)
 
 
 @compiled
@@ -291,14 +250,14 @@ def _change(system: System, state: State, tau: float, c: int, target: int) -> No
 
 @compiled
 def _sample(system: System, series: Series, place: float, index: int, dof: int, record: Record) -> None:
-    record.x[index] = _value(series.x[:, dof], place)
-    record.v[index] = _value(series.v[:, dof], place)
+    record.x[index] = value_at(series.x[:, dof], place)
+    record.v[index] = value_at(series.v[:, dof], place)
     for c in range(system.kt.size):
         first, second = system.first[c], system.second[c]
-        slip = _value(series.x[:, first], place) if first >= 0 else 0.0
-        record.slip[c, index] = slip - (_value(series.x[:, second], place) if second >= 0 else 0.0)
-        record.force[c, index] = _value(series.force[:, c], place)
-        record.load[c, index] = max(_value(series.load[:, c], place), 0.0)
+        slip = value_at(series.x[:, first], place) if first >= 0 else 0.0
+        record.slip[c, index] = slip - (value_at(series.x[:, second], place) if second >= 0 else 0.0)
+        record.force[c, index] = value_at(series.force[:, c], place)
+        record.load[c, index] = max(value_at(series.load[:, c], place), 0.0)
 
 
 @compiled
@@ -345,6 +304,14 @@ def _largest_change(now: Real, before: Real, scale: float) -> float:
 
 
 @compiled
+def _finite(state: State) -> bool:
+    total = 0.0
+    for i in range(state.x.size):
+        total += state.x[i] + state.v[i]
+    return math.isfinite(total)
+
+
+@compiled
 def run_periods(
     system: System, state: State, steps: int, tolerance: float, dof: int, record: Record, change: Real
 ) -> tuple[int, int]:
@@ -357,8 +324,8 @@ def run_periods(
     steps : int
         Steps per period.
     tolerance : float
-        Largest change of the state over a period, each of displacements, velocities and contact forces
-        relative to its largest in the period.
+        Largest change of the state over a period: displacements and contact forces relative to their
+        largest in the period, velocities (by tau) to the larger of theirs and the displacements'.
     dof : int
         The DOF to record.
     record : Record
@@ -389,9 +356,11 @@ def run_periods(
                 top_force = max(top_force, abs(state.force[c]))
         change[period] = max(
             _largest_change(state.x, x, top_x),
-            max(_largest_change(state.v, v, top_v), _largest_change(state.force, force, top_force)),
+            max(
+                _largest_change(state.v, v, max(top_x, top_v)), _largest_change(state.force, force, top_force)
+            ),
         )
-        if not math.isfinite(top_x + top_v):
+        if not _finite(state):
             return NOT_FINITE, period + 1
         if change[period] < tolerance:
             return SETTLED, period + 1
