@@ -12,6 +12,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.routing import Match
 
 from service import errors
 from service.validation import issues_of
@@ -120,13 +121,27 @@ async def _http_error(request: Request, error: Exception) -> JSONResponse:
         return _unexpected(request, error)
     title = HTTPStatus(error.status_code).phrase
     detail = str(error.detail)
+    headers = dict(error.headers or {})
     if error.status_code == HTTPStatus.NOT_FOUND:
         detail = f"there is nothing at {request.url.path}"
     elif error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
-        allowed = (error.headers or {}).get("Allow", "other methods")
-        detail = f"{request.method} is not possible at {request.url.path}, use {allowed}"
+        headers["Allow"] = ", ".join(_allowed(request))
+        detail = f"{request.method} is not possible at {request.url.path}, use {headers['Allow']}"
     slug = title.lower().replace(" ", "-").replace("'", "")
-    return problem(request, error.status_code, slug, title, detail, headers=error.headers)
+    return problem(request, error.status_code, slug, title, detail, headers=headers)
+
+
+def _allowed(request: Request) -> list[str]:
+    """The methods of every route at the path of a request; Starlette names those of the first one only."""
+    methods = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
+    return [
+        method
+        for method in methods
+        if any(
+            route.matches({**request.scope, "method": method})[0] is Match.FULL
+            for route in request.app.routes
+        )
+    ]
 
 
 async def _unexpected_error(request: Request, error: Exception) -> JSONResponse:

@@ -9,16 +9,20 @@ from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Engine, inspect
+from sqlalchemy.exc import DBAPIError
 
-import migrations
 from service.db import database_path, migration_engine
 from service.errors import DatabaseError, WrongRevisionError
 from service.lock import FileLock
 
+# Beside this package, in the source tree and once installed; found by place, since another
+# package of this common name may come first on the path.
+_MIGRATIONS = Path(__file__).resolve().parent.parent / "migrations"
+
 
 def _config() -> Config:
     config = Config()
-    config.set_main_option("script_location", str(Path(migrations.__file__).parent).replace("%", "%%"))
+    config.set_main_option("script_location", str(_MIGRATIONS).replace("%", "%%"))
     config.set_main_option("path_separator", "os")
     return config
 
@@ -33,9 +37,12 @@ def head_revision() -> str:
 
 def _current(engine: Engine) -> tuple[str | None, bool]:
     """The revision of a database, and whether it has no tables at all."""
-    with engine.begin() as connection:
-        revision = MigrationContext.configure(connection).get_current_revision()
-        return revision, not inspect(connection).get_table_names()
+    try:
+        with engine.begin() as connection:
+            revision = MigrationContext.configure(connection).get_current_revision()
+            return revision, not inspect(connection).get_table_names()
+    except DBAPIError as error:
+        raise DatabaseError(f"{engine.url.database} cannot be used: {error.orig}") from error
 
 
 def _migrate(engine: Engine, target: str) -> None:

@@ -17,11 +17,12 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from types import FrameType
-from typing import Any
+from typing import Any, cast
 
+from service import strict_json
 from service.jobs import FailureKind, JobFailure, JobOutput, Run
 from solver.errors import SceneError, SettingError, SolverError
 
@@ -170,12 +171,19 @@ def _die_with_parent() -> None:
 def _compute(runs: Mapping[str, Run], task: Task, progress: _Throttle, stop: _Stop) -> Done:
     """Run one task; every error becomes an answer, the process lives on."""
     try:
-        output = runs[task.kind](task.spec, progress, stop)
+        output = _checked(runs[task.kind](task.spec, progress, stop))
     except MemoryError as error:
         return Done(retry=f"the worker ran out of memory ({error})")
     except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
         return Done() if stop.obeyed else Done(failure=_failure(task, error))
     return Done() if stop.obeyed else Done(output=output)
+
+
+def _checked(output: JobOutput) -> JobOutput:
+    """The output with its result as JSON: null where a number is not finite, TypeError if it cannot be."""
+    result = strict_json.finite(output.result)
+    strict_json.dumps(result)
+    return replace(output, result=cast(dict[str, Any], result))
 
 
 def _failure(task: Task, error: Exception) -> JobFailure:

@@ -111,8 +111,16 @@ def broken(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldSt
     raise ZeroDivisionError("a mistake in the program")
 
 
+def not_json(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    return JobOutput(result={"number": np.int64(1)})
+
+
+def not_finite(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    return JobOutput(result={"mean": float("nan"), "list": [float("inf"), np.float64(1.0)]})
+
+
 def unsendable(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
-    return JobOutput(result={"function": lambda: None})
+    return JobOutput(result={}, sweeps=(lambda: None,))
 
 
 def out_of_memory(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
@@ -132,6 +140,8 @@ _RUNS = {
     "bad-setting": bad_setting,
     "falls-short": falls_short,
     "broken": broken,
+    "not-json": not_json,
+    "not-finite": not_finite,
     "unsendable": unsendable,
     "out-of-memory": out_of_memory,
     "threads": threads,

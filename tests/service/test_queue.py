@@ -124,6 +124,7 @@ def test_higher_priority_first_then_in_order(embedded: EmbeddedService) -> None:
         ("bad-setting", "setting", "`harmonics` must be at least 1"),
         ("broken", "internal", "ZeroDivisionError"),
         ("unsendable", "internal", "unexpected"),
+        ("not-json", "internal", "int64 is not JSON serializable"),
         ("falls-short", "goal-not-reached", "raise `limit`"),
     ],
 )
@@ -141,6 +142,12 @@ def test_a_deterministic_error_is_not_tried_again(
         assert kept.status is JobState.FAILED
         assert kept.result["eigenvalue"] > 0.0
         assert len(kept.sweeps) == 1
+
+
+def test_numbers_that_are_not_finite_are_null(embedded: EmbeddedService) -> None:
+    job = embedded.submit("not-finite", {})
+    embedded.wait(job, timeout=30.0)
+    assert embedded.results(job).result == {"mean": None, "list": [None, 1.0]}
 
 
 def test_memory_that_runs_out_is_tried_again(embedded: EmbeddedService) -> None:

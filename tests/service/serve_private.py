@@ -1,0 +1,17 @@
+"""A service with the private kinds as a process of its own: ``serve_private.py URL [port | work]``."""
+
+from __future__ import annotations
+
+import sys
+
+from private_kinds import PRIVATE
+
+from service.server import serve, work
+from service.settings import load_settings
+
+if __name__ == "__main__":
+    url, what = sys.argv[1:]
+    if what == "work":
+        work(load_settings(database=url, workers=1), PRIVATE, until_empty=True)
+    else:
+        serve(load_settings(database=url, workers=2, port=int(what)), PRIVATE)

@@ -1,0 +1,311 @@
+"""The file: its transactions, its lock, its revisions."""
+
+from __future__ import annotations
+
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.runtime.migration import MigrationContext
+from conftest import MakeSettings
+from private_kinds import PRIVATE
+from sqlalchemy import insert, select, text
+from sqlalchemy.exc import OperationalError, StatementError
+
+from service import revisions
+from service.arrays import decode, encode
+from service.core import Service
+from service.db import Database, backup, migration_engine, sqlite_note, write_engine
+from service.embedded import EmbeddedService
+from service.errors import DatabaseError, DatabaseInUseError, WrongRevisionError
+from service.ids import new_id
+from service.jobs import FailureKind, JobFailure, JobOutput, StoredArray
+from service.models import Base, Job, JobState
+from service.repository import Attempt, JobRepository, NewJob
+from service.repository.jobs import utc_now
+
+
+@pytest.fixture
+def url(tmp_path: Path) -> str:
+    return f"sqlite:///{tmp_path}/jobs.db"
+
+
+@pytest.fixture
+def database(url: str) -> Database:
+    revisions.upgrade(url)
+    database = Database(url)
+    yield database
+    database.close()
+
+
+def new_job(**values: object) -> NewJob:
+    defaults = {
+        "kind": "iteration",
+        "request": {},
+        "spec": {},
+        "spec_hash": "0" * 64,
+        "request_hash": "0" * 64,
+        "max_attempts": 3,
+        "fresh": True,
+    }
+    return NewJob(**{**defaults, **values})
+
+
+def claimed(jobs: JobRepository, owner: str = "one") -> Attempt:
+    jobs.submit(new_job(), queue_limit=10)
+    attempt = jobs.claim(owner, utc_now())
+    assert attempt is not None
+    return attempt
+
+
+def test_read_modify_writes_of_four_processes_lose_nothing(url: str) -> None:
+    engine = write_engine(url)
+    with engine.begin() as connection:
+        connection.execute(text("CREATE TABLE counter (number INTEGER NOT NULL)"))
+        connection.execute(text("INSERT INTO counter VALUES (0)"))
+    script = Path(__file__).with_name("counting.py")
+    running = [subprocess.Popen([sys.executable, str(script), url, "300"]) for _ in range(4)]
+    assert [process.wait(60) for process in running] == [0, 0, 0, 0]
+    with engine.begin() as connection:
+        assert connection.execute(text("SELECT number FROM counter")).scalar_one() == 1200
+    engine.dispose()
+
+
+def test_connections_are_set_up_and_readers_cannot_write(database: Database) -> None:
+    with database.writing() as connection:
+        pragmas = {
+            name: connection.exec_driver_sql(f"PRAGMA {name}").scalar_one()
+            for name in ("journal_mode", "synchronous", "foreign_keys", "busy_timeout")
+        }
+    assert pragmas == {"journal_mode": "wal", "synchronous": 2, "foreign_keys": 1, "busy_timeout": 30_000}
+    with pytest.raises(OperationalError, match="readonly"), database.reading() as connection:
+        connection.execute(text("DELETE FROM job"))
+
+
+def test_a_reader_sees_one_snapshot(database: Database) -> None:
+    jobs = JobRepository(database)
+    with database.reading() as connection:
+        before = connection.execute(select(Job.id)).all()
+        jobs.submit(new_job(), queue_limit=10)
+        assert connection.execute(select(Job.id)).all() == before == []
+    assert len(jobs.page()) == 1
+
+
+def test_a_failed_transaction_writes_nothing(database: Database) -> None:
+    jobs = JobRepository(database)
+    attempt = claimed(jobs)
+    with pytest.raises(StatementError, match="not JSON serializable"):
+        jobs.succeed(attempt, JobOutput(result={"not JSON": object()}))
+    row = jobs.get(attempt.job_id)
+    assert row is not None
+    assert row.state is JobState.RUNNING
+    assert jobs.succeed(attempt, JobOutput(result={})), "the attempt still owns the job"
+
+
+@pytest.mark.parametrize("state", JobState)
+def test_every_state_can_be_stored(database: Database, state: JobState) -> None:
+    with database.writing() as connection:
+        connection.execute(
+            insert(Job).values(
+                id=new_id(),
+                kind="iteration",
+                state=state,
+                spec_hash="",
+                request_hash="",
+                max_attempts=1,
+                created=utc_now(),
+                request={},
+                spec={},
+                lease_owner="me" if state is JobState.RUNNING else None,
+            )
+        )
+    assert JobRepository(database).count()[state] == 1
+
+
+@pytest.mark.parametrize("kind", FailureKind)
+def test_every_failure_can_be_stored(database: Database, kind: FailureKind) -> None:
+    jobs = JobRepository(database)
+    attempt = claimed(jobs)
+    assert jobs.fail(attempt, JobFailure(kind=kind, detail="why"))
+    row = jobs.get(attempt.job_id)
+    assert row is not None
+    assert row.error == {"type": kind.value, "detail": "why"}
+
+
+@pytest.mark.parametrize("way", ["succeed", "fail", "release", "dismiss", "report", "renew", "lose"])
+def test_who_lost_the_lease_writes_nothing(database: Database, way: str) -> None:
+    jobs = JobRepository(database)
+    lost = claimed(jobs)
+    assert jobs.recover_expired().accepted == 1
+    holder = jobs.claim("two", utc_now())
+    assert holder is not None
+    assert (holder.job_id, holder.attempt) == (lost.job_id, 2)
+    before = jobs.get(lost.job_id)
+    written = {
+        "succeed": lambda: jobs.succeed(lost, JobOutput(result={"wrong": True})),
+        "fail": lambda: jobs.fail(lost, JobFailure(kind=FailureKind.GOAL, detail="wrong")),
+        "release": lambda: jobs.release(lost),
+        "dismiss": lambda: jobs.dismiss(lost),
+        "report": lambda: jobs.report(lost, 0.5, 10, utc_now()),
+        "renew": lambda: jobs.renew([lost], utc_now()) != [lost],
+        "lose": lambda: jobs.lose(lost, "wrong").total > 0,
+    }[way]()
+    assert not written
+    assert jobs.get(lost.job_id) == before
+    assert jobs.result(lost.job_id) is None
+    assert jobs.succeed(holder, JobOutput(result={"right": True}))
+    assert jobs.result(lost.job_id) == {"right": True}
+
+
+def test_a_cancel_that_was_asked_for_wins_over_a_result(database: Database) -> None:
+    jobs = JobRepository(database)
+    attempt = claimed(jobs)
+    jobs.cancel(attempt.job_id)
+    assert not jobs.succeed(attempt, JobOutput(result={}))
+    assert jobs.dismiss(attempt)
+
+
+def test_what_a_dead_owner_left(database: Database) -> None:
+    jobs = JobRepository(database)
+    attempts = [claimed(jobs, "dead") for _ in range(2)]
+    jobs.cancel(attempts[0].job_id)
+    mine = claimed(jobs, "me")
+    recovered = jobs.recover_others("me")
+    assert (recovered.accepted, recovered.failed, recovered.dismissed) == (1, 0, 1)
+    row = jobs.get(mine.job_id)
+    assert row is not None
+    assert row.state is JobState.RUNNING
+    for _ in range(2):
+        assert jobs.claim("dead", utc_now()) is not None
+        recovered = jobs.recover_others("me")
+    assert recovered.failed == 1
+    row = jobs.get(attempts[1].job_id)
+    assert row is not None
+    assert row.error is not None
+    assert "the service ended while the job ran, in attempt 3 of 3" in row.error["detail"]
+
+
+def test_a_second_service_is_refused(make_settings: MakeSettings) -> None:
+    settings = make_settings()
+    with EmbeddedService(settings, PRIVATE) as service:
+        with pytest.raises(DatabaseInUseError, match=r"in use by another stickslip service \(process \d+\)"):
+            Service(settings, PRIVATE).start()
+        code = (
+            "from service.core import Service; from service.settings import load_settings; "
+            f"Service(load_settings(database={settings.database!r})).open()"
+        )
+        other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+        assert other.returncode == 1
+        assert "DatabaseInUseError" in other.stderr
+        with pytest.raises(DatabaseInUseError):
+            revisions.upgrade(settings.database)
+        done = service.wait(service.submit("iteration", {}), timeout=30.0)
+        assert done.status is JobState.SUCCESSFUL
+    with EmbeddedService(settings, PRIVATE) as service:
+        assert service.job(done.id).status is JobState.SUCCESSFUL
+
+
+def test_the_first_revision_upgraded_is_the_models(url: str) -> None:
+    revisions.upgrade(url, "0001")
+    revisions.upgrade(url)
+    engine = migration_engine(url)
+    with engine.begin() as connection:
+        context = MigrationContext.configure(connection, opts={"compare_type": True})
+        assert compare_metadata(context, Base.metadata) == []
+        named = {
+            row[0]: row[1]
+            for row in connection.execute(text("SELECT name, sql FROM sqlite_master WHERE type = 'table'"))
+        }
+    engine.dispose()
+    assert "CONSTRAINT ck_job_state CHECK" in named["job"]
+    assert set(named) == {*Base.metadata.tables, "alembic_version"}
+
+
+def test_an_old_file_keeps_its_rows(url: str) -> None:
+    revisions.upgrade(url, "0001")
+    path = url.removeprefix("sqlite:///")
+    connection = sqlite3.connect(path)
+    connection.execute(
+        "INSERT INTO job (id, kind, state, priority, spec_hash, request_hash, attempt, max_attempts, "
+        "cancel_requested, progress, points, created, request, spec) VALUES "
+        "('a', 'iteration', 'accepted', 0, '', '', 0, 3, 0, 0.0, 0, '2026-01-02 03:04:05.000000', '{}', '{}')"
+    )
+    connection.commit()
+    connection.close()
+    assert revisions.upgrade(url) == revisions.head_revision()
+    database = Database(url)
+    row = JobRepository(database).get("a")
+    database.close()
+    assert row is not None
+    assert row.created.isoformat() == "2026-01-02T03:04:05+00:00"
+
+
+def test_a_wrong_revision_is_refused_with_the_command(url: str) -> None:
+    revisions.upgrade(url)
+    engine = write_engine(url)
+    for revision, words in (("0000", "written by a newer"), (None, "another program")):
+        with engine.begin() as connection:
+            connection.execute(text("DELETE FROM alembic_version"))
+            if revision is not None:
+                connection.execute(text("INSERT INTO alembic_version VALUES (:r)"), {"r": revision})
+        with pytest.raises(DatabaseError, match=words):
+            revisions.prepare(url)
+        with pytest.raises(DatabaseError, match=words):
+            revisions.upgrade(url)
+    engine.dispose()
+
+
+def test_an_older_revision_is_refused_with_the_command(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    revisions.upgrade(url)
+    monkeypatch.setattr(revisions, "head_revision", lambda: "0002")
+    with pytest.raises(WrongRevisionError, match="run `stickslip db upgrade --database sqlite:///"):
+        revisions.prepare(url)
+
+
+def test_a_file_that_cannot_be_used(tmp_path: Path, make_settings: MakeSettings) -> None:
+    with pytest.raises(DatabaseError, match="cannot use"):
+        Service(make_settings(database=f"sqlite:///{tmp_path}/missing/jobs.db"), PRIVATE).open()
+    with pytest.raises(DatabaseError, match="no folder"):
+        revisions.upgrade(f"sqlite:///{tmp_path}/missing/jobs.db")
+    (tmp_path / "text.db").write_text("this is no database " * 100)
+    with pytest.raises(DatabaseError, match="not a database"):
+        Service(make_settings(database=f"sqlite:///{tmp_path}/text.db"), PRIVATE).open()
+
+
+def test_a_backup_is_a_database(url: str, database: Database, tmp_path: Path) -> None:
+    claimed(JobRepository(database))
+    backup(url, tmp_path / "copy.db")
+    copy = Database(f"sqlite:///{tmp_path}/copy.db")
+    assert len(JobRepository(copy).page()) == 1
+    copy.close()
+    with pytest.raises(DatabaseError, match="does not overwrite"):
+        backup(url, tmp_path / "copy.db")
+    with pytest.raises(DatabaseError, match="no database"):
+        backup(f"sqlite:///{tmp_path}/none.db", tmp_path / "other.db")
+
+
+def test_arrays_are_numbers_with_a_checksum() -> None:
+    array = np.arange(6.0).reshape(2, 3)
+    stored = encode(array)
+    np.testing.assert_array_equal(decode(stored), array)
+    with pytest.raises(DatabaseError, match="checksum"):
+        decode(StoredArray(sha256=stored.sha256, data=stored.data[:-1] + b"x"))
+    with pytest.raises(ValueError, match="Object arrays"):
+        encode(np.array([object()]))
+
+
+def test_ids_sort_by_the_order_they_were_made() -> None:
+    ids = [new_id() for _ in range(5000)]
+    assert ids == sorted(set(ids))
+    assert {(value[14], value[19] in "89ab") for value in ids} == {("7", True)}
+
+
+def test_the_bug_of_old_sqlite_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sqlite3, "sqlite_version_info", (3, 51, 3))
+    assert sqlite_note() is None
+    monkeypatch.setattr(sqlite3, "sqlite_version_info", (3, 51, 2))
+    assert "3.51.3" in str(sqlite_note())

@@ -1,0 +1,131 @@
+"""Nothing that was accepted is lost, however the service ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from conftest import pids, until
+
+from service.client import Client
+from service.errors import ServiceProblem
+from service.models import JobState
+
+SCRIPT = Path(__file__).with_name("serve_private.py")
+
+
+@pytest.fixture
+def port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture
+def client(port: int) -> Iterator[Client]:
+    with Client(f"http://127.0.0.1:{port}") as client:
+        yield client
+
+
+Start = Callable[[object], "subprocess.Popen[bytes]"]
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Start]:
+    """Starts services on one database; what they log is shown if the test fails."""
+    started: list[subprocess.Popen[bytes]] = []
+    log = tmp_path / "log"
+
+    def begin(what: object) -> subprocess.Popen[bytes]:
+        with log.open("ab") as stderr:
+            command = [sys.executable, str(SCRIPT), f"sqlite:///{tmp_path}/jobs.db", str(what)]
+            started.append(subprocess.Popen(command, stderr=stderr))
+        return started[-1]
+
+    yield begin
+    for process in started:
+        process.kill()
+        process.wait()
+    sys.stderr.write(log.read_text())
+
+
+def answers(client: Client) -> bool:
+    try:
+        list(client.sweeps(limit=1))
+    except ServiceProblem:
+        return False
+    return True
+
+
+def alive(pid: int) -> bool:
+    """Whether the process runs; one that ended and was not collected yet does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def test_a_service_killed_loses_nothing_and_leaves_no_worker(
+    tmp_path: Path, port: int, client: Client, start: Start
+) -> None:
+    file = tmp_path / "pids"
+    process = start(port)
+    until(lambda: answers(client))
+    specs = [{"kind": "iteration", "seconds": 1.0, "seed": n, "pid_file": str(file)} for n in range(4)]
+    jobs = [client.submit(spec).id for spec in specs]
+    until(lambda: len(pids(file)) == 2)
+    process.kill()
+    process.wait()
+    until(lambda: not any(alive(pid) for pid in pids(file)), seconds=2.0)
+
+    process = start(port)
+    until(lambda: answers(client))
+    done = [client.wait(job, timeout=30.0) for job in jobs]
+    assert [job.status for job in done] == [JobState.SUCCESSFUL] * 4
+    assert sorted(job.attempt for job in done) == [1, 1, 2, 2]
+
+    running = client.submit({"kind": "deaf", "seconds": 60.0, "pid_file": str(file)}).id
+    until(lambda: len(pids(file)) == 7)
+    asked = time.monotonic()
+    process.terminate()
+    assert process.wait(10.0) == 0
+    assert time.monotonic() - asked < 3.0
+    assert not any(alive(pid) for pid in pids(file))
+
+    process = start(port)
+    until(lambda: answers(client))
+    until(lambda: client.job(running).status is JobState.RUNNING)
+    assert client.job(running).attempt == 1, "an orderly stop costs no attempt"
+    assert client.dismiss(running).status is JobState.DISMISSED
+    process.send_signal(signal.SIGINT)
+    assert process.wait(10.0) == 0
+
+
+def test_workers_that_get_the_same_sigterm_as_their_service_cost_no_attempt(
+    tmp_path: Path, port: int, client: Client, start: Start
+) -> None:
+    """As when an init system ends everything in a service's control group at once."""
+    file = tmp_path / "pids"
+    process = start(port)
+    until(lambda: answers(client))
+    job = client.submit({"kind": "iteration", "seconds": 2.0, "pid_file": str(file)}).id
+    until(lambda: pids(file))
+    for pid in (*pids(file), process.pid):
+        os.kill(pid, signal.SIGTERM)
+    assert process.wait(10.0) == 0
+
+    worked = start("work")
+    assert worked.wait(30.0) == 0, "until nothing waits"
+    process = start(port)
+    until(lambda: answers(client))
+    done = client.job(job)
+    process.terminate()
+    process.wait(10.0)
+    assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 1)
