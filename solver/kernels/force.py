@@ -43,6 +43,7 @@ from solver.kernels.events import (
     largest,
     march,
 )
+from solver.kernels.linear import fill, fill_block
 from solver.kernels.trigpoly import at_point, bracketed_root, on_grid, unpack
 
 
@@ -60,17 +61,16 @@ def _contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, 
     """
     n = value.size
     delta = 2.0 * math.pi / n
+    low = 0.0
     negative = -1
     for j in range(n):
         if value[j] < 0.0:
             negative = j
             break
-    low = 0.0
     if negative < 0:
-        below, place = largest(-c, -s, degree, -value, -slope)
-        if below <= 0.0:
+        above, low = _smallest(c, s, degree, value, slope)
+        if above >= 0.0:
             return -1
-        low = place
     else:
         low = negative * delta
     count = 0
@@ -102,6 +102,20 @@ def _contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, 
         at = hi
         j += 1
     return count
+
+
+@compiled
+def _smallest(c: Real, s: Real, degree: int, value: Real, slope: Real) -> tuple[float, float]:
+    """Return the minimum of a polynomial over the period and its place, from its values on the grid."""
+    n = value.size
+    minus_c, minus_s = np.empty(degree + 1), np.empty(degree + 1)
+    minus_value, minus_slope = np.empty(n), np.empty(n)
+    for k in range(degree + 1):
+        minus_c[k], minus_s[k] = -c[k], -s[k]
+    for j in range(n):
+        minus_value[j], minus_slope[j] = -value[j], -slope[j]
+    high, place = largest(minus_c, minus_s, degree, minus_value, minus_slope)
+    return -high, place
 
 
 @compiled
@@ -298,14 +312,18 @@ def contact_force(
     """
     state, count = find_segments(U, ks, N, load_ks, kt, mu, cos_table, sin_table, segments)
     n = coefficient_count(ks)
-    dF_dkt[:] = 0.0
     if state == SEPARATED or state == FAILED:
-        fill = 0.0 if state == SEPARATED else np.nan
-        F[:], dF_dkt[:], dF_dmu[:] = fill, fill, fill
-        dF_dU[:, :], dF_dN[:, :] = fill, fill
+        value = 0.0 if state == SEPARATED else np.nan
+        fill(F, value)
+        fill(dF_dkt, value)
+        fill(dF_dmu, value)
+        fill_block(dF_dU, value)
+        fill_block(dF_dN, value)
         return state, count
     if state == STUCK and segments[0, BEGAN] == UNLOADED:
-        dF_dU[:, :], dF_dN[:, :], dF_dmu[:] = 0.0, 0.0, 0.0
+        fill_block(dF_dU, 0.0)
+        fill_block(dF_dN, 0.0)
+        fill(dF_dmu, 0.0)
         for i in range(n):
             dF_dU[i, i], dF_dkt[i], F[i] = kt, U[i], kt * U[i]
         return state, count
@@ -333,38 +351,48 @@ def contact_force(
             dF_dN[i, j] *= mu
         for j in range(n):
             dF_dU[i, j] *= kt
-    _add_onsets(segments[:count], U, ks, N, load_ks, kt, mu, dF_dU, dF_dkt, dF_dmu, dF_dN)
+    _add_onsets(segments, count, U, ks, N, load_ks, kt, mu, dF_dU, dF_dkt, dF_dmu, dF_dN)
     for i in range(n):
         F[i] = kt * dF_dkt[i] + mu * dF_dmu[i]
     return state, count
 
 
 @compiled
+def _dot(a: Real, b: Real) -> float:
+    """Return a · b."""
+    total = 0.0
+    for i in range(a.size):
+        total += a[i] * b[i]
+    return total
+
+
+@compiled
 def _add_onsets(
-    segments: Real, U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float,
+    segments: Real, count: int, U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float,
     dF_dU: Real, dF_dkt: Real, dF_dmu: Real, dF_dN: Real,
 ) -> None:  # fmt: skip
     """Add the rank-one terms of every stick segment: its offset, fixed at its onset."""
     n, m = U.size, N.size
     cosines, sines = np.empty(ks[-1] + 1), np.empty(ks[-1] + 1)
     moment, e_u, e_n, de_u, de_n = np.empty(n), np.empty(n), np.empty(m), np.empty(n), np.empty(m)
-    for index in range(segments.shape[0]):
+    for index in range(count):
         row = segments[index]
         if row[MOTION] == SLIP or row[BEGAN] == UNLOADED:
             continue
-        cosines[:], sines[:] = 0.0, 0.0
+        fill(cosines, 0.0)
+        fill(sines, 0.0)
         add_moments(row[BEGIN], row[END], 1.0, cosines, sines)
         _moment_rows(cosines, sines, ks, moment)
         tau = row[ONSET]
         _basis_at(tau, ks, e_u)
         _basis_at(tau, load_ks, e_n)
-        u_onset, load_onset = np.dot(e_u, U), np.dot(e_n, N)
+        u_onset, load_onset = _dot(e_u, U), _dot(e_n, N)
         slipped = row[BEGAN] == AFTER_SLIP
         rate = 0.0
         if not slipped:
             _basis_slope(tau, ks, de_u)
             _basis_slope(tau, load_ks, de_n)
-            rate = kt * np.dot(de_u, U) / np.dot(de_n, N)
+            rate = kt * _dot(de_u, U) / _dot(de_n, N)
         for i in range(n):
             here = moment[i]
             dF_dkt[i] -= u_onset * here

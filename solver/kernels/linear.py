@@ -1,4 +1,6 @@
-"""Dense linear solves inside compiled loops, with the sign of the determinant.
+"""Dense linear algebra inside compiled loops: vectors, solves with the sign of the determinant, inverses.
+
+Written as plain loops: an array expression costs Numba a tenth of a second of compilation each time it is used.
 
 Small systems use a loop of our own (a call to LAPACK costs more than the factorisation), larger ones LAPACK's
 ``dgesv`` through the entry Numba itself links, which stays cacheable on disk.
@@ -6,11 +8,13 @@ Small systems use a loop of our own (a call to LAPACK costs more than the factor
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import types
 from numba.core.types import ExternalFunction
 
-from solver.fourier import Real
+from solver.fourier import Complex, Real
 from solver.kernels.compiled import compiled
 
 OWN_UP_TO = 36  # measured crossing of our loop and LAPACK
@@ -23,6 +27,88 @@ _gesv = ExternalFunction(
     ),
 )  # fmt: skip
 _DOUBLE = np.int8(ord("d"))
+
+
+@compiled
+def copy_to(target: Real, source: Real) -> None:
+    """Copy a vector."""
+    for i in range(target.size):
+        target[i] = source[i]
+
+
+@compiled
+def set_to(target: Real, source: Real, factor: float, direction: Real) -> None:
+    """Set target = source + factor · direction."""
+    for i in range(target.size):
+        target[i] = source[i] + factor * direction[i]
+
+
+@compiled
+def copy_block(target: Real, source: Real) -> None:
+    """Copy a matrix into the upper left block of another."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[i, j] = source[i, j]
+
+
+@compiled
+def fill(target: Real, value: float) -> None:
+    """Set every entry of a vector."""
+    for i in range(target.size):
+        target[i] = value
+
+
+@compiled
+def fill_block(target: Real, value: float) -> None:
+    """Set every entry of a matrix."""
+    for i in range(target.shape[0]):
+        for j in range(target.shape[1]):
+            target[i, j] = value
+
+
+@compiled
+def largest_entry(vector: Real) -> float:
+    """Return max|v|."""
+    size = 0.0
+    for i in range(vector.size):
+        size = max(size, abs(vector[i]))
+    return size
+
+
+@compiled
+def invert(matrix: Complex, inverse: Complex) -> bool:
+    """Invert a complex matrix by Gauss–Jordan elimination with partial pivoting; `matrix` is destroyed.
+
+    Returns False, with `inverse` meaningless, if the matrix is singular or not finite.
+    """
+    n = matrix.shape[0]
+    for i in range(n):
+        for j in range(n):
+            inverse[i, j] = 1.0 if i == j else 0.0
+    for k in range(n):
+        pivot, size = k, abs(matrix[k, k])
+        for i in range(k + 1, n):
+            here = abs(matrix[i, k])
+            if here > size:
+                pivot, size = i, here
+        if not size > 0.0:
+            return False
+        if pivot != k:
+            for j in range(n):
+                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+                inverse[k, j], inverse[pivot, j] = inverse[pivot, j], inverse[k, j]
+        factor = 1.0 / matrix[k, k]
+        for j in range(n):
+            matrix[k, j] *= factor
+            inverse[k, j] *= factor
+        for i in range(n):
+            factor = matrix[i, k]
+            if i == k or factor == 0.0:
+                continue
+            for j in range(n):
+                matrix[i, j] -= factor * matrix[k, j]
+                inverse[i, j] -= factor * inverse[k, j]
+    return True
 
 
 @compiled
@@ -79,9 +165,12 @@ def solve(matrix: Real, rhs: Real) -> float:
     n = matrix.shape[0]
     if n <= OWN_UP_TO:
         return _solve_small(matrix, rhs)
-    if not np.isfinite(matrix.sum()):
-        return 0.0
-    columns = np.ascontiguousarray(matrix.T)
+    columns = np.empty((n, n))
+    for i in range(n):
+        for j in range(n):
+            columns[j, i] = matrix[i, j]
+            if not math.isfinite(matrix[i, j]):
+                return 0.0
     pivots = np.empty(n, np.int32)
     info = _gesv(_DOUBLE, n, rhs.shape[0], columns.ctypes, n, pivots.ctypes, rhs.ctypes, n)
     if info != 0:

@@ -14,14 +14,12 @@ import numpy as np
 
 from solver.fourier import Real, coefficient_count, cosine_position
 from solver.kernels.compiled import compiled
-from solver.kernels.linear import solve
+from solver.kernels.linear import copy_block, copy_to, invert, set_to, solve
 from solver.kernels.system import (
-    FREQUENCY,
     KT,
     MU,
     N0,
     N1,
-    STRUCTURE,
     Evaluation,
     Receptance,
     System,
@@ -46,46 +44,48 @@ def newton(
     -------
     (converged, Newton iterations, relative residual); `point` belongs to the final u.
     """
-    norm = evaluate(system, linear, u, p, added, point)
-    best, kept = norm, u.copy()
-    uphill = 0
-    trial, matrix = np.empty_like(u), np.empty_like(point.jacobian)
-    step = np.empty((1, u.size))
-    for iteration in range(most):
-        if not math.isfinite(norm):
-            return False, iteration, norm
-        if norm <= TARGET:
-            return True, iteration, norm
-        matrix[:, :] = point.jacobian
-        step[0] = point.residual
-        if solve(matrix, step) == 0.0:
-            break
-        length, fallen = 1.0, False
-        for _ in range(_HALVINGS):
-            trial[:] = u - length * step[0]
-            fresh = evaluate(system, linear, trial, p, added, point)
-            if fresh < (1.0 - 0.1 * length) * norm:
-                fallen = True
-                break
-            if norm <= ACCEPTED:
-                break
-            length *= 0.5
-        if not fallen:
+    n = u.size
+    trial, kept, matrix, step = np.empty(n), np.empty(n), np.empty((n, n)), np.empty((1, n))
+    copy_to(trial, u)
+    norm, best, length = np.inf, np.inf, 0.0
+    iteration, halvings, uphill, must_take = 0, 0, 0, True
+    while True:
+        fresh = evaluate(system, linear, trial, p, added, point)
+        if not must_take and not fresh < (1.0 - 0.1 * length) * norm:
             if best <= ACCEPTED:
                 break
-            uphill += 1
-            if uphill > _UPHILL_STEPS:
-                break
-            trial[:] = u - step[0]
-            fresh = evaluate(system, linear, trial, p, added, point)
-        u[:] = trial
+            halvings += 1
+            length *= 0.5
+            if halvings > _HALVINGS:
+                uphill += 1
+                if uphill > _UPHILL_STEPS:
+                    break
+                length, must_take = 1.0, True
+            set_to(trial, u, -length, step[0])
+            continue
+        if not math.isfinite(fresh):
+            break
+        copy_to(u, trial)
         norm = fresh
         if norm < best:
             best = norm
-            kept[:] = u
-    u[:] = kept
+            copy_to(kept, u)
+        if norm <= TARGET:
+            return True, iteration, norm
+        if iteration >= most:
+            break
+        copy_block(matrix, point.jacobian)
+        copy_to(step[0], point.residual)
+        if solve(matrix, step) == 0.0:
+            break
+        iteration += 1
+        length, halvings, must_take = 1.0, 0, False
+        set_to(trial, u, -length, step[0])
+    if not math.isfinite(best):
+        return False, iteration, best
+    copy_to(u, kept)
     norm = evaluate(system, linear, u, p, added, point)
-    return norm <= ACCEPTED, most, norm
+    return norm <= ACCEPTED, iteration, norm
 
 
 @compiled
@@ -105,7 +105,7 @@ def arc_newton(
     """
     n = u.size
     matrix, rhs = np.empty((n + 1, n + 1)), np.empty((1, n + 1))
-    before = np.inf
+    before, norm = np.inf, np.inf
     for iteration in range(most + 1):
         receptance(system, p, linear)
         norm = evaluate(system, linear, u, p, 0.0, point)
@@ -117,52 +117,52 @@ def arc_newton(
             return False, iteration, p, norm
         before = norm
         border(point, tangent, weight_u, weight_p, matrix)
-        rhs[0, :n] = point.residual
         plane = weight_p * tangent[n] * (p - guess_p)
         for i in range(n):
+            rhs[0, i] = point.residual[i]
             plane += weight_u * tangent[i] * (u[i] - guess_u[i])
         rhs[0, n] = plane
         if solve(matrix, rhs) == 0.0:
             return False, iteration, p, norm
-        u -= rhs[0, :n]
+        set_to(u, u, -1.0, rhs[0])
         p -= rhs[0, n]
-    return False, most, p, np.nan
+    return False, most, p, norm
 
 
 @compiled
 def border(point: Evaluation, tangent: Real, weight_u: float, weight_p: float, matrix: Real) -> None:
     """Fill `matrix` with [dr/du, dr/dλ; weighted tangentᵀ]."""
     n = point.residual.size
-    matrix[:n, :n] = point.jacobian
-    matrix[:n, n] = point.dr_dp
+    copy_block(matrix, point.jacobian)
     for i in range(n):
+        matrix[i, n] = point.dr_dp[i]
         matrix[n, i] = weight_u * tangent[i]
     matrix[n, n] = weight_p * tangent[n]
 
 
 @compiled
-def stuck_start(system: System, linear: Receptance, p: float) -> tuple[Real, float]:
-    """Return the response with every contact fully stuck, and the load that has to be added to keep it so.
+def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
+    """Fill `u` with the response of fully stuck contacts; return the load that must be added to keep it so.
 
     (I + A kt) u = ū harmonic by harmonic; a contact stays stuck while max|kt u| ≤ μ (N0 − |N1| + added).
     """
     nc, n = system.contacts.shape[0], coefficient_count(system.ks)
     table, load, _, _ = contact_values(system, p, 0.0)
-    u = np.zeros(nc * n)
+    matrix, inverse = np.empty((nc, nc), np.complex128), np.empty((nc, nc), np.complex128)
     for i in range(system.ks.size):
-        matrix = np.zeros((nc, nc), np.complex128)
-        rhs = np.empty(nc, np.complex128)
         for c in range(nc):
-            rhs[c] = linear.u_linear[0, i, c]
             for d in range(nc):
                 matrix[c, d] = linear.A[0, i, c, d] * (table[d, KT] - system.shift[d])
             matrix[c, c] += 1.0
-        motion = np.linalg.solve(matrix, rhs)
+        good = invert(matrix, inverse)
         here = cosine_position(system.ks, i)
         for c in range(nc):
-            u[c * n + here] = motion[c].real
+            motion = complex(0.0)
+            for d in range(nc):
+                motion += inverse[c, d] * linear.u_linear[0, i, d]
+            u[c * n + here] = motion.real if good else 0.0
             if system.ks[i] > 0:
-                u[c * n + here + 1] = -motion[c].imag
+                u[c * n + here + 1] = -motion.imag if good else 0.0
     added = 0.0
     for c in range(nc):
         if table[c, MU] <= 0.0:
@@ -170,62 +170,65 @@ def stuck_start(system: System, linear: Receptance, p: float) -> tuple[Real, flo
         reach = 0.0
         for i in range(system.ks.size):
             here = c * n + cosine_position(system.ks, i)
-            size = abs(u[here]) if system.ks[i] == 0 else math.hypot(u[here], u[here + 1])
-            reach += size
+            reach += abs(u[here]) if system.ks[i] == 0 else math.hypot(u[here], u[here + 1])
         needed = 1.05 * table[c, KT] * reach / table[c, MU] - (table[c, N0] - abs(table[c, N1]))
         added = max(added, needed)
-    return u, added
+    return added
 
 
 @compiled
 def start(system: System, linear: Receptance, u: Real, p: float, point: Evaluation) -> tuple[bool, int, float]:
     """Find a first solution at λ = p from nothing, in place in `u`.
 
-    The fully stuck response is exact under a large enough added load; that load is then walked down to 0,
-    each rung predicted from the two before, the steps shortened where Newton fails.
+    Newton from the stuck response is tried first. Then the ladder: the fully stuck response is exact under a
+    large enough added load, which is walked down to 0, each rung predicted from the two before and the steps
+    shortened where Newton fails.
 
     Returns
     -------
     (converged, Newton iterations in all, relative residual).
     """
+    n = u.size
+    stuck, last_u, trial, best = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     receptance(system, p, linear)
-    stuck, added = stuck_start(system, linear, p)
-    u[:] = stuck
-    good, total, norm = newton(system, linear, u, p, 0.0, point, 25)
-    if good:
-        return True, total, norm
-    u[:] = stuck
-    here, factor = added, 0.5
-    last_u, last = stuck.copy(), added
-    floor = 1e-6 * added
+    here = stuck_start(system, linear, p, stuck)
+    copy_to(best, stuck)
+    copy_to(last_u, stuck)
+    copy_to(trial, stuck)
+    last, ahead, factor = here, 0.0, 0.25
+    floor = 1e-6 * here
+    total, most, predicted = 0, 20, False
     for _ in range(400):
-        ahead = here * factor if here * factor > floor else 0.0
-        trial = u.copy()
-        if last != here:
-            trial += (u - last_u) * ((ahead - here) / (here - last))
-        good, iterations, norm = newton(system, linear, trial, p, ahead, point, 15)
+        good, iterations, norm = newton(system, linear, trial, p, ahead, point, most)
         total += iterations
-        if not good:
-            trial[:] = u
-            good, iterations, norm = newton(system, linear, trial, p, ahead, point, 30)
-            total += iterations
         if good:
-            last_u[:], last = u, here
-            u[:], here = trial, ahead
+            copy_to(last_u, best)
+            copy_to(best, trial)
+            last, here = here, ahead
             if here == 0.0:
+                copy_to(u, best)
                 return True, total, norm
             factor = max(0.1, factor * factor) if iterations <= 6 else factor
+        elif predicted:
+            # The same rung once more, from the last solution instead of the prediction.
+            copy_to(trial, best)
+            predicted = False
+            continue
+        elif most == 20:
+            most = 12
         else:
             factor = math.sqrt(factor)
             if factor > 0.9999:
                 break
             if here <= floor:
                 floor *= 0.1
+        ahead = here * factor if here * factor > floor else 0.0
+        copy_to(trial, best)
+        predicted = last != here
+        if predicted:
+            step = (ahead - here) / (here - last)
+            for i in range(n):
+                trial[i] += step * (best[i] - last_u[i])
+    copy_to(u, best)
     norm = evaluate(system, linear, u, p, 0.0, point)
     return False, total, norm
-
-
-@compiled
-def moves_receptance(kind: int) -> bool:
-    """Return whether λ of this kind changes the linear part (otherwise it can be computed once)."""
-    return kind == FREQUENCY or kind == STRUCTURE

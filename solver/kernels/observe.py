@@ -73,7 +73,11 @@ def extremes(system: System, x: Real) -> tuple[float, float, float, float]:
     unpack(x, system.ks, c, s)
     on_grid(c, s, degree, system.cos_table, system.sin_table, value, slope)
     high, at_high = largest(c, s, degree, value, slope)
-    low, at_low = largest(-c, -s, degree, -value, -slope)
+    for k in range(degree + 1):
+        c[k], s[k] = -c[k], -s[k]
+    for j in range(n_grid):
+        value[j], slope[j] = -value[j], -slope[j]
+    low, at_low = largest(c, s, degree, value, slope)
     return high, at_high, -low, at_low
 
 
@@ -100,7 +104,7 @@ def measure(
     """
     observed_motion(system, linear, u, point, x)
     high, at_high, low, at_low = extremes(system, x)
-    dx = np.empty_like(x)
+    dx = np.empty(x.size)
     observed_slope(system, linear, u, point, du, dp, dx)
     rise, sink = _along(system, dx, at_high), _along(system, dx, at_low)
     out[HALF_RANGE], out[RANGE_SLOPE] = 0.5 * (high - low), 0.5 * (rise - sink)

@@ -12,10 +12,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numba.core import types
+from numba.experimental import structref
 
 from solver.fourier import Integer, Real
 from solver.kernels.compiled import compiled
-from solver.kernels.linear import solve
+from solver.kernels.linear import copy_to, largest_entry, set_to, solve
 from solver.kernels.newton import arc_newton, border, newton, start
 from solver.kernels.observe import RESIDUAL, measure
 from solver.kernels.system import Evaluation, Receptance, System, evaluate, receptance
@@ -52,6 +54,17 @@ class Walk(NamedTuple):
     numbers: Real  # (8,)
 
 
+@structref.register
+class _WalkType(types.StructRef):
+    """Numba's type of a `Walk` by reference."""
+
+
+class _WalkReference(structref.StructRefProxy):
+    """A `Walk` by reference."""
+
+
+structref.define_proxy(_WalkReference, _WalkType, list(Walk._fields))
+
 P, STEP, ORIENTATION, ITERATIONS, REJECTED, STEPPED_OVER, COUNT, NORM = 0, 1, 2, 3, 4, 5, 6, 7
 
 
@@ -61,12 +74,12 @@ def begin_walk(
 ) -> tuple[int, Walk]:
     """Find the first point of a branch (from `guess` if it is not empty) and its tangent."""
     nt = system.contacts.shape[0] * (2 * system.ks.size - (1 if system.ks[0] == 0 else 0))
-    walk = Walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(8))
+    walk = _WalkReference(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(8))
     p = control.start
     good, iterations = False, 0
     if guess.size == nt:
         receptance(system, p, linear)
-        walk.u[:] = guess
+        copy_to(walk.u, guess)
         good, iterations, _ = newton(system, linear, walk.u, p, 0.0, point, 20)
     if not good:
         good, more, _ = start(system, linear, walk.u, p, point)
@@ -81,7 +94,7 @@ def begin_walk(
     walk.numbers[NORM] = evaluate(system, linear, walk.u, p, 0.0, point)
     if not _turn(walk, point, control, True):
         return NO_START, walk
-    walk.before[:nt] = walk.u - control.first_step * walk.tangent[:nt]
+    set_to(walk.before[:nt], walk.u, -control.first_step, walk.tangent)
     walk.before[nt] = p - control.first_step * walk.tangent[nt]
     return RUNNING, walk
 
@@ -89,9 +102,7 @@ def begin_walk(
 @compiled
 def _weights(u: Real, control: Control) -> tuple[float, float]:
     """Return the weights of the scalar product: u relative to its size, λ relative to its range."""
-    size = 0.0
-    for i in range(u.size):
-        size = max(size, abs(u[i]))
+    size = largest_entry(u)
     span = abs(control.stop - control.start) / control.range_weight
     weight_u = 1.0 / (size * size) if size > 0.0 else 1.0
     return weight_u, 1.0 / (span * span) if span > 0.0 else 1.0
@@ -138,9 +149,10 @@ def _predict(walk: Walk, control: Control, step: float, guess: Real) -> float:
             length += weight_u * (walk.u[i] - walk.before[i]) ** 2
         if length > 0.0:
             scale = step / math.sqrt(length)
-            guess[:] = walk.u + scale * (walk.u - walk.before[:n])
+            for i in range(n):
+                guess[i] = walk.u[i] + scale * (walk.u[i] - walk.before[i])
             return p + scale * (p - walk.before[n])
-    guess[:] = walk.u + step * walk.tangent[:n]
+    set_to(guess, walk.u, step, walk.tangent)
     return p + step * walk.tangent[n]
 
 
@@ -157,9 +169,9 @@ def _distance(u: Real, p: float, v: Real, q: float, weight_u: float, weight_p: f
 def _accept(walk: Walk, trial: Real, p: float, norm: float) -> None:
     """Move the walk to a converged point."""
     n = trial.size
-    walk.before[:n] = walk.u
+    copy_to(walk.before[:n], walk.u)
     walk.before[n] = walk.numbers[P]
-    walk.u[:] = trial
+    copy_to(walk.u, trial)
     walk.numbers[P] = p
     walk.numbers[COUNT] += 1
     walk.numbers[NORM] = norm
@@ -180,15 +192,16 @@ def _step(
         last = (p_guess - control.stop) * forward >= 0.0
         if last:
             share = (control.stop - walk.numbers[P]) / (p_guess - walk.numbers[P])
-            guess[:] = walk.u + share * (guess - walk.u)
+            for i in range(n):
+                guess[i] = walk.u[i] + share * (guess[i] - walk.u[i])
             p_guess = control.stop
             step *= share
-            trial[:] = guess
+            copy_to(trial, guess)
             receptance(system, p_guess, linear)
             good, iterations, norm = newton(system, linear, trial, p_guess, 0.0, point, control.most_iterations)
             p = p_guess
         else:
-            trial[:] = guess
+            copy_to(trial, guess)
             good, iterations, p, norm = arc_newton(
                 system, linear, trial, p_guess, guess, p_guess, walk.tangent, weight_u, weight_p, point,
                 control.most_iterations,
@@ -236,7 +249,7 @@ def _step_over(
         if (p - control.start) * forward < 0.0 or abs(away) > 0.05 * abs(span):
             break
         receptance(system, p, linear)
-        trial[:] = walk.u
+        copy_to(trial, walk.u)
         good, iterations, norm = newton(system, linear, trial, p, 0.0, point, 30)
         walk.numbers[ITERATIONS] += iterations
         if not good:
@@ -294,8 +307,10 @@ def record(
 ) -> None:  # fmt: skip
     """Write the walk's present point, with what is observed there, into one row of the result."""
     n = walk.u.size
-    points[row, :n], points[row, n] = walk.u, walk.numbers[P]
-    tangents[row] = walk.tangent
-    states[row] = point.states
+    copy_to(points[row, :n], walk.u)
+    points[row, n] = walk.numbers[P]
+    copy_to(tangents[row], walk.tangent)
+    for c in range(point.states.size):
+        states[row, c] = point.states[c]
     measure(system, linear, walk.u, point, walk.tangent[:n], walk.tangent[n], observed[row], measures[row])
     measures[row, RESIDUAL] = walk.numbers[NORM]

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from solver.fourier import Real, coefficient_count
+from solver.fourier import Real
 from solver.kernels.compiled import compiled
-from solver.kernels.linear import solve
-from solver.kernels.newton import arc_newton
-from solver.kernels.observe import MAX_ABS, MEASURES, RESIDUAL, SLOPE, measure
+from solver.kernels.linear import copy_block, copy_to, largest_entry, set_to, solve
+from solver.kernels.newton import arc_newton, border
+from solver.kernels.observe import MAX_ABS, RESIDUAL, SLOPE, measure
 from solver.kernels.system import Evaluation, Receptance, System
 
 PEAK, EDGE = 0, 1
@@ -21,9 +21,12 @@ def slope_by_parameter(
     system: System, linear: Receptance, u: Real, point: Evaluation, x: Real, out: Real
 ) -> bool:
     """Measure a solution with its slopes by λ, du/dλ = −(dr/du)⁻¹ dr/dλ; False where dr/du is singular."""
-    matrix, rhs = point.jacobian.copy(), np.empty((1, u.size))
-    rhs[0] = -point.dr_dp
-    if u.size > 0 and solve(matrix, rhs) == 0.0:
+    n = u.size
+    matrix, rhs = np.empty((n, n)), np.empty((1, n))
+    copy_block(matrix, point.jacobian)
+    for i in range(n):
+        rhs[0, i] = -point.dr_dp[i]
+    if n > 0 and solve(matrix, rhs) == 0.0:
         return False
     measure(system, linear, u, point, rhs[0], 1.0, x, out)
     return True
@@ -36,23 +39,21 @@ def _correct(
 ) -> tuple[bool, float, int]:  # fmt: skip
     """Solve on the plane across the chord at `share` of it, and measure there; slope along the chord."""
     n = out_u.size
-    size, span = 0.0, abs(chord[n])
-    for i in range(n):
-        size = max(size, abs(left[i]))
+    size, span = largest_entry(left[:n]), abs(chord[n])
     weight_u = 1.0 / (size * size) if size > 0.0 else 1.0
     weight_p = 1.0 / (span * span) if span > 0.0 else 1.0
-    plane_u, plane_p = left[:n] + share * chord[:n], left[n] + share * chord[n]
-    out_u[:] = guess[:n]
+    plane_u, plane_p = np.empty(n), left[n] + share * chord[n]
+    set_to(plane_u, left, share, chord)
+    copy_to(out_u, guess)
     good, iterations, p, norm = arc_newton(
         system, linear, out_u, guess[n], plane_u, plane_p, chord, weight_u, weight_p, point, 12
     )
     if not good:
         return False, p, iterations
-    matrix, rhs = np.zeros((n + 1, n + 1)), np.zeros((1, n + 1))
-    matrix[:n, :n], matrix[:n, n], matrix[n, n] = point.jacobian, point.dr_dp, weight_p * chord[n]
+    matrix, rhs = np.empty((n + 1, n + 1)), np.zeros((1, n + 1))
+    border(point, chord, weight_u, weight_p, matrix)
     total = weight_p * chord[n] * chord[n]
     for i in range(n):
-        matrix[n, i] = weight_u * chord[i]
         total += weight_u * chord[i] * chord[i]
     rhs[0, n] = total
     if solve(matrix, rhs) == 0.0:
@@ -81,8 +82,9 @@ def refine(
     converged solution.
     """
     n = left.size - 1
-    chord = right - left
-    u, guess, found = np.empty(n), np.empty(n + 1), left.copy()
+    u, guess, found, chord = np.empty(n), np.empty(n + 1), np.empty(n + 1), np.empty(n + 1)
+    copy_to(found, left)
+    set_to(chord, right, -1.0, left)
     lo, hi, g_lo, g_hi = 0.0, 1.0, g_left, g_right
     total, side, share, good = 0, 0, 0.5, False
     for iteration in range(40):
@@ -99,7 +101,8 @@ def refine(
         total += iterations
         if not good:
             return False, found, total
-        found[:n], found[n] = u, p
+        copy_to(found[:n], u)
+        found[n] = p
         g = out[SLOPE] if what == PEAK else out[MAX_ABS] - level
         scale = max(abs(g_left), abs(g_right))
         if abs(g) <= 1e-10 * scale or hi - lo <= 1e-11:
@@ -114,9 +117,3 @@ def refine(
         side = now
     good = math.isfinite(out[MAX_ABS]) and slope_by_parameter(system, linear, u, point, x, out)
     return good, found, total
-
-
-@compiled
-def polish_size(system: System) -> tuple[int, int]:
-    """Return the lengths of `x` and `out` that `refine` fills."""
-    return coefficient_count(system.ks), MEASURES

@@ -16,11 +16,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numba.core import types
+from numba.experimental import structref
 
 from solver.fourier import Complex, Integer, Real, coefficient_count, cosine_position
 from solver.kernels.compiled import compiled
 from solver.kernels.events import FAILED
 from solver.kernels.force import contact_force
+from solver.kernels.linear import copy_block, fill_block, invert
 
 # What λ is.
 FREQUENCY, LEVEL, FORCE_PHASE, STRUCTURE = 0, 1, 2, 3
@@ -94,11 +97,68 @@ class Evaluation(NamedTuple):
     segments: Real  # scratch
 
 
+# Inside the compiled loops each record is one pointer: forty arrays passed by value at every call cost more
+# than the work itself, and minutes of compilation.
+
+
+@structref.register
+class _SystemType(types.StructRef):
+    """Numba's type of a `System` by reference."""
+
+
+@structref.register
+class _ReceptanceType(types.StructRef):
+    """Numba's type of a `Receptance` by reference."""
+
+
+@structref.register
+class _EvaluationType(types.StructRef):
+    """Numba's type of an `Evaluation` by reference."""
+
+
+class _SystemReference(structref.StructRefProxy):
+    """A `System` by reference."""
+
+
+class _ReceptanceReference(structref.StructRefProxy):
+    """A `Receptance` by reference."""
+
+
+class _EvaluationReference(structref.StructRefProxy):
+    """An `Evaluation` by reference."""
+
+
+structref.define_proxy(_SystemReference, _SystemType, list(System._fields))
+structref.define_proxy(_ReceptanceReference, _ReceptanceType, list(Receptance._fields))
+structref.define_proxy(_EvaluationReference, _EvaluationType, list(Evaluation._fields))
+
+
+@compiled
+def by_reference(system: System) -> System:
+    """Return the same system as the compiled loops take it: one pointer."""
+    return _SystemReference(*system)
+
+
+@compiled
+def evaluation_by_value(point: Evaluation) -> Evaluation:
+    """Return the arrays of an evaluation as a tuple that Python can read (views, not copies)."""
+    return Evaluation(
+        point.residual, point.jacobian, point.dr_dp, point.F, point.dF_dU, point.dF_dkt, point.dF_dmu,
+        point.dF_dN, point.dF_dp, point.states, point.segments,
+    )  # fmt: skip
+
+
+@compiled
+def receptance_by_value(linear: Receptance) -> Receptance:
+    """Return the arrays of a receptance as a tuple that Python can read (views, not copies)."""
+    return Receptance(linear.A, linear.u_linear, linear.B, linear.x_linear)
+
+
 @compiled
 def new_receptance(system: System) -> Receptance:
     """Return an empty receptance for `system`."""
     nk, nc = system.ks.size, system.contacts.shape[0]
-    return Receptance(
+    return _ReceptanceReference(
         np.zeros((2, nk, nc, nc), np.complex128),
         np.zeros((2, nk, nc), np.complex128),
         np.zeros((2, nk, nc), np.complex128),
@@ -110,7 +170,7 @@ def new_receptance(system: System) -> Receptance:
 def new_evaluation(system: System) -> Evaluation:
     """Return empty arrays for `evaluate`."""
     nc, n = system.contacts.shape[0], coefficient_count(system.ks)
-    return Evaluation(
+    return _EvaluationReference(
         np.zeros(nc * n), np.zeros((nc * n, nc * n)), np.zeros(nc * n),
         np.zeros((nc, n)), np.zeros((nc, n, n)), np.zeros((nc, n)), np.zeros((nc, n)),
         np.zeros((nc, n, LOAD_COEFFICIENTS)), np.zeros((nc, n)), np.zeros(nc, np.int64),
@@ -124,9 +184,9 @@ def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, 
 
     `added` [N] is put on every mean load (the start-up ladder presses the contacts into full stick).
     """
-    table = system.contacts.copy()
-    slope = np.zeros_like(table)
-    nc = table.shape[0]
+    nc = system.contacts.shape[0]
+    table, slope = np.empty((nc, 6)), np.zeros((nc, 6))
+    copy_block(table, system.contacts)
     for c in range(nc):
         row, d = table[c], slope[c]
         tied = not math.isnan(row[RATIO])
@@ -190,12 +250,26 @@ def receptance(system: System, p: float, out: Receptance) -> None:
 
 
 @compiled
+def _clear(out: Receptance) -> None:
+    """Set a receptance to zero."""
+    nk, nc = out.x_linear.shape[1], out.B.shape[2]
+    for order in range(2):
+        for i in range(nk):
+            out.x_linear[order, i] = 0.0
+            for c in range(nc):
+                out.u_linear[order, i, c] = 0.0
+                out.B[order, i, c] = 0.0
+                for d in range(nc):
+                    out.A[order, i, c, d] = 0.0
+
+
+@compiled
 def _modal_receptance(system: System, p: float, out: Receptance) -> None:
     """Sum the modes: Z⁻¹ = Σ x_m y_mᴴ / d_m with d_m = ω_m² − (kω)² + ikω c_m, or ikω − s_m for poles."""
     omega = p if system.kind == FREQUENCY else system.omega
     by_omega = 1.0 if system.kind == FREQUENCY else 0.0
     nc = system.contacts.shape[0]
-    out.A[:], out.u_linear[:], out.B[:], out.x_linear[:] = 0.0, 0.0, 0.0, 0.0
+    _clear(out)
     for i in range(system.ks.size):
         k, s = system.ks[i], system.which[i]
         speed = k * omega
@@ -225,35 +299,70 @@ def _modal_receptance(system: System, p: float, out: Receptance) -> None:
 
 @compiled
 def _dense_receptance(system: System, p: float, out: Receptance) -> None:
-    """Solve with Z_k itself; λ may be the frequency or a structural parameter."""
+    """Invert Z_k itself; λ may be the frequency or a structural parameter: dZ⁻¹ = −Z⁻¹ dZ Z⁻¹."""
     omega = p if system.kind == FREQUENCY else system.omega
     moved = p - system.parameter_reference if system.kind == STRUCTURE else 0.0
+    n = system.observe.size
+    Z, dZ = np.empty((n, n), np.complex128), np.empty((n, n), np.complex128)
+    green = np.empty((2, n, n), np.complex128)
+    half = np.empty((n, n), np.complex128)
     for i in range(system.ks.size):
         k, s = system.ks[i], system.which[i]
         speed = k * omega
-        Z = (
-            system.K[s] + moved * system.dK[s]
-            - speed * speed * (system.M[s] + moved * system.dM[s])
-            + 1j * speed * (system.C[s] + moved * system.dC[s])
-        )  # fmt: skip
-        if system.kind == STRUCTURE:
-            dZ = system.dK[s] - speed * speed * system.dM[s] + 1j * speed * system.dC[s]
-        elif system.kind == FREQUENCY:
-            dZ = -2.0 * k * speed * system.M[s] + 1j * k * system.C[s]
-        else:
-            dZ = np.zeros_like(Z)
-        inverse = np.linalg.inv(Z)
-        dinverse = -inverse @ (dZ @ inverse)
-        L, force, seen = system.L[s], system.forces[i], system.observe
-        Lh = np.ascontiguousarray(L.conj().T)
+        damped, inertia = complex(0.0, speed), speed * speed
+        for a in range(n):
+            for b in range(n):
+                dK, dC, dM = system.dK[s, a, b], system.dC[s, a, b], system.dM[s, a, b]
+                C, M = system.C[s, a, b] + moved * dC, system.M[s, a, b] + moved * dM
+                Z[a, b] = system.K[s, a, b] + moved * dK + damped * C - inertia * M
+                dZ[a, b] = 0.0
+                if system.kind == STRUCTURE:
+                    dZ[a, b] = dK + damped * dC - inertia * dM
+                elif system.kind == FREQUENCY:
+                    dZ[a, b] = complex(0.0, float(k)) * C - 2.0 * k * speed * M
+        if not invert(Z, green[0]):
+            green[0, 0, 0] = np.nan
+        _product(dZ, green[0], half)
+        _product(green[0], half, green[1])
         for order in range(2):
-            green = inverse if order == 0 else dinverse
-            response = green @ force
-            back = green @ Lh
-            out.A[order, i] = L @ back
-            out.u_linear[order, i] = L @ response
-            out.B[order, i] = seen @ back
-            out.x_linear[order, i] = (seen * response).sum()
+            _project(system, s, i, 1.0 - 2.0 * order, green[order], order, out)
+
+
+@compiled
+def _product(left: Complex, right: Complex, out: Complex) -> None:
+    """Fill `out` with left @ right."""
+    n = left.shape[0]
+    for a in range(n):
+        for b in range(n):
+            out[a, b] = 0.0
+        for c in range(n):
+            factor = left[a, c]
+            if factor != 0.0:
+                for b in range(n):
+                    out[a, b] += factor * right[c, b]
+
+
+@compiled
+def _project(system: System, s: int, i: int, sign: float, green: Complex, order: int, out: Receptance) -> None:
+    """Project Z⁻¹ (or its derivative) of harmonic number i on contacts, excitation and observed DOF."""
+    nc, n = system.contacts.shape[0], green.shape[0]
+    out.x_linear[order, i] = 0.0
+    for c in range(nc):
+        out.u_linear[order, i, c] = 0.0
+        out.B[order, i, c] = 0.0
+        for d in range(nc):
+            out.A[order, i, c, d] = 0.0
+    for a in range(n):
+        for b in range(n):
+            value = sign * green[a, b]
+            driven = value * system.forces[i, b]
+            out.x_linear[order, i] += system.observe[a] * driven
+            for c in range(nc):
+                out.u_linear[order, i, c] += system.L[s, c, a] * driven
+                back = value * system.L[s, c, b].conjugate()
+                out.B[order, i, c] += system.observe[a] * back
+                for d in range(nc):
+                    out.A[order, i, d, c] += system.L[s, d, a] * back
 
 
 @compiled
@@ -288,7 +397,7 @@ def _assemble(system: System, linear: Receptance, u: Real, out: Evaluation) -> f
     """Put r, dr/du and dr/dλ together from the contact forces and the receptance."""
     nc, n = system.contacts.shape[0], coefficient_count(system.ks)
     r, J, dr = out.residual, out.jacobian, out.dr_dp
-    J[:, :] = 0.0
+    fill_block(J, 0.0)
     scale, largest_residual = 0.0, 0.0
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)

@@ -37,7 +37,7 @@ def on_grid(c: Real, s: Real, degree: int, cos_table: Real, sin_table: Real, val
     """
     n = value.size
     half = n // 2
-    even = np.full(half + 1, c[0])
+    even = np.zeros(half + 1)
     odd = np.zeros(half + 1)
     slope_even = np.zeros(half + 1)
     slope_odd = np.zeros(half + 1)
@@ -53,6 +53,7 @@ def on_grid(c: Real, s: Real, degree: int, cos_table: Real, sin_table: Real, val
             slope_even[j] += ks * cosine
             slope_odd[j] -= kc * sine
     for j in range(half + 1):
+        even[j] += c[0]
         value[j] = even[j] + odd[j]
         slope[j] = slope_even[j] + slope_odd[j]
     for j in range(1, half):
@@ -121,8 +122,8 @@ def bracketed_root(
 @compiled
 def unpack(q: Real, ks: Integer, c: Real, s: Real) -> None:
     """Spread coefficients in the order of `solver.fourier` for the harmonics `ks` over c[0…], s[0…]."""
-    c[:] = 0.0
-    s[:] = 0.0
+    for k in range(c.size):
+        c[k], s[k] = 0.0, 0.0
     here = 0
     for i in range(ks.size):
         k = ks[i]

@@ -1,0 +1,254 @@
+"""One periodic response: `solve`, and what can be read off it."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from solver import fourier
+from solver.accuracy import truncation_error
+from solver.balance import Balance, build, check_frequency
+from solver.fourier import Real
+from solver.kernels.events import LIFTING, SEPARATED, STUCK
+from solver.kernels.observe import HALF_RANGE, MAX_ABS, MEAN
+from solver.scene import Scene
+from solver.workspace import PointSolution, Workspace
+
+# A stuck contact below this share of its friction limit cannot have slipped while the vibration built up from
+# rest: a suddenly started linear vibration overshoots its steady amplitude at most twofold.
+SAFELY_STUCK = 0.5
+
+
+class ContactState(Enum):
+    """What a contact does over a period; the value is what a user reads."""
+
+    SEPARATED = "separated"
+    STUCK = "stuck"
+    SLIPPING = "stick and slip"
+    LIFTING = "stick, slip and separation"
+
+
+_STATES = tuple(ContactState)
+
+
+class SolutionStatus(Enum):
+    """How a solve ended; the value is a sentence a user can act on."""
+
+    CONVERGED = "The balance is satisfied."
+    NOT_CONVERGED = (
+        "No solution was found at this frequency: try more harmonics, or a sweep that passes through it."
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactResponse:
+    """The motion and force of one contact.
+
+    Attributes
+    ----------
+    name : str
+        Name of the contact.
+    state : ContactState
+        What it does over the period.
+    slip : (2H + 1,) array
+        Coefficients of the slip motion u [m].
+    force : (2H + 1,) array
+        Coefficients of the friction force [N].
+    load : (3,) array
+        Coefficients of the normal load N [N] before it is cut at 0.
+    utilisation : float
+        max|f| / (μ N) of a stuck contact, 1 for one that slips, NaN for one that is separated throughout.
+    """
+
+    name: str
+    state: ContactState
+    slip: Real
+    force: Real
+    load: Real
+    utilisation: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Solution:
+    """A periodic response at one frequency.
+
+    Attributes
+    ----------
+    status : SolutionStatus
+        Whether and why; every number below is NaN unless it is CONVERGED.
+    max_abs, half_peak_to_peak, mean : float
+        Of the observed DOF over the period [m]. Not unique when `flags` has ``mean_undetermined``: the first
+        and the last then depend on the history.
+    harmonics : (H + 1,) array
+        |mean| and the amplitude of each harmonic of the observed DOF [m].
+    observed : (2H + 1,) array
+        Its coefficients [m].
+    contacts : tuple of ContactResponse
+        One for each contact of the scene.
+    flags : tuple of str
+        ``mean_undetermined``, ``all_stuck``, ``separation`` where they apply.
+    residual : float
+        Relative residual of the balance.
+    error_estimate : float
+        Estimated error of `max_abs` by the harmonics left out [m].
+    """
+
+    scene: Scene
+    frequency_hz: float
+    n_harmonics: int
+    status: SolutionStatus
+    max_abs: float
+    half_peak_to_peak: float
+    mean: float
+    harmonics: Real
+    observed: Real
+    contacts: tuple[ContactResponse, ...]
+    flags: tuple[str, ...]
+    residual: float
+    error_estimate: float
+    newton_iterations: int
+    seconds: float
+
+    @property
+    def converged(self) -> bool:
+        """Whether the numbers are a solution."""
+        return self.status is SolutionStatus.CONVERGED
+
+    def to_json(self) -> dict[str, object]:
+        """Return the answer as one JSON object."""
+        return {
+            "scene": self.scene.name,
+            "frequency_hz": self.frequency_hz,
+            "converged": self.converged,
+            "status": self.status.value,
+            "max_abs": _number(self.max_abs),
+            "half_peak_to_peak": _number(self.half_peak_to_peak),
+            "mean": _number(self.mean),
+            "harmonics": self.harmonics.tolist() if self.converged else None,
+            "flags": list(self.flags),
+            "contacts": {contact.name: contact.state.value for contact in self.contacts},
+            "residual": _number(self.residual),
+            "error_estimate": _number(self.error_estimate),
+            "n_harmonics": self.n_harmonics,
+            "newton_iterations": self.newton_iterations,
+            "seconds": self.seconds,
+        }
+
+
+def solve(scene: Scene, *, frequency_hz: float, harmonics: int = 11) -> Solution:
+    """Find the periodic response of a scene at one frequency.
+
+    Parameters
+    ----------
+    scene : what vibrates.
+    frequency_hz : excitation frequency [Hz].
+    harmonics : highest harmonic kept.
+
+    Raises
+    ------
+    SettingError
+        A bad frequency or number of harmonics.
+    """
+    begun = time.perf_counter()
+    check_frequency("frequency_hz", frequency_hz)
+    balance = build(scene, harmonics=harmonics)
+    workspace = Workspace.of(balance)
+    omega = 2.0 * math.pi * frequency_hz
+    found = workspace.solve(omega)
+    if not found.converged:
+        return _failure(balance, frequency_hz, found, time.perf_counter() - begun)
+    return describe(workspace, found, frequency_hz, begun)
+
+
+def describe(workspace: Workspace, found: PointSolution, frequency_hz: float, begun: float) -> Solution:
+    """Turn a converged point of a frequency balance into a `Solution`."""
+    balance = workspace.balance
+    omega = 2.0 * math.pi * frequency_hz
+    error = truncation_error(workspace, found.u, omega)
+    measures = workspace.measure(found.u, omega)
+    if measures is None:
+        return _failure(balance, frequency_hz, found, time.perf_counter() - begun)
+    contacts = contact_responses(workspace, found.u, omega)
+    observed = fourier.to_full(measures.observed, balance.system.ks, balance.n_harmonics)
+    return Solution(
+        scene=balance.scene,
+        frequency_hz=frequency_hz,
+        n_harmonics=balance.n_harmonics,
+        status=SolutionStatus.CONVERGED,
+        max_abs=float(measures.values[MAX_ABS]),
+        half_peak_to_peak=float(measures.values[HALF_RANGE]),
+        mean=float(measures.values[MEAN]),
+        harmonics=np.abs(fourier.to_complex(observed)),
+        observed=observed,
+        contacts=contacts,
+        flags=_flags(contacts),
+        residual=found.residual,
+        error_estimate=error,
+        newton_iterations=found.iterations,
+        seconds=time.perf_counter() - begun,
+    )
+
+
+def contact_responses(workspace: Workspace, u: Real, p: float) -> tuple[ContactResponse, ...]:
+    """Return motion, force and state of every contact at a solution (u, λ = p)."""
+    balance = workspace.balance
+    _, point = workspace.evaluate(u, p)
+    ks, top = balance.system.ks, balance.n_harmonics
+    slips = fourier.to_full(u.reshape(len(balance.scene.contacts), balance.n_coefficients), ks, top)
+    forces = fourier.to_full(point.F, ks, top)
+    return tuple(
+        _contact(contact.name, int(state), slip, force, _load(contact.N0, contact.N1_value, contact.N1_phase), contact.mu)
+        for contact, state, slip, force in zip(balance.scene.contacts, point.states, slips, forces, strict=True)
+    )  # fmt: skip
+
+
+def _load(N0: float, N1: float, phase: float) -> Real:
+    """Return the coefficients of N0 + N1 cos(τ + phase)."""
+    return np.array([N0, N1 * math.cos(phase), -N1 * math.sin(phase)])
+
+
+def _contact(name: str, state: int, slip: Real, force: Real, load: Real, mu: float) -> ContactResponse:
+    utilisation = 1.0
+    if state == STUCK:
+        tau = np.linspace(0.0, 2.0 * np.pi, max(360, 8 * slip.size), endpoint=False)
+        limit = mu * (fourier.basis(tau, 1) @ load)
+        carried = np.abs(fourier.basis(tau, (force.size - 1) // 2) @ force)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shares = np.where(carried > 0.0, carried / limit, 0.0)
+        utilisation = float(min(shares.max(), 1.0))
+    elif state == SEPARATED:
+        utilisation = math.nan
+    return ContactResponse(
+        name=name, state=_STATES[state], slip=slip, force=force, load=load, utilisation=utilisation
+    )
+
+
+def _flags(contacts: tuple[ContactResponse, ...]) -> tuple[str, ...]:
+    stuck = [contact for contact in contacts if contact.state is ContactState.STUCK]
+    flags = []
+    if any(contact.utilisation > SAFELY_STUCK for contact in stuck):
+        flags.append("mean_undetermined")
+    if stuck and len(stuck) == len(contacts):
+        flags.append("all_stuck")
+    if any(contact.state in (_STATES[LIFTING], _STATES[SEPARATED]) for contact in contacts):
+        flags.append("separation")
+    return tuple(flags)
+
+
+def _failure(balance: Balance, frequency_hz: float, found: PointSolution, seconds: float) -> Solution:
+    nothing = np.full(2 * balance.n_harmonics + 1, np.nan)
+    return Solution(
+        scene=balance.scene, frequency_hz=frequency_hz, n_harmonics=balance.n_harmonics,
+        status=SolutionStatus.NOT_CONVERGED, max_abs=math.nan, half_peak_to_peak=math.nan, mean=math.nan,
+        harmonics=np.full(balance.n_harmonics + 1, np.nan), observed=nothing, contacts=(), flags=(),
+        residual=found.residual, error_estimate=math.nan, newton_iterations=found.iterations, seconds=seconds,
+    )  # fmt: skip
+
+
+def _number(value: float) -> float | None:
+    """Return a float that JSON can carry (null for NaN and infinity)."""
+    return float(value) if math.isfinite(value) else None
