@@ -1,1 +1,61 @@
-"""The solver."""
+"""Periodic response of structures with friction contacts: scenes, balance, continuation, time marching.
+
+The names below are the public interface; they are loaded on first use, so that importing the package is cheap.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from solver.annulus import annulus
+    from solver.branch import Band, Branch, BranchStatus, Peak
+    from solver.continuation import ContinuationSettings, Predictor, sweep
+    from solver.errors import Issue, SceneError, SettingError, SolverError
+    from solver.marching import march
+    from solver.plan import Plan, plan
+    from solver.response import Solution, SolutionStatus, solve
+    from solver.scene import Scene, load_scene, shipped_scenes
+
+_HOME = {
+    "Band": "branch", "Branch": "branch", "BranchStatus": "branch", "Peak": "branch",
+    "ContinuationSettings": "continuation", "Predictor": "continuation", "sweep": "continuation",
+    "Issue": "errors", "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
+    "Plan": "plan", "plan": "plan", "Scene": "scene", "load_scene": "scene", "shipped_scenes": "scene",
+    "Solution": "response", "SolutionStatus": "response", "solve": "response",
+    "annulus": "annulus", "march": "marching",
+}  # fmt: skip
+
+__all__ = [
+    "Band",
+    "Branch",
+    "BranchStatus",
+    "ContinuationSettings",
+    "Issue",
+    "Peak",
+    "Plan",
+    "Predictor",
+    "Scene",
+    "SceneError",
+    "SettingError",
+    "Solution",
+    "SolutionStatus",
+    "SolverError",
+    "annulus",
+    "load_scene",
+    "march",
+    "plan",
+    "shipped_scenes",
+    "solve",
+    "sweep",
+]
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name on first use."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'solver' has no attribute {name!r}")
+    value = getattr(import_module(f"solver.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value

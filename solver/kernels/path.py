@@ -65,6 +65,13 @@ class _WalkReference(structref.StructRefProxy):
 
 structref.define_proxy(_WalkReference, _WalkType, list(Walk._fields))
 
+
+@compiled
+def walk_by_value(walk: Walk) -> Walk:
+    """Return the arrays of a walk as a tuple that Python can read (views, not copies)."""
+    return Walk(walk.u, walk.before, walk.tangent, walk.numbers)
+
+
 P, STEP, ORIENTATION, ITERATIONS, REJECTED, STEPPED_OVER, COUNT, NORM = 0, 1, 2, 3, 4, 5, 6, 7
 
 

@@ -1,0 +1,197 @@
+"""Branches: what continuation returns. Only converged points are in them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from solver.balance import Balance
+from solver.fourier import Integer, Real
+from solver.kernels.observe import HALF_RANGE, MAX_ABS, MEAN, RESIDUAL, SLOPE
+from solver.kernels.path import FINISHED, LEFT_RANGE, NO_START, STALLED
+
+
+class BranchStatus(Enum):
+    """How a continuation ended; the value is a sentence a user can act on."""
+
+    COMPLETED = "The branch reached the end of the range."
+    NO_START = "No first solution was found: start somewhere else, or use more harmonics."
+    STALLED = (
+        "The steps became too small to go on: use more harmonics, or start from the other end of the range."
+    )
+    TURNED_BACK = "The branch turned and left the range where it began; the end of the range was not reached."
+    STOPPED = "The continuation was stopped by the caller."
+    TOO_MANY_POINTS = "The largest number of points was used up: allow more points or a larger step."
+
+
+ENDINGS = {
+    FINISHED: BranchStatus.COMPLETED,
+    NO_START: BranchStatus.NO_START,
+    STALLED: BranchStatus.STALLED,
+    LEFT_RANGE: BranchStatus.TURNED_BACK,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Peak:
+    """A local maximum of the amplitude along a branch, polished to the stationary point.
+
+    Attributes
+    ----------
+    value : float
+        max|x| of the observed DOF [m].
+    at : float
+        Parameter value there, in user units (Hz for a frequency).
+    solution : (n_unknowns,) array
+        Slip motions of the contacts there [m].
+    interior : bool
+        A true maximum, not an end of the branch.
+    """
+
+    value: float
+    at: float
+    solution: Real
+    interior: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Band:
+    """Where the amplitude exceeds a limit.
+
+    Attributes
+    ----------
+    limit : float
+        The limit [m].
+    width : float
+        Measure of {parameter : amplitude > limit}, in user units (Hz for a frequency).
+    intervals : tuple of (low, high)
+        Its intervals, ascending.
+    """
+
+    limit: float
+    width: float
+    intervals: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Branch:
+    """A branch of periodic responses over one parameter, P points in the order they were found.
+
+    Attributes
+    ----------
+    balance : Balance
+        What was continued; its scene holds the values that stayed fixed.
+    status : BranchStatus
+        How it ended.
+    values : (P,) array
+        Parameter values in user units.
+    solutions, tangents : (P, n_unknowns + 1) array
+        Slip motions [m] with λ (inside unit) last, and unit tangents of the branch.
+    observed : (P, n) array
+        Coefficients of the observed DOF [m].
+    measures : (P, MEASURES) array
+        Columns named in `solver.kernels.observe`; slopes are along the tangents.
+    states : (P, n_contacts) array
+        State of every contact, as in `solver.response.ContactState`.
+    peaks : tuple of Peak
+        All local maxima, highest first; the ends of the branch are in it too.
+    band : Band or None
+        Where the amplitude exceeds the limit asked for (peak/√2 if none was); None without a peak.
+    """
+
+    balance: Balance
+    status: BranchStatus
+    start: float
+    stop: float
+    values: Real
+    solutions: Real
+    tangents: Real
+    observed: Real
+    measures: Real
+    states: Integer
+    peaks: tuple[Peak, ...]
+    band: Band | None
+    newton_iterations: int
+    rejected_steps: int
+    stepped_over: int
+    seconds: float
+
+    @property
+    def parameter(self) -> str:
+        """Path of the parameter that was continued in."""
+        return self.balance.parameter.path
+
+    @property
+    def completed(self) -> bool:
+        """Whether the branch reached the end of the range."""
+        return self.status is BranchStatus.COMPLETED
+
+    @property
+    def amplitude(self) -> Real:
+        """max|x| of the observed DOF at each point [m]."""
+        return self.measures[:, MAX_ABS]
+
+    @property
+    def half_peak_to_peak(self) -> Real:
+        """(max x − min x)/2 of the observed DOF at each point [m]."""
+        return self.measures[:, HALF_RANGE]
+
+    @property
+    def mean(self) -> Real:
+        """Mean of the observed DOF at each point [m]."""
+        return self.measures[:, MEAN]
+
+    @property
+    def residuals(self) -> Real:
+        """Relative residual at each point."""
+        return self.measures[:, RESIDUAL]
+
+    @property
+    def slopes(self) -> Real:
+        """Change of max|x| along the unit tangent at each point."""
+        return self.measures[:, SLOPE]
+
+    @property
+    def coefficients(self) -> Real:
+        """Slip motion of every contact at each point, (P, n_contacts, n) [m]."""
+        n = self.balance.n_coefficients
+        return self.solutions[:, :-1].reshape(len(self.values), -1, n)
+
+    @property
+    def peak(self) -> Peak | None:
+        """The highest peak, or None if the branch has no point."""
+        return self.peaks[0] if self.peaks else None
+
+    @property
+    def folds(self) -> int:
+        """How often the branch turned back in its parameter."""
+        return int(np.count_nonzero(np.diff(np.sign(np.diff(self.values)))))
+
+    def to_json(self) -> dict[str, object]:
+        """Return the branch as one JSON object."""
+        peak, band = self.peak, self.band
+        return {
+            "scene": self.balance.scene.name,
+            "parameter": self.values.tolist(),
+            "parameter_path": self.parameter,
+            "unit": self.balance.parameter.unit,
+            "amplitude": self.amplitude.tolist(),
+            "half_peak_to_peak": self.half_peak_to_peak.tolist(),
+            "mean": self.mean.tolist(),
+            "peak": None if peak is None else {"value": peak.value, "at": peak.at},
+            "peaks": [{"value": peak.value, "at": peak.at} for peak in self.peaks if peak.interior],
+            "band_hz": None if band is None else band.width,
+            "band_limit": None if band is None else band.limit,
+            "band_intervals_hz": None if band is None else [list(interval) for interval in band.intervals],
+            "points": len(self.values),
+            "n_harmonics": self.balance.n_harmonics,
+            "newton_iterations": self.newton_iterations,
+            "rejected_steps": self.rejected_steps,
+            "folds": self.folds,
+            "largest_residual": float(self.residuals.max()) if len(self.values) else None,
+            "seconds": self.seconds,
+            "completed": self.completed,
+            "status": self.status.value,
+        }

@@ -1,0 +1,251 @@
+"""Continuation of periodic responses in any parameter: `sweep`, and the walk it is made of.
+
+The steps themselves are compiled (`solver.kernels.path`); here they are taken in stretches, so that the
+caller can watch and stop, and the result is put together.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from solver.balance import Balance, build
+from solver.branch import ENDINGS, Branch, BranchStatus
+from solver.errors import SettingError
+from solver.fourier import Integer, Real
+from solver.kernels import path
+from solver.kernels.observe import MEASURES
+from solver.kernels.path import Control, begin_walk, record, walk_by_value, walk_on
+from solver.peaks import Points, band_limit, find_band, find_peaks
+from solver.scene import Scene
+from solver.workspace import Workspace
+
+_STRETCH = 64  # points between two looks at the caller
+
+
+class Predictor(IntEnum):
+    """How the next point is guessed."""
+
+    TANGENT = path.TANGENT
+    SECANT = path.SECANT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContinuationSettings:
+    """Settings of a continuation; arc length is relative to the size of u and to a share of the range of λ.
+
+    Attributes
+    ----------
+    predictor : Predictor
+        How the next point is guessed.
+    first_step, largest_step, smallest_step : float
+        Arc length steps.
+    range_length : float
+        Arc length of the whole range of λ if u did not change: more gives a finer branch.
+    wanted_iterations : int
+        Newton iterations of a step that is neither lengthened nor shortened.
+    most_iterations : int
+        Newton iterations after which a step is halved.
+    largest_turn : float
+        Distance from predicted to corrected point, relative to the step, beyond which a step is halved.
+    most_points : int
+        Points after which the branch ends with a status.
+    """
+
+    predictor: Predictor = Predictor.TANGENT
+    first_step: float = 0.02
+    largest_step: float = 0.2
+    smallest_step: float = 1e-8
+    range_length: float = 6.0
+    wanted_iterations: int = 3
+    most_iterations: int = 8
+    largest_turn: float = 0.3
+    most_points: int = 20_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stretch:
+    """Some consecutive points of a branch; the arrays are those of `solver.branch.Branch`."""
+
+    solutions: Real
+    tangents: Real
+    states: Integer
+    observed: Real
+    measures: Real
+    status: BranchStatus | None
+    newton_iterations: int
+    rejected_steps: int
+    stepped_over: int
+
+
+def sweep(
+    scene: Scene,
+    parameter: str = "frequency",
+    start: float | None = None,
+    stop: float | None = None,
+    *,
+    harmonics: int = 11,
+    frequency_hz: float | None = None,
+    limit: float | None = None,
+    settings: ContinuationSettings | None = None,
+    guess: Real | None = None,
+    on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> Branch:
+    """Follow the periodic response over a range of one parameter.
+
+    Parameters
+    ----------
+    scene : what vibrates, with the values that stay fixed.
+    parameter : path of the parameter, for example ``frequency`` or ``shroud.N0``.
+    start, stop : the range in user units (Hz for a frequency); for the frequency the scene's band if left out.
+    harmonics : highest harmonic kept.
+    frequency_hz : excitation frequency [Hz], needed unless it is the parameter.
+    limit : amplitude [m] above which the resonance band is measured; peak/√2 if left out.
+    settings : of the continuation.
+    guess : (n_unknowns,) slip motions [m] to start from, instead of the start-up ladder.
+    on_progress : called with (share of the range reached, points so far).
+    should_stop : asked between stretches of points; True ends the branch with the status STOPPED.
+
+    Returns
+    -------
+    The branch; whatever happened, it holds converged points only, and its status says how it ended.
+
+    Raises
+    ------
+    SettingError
+        A bad path, range, frequency, limit or number of harmonics.
+    """
+    begun = time.perf_counter()
+    settings = settings or ContinuationSettings()
+    if parameter == "frequency":
+        start = scene.observe.band[0] if start is None else start
+        stop = scene.observe.band[1] if stop is None else stop
+    balance = build(scene, parameter, harmonics=harmonics, frequency_hz=frequency_hz)
+    first, last = check_range(balance, start, stop)
+    if limit is not None and not (isinstance(limit, (int, float)) and np.isfinite(limit) and limit > 0.0):
+        raise SettingError("limit", limit, "must be an amplitude > 0 m")
+    workspace = Workspace.of(balance)
+    stretches: list[Stretch] = []
+    status, count = BranchStatus.TOO_MANY_POINTS, 0
+    for stretch in walk(workspace, first, last, settings, guess):
+        stretches.append(stretch)
+        count += len(stretch.solutions)
+        if stretch.status is not None:
+            status = stretch.status
+            break
+        if on_progress is not None:
+            here = float(balance.parameter.outside(stretch.solutions[-1, -1]))
+            on_progress(min(max((here - first) / (last - first), 0.0), 1.0), count)
+        if should_stop is not None and should_stop():
+            status = BranchStatus.STOPPED
+            break
+        if count >= settings.most_points:
+            break
+    if on_progress is not None and status is BranchStatus.COMPLETED:
+        on_progress(1.0, count)
+    return _finish(workspace, stretches, status, first, last, limit, begun)
+
+
+def check_range(balance: Balance, start: float | None, stop: float | None) -> tuple[float, float]:
+    """Return the range of a continuation as floats.
+
+    Raises
+    ------
+    SettingError
+        An end is missing, not a value the parameter may have, or both are the same.
+    """
+    ends = []
+    for name, value in (("start", start), ("stop", stop)):
+        if value is None:
+            raise SettingError(name, None, f"is needed for a sweep of `{balance.parameter.path}`")
+        ends.append(balance.parameter.check(name, value))
+    first, last = ends
+    if first == last:
+        raise SettingError("stop", last, f"must differ from the start {first!r}")
+    return first, last
+
+
+def walk(
+    workspace: Workspace, start: float, stop: float, settings: ContinuationSettings, guess: Real | None = None
+) -> Iterator[Stretch]:
+    """Yield the branch in stretches; the last one carries the status. The caller owns stop, save and plot.
+
+    Parameters
+    ----------
+    workspace : of the balance in the parameter that is continued in.
+    start, stop : the range in user units.
+    guess : (n_unknowns,) slip motions to start from [m].
+    """
+    balance, system = workspace.balance, workspace.system
+    control = Control(
+        start=balance.parameter.inside(start), stop=balance.parameter.inside(stop),
+        first_step=settings.first_step, largest_step=settings.largest_step,
+        smallest_step=settings.smallest_step, wanted_iterations=settings.wanted_iterations,
+        most_iterations=settings.most_iterations, predictor=int(settings.predictor),
+        largest_turn=settings.largest_turn, range_weight=settings.range_length,
+    )  # fmt: skip
+    linear, point = workspace.linear, workspace.point
+    code, state = begin_walk(system, linear, point, control, np.zeros(0) if guess is None else guess)
+    rows = _rows(balance, 1)
+    if code == path.RUNNING:
+        record(system, linear, point, state, 0, *rows)
+        yield _stretch(rows, 1, None, state)
+    while code == path.RUNNING:
+        rows = _rows(balance, _STRETCH)
+        code, count = walk_on(system, linear, point, control, state, _STRETCH, *rows)
+        yield _stretch(rows, count, ENDINGS.get(code), state)
+    if code == path.NO_START:
+        yield _stretch(rows, 0, BranchStatus.NO_START, state)
+
+
+def _rows(balance: Balance, count: int) -> tuple[Real, Real, Integer, Real, Real]:
+    """Return empty rows for `count` points: solutions, tangents, states, observed, measures."""
+    nt, n = balance.n_unknowns, balance.n_coefficients
+    return (
+        np.zeros((count, nt + 1)), np.zeros((count, nt + 1)),
+        np.zeros((count, len(balance.scene.contacts)), np.int64), np.zeros((count, n)),
+        np.zeros((count, MEASURES)),
+    )  # fmt: skip
+
+
+def _stretch(
+    rows: tuple[Real, Real, Integer, Real, Real], count: int, status: BranchStatus | None, state: path.Walk
+) -> Stretch:
+    numbers = walk_by_value(state).numbers
+    return Stretch(
+        solutions=rows[0][:count], tangents=rows[1][:count], states=rows[2][:count], observed=rows[3][:count],
+        measures=rows[4][:count], status=status, newton_iterations=int(numbers[path.ITERATIONS]),
+        rejected_steps=int(numbers[path.REJECTED]), stepped_over=int(numbers[path.STEPPED_OVER]),
+    )  # fmt: skip
+
+
+def _finish(
+    workspace: Workspace, stretches: list[Stretch], status: BranchStatus, start: float, stop: float,
+    limit: float | None, begun: float,
+) -> Branch:  # fmt: skip
+    """Put the stretches together, polish the peaks and measure the band."""
+    balance = workspace.balance
+    solutions = np.concatenate([stretch.solutions for stretch in stretches])
+    tangents = np.concatenate([stretch.tangents for stretch in stretches])
+    measures = np.concatenate([stretch.measures for stretch in stretches])
+    points = Points(solutions=solutions, tangents=tangents, measures=measures)
+    peaks, spent = find_peaks(workspace, points)
+    at = band_limit(limit, peaks, balance.parameter.kind)
+    band = None
+    if at is not None:
+        band, more = find_band(workspace, points, at)
+        spent += more
+    return Branch(
+        balance=balance, status=status, start=start, stop=stop,
+        values=np.asarray(balance.parameter.outside(solutions[:, -1])), solutions=solutions,
+        tangents=tangents, observed=np.concatenate([stretch.observed for stretch in stretches]),
+        measures=measures, states=np.concatenate([stretch.states for stretch in stretches]), peaks=peaks,
+        band=band, newton_iterations=stretches[-1].newton_iterations + spent,
+        rejected_steps=stretches[-1].rejected_steps, stepped_over=stretches[-1].stepped_over,
+        seconds=time.perf_counter() - begun,
+    )  # fmt: skip
