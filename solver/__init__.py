@@ -9,12 +9,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from solver.annulus import annulus
+    from solver.sectors import annulus
     from solver.branch import Band, Branch, BranchStatus, Peak
     from solver.continuation import ContinuationSettings, Predictor, sweep
     from solver.errors import Issue, SceneError, SettingError, SolverError
     from solver.marching import march
-    from solver.plan import Plan, plan
+    from solver.effects import Plan, plan
     from solver.response import Solution, SolutionStatus, solve
     from solver.scene import Scene, load_scene, shipped_scenes
 
@@ -22,9 +22,9 @@ _HOME = {
     "Band": "branch", "Branch": "branch", "BranchStatus": "branch", "Peak": "branch",
     "ContinuationSettings": "continuation", "Predictor": "continuation", "sweep": "continuation",
     "Issue": "errors", "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
-    "Plan": "plan", "plan": "plan", "Scene": "scene", "load_scene": "scene", "shipped_scenes": "scene",
+    "Plan": "effects", "plan": "effects", "Scene": "scene", "load_scene": "scene", "shipped_scenes": "scene",
     "Solution": "response", "SolutionStatus": "response", "solve": "response",
-    "annulus": "annulus", "march": "marching",
+    "annulus": "sectors", "march": "marching",
 }  # fmt: skip
 
 __all__ = [

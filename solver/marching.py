@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
-from solver.annulus import annulus
+from solver.sectors import annulus
 from solver.errors import SettingError
 from solver.kernels import march as kernel
 from solver.march_result import MarchResult, MarchStatus, describe

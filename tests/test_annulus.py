@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigvalsh
 
-from solver.annulus import annulus
+from solver.sectors import annulus
 from solver.errors import SettingError
 from solver.parametric import linear_model
 from solver.scene import CyclicStructure, LumpedStructure, Scene, load_scene
