@@ -1,1 +1,24 @@
-"""The design layer."""
+"""The design layer: criteria with gradients, and the search for the best damper."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from optim.errors import DesignError
+    from optim.problem import design
+    from optim.result import DesignResult, DesignStatus
+
+_HOME = {"design": "problem", "DesignResult": "result", "DesignStatus": "result", "DesignError": "errors"}
+
+__all__ = ["DesignError", "DesignResult", "DesignStatus", "design"]
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name on first use (CVXPY takes a second to import)."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'optim' has no attribute {name!r}")
+    value = getattr(import_module(f"optim.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value

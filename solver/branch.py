@@ -57,6 +57,25 @@ class Peak:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Edge:
+    """An end of an interval in which the amplitude exceeds a limit, where it equals the limit.
+
+    Attributes
+    ----------
+    at : float
+        Parameter value, in user units.
+    solution : (n_unknowns,) array
+        Slip motions of the contacts there [m].
+    opens : bool
+        The interval begins here; otherwise it ends here.
+    """
+
+    at: float
+    solution: Real
+    opens: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Band:
     """Where the amplitude exceeds a limit.
 
@@ -68,11 +87,14 @@ class Band:
         Measure of {parameter : amplitude > limit}, in user units (Hz for a frequency).
     intervals : tuple of (low, high)
         Its intervals, ascending.
+    edges : tuple of Edge
+        The interval ends inside the branch (an end of the range itself is not one).
     """
 
     limit: float
     width: float
     intervals: tuple[tuple[float, float], ...]
+    edges: tuple[Edge, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -43,7 +43,13 @@ _UNITS = {
     Kind.FRICTION: "", Kind.STRUCTURE: "SI",
 }  # fmt: skip
 # Smallest value that means something; a load amplitude may be negative (it is then in antiphase).
-_LEAST = {Kind.NORMAL_LOAD: 0.0, Kind.STIFFNESS: 0.0, Kind.FRICTION: 0.0, Kind.STRUCTURE: 0.0, Kind.LEVEL: 0.0}
+_LEAST = {
+    Kind.NORMAL_LOAD: 0.0,
+    Kind.STIFFNESS: 0.0,
+    Kind.FRICTION: 0.0,
+    Kind.STRUCTURE: 0.0,
+    Kind.LEVEL: 0.0,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +92,11 @@ class Parameter:
         SettingError
             Not a finite number, or out of the parameter's range; the message names `name`.
         """
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, (int, float, np.number))
+            or not np.isfinite(value)
+        ):
             raise SettingError(name, value, f"must be a finite number ({self.path})")
         if self.kind is Kind.FREQUENCY and value <= 0.0:
             raise SettingError(name, value, "must be a frequency > 0 Hz")

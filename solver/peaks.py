@@ -11,8 +11,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from solver.branch import Band, Peak
+from solver.branch import Band, Edge, Peak
 from solver.fourier import Real
 from solver.kernels.observe import MAX_ABS, MEASURES, SLOPE
 from solver.kernels.refine import EDGE, PEAK, refine
@@ -54,7 +55,9 @@ def find_peaks(workspace: Workspace, points: Points) -> tuple[tuple[Peak, ...], 
             # Where polishing fails, or a kink is the maximum, the best converged point stands.
             if polished[0] is not None and polished[1] >= value:
                 point, value = polished[0], polished[1]
-        found.append(Peak(value=value, at=float(outside(point[-1])), solution=point[:-1].copy(), interior=True))
+        found.append(
+            Peak(value=value, at=float(outside(point[-1])), solution=point[:-1].copy(), interior=True)
+        )
     for end, falls in ((0, slope[0] <= 0.0), (amplitude.size - 1, slope[-1] >= 0.0)):
         if falls or amplitude.size == 1:
             point = points.solutions[end]
@@ -69,30 +72,46 @@ def find_peaks(workspace: Workspace, points: Points) -> tuple[tuple[Peak, ...], 
 
 def find_band(workspace: Workspace, points: Points, limit: float) -> tuple[Band, int]:
     """Return where the amplitude exceeds `limit` [m] (anywhere on the branch), and the iterations spent."""
-    amplitude = points.measures[:, MAX_ABS]
-    place = points.solutions[:, -1]
-    intervals, spent = [], 0
+    amplitude, place = points.measures[:, MAX_ABS], points.solutions[:, -1]
     above = amplitude > limit
-    begin = place[0] if above[0] else math.nan
-    for i in range(amplitude.size - 1):
-        if above[i] and above[i + 1]:
-            intervals.append((begin, place[i + 1]) if place[i + 1] >= begin else (place[i + 1], begin))
-            begin = place[i + 1]
-        elif above[i] != above[i + 1]:
-            gap = amplitude[i : i + 2] - limit
-            point, _, iterations = _refine(workspace, points, i, EDGE, limit, gap[0], gap[1])
-            spent += iterations
-            edge = float(point[-1]) if point is not None else _interpolate(place[i : i + 2], gap)
-            if above[i]:
-                intervals.append((min(begin, edge), max(begin, edge)))
-            else:
-                begin = edge
-                if above[i + 1]:
-                    intervals.append((min(edge, place[i + 1]), max(edge, place[i + 1])))
-                    begin = place[i + 1]
+    crossings, spent = [], 0
+    for i in np.flatnonzero(above[:-1] != above[1:]):
+        gap = amplitude[i : i + 2] - limit
+        point, _, iterations = _refine(workspace, points, int(i), EDGE, limit, gap[0], gap[1])
+        spent += iterations
+        if point is None:
+            # Between two converged points the straight line stands in; its error is that of the branch.
+            share = gap[0] / (gap[0] - gap[1])
+            point = points.solutions[i] + share * (points.solutions[i + 1] - points.solutions[i])
+        crossings.append((int(i), point))
+    pieces = _pieces(place, above, crossings)
     outside = workspace.balance.parameter.outside
-    merged = tuple((float(outside(low)), float(outside(high))) for low, high in _merge(intervals))
-    return Band(limit=limit, width=float(sum(high - low for low, high in merged)), intervals=merged), spent
+    merged = tuple((float(outside(low)), float(outside(high))) for low, high in _merge(pieces))
+    edges = []
+    for _, point in crossings:
+        at = float(outside(point[-1]))
+        for low, high in merged:
+            if at in (low, high):
+                edges.append(Edge(at=at, solution=point[:-1].copy(), opens=at == low))
+    width = float(sum(high - low for low, high in merged))
+    return Band(limit=limit, width=width, intervals=merged, edges=tuple(edges)), spent
+
+
+def _pieces(
+    place: Real, above: NDArray[np.bool_], crossings: list[tuple[int, Real]]
+) -> list[tuple[float, float]]:
+    """Return the stretches of λ passed above the limit, segment by segment of the branch."""
+    at = {i: float(point[-1]) for i, point in crossings}
+    pieces = []
+    for i in range(place.size - 1):
+        if not (above[i] or above[i + 1]):
+            continue
+        ends = (
+            at.get(i, float(place[i])) if not above[i] else float(place[i]),
+            at.get(i, float(place[i + 1])) if not above[i + 1] else float(place[i + 1]),
+        )
+        pieces.append((min(ends), max(ends)))
+    return pieces
 
 
 def band_limit(limit: float | None, peaks: tuple[Peak, ...], kind: Kind) -> float | None:
@@ -100,10 +119,6 @@ def band_limit(limit: float | None, peaks: tuple[Peak, ...], kind: Kind) -> floa
     if not peaks or kind is not Kind.FREQUENCY:
         return None
     return limit if limit is not None else peaks[0].value * HALF_POWER
-
-
-def _interpolate(place: Real, gap: Real) -> float:
-    return float(place[0] + (place[1] - place[0]) * gap[0] / (gap[0] - gap[1]))
 
 
 def _merge(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:

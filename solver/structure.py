@@ -133,7 +133,9 @@ def _modes(held: _Matrices, forces: Complex, which: Integer, observe: Real) -> d
         values, phi = linalg.eigh(K, M)
         damping = phi.conj().T @ C @ phi
         diagonal = np.diag(damping).real
-        if np.abs(damping - np.diag(diagonal)).max(initial=0.0) > CLASSICAL * np.abs(diagonal).max(initial=0.0):
+        if np.abs(damping - np.diag(diagonal)).max(initial=0.0) > CLASSICAL * np.abs(diagonal).max(
+            initial=0.0
+        ):
             return None
         eigenvalues.append(values.astype(np.complex128))
         dampings.append(diagonal)
@@ -203,7 +205,11 @@ def _no_modes(n_structures: int, n_harmonics: int, n_contacts: int) -> dict[str,
 
 
 def _dense(
-    held: _Matrices, theta: Real, model: LinearModel, forces: Complex, derivative: LinearModelDerivative | None
+    held: _Matrices,
+    theta: Real,
+    model: LinearModel,
+    forces: Complex,
+    derivative: LinearModelDerivative | None,
 ) -> dict[str, Complex]:
     """Return the matrices and their derivatives by the structural parameter (zero if there is none)."""
     turn = np.exp(1j * theta)[:, None, None]

@@ -36,7 +36,7 @@ def _cache_folder() -> str:
     """Return a writable folder for the machine code of exactly these sources."""
     asked = os.environ.get("NUMBA_CACHE_DIR")
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    for root in ([asked] if asked else [home, tempfile.gettempdir()]):
+    for root in [asked] if asked else [home, tempfile.gettempdir()]:
         folder = Path(root) / "stickslip-kernels" / _source_hash()
         try:
             folder.mkdir(parents=True, exist_ok=True)

@@ -107,7 +107,15 @@ def _crosses(
 
 @compiled
 def leave_stick(
-    c: Real, s: Real, degree: int, value: Real, slope: Real, offset: float, start: float, end: float, tol: float
+    c: Real,
+    s: Real,
+    degree: int,
+    value: Real,
+    slope: Real,
+    offset: float,
+    start: float,
+    end: float,
+    tol: float,
 ) -> tuple[float, int]:
     """Return when a stuck contact reaches a limit, and which (0: ξ = +1, 1: ξ = −1), or (end, −1)."""
     n = value.shape[1]

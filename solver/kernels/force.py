@@ -185,7 +185,20 @@ def find_segments(
         direction = 0 if rate_plus >= rate_minus else 1
         offset = -kt * at_point(uc, us, ks[-1], begin)[0]
         count = march(
-            c, s, degree, value, slope, begin, end, stuck, direction, offset, AFTER_SEPARATION, tol, segments, count
+            c,
+            s,
+            degree,
+            value,
+            slope,
+            begin,
+            end,
+            stuck,
+            direction,
+            offset,
+            AFTER_SEPARATION,
+            tol,
+            segments,
+            count,
         )
         if count < 0:
             return FAILED, 0
@@ -265,7 +278,9 @@ def _moment_rows(cosines: Real, sines: Real, ks: Integer, out: Real) -> None:
 
 
 @compiled
-def _products(cosines: Real, sines: Real, row_ks: Integer, column_ks: Integer, scale: float, out: Real) -> None:
+def _products(
+    cosines: Real, sines: Real, row_ks: Integer, column_ks: Integer, scale: float, out: Real
+) -> None:
     """Fill `out` with scale·∫e_row e_column/π (2π for the mean row): Toeplitz plus Hankel of the moments."""
     half = 0.5 * scale / math.pi
     row = 0

@@ -177,7 +177,9 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
 
 
 @compiled
-def start(system: System, linear: Receptance, u: Real, p: float, point: Evaluation) -> tuple[bool, int, float]:
+def start(
+    system: System, linear: Receptance, u: Real, p: float, point: Evaluation
+) -> tuple[bool, int, float]:
     """Find a first solution at λ = p from nothing, in place in `u`.
 
     Newton from the stuck response is tried first. Then the ladder: the fully stuck response is exact under a

@@ -185,9 +185,7 @@ def _accept(walk: Walk, trial: Real, p: float, norm: float) -> None:
 
 
 @compiled
-def _step(
-    system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk
-) -> int:
+def _step(system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk) -> int:
     """Make one step; return RUNNING, FINISHED, STALLED or LEFT_RANGE."""
     n = walk.u.size
     guess, trial = np.empty(n), np.empty(n)
@@ -205,7 +203,9 @@ def _step(
             step *= share
             copy_to(trial, guess)
             receptance(system, p_guess, linear)
-            good, iterations, norm = newton(system, linear, trial, p_guess, 0.0, point, control.most_iterations)
+            good, iterations, norm = newton(
+                system, linear, trial, p_guess, 0.0, point, control.most_iterations
+            )
             p = p_guess
         else:
             copy_to(trial, guess)
@@ -225,7 +225,9 @@ def _step(
             continue
         growth = (control.wanted_iterations + 0.5) / (iterations + 0.5)
         growth = min(growth, math.sqrt(0.3 * control.largest_turn / (turned + 1e-12)))
-        walk.numbers[STEP] = min(control.largest_step, step * min(max(growth, 0.5), 2.0)) if not last else step
+        walk.numbers[STEP] = (
+            min(control.largest_step, step * min(max(growth, 0.5), 2.0)) if not last else step
+        )
         _accept(walk, trial, p, norm)
         if last:
             _turn(walk, point, control, False)
@@ -237,9 +239,7 @@ def _step(
 
 
 @compiled
-def _step_over(
-    system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk
-) -> int:
+def _step_over(system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk) -> int:
     """Get past a kink: look for a solution a little further in λ, in the direction of the last advance."""
     n = walk.u.size
     span = control.stop - control.start

@@ -343,7 +343,9 @@ def _product(left: Complex, right: Complex, out: Complex) -> None:
 
 
 @compiled
-def _project(system: System, s: int, i: int, sign: float, green: Complex, order: int, out: Receptance) -> None:
+def _project(
+    system: System, s: int, i: int, sign: float, green: Complex, order: int, out: Receptance
+) -> None:
     """Project Z⁻¹ (or its derivative) of harmonic number i on contacts, excitation and observed DOF."""
     nc, n = system.contacts.shape[0], green.shape[0]
     out.x_linear[order, i] = 0.0

@@ -30,7 +30,9 @@ def grid_tables(n_grid: int, highest_harmonic: int) -> tuple[Real, Real]:
 
 
 @compiled
-def on_grid(c: Real, s: Real, degree: int, cos_table: Real, sin_table: Real, value: Real, slope: Real) -> None:
+def on_grid(
+    c: Real, s: Real, degree: int, cos_table: Real, sin_table: Real, value: Real, slope: Real
+) -> None:
     """Fill `value` and `slope` (d/dτ) of the polynomial at τ_j = 2πj/n, j = 0 … n − 1.
 
     Even and odd part are summed on half the grid only: q(−τ) = even − odd.
