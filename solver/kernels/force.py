@@ -33,7 +33,6 @@ from solver.kernels.events import (
     MOTION,
     ONSET,
     ROUNDING,
-    SEGMENT_COLUMNS,
     SEPARATED,
     SLIP,
     SLIPPING,
@@ -75,7 +74,7 @@ def _contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, 
         low = negative * delta
     count = 0
     before, at = -1.0, low
-    j = int(math.floor(low / delta)) + 1
+    j = math.floor(low / delta) + 1
     end = low + 2.0 * math.pi
     rising_at = 0.0
     in_contact = False
@@ -93,10 +92,17 @@ def _contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, 
                     count += 1
                 in_contact = False
         elif before < 0.0 and now < 0.0:
-            tau, top = _bump(c, s, degree, at, hi)
+            tau, top = _turning(c, s, degree, at, hi, False)
             if top > 0.0 and count < out.shape[0]:
                 out[count, 0] = bracketed_root(c, s, degree, 0, 0.0, at, tau, 0.5 * (at + tau), True)
                 out[count, 1] = bracketed_root(c, s, degree, 0, 0.0, tau, hi, 0.5 * (hi + tau), False)
+                count += 1
+        elif in_contact:
+            tau, bottom = _turning(c, s, degree, at, hi, True)
+            if bottom < 0.0 and count < out.shape[0]:
+                out[count, 0] = rising_at
+                out[count, 1] = bracketed_root(c, s, degree, 0, 0.0, at, tau, 0.5 * (at + tau), False)
+                rising_at = bracketed_root(c, s, degree, 0, 0.0, tau, hi, 0.5 * (hi + tau), True)
                 count += 1
         before = now
         at = hi
@@ -119,11 +125,12 @@ def _smallest(c: Real, s: Real, degree: int, value: Real, slope: Real) -> tuple[
 
 
 @compiled
-def _bump(c: Real, s: Real, degree: int, lo: float, hi: float) -> tuple[float, float]:
-    """Return place and value of a maximum between `lo` and `hi`, or (lo, −inf) if the slopes show none."""
-    if at_point(c, s, degree, lo)[1] <= 0.0 or at_point(c, s, degree, hi)[1] >= 0.0:
-        return lo, -np.inf
-    tau = bracketed_root(c, s, degree, 1, 0.0, lo, hi, 0.5 * (lo + hi), False)
+def _turning(c: Real, s: Real, degree: int, lo: float, hi: float, lowest: bool) -> tuple[float, float]:
+    """Return place and value of the lowest (else highest) point inside [lo, hi], (lo, 0) if there is none."""
+    sign = -1.0 if lowest else 1.0
+    if sign * at_point(c, s, degree, lo)[1] <= 0.0 or sign * at_point(c, s, degree, hi)[1] >= 0.0:
+        return lo, 0.0
+    tau = bracketed_root(c, s, degree, 1, 0.0, lo, hi, 0.5 * (lo + hi), lowest)
     return tau, at_point(c, s, degree, tau)[0]
 
 
@@ -327,7 +334,7 @@ def contact_force(
     """
     state, count = find_segments(U, ks, N, load_ks, kt, mu, cos_table, sin_table, segments)
     n = coefficient_count(ks)
-    if state == SEPARATED or state == FAILED:
+    if state in (SEPARATED, FAILED):
         value = 0.0 if state == SEPARATED else np.nan
         fill(F, value)
         fill(dF_dkt, value)
