@@ -67,7 +67,7 @@ class Service:
         self.waiters = Waiters()
         executor = LocalExecutor(
             registry.runs(),
-            registry.preload,
+            registry.warm_up,
             workers=settings.workers,
             grace_seconds=settings.grace_seconds,
             progress_seconds=settings.progress_seconds,

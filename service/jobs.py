@@ -158,6 +158,7 @@ class JobFailure:
 
 
 Run = Callable[[Mapping[str, Any], Progress, ShouldStop], JobOutput]
+WarmUp = Callable[[], None]
 Resolve = Callable[[Any, SceneSource], Resolved]
 
 
@@ -186,12 +187,24 @@ class JobKind:
     run: Run
 
 
-class Registry:
-    """The kinds of job a service knows, and the modules its workers load before the first one."""
+def no_warm_up() -> None:
+    """For kinds that need none."""
 
-    def __init__(self, kinds: Iterable[JobKind], preload: tuple[str, ...] = ()) -> None:
+
+class Registry:
+    """The kinds of job a service knows, and what its workers do before they take the first one.
+
+    Parameters
+    ----------
+    kinds : iterable of JobKind
+        The kinds.
+    warm_up : callable
+        Loads and compiles what the kinds need; sent to workers by name, as their `run` is.
+    """
+
+    def __init__(self, kinds: Iterable[JobKind], warm_up: WarmUp = no_warm_up) -> None:
         self._kinds = {kind.name: kind for kind in kinds}
-        self.preload = preload
+        self.warm_up = warm_up
 
     def __getitem__(self, name: str) -> JobKind:
         return self._kinds[name]
@@ -214,7 +227,7 @@ class Registry:
 
     def extended(self, *kinds: JobKind) -> Registry:
         """This registry with further kinds."""
-        return Registry([*self, *kinds], self.preload)
+        return Registry([*self, *kinds], self.warm_up)
 
     def runs(self) -> dict[str, Run]:
         """The functions workers call, by kind."""

@@ -183,9 +183,11 @@ class Sweep(Base):
     created: Mapped[datetime]
 
     __table_args__ = (
-        Index(None, "job_id", "position"),
+        Index(None, "job_id", "id"),
         Index(None, "scene_name", "peak", "id"),
         Index(None, "scene_name", "id"),
+        Index(None, "scene_hash", "id"),
+        Index(None, "completed", "id"),
         Index(None, "parameter", "id"),
         Index(None, "peak", "id"),
         Index(None, "peak_at", "id"),

@@ -8,7 +8,6 @@ itself when its parent dies. This module imports nothing heavy: the numerical pa
 from __future__ import annotations
 
 import ctypes
-import importlib
 import logging
 import multiprocessing as mp
 import os
@@ -23,7 +22,7 @@ from types import FrameType
 from typing import Any, cast
 
 from service import strict_json
-from service.jobs import FailureKind, JobFailure, JobOutput, Run
+from service.jobs import FailureKind, JobFailure, JobOutput, Run, WarmUp
 from solver.errors import SceneError, SettingError, SolverError
 
 THREAD_LIMITS = dict.fromkeys(
@@ -128,15 +127,14 @@ def main(
     connection: Connection,
     number: ctypes.c_longlong,
     runs: Mapping[str, Run],
-    preload: tuple[str, ...],
+    warm_up: WarmUp,
     progress_seconds: float,
 ) -> None:
     """The life of a worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _leave_soon)
     threading.Thread(target=_die_with_parent, name="parent watch", daemon=True).start()
-    for name in preload:
-        importlib.import_module(name)
+    warm_up()
     flag = StopFlag(number)
     connection.send(Ready())
     while True:

@@ -16,14 +16,14 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 
 from service.executors.base import ExecutorStatus, Failed, Finished, Lost, Outcome, Sink, Stopped
-from service.jobs import Run
+from service.jobs import Run, WarmUp
 from service.repository import Attempt
 from service.worker import THREAD_LIMITS, Done, Ready, Report, StopFlag, Task, main
 
 log = logging.getLogger("stickslip.executor")
 
 _BACKOFF_SECONDS = (0.2, 1.0, 3.0, 10.0)
-_START_SECONDS = 120.0
+_START_SECONDS = 1800.0
 
 _environment_lock = threading.Lock()
 _tokens = itertools.count(1)
@@ -62,7 +62,7 @@ def _death(process: SpawnProcess) -> str:
 class _Child:
     """One worker process and the parent's end of its pipe."""
 
-    def __init__(self, runs: Mapping[str, Run], preload: tuple[str, ...], progress_seconds: float) -> None:
+    def __init__(self, runs: Mapping[str, Run], warm_up: WarmUp, progress_seconds: float) -> None:
         context = mp.get_context("spawn")
         number: ctypes.c_longlong = context.RawValue(ctypes.c_longlong, 0)
         self.flag = StopFlag(number)
@@ -70,7 +70,7 @@ class _Child:
         self.connection, theirs = context.Pipe()
         self.process = context.Process(
             target=main,
-            args=(theirs, number, runs, preload, progress_seconds),
+            args=(theirs, number, runs, warm_up, progress_seconds),
             name="stickslip worker",
             daemon=True,
         )
@@ -94,6 +94,7 @@ class _Slot(threading.Thread):
     def __init__(self, executor: LocalExecutor, index: int) -> None:
         super().__init__(name=f"stickslip slot {index}", daemon=True)
         self._executor = executor
+        self._waits = index > 0
         self._lock = threading.Lock()
         self._wake_reader, self._wake_writer = mp.get_context("spawn").Pipe(duplex=False)
         self._child: _Child | None = None
@@ -146,9 +147,11 @@ class _Slot(threading.Thread):
     def run(self) -> None:
         """Keep a worker process up."""
         failures = 0
+        if self._waits:
+            self._executor.warmed.wait()
         while not self._closing:
             try:
-                child = _Child(self._executor.runs, self._executor.preload, self._executor.progress_seconds)
+                child = _Child(self._executor.runs, self._executor.warm_up, self._executor.progress_seconds)
             except OSError as error:
                 trouble = f"a worker process could not be started: {error}"
             else:
@@ -158,6 +161,7 @@ class _Slot(threading.Thread):
                     continue
                 trouble = served
             self._executor.trouble = trouble
+            self._executor.warmed.set()
             log.error("%s", trouble)
             delay = _BACKOFF_SECONDS[min(failures, len(_BACKOFF_SECONDS) - 1)]
             failures += 1
@@ -180,6 +184,7 @@ class _Slot(threading.Thread):
                 with self._lock:
                     self._child, self.ready = child, True
                 self._executor.trouble = None
+                self._executor.warmed.set()
                 self._executor.sink.room()
                 self._converse(child)
             return trouble
@@ -259,8 +264,8 @@ class LocalExecutor:
     ----------
     runs : mapping
         The function of each kind; sent to the processes by name.
-    preload : tuple of str
-        Modules every process loads before it takes an attempt.
+    warm_up : callable
+        Called in every process before it takes an attempt; sent by name.
     workers : int
         Number of processes.
     grace_seconds : float
@@ -272,17 +277,19 @@ class LocalExecutor:
     def __init__(
         self,
         runs: Mapping[str, Run],
-        preload: tuple[str, ...],
+        warm_up: WarmUp,
         *,
         workers: int,
         grace_seconds: float,
         progress_seconds: float,
     ) -> None:
         self.runs = runs
-        self.preload = preload
+        self.warm_up = warm_up
         self.grace_seconds = grace_seconds
         self.progress_seconds = progress_seconds
         self.trouble: str | None = None
+        # The first process fills the cache of compiled loops that the others then only read.
+        self.warmed = threading.Event()
         self.sink: Sink
         self._slots = [_Slot(self, index) for index in range(workers)]
 
@@ -309,6 +316,7 @@ class LocalExecutor:
         """End every process; attempts end first."""
         for slot in self._slots:
             slot.close()
+        self.warmed.set()
         for slot in self._slots:
             if slot.ident is not None:
                 slot.join()

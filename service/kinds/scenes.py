@@ -49,15 +49,24 @@ class SceneRequest(JobRequest):
         Name of a shipped or stored scene, or the scene itself.
     set : dict
         Values put on parameter paths before anything is computed.
-    harmonics : int
-        Number of harmonics of the balance.
     """
 
     scene: SceneReference = Field(description="Name of a shipped or stored scene, or the scene as an object.")
     set: dict[ParameterPath, Number] = Field(
         default={}, max_length=1000, description='Values of parameters, {"damper.N0": 100}.'
     )
-    harmonics: Harmonics = Field(default=11, description="Number of harmonics.")
+
+
+class HarmonicRequest(SceneRequest):
+    """A request answered by harmonic balance.
+
+    Attributes
+    ----------
+    harmonics : int
+        Highest harmonic of the balance.
+    """
+
+    harmonics: Harmonics = Field(default=11, description="Highest harmonic of the balance.")
 
 
 def resolve_scene(request: SceneRequest, source: SceneSource) -> Scene:
@@ -110,6 +119,11 @@ def check(where: str, attempt: Callable[[], object]) -> list[Issue]:
     except SettingError as error:
         return [Issue(pointer=where, message=str(error))]
     return []
+
+
+def refusal(where: str, message: str) -> Issue:
+    """Something wrong with the field at the pointer `where`."""
+    return Issue(pointer=where, message=message)
 
 
 def require(issues: list[Issue]) -> None:

@@ -1,0 +1,70 @@
+"""The commands put together, and the way from an error to an exit status."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from service.cli import service_commands, solver_commands, submit_commands
+from service.cli.failures import REPORTED, report
+from service.cli.inputs import join_variables
+
+app = typer.Typer(
+    name="stickslip",
+    help="Design friction dampers: periodic responses, continuation, the best normal load, as a command and a service.",
+    rich_markup_mode=None,
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+_database = typer.Typer(help="Look after the database.", no_args_is_help=True, rich_markup_mode=None)
+_submit = typer.Typer(help="Hand a job to a running service.", no_args_is_help=True, rich_markup_mode=None)
+
+for _command in (
+    solver_commands.scenes, solver_commands.plan, solver_commands.solve, solver_commands.sweep,
+    solver_commands.design, solver_commands.march, service_commands.demo, service_commands.serve,
+    service_commands.worker,
+):  # fmt: skip
+    app.command()(_command)
+app.add_typer(_submit, name="submit")
+app.command()(submit_commands.watch)
+app.command()(submit_commands.results)
+app.add_typer(_database, name="db")
+_database.command()(service_commands.upgrade)
+for _command in (submit_commands.design, submit_commands.sweep, submit_commands.solve, submit_commands.march):
+    _submit.command()(_command)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(version("stickslip"))
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    _version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None: ...
+
+
+@_database.callback()
+def _database_root() -> None: ...
+
+
+def run(arguments: Sequence[str] | None) -> int:
+    """Run the command and return its exit status."""
+    given = sys.argv[1:] if arguments is None else arguments
+    try:
+        app(args=join_variables(given), prog_name="stickslip")
+    except REPORTED as error:
+        return report(error)
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else 0
+    return 0

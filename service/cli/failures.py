@@ -1,0 +1,86 @@
+"""What becomes of an error on the command line: a message on standard error and an exit status."""
+
+from __future__ import annotations
+
+import re
+import sys
+
+from optim.errors import DesignError
+from service import errors
+from solver.errors import Issue, SceneError, SettingError, SolverError
+
+DONE = 0
+FELL_SHORT = 1
+BAD_INPUT = 2
+
+# Arguments of the Python interface as the user of the command knows them.
+_OPTIONS = {
+    "frequency_hz": "--frequency",
+    "start": "--from",
+    "stop": "--to",
+    "harmonics": "--harmonics",
+    "limit": "--limit",
+    "max_band_hz": "--max-band",
+    "variables": "--variable",
+    "steps_per_period": "--steps",
+    "max_periods": "--max-periods",
+}
+# What is not the user's input: the state of a file or of a service.
+_STATE = (errors.DatabaseError, errors.ConflictError, errors.QueueFullError, errors.JobFailedError)
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+
+
+class InputError(Exception):
+    """An argument or option of the command that cannot be used; the message names it and quotes its value."""
+
+
+class ShortfallError(Exception):
+    """The computation did not reach its goal; the message is its status, with what to try."""
+
+
+REPORTED = (SolverError, DesignError, errors.ServiceError, InputError, ShortfallError)
+
+
+def report(error: Exception) -> int:
+    """Print an error of `REPORTED`; return the exit status."""
+    for line in _lines(error):
+        sys.stderr.write(_CONTROL.sub("?", f"stickslip: {line}") + "\n")
+    return _status(error)
+
+
+def _status(error: Exception) -> int:
+    if isinstance(error, (SceneError, SettingError, DesignError, InputError)):
+        return BAD_INPUT
+    if isinstance(error, errors.ServiceProblem):
+        return BAD_INPUT if 400 <= error.status < 500 and error.status != 409 else FELL_SHORT
+    if isinstance(error, errors.ServiceError) and not isinstance(error, _STATE):
+        return BAD_INPUT
+    return FELL_SHORT
+
+
+def _lines(error: Exception) -> list[str]:
+    if isinstance(error, (SceneError, errors.InvalidRequestError)):
+        return [_issue(issue) for issue in error.issues]
+    if isinstance(error, (SettingError, DesignError)):
+        return [_as_option(str(error), error.name)]
+    if isinstance(error, errors.ServiceProblem):
+        return _problem(error)
+    return [str(error)]
+
+
+def _issue(issue: Issue) -> str:
+    return f"{issue.pointer}: {issue.message}" if issue.pointer else issue.message
+
+
+def _as_option(message: str, name: str) -> str:
+    option = _OPTIONS.get(name)
+    return message if option is None else message.replace(f"`{name}`", f"`{option}`", 1)
+
+
+def _problem(error: errors.ServiceProblem) -> list[str]:
+    issues = error.problem.get("errors")
+    if not isinstance(issues, list) or not issues:
+        return [str(error)]
+    return [
+        f"{issue.get('pointer') or issue.get('parameter', '')}: {issue.get('detail', '')}" for issue in issues
+    ]

@@ -1,0 +1,108 @@
+"""From the words of the command line to values; every refusal names the option and quotes what was given."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from service.cli.failures import InputError
+
+if TYPE_CHECKING:
+    from solver.scene import Scene
+
+_VARIABLE = "--variable"
+
+
+def number(text: str) -> float:
+    """A number, for an option (NaN is refused later, with the range that holds there)."""
+    try:
+        return float(text)
+    except ValueError:
+        raise typer.BadParameter(f"must be a number, got {text!r}") from None
+
+
+def whole_number(text: str) -> int:
+    """A whole number, for an option."""
+    try:
+        return int(text)
+    except ValueError:
+        raise typer.BadParameter(f"must be a whole number, got {text!r}") from None
+
+
+def join_variables(arguments: Iterable[str]) -> list[str]:
+    """Make one argument of the three that follow ``--variable``, which Typer's repeatable options need."""
+    joined: list[str] = []
+    waiting = 0
+    for argument in arguments:
+        if waiting and argument.startswith("--"):
+            waiting = 0
+        if not waiting:
+            joined.append(argument)
+            waiting = 3 if argument == _VARIABLE else 0
+        else:
+            if waiting == 3:
+                joined.append(argument)
+            else:
+                joined[-1] += f" {argument}"
+            waiting -= 1
+    return joined
+
+
+def bounds(texts: Sequence[str] | None) -> dict[str, tuple[float, float]] | None:
+    """The variables of a design with their bounds; None if there are none."""
+    if not texts:
+        return None
+    variables: dict[str, tuple[float, float]] = {}
+    for text in texts:
+        words = text.split()
+        if len(words) != 3:
+            raise InputError(f"`{_VARIABLE}` takes PATH LO HI, for example shroud.N0 20 3000, got {text!r}")
+        path, low, high = words
+        if path in variables:
+            raise InputError(f"`{_VARIABLE}` names {path!r} twice; keep one")
+        variables[path] = (_part(_VARIABLE, text, low), _part(_VARIABLE, text, high))
+    return variables
+
+
+def settings(texts: Sequence[str] | None) -> dict[str, float]:
+    """The values of ``--set``, in the given order."""
+    values: dict[str, float] = {}
+    for text in texts or ():
+        path, equals, value = text.partition("=")
+        path = path.strip()
+        if not equals or not path:
+            raise InputError(f"`--set` takes PATH=VALUE, for example shroud.N0=150, got {text!r}")
+        values.pop(path, None)
+        values[path] = _part("--set", text, value)
+    return values
+
+
+def scene(name: str, texts: Sequence[str] | None) -> Scene:
+    """A shipped scene or a file, with the values of ``--set``."""
+    import solver
+
+    return solver.load_scene(name).with_values(settings(texts))
+
+
+def output_path(option: str, text: str | None, suffixes: Sequence[str] = ()) -> Path | None:
+    """A file that can be written at the end, checked before the work begins; None if none was asked for."""
+    if text is None:
+        return None
+    path = Path(text)
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise InputError(f"`{option}` must end in {', '.join(suffixes)}, got {text!r}")
+    if path.is_dir():
+        raise InputError(f"`{option}` must be a file, but {text!r} is a folder")
+    if not path.absolute().parent.is_dir():
+        raise InputError(f"`{option}`: there is no folder {str(path.absolute().parent)!r} for {text!r}")
+    return path
+
+
+def _part(option: str, text: str, word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        raise InputError(f"`{option}` needs a number where {word.strip()!r} stands, got {text!r}") from None

@@ -1,0 +1,92 @@
+"""The arguments and options that several commands share, in one wording."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from service.cli.inputs import number, whole_number
+
+Scene = Annotated[
+    str, typer.Argument(metavar="SCENE", help="Name of a shipped scene, or a scene file (.toml, .json).")
+]
+Values = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="PATH=VALUE", help="Value of a parameter, for example shroud.N0=150; repeatable."
+    ),
+]
+Frequency = Annotated[
+    float, typer.Option("--frequency", metavar="HZ", parser=number, help="Excitation frequency [Hz].")
+]
+FixedFrequency = Annotated[
+    float | None,
+    typer.Option(
+        "--frequency", metavar="HZ", parser=number,
+        help="Excitation frequency [Hz], needed when another parameter is swept.",
+    ),
+]  # fmt: skip
+Harmonics = Annotated[
+    int, typer.Option("--harmonics", metavar="H", parser=whole_number, help="Highest harmonic kept.")
+]
+Parameter = Annotated[
+    str, typer.Option("--parameter", metavar="PATH", help="What is swept: frequency, shroud.N0, …")
+]
+From = Annotated[
+    float | None,
+    typer.Option(
+        "--from", metavar="A", parser=number,
+        help="Start of the range; for the frequency, the scene's band if left out.",
+    ),
+]  # fmt: skip
+To = Annotated[float | None, typer.Option("--to", metavar="B", parser=number, help="End of the range.")]
+Limit = Annotated[
+    float | None,
+    typer.Option(
+        "--limit", metavar="A", parser=number,
+        help="Amplitude [m] above which the resonance band is measured; peak/√2 if left out.",
+    ),
+]  # fmt: skip
+Variables = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--variable", metavar="PATH LO HI",
+        help="A parameter and its bounds, for example shroud.N0 20 3000; repeatable. "
+        "If left out, the normal load of the contact whose load varies.",
+    ),
+]  # fmt: skip
+MaxBand = Annotated[
+    float | None,
+    typer.Option("--max-band", metavar="HZ", parser=number, help="Widest resonance band allowed [Hz]."),
+]
+Steps = Annotated[
+    int | None,
+    typer.Option("--steps", metavar="N", parser=whole_number, help="Steps per period; chosen if left out."),
+]
+MaxPeriods = Annotated[
+    int,
+    typer.Option("--max-periods", metavar="N", parser=whole_number, help="Periods to march at most."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+Plot = Annotated[
+    str | None, typer.Option("--plot", metavar="F", help="Draw a picture: F ends in .png, .svg or .pdf.")
+]
+Database = Annotated[
+    str | None,
+    typer.Option(
+        "--database", metavar="URL", help="sqlite:///path of the database; STICKSLIP_DATABASE sets it too."
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option("--workers", metavar="N", parser=whole_number, help="Worker processes; one a processor."),
+]
+Url = Annotated[
+    str,
+    typer.Option("--url", metavar="URL", envvar="STICKSLIP_URL", help="Where the service is."),
+]
+Wait = Annotated[bool, typer.Option("--wait", help="Wait for the end and print the results.")]
+Job = Annotated[str, typer.Argument(metavar="JOB", help="Id of a job.")]
+
+DEFAULT_URL = "http://127.0.0.1:8000"

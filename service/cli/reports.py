@@ -1,0 +1,143 @@
+"""What people read of a result, given as the JSON object a program reads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from service import units
+from service.cli.output import print_pairs, print_table
+
+if TYPE_CHECKING:
+    from solver.scene import Scene
+
+Json = Mapping[str, Any]
+Pairs = list[tuple[str, str]]
+
+_FLAGS = {
+    "mean_undetermined": "the mean, and with it max|x|, depends on the history: go by half peak to peak",
+    "all_stuck": "every contact sticks all the time",
+    "separation": "a contact opens during the period",
+}
+_EFFECT_COLUMNS = ("used", "effect", "reason")
+_SCENE_COLUMNS = ("name", "kind", "DOFs", "contacts", "observed", "band")
+
+
+def scenes(known: Sequence[Scene]) -> None:
+    """A table of scenes."""
+    rows = [
+        (
+            scene.name,
+            scene.structure.kind,
+            str(len(scene.structure.dofs)),
+            ", ".join(contact.name for contact in scene.contacts),
+            scene.observe.dof,
+            f"{scene.observe.band[0]:g} to {scene.observe.band[1]:g} Hz",
+        )
+        for scene in known
+    ]
+    print_table("Shipped scenes", _SCENE_COLUMNS, rows)
+
+
+def plan(found: Json) -> None:
+    """The effects in use and left out, the sizes and the cost."""
+    effects = [("yes" if e["used"] else "no", e["name"], e["reason"]) for e in found["effects"]]
+    print_table(f"Plan of {found['scene']}", _EFFECT_COLUMNS, effects)
+    print_pairs(
+        "",
+        [
+            (
+                "unknowns",
+                f"{found['unknowns']} ({found['contacts']} contacts, {found['n_harmonics']} harmonics)",
+            ),
+            ("linear DOFs", str(found["linear_dofs"])),
+            ("estimated cost", f"{units.duration(found['estimated_seconds_a_point'])} a point of a branch"),
+        ],
+    )
+
+
+def solution(found: Json) -> None:
+    """One response."""
+    title = f"{found['scene']} at {found['frequency_hz']:g} Hz, {found['n_harmonics']} harmonics"
+    if not found["converged"]:
+        print_pairs(title, [("converged", "no")])
+        return
+    pairs = _amplitudes(found)
+    if found["error_estimate"] is not None:
+        pairs.append(
+            ("estimated error", f"{units.length(found['error_estimate'])} of max|x|, by harmonics left out")
+        )
+    pairs.append(("harmonics 1 to 5", ", ".join(units.length(a) for a in found["harmonics"][1:6])))
+    pairs += [(f"contact {name}", state) for name, state in found["contacts"].items()]
+    pairs += [("note", _FLAGS.get(flag, flag)) for flag in found["flags"]]
+    pairs += [("residual", f"{found['residual']:.1e}"), ("time", units.duration(found["seconds"]))]
+    print_pairs(title, pairs)
+
+
+def branch(found: Json) -> None:
+    """A branch: its peaks and its band."""
+    path, values = found["parameter_path"], found["parameter"]
+    pairs = _peaks(found, path)
+    if found["band_hz"] is not None:
+        pairs.append(("band", _band(found)))
+    effort = f"{found['newton_iterations']} Newton iterations, {found['rejected_steps']} steps rejected"
+    pairs.append(("points", f"{found['points']} ({effort}, {found['folds']} folds)"))
+    pairs.append(("time", units.duration(found["seconds"])))
+    title = f"{found['scene']}, {path}"
+    if values:
+        title += f" from {units.parameter(path, values[0])} to {units.parameter(path, values[-1])}"
+    print_pairs(f"{title}, {found['n_harmonics']} harmonics", pairs)
+
+
+def design(found: Json) -> None:
+    """The best design."""
+    pairs = [(path, units.parameter(path, value)) for path, value in found["optimum"].items()]
+    if found["peak"] is not None:
+        pairs.append(("peak", f"{units.length(found['peak']['value'])} at {found['peak']['at']:.6g} Hz"))
+    if found["band_hz"] is not None:
+        pairs.append(("band", f"{units.number(found['band_hz'])} Hz above {units.length(found['limit'])}"))
+    if found["active"]:
+        pairs.append(("held by", "; ".join(found["active"])))
+    effort = f"{found['evaluations']} frequency responses in {units.duration(found['seconds'])}"
+    print_pairs(f"Best damper of {found['scene']}", [*pairs, ("effort", effort)])
+
+
+def march(found: Json) -> None:
+    """What a time march came to."""
+    pairs = _amplitudes(found)
+    if found["error_estimate"] is not None:
+        pairs.append(("estimated error", f"{found['error_estimate']:.1e} of max|x|"))
+    pairs.append(("periods", f"{found['periods']} of {found['steps_per_period']} steps"))
+    pairs.append(("time", units.duration(found["seconds"])))
+    print_pairs("Time march", pairs)
+
+
+BY_KIND: Mapping[str, Callable[[Json], None]] = {
+    "solve": solution,
+    "sweep": branch,
+    "design": design,
+    "march": march,
+}
+
+
+def _amplitudes(found: Json) -> Pairs:
+    names = {"max_abs": "max|x|", "half_peak_to_peak": "half peak to peak", "mean": "mean"}
+    known = {key: found[key] for key in names if found[key] is not None}
+    show = units.length_unit(max((abs(value) for value in known.values()), default=0.0)).show
+    return [(names[key], show(value)) for key, value in known.items()]
+
+
+def _peaks(found: Json, path: str) -> Pairs:
+    peak, interior = found["peak"], found["peaks"]
+    if peak is None:
+        return []
+    highest = "peak" if peak in interior else "highest, at an end"
+    others = [other for other in interior if other != peak]
+    named = [(highest, peak), *(("further peak", other) for other in others)]
+    return [(name, f"{units.length(p['value'])} at {units.parameter(path, p['at'])}") for name, p in named]
+
+
+def _band(found: Json) -> str:
+    above = f"{units.number(found['band_hz'])} Hz above {units.length(found['band_limit'])}"
+    intervals = [f"{low:.6g} to {high:.6g}" for low, high in found["band_intervals_hz"]]
+    return f"{above}: {', '.join(intervals)}" if intervals else above

@@ -1,0 +1,71 @@
+"""The commands that run the service or look after its database: serve, worker, db upgrade, demo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from service.cli import options
+from service.cli.failures import InputError
+from service.cli.inputs import whole_number
+from service.cli.output import say
+
+if TYPE_CHECKING:
+    from service.settings import Settings
+
+
+def serve(
+    host: Annotated[str | None, typer.Option("--host", metavar="H", help="Address to listen on.")] = None,
+    port: Annotated[
+        int | None, typer.Option("--port", metavar="P", parser=whole_number, help="Port to listen on.")
+    ] = None,
+    database: options.Database = None,
+    workers: options.Workers = None,
+) -> None:
+    """Serve the REST API and work off its queue, until interrupted."""
+    from service.server import serve as run
+
+    run(_settings(host=host, port=port, database=database, workers=workers))
+
+
+def worker(
+    database: options.Database = None,
+    workers: options.Workers = None,
+    until_empty: Annotated[
+        bool, typer.Option("--until-empty", help="End when no job waits or runs.")
+    ] = False,
+) -> None:
+    """Work off the queue of a database without HTTP, while no service does."""
+    from service.server import work
+
+    work(_settings(database=database, workers=workers), until_empty=until_empty)
+
+
+def upgrade(database: options.Database = None) -> None:
+    """Bring a database to the revision this version works with."""
+    from service.revisions import upgrade as bring_up
+
+    url = _settings(database=database).database
+    say(f"{url} is at revision {bring_up(url)}")
+
+
+def demo(
+    out: Annotated[
+        str, typer.Option("--out", metavar="DIR", help="Folder of the database and the pictures.")
+    ] = "demo-output",
+) -> None:
+    """Run the main job end to end on an embedded service, with pictures."""
+    from service.demo import run
+
+    folder = Path(out)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"`--out` must be a folder, got {out!r}")
+    run(folder)
+
+
+def _settings(**values: object) -> Settings:
+    from service.settings import load_settings
+
+    return load_settings(**{name: value for name, value in values.items() if value is not None})

@@ -1,0 +1,175 @@
+"""The commands that compute here and now: scenes, plan, solve, sweep, design, march.
+
+What is heavy is imported inside the commands: `stickslip solve` starts without CVXPY, Matplotlib or the
+service.
+"""
+
+from __future__ import annotations
+
+import typer
+
+from service.cli import inputs, options, reports
+from service.cli.failures import FELL_SHORT
+from service.cli.output import print_json
+from service.cli.progress import bar, patience
+
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def scenes(as_json: options.Json = False) -> None:
+    """List the shipped scenes."""
+    import solver
+
+    known = [solver.load_scene(name) for name in solver.shipped_scenes()]
+    if as_json:
+        print_json({"scenes": [scene.name for scene in known]})
+    else:
+        reports.scenes(known)
+
+
+def plan(
+    name: options.Scene,
+    values: options.Values = None,
+    harmonics: options.Harmonics = 11,
+    as_json: options.Json = False,
+) -> None:
+    """Say which effects a scene calls for, which are left out, and why; sizes and estimated cost."""
+    import solver
+
+    found = solver.plan(inputs.scene(name, values), harmonics=harmonics)
+    if as_json:
+        print_json(found.to_json())
+    else:
+        reports.plan(found.to_json())
+
+
+def solve(
+    name: options.Scene,
+    frequency: options.Frequency,
+    values: options.Values = None,
+    harmonics: options.Harmonics = 11,
+    plot: options.Plot = None,
+    as_json: options.Json = False,
+) -> None:
+    """Compute one periodic response."""
+    import solver
+
+    picture = inputs.output_path("--plot", plot, PICTURES)
+    scene = inputs.scene(name, values)
+    with patience():
+        solution = solver.solve(scene, frequency_hz=frequency, harmonics=harmonics)
+    if solution.converged and picture is not None:
+        from service.plots.motion import Motion, motion_figure
+        from service.plots.style import save
+
+        save(motion_figure(Motion.of_solution(solution)), picture)
+    if as_json:
+        print_json(solution.to_json())
+    else:
+        reports.solution(solution.to_json())
+    _end(solution.converged, solution.status.value)
+
+
+def sweep(
+    name: options.Scene,
+    parameter: options.Parameter = "frequency",
+    start: options.From = None,
+    stop: options.To = None,
+    frequency: options.FixedFrequency = None,
+    values: options.Values = None,
+    limit: options.Limit = None,
+    harmonics: options.Harmonics = 11,
+    plot: options.Plot = None,
+    as_json: options.Json = False,
+) -> None:
+    """Follow the response over a range of one parameter, by continuation."""
+    import solver
+
+    picture = inputs.output_path("--plot", plot, PICTURES)
+    scene = inputs.scene(name, values)
+    with bar("sweep") as on_progress:
+        branch = solver.sweep(
+            scene, parameter, start, stop, harmonics=harmonics, frequency_hz=frequency, limit=limit,
+            on_progress=on_progress,
+        )  # fmt: skip
+    if picture is not None and len(branch.values):
+        from service.plots.responses import Response, response_figure
+        from service.plots.style import save
+
+        save(response_figure(Response.of_branch(branch), limit=limit), picture)
+    if as_json:
+        print_json(branch.to_json())
+    else:
+        reports.branch(branch.to_json())
+    _end(branch.completed, branch.status.value)
+
+
+def design(
+    name: options.Scene,
+    variables: options.Variables = None,
+    limit: options.Limit = None,
+    max_band: options.MaxBand = None,
+    values: options.Values = None,
+    harmonics: options.Harmonics = 11,
+    plot: options.Plot = None,
+    as_json: options.Json = False,
+) -> None:
+    """Choose parameters within bounds so that the highest peak over the scene's band is least."""
+    picture = inputs.output_path("--plot", plot, PICTURES)
+    bounds = inputs.bounds(variables)
+    scene = inputs.scene(name, values)
+    with bar("design", "responses") as on_progress:
+        import optim
+
+        result = optim.design(
+            scene, variables=bounds, limit=limit, max_band_hz=max_band, harmonics=harmonics,
+            on_progress=on_progress,
+        )  # fmt: skip
+    if picture is not None and result.sweeps:
+        from service.plots.responses import Response, response_figure
+        from service.plots.style import save
+
+        save(response_figure(Response.of_branch(result.sweeps[-1]), limit=limit), picture)
+    if as_json:
+        print_json(result.to_json())
+    else:
+        reports.design(result.to_json())
+    _end(result.reached, result.status.value)
+
+
+def march(
+    name: options.Scene,
+    frequency: options.Frequency,
+    values: options.Values = None,
+    steps: options.Steps = None,
+    max_periods: options.MaxPeriods = 20_000,
+    plot: options.Plot = None,
+    as_json: options.Json = False,
+) -> None:
+    """March in time until the motion repeats: the independent referee of solve."""
+    import solver
+
+    picture = inputs.output_path("--plot", plot, PICTURES)
+    scene = inputs.scene(name, values)
+    with bar("march", "periods") as on_progress:
+        marched = solver.march(
+            scene, frequency_hz=frequency, steps_per_period=steps, max_periods=max_periods,
+            on_progress=on_progress,
+        )  # fmt: skip
+    if picture is not None and marched.converged:
+        from service.plots.motion import Motion, motion_figure
+        from service.plots.style import save
+
+        save(motion_figure(Motion.of_march(marched)), picture)
+    if as_json:
+        print_json(marched.to_json())
+    else:
+        reports.march(marched.to_json())
+    _end(marched.converged, marched.status.value)
+
+
+def _end(reached: bool, status: str) -> None:
+    """Leave with status 1 and the reason, if the goal was not reached."""
+    if not reached:
+        typer.echo(f"stickslip: {status}", err=True)
+        raise typer.Exit(FELL_SHORT)

@@ -1,0 +1,217 @@
+"""The commands that talk to a running service: submit, watch, results."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from service.cli import inputs, options, reports
+from service.cli.failures import BAD_INPUT, FELL_SHORT
+from service.cli.output import print_json, print_table, say
+from service.cli.progress import bar
+
+if TYPE_CHECKING:
+    from service.answers import JobAnswer, ResultsAnswer
+    from service.client import Client
+
+_SCENE_FILES = (".toml", ".json")
+_INPUT_FAILURES = ("scene", "setting")
+
+
+def design(
+    name: options.Scene,
+    variables: options.Variables = None,
+    limit: options.Limit = None,
+    max_band: options.MaxBand = None,
+    values: options.Values = None,
+    harmonics: options.Harmonics = 11,
+    wait: options.Wait = False,
+    as_json: options.Json = False,
+    url: options.Url = options.DEFAULT_URL,
+) -> None:
+    """Submit a design."""
+    bounds = inputs.bounds(variables)
+    body = _body("design", name, values, harmonics=harmonics, limit=limit, max_band_hz=max_band)
+    if bounds is not None:
+        body["variables"] = {path: list(pair) for path, pair in bounds.items()}
+    _submit(url, body, wait=wait, as_json=as_json)
+
+
+def sweep(
+    name: options.Scene,
+    parameter: options.Parameter = "frequency",
+    start: options.From = None,
+    stop: options.To = None,
+    frequency: options.FixedFrequency = None,
+    values: options.Values = None,
+    limit: options.Limit = None,
+    harmonics: options.Harmonics = 11,
+    wait: options.Wait = False,
+    as_json: options.Json = False,
+    url: options.Url = options.DEFAULT_URL,
+) -> None:
+    """Submit a sweep."""
+    body = _body("sweep", name, values, harmonics=harmonics, limit=limit, frequency_hz=frequency, to=stop)
+    body["parameter"] = parameter
+    if start is not None:
+        body["from"] = start
+    _submit(url, body, wait=wait, as_json=as_json)
+
+
+def solve(
+    name: options.Scene,
+    frequency: options.Frequency,
+    values: options.Values = None,
+    harmonics: options.Harmonics = 11,
+    wait: options.Wait = False,
+    as_json: options.Json = False,
+    url: options.Url = options.DEFAULT_URL,
+) -> None:
+    """Submit a single response."""
+    body = _body("solve", name, values, harmonics=harmonics, frequency_hz=frequency)
+    _submit(url, body, wait=wait, as_json=as_json)
+
+
+def march(
+    name: options.Scene,
+    frequency: options.Frequency,
+    values: options.Values = None,
+    steps: options.Steps = None,
+    max_periods: options.MaxPeriods = 20_000,
+    wait: options.Wait = False,
+    as_json: options.Json = False,
+    url: options.Url = options.DEFAULT_URL,
+) -> None:
+    """Submit a time march."""
+    body = _body(
+        "march", name, values, frequency_hz=frequency, steps_per_period=steps, max_periods=max_periods
+    )
+    _submit(url, body, wait=wait, as_json=as_json)
+
+
+def watch(job: options.Job, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL) -> None:
+    """Follow a job until it has ended."""
+    with _client(url) as client:
+        ended = _follow(client, job)
+    if as_json:
+        print_json(ended.model_dump(mode="json"))
+    else:
+        say(f"{ended.id}  {ended.kind}  {ended.status.value}")
+    _end(ended)
+
+
+def results(
+    job: options.Job,
+    out: Annotated[
+        str | None, typer.Option("--out", metavar="F", help="Also write the JSON object to a file.")
+    ] = None,
+    plot: options.Plot = None,
+    as_json: options.Json = False,
+    url: options.Url = options.DEFAULT_URL,
+) -> None:
+    """Print what a job computed, and the sweeps it stored."""
+    from service.plots.formats import SUFFIXES
+
+    file = inputs.output_path("--out", out)
+    picture = inputs.output_path("--plot", plot, SUFFIXES)
+    with _client(url) as client:
+        ended = client.job(job)
+        answer = client.results(job)
+        if picture is not None:
+            _draw(client, answer, picture)
+    if file is not None:
+        _write(file, answer)
+    _show(ended, answer, as_json=as_json)
+    _end(ended)
+
+
+def _body(kind: str, name: str, values: list[str] | None, **fields: Any) -> dict[str, Any]:
+    """The body of ``POST /v1/jobs``; a scene file goes with it, a name is looked up by the service."""
+    scene: Any = name
+    if name.endswith(_SCENE_FILES):
+        import solver
+
+        scene = solver.load_scene(name).to_dict()
+    given = {key: value for key, value in fields.items() if value is not None}
+    return {"kind": kind, "scene": scene, "set": inputs.settings(values), **given}
+
+
+def _submit(url: str, body: Mapping[str, Any], *, wait: bool, as_json: bool) -> None:
+    with _client(url) as client:
+        job = client.submit(body)
+        if not wait:
+            _announce(job, as_json=as_json)
+            return
+        ended = _follow(client, job.id)
+        answer = client.results(job.id)
+    _show(ended, answer, as_json=as_json)
+    _end(ended)
+
+
+def _announce(job: JobAnswer, *, as_json: bool) -> None:
+    if as_json:
+        print_json(job.model_dump(mode="json"))
+    else:
+        say(job.id)
+
+
+def _client(url: str) -> Client:
+    from service.client import Client
+
+    return Client(url)
+
+
+def _follow(client: Client, job: str) -> JobAnswer:
+    with bar(job) as on_progress:
+        return client.wait(job, on_progress)
+
+
+def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
+    if as_json:
+        print_json(answer.model_dump(mode="json"))
+        return
+    reports.BY_KIND[job.kind](answer.result)
+    rows = [
+        (
+            sweep.id,
+            sweep.parameter,
+            str(sweep.points),
+            "" if sweep.peak is None else f"{sweep.peak.value:.6g}",
+        )
+        for sweep in answer.sweeps
+    ]
+    if rows:
+        print_table("Stored sweeps", ("id", "parameter", "points", "peak [m]"), rows, right="23")
+
+
+def _draw(client: Client, answer: ResultsAnswer, picture: Path) -> None:
+    """Draw the sweep with the peak of the result (a design stores many)."""
+    from service.plots.responses import Response, response_figure
+    from service.plots.style import save
+
+    peak = answer.result.get("peak")
+    if not answer.sweeps or peak is None:
+        raise inputs.InputError(f"`--plot`: job {answer.job} stored no sweep to draw")
+    best = min(answer.sweeps, key=lambda s: abs(s.peak.value - peak["value"]) if s.peak else float("inf"))
+    save(response_figure(Response.of_stored(client.sweep(best.id))), picture)
+
+
+def _write(file: Path, answer: ResultsAnswer) -> None:
+    from service.files import whole
+
+    with whole(file) as temporary:
+        temporary.write_text(json.dumps(answer.model_dump(mode="json"), allow_nan=False) + "\n", "utf-8")
+
+
+def _end(job: JobAnswer) -> None:
+    """Leave with the status that says how a job ended."""
+    if job.status.value == "successful":
+        return
+    error = job.error or {}
+    reason = error.get("detail") or f"job {job.id} is {job.status.value}"
+    typer.echo(f"stickslip: {reason}", err=True)
+    raise typer.Exit(BAD_INPUT if error.get("type") in _INPUT_FAILURES else FELL_SHORT)

@@ -1,0 +1,74 @@
+"""The kind `march`: time marching, the independent referee."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import Field
+
+import solver
+from service.jobs import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from service.kinds.scenes import FrequencyHz, SceneRequest, resolve_scene, resolved
+from solver.scene import Scene
+
+
+class MarchRequest(SceneRequest):
+    """A time march.
+
+    Attributes
+    ----------
+    frequency_hz : float
+        Excitation frequency [Hz].
+    steps_per_period : int or None
+        Steps of the finer run; chosen from the fastest motion of the structure if left out.
+    tolerance : float
+        Largest relative change over a period of a motion that repeats.
+    max_periods : int
+        Periods marched at most.
+    """
+
+    frequency_hz: FrequencyHz = Field(description="Excitation frequency [Hz].")
+    steps_per_period: Annotated[int, Field(strict=True, ge=16, le=1_000_000)] | None = Field(
+        default=None, description="Steps of the finer run; chosen by the solver if left out."
+    )
+    tolerance: float = Field(
+        default=1e-10, strict=True, gt=0.0, lt=1.0, description="Largest change over a period, relative."
+    )
+    max_periods: int = Field(
+        default=20_000, strict=True, ge=1, le=1_000_000, description="Periods marched at most."
+    )
+
+
+def resolve(request: MarchRequest, source: SceneSource) -> Resolved:
+    """Look up the scene."""
+    return resolved(
+        resolve_scene(request, source),
+        frequency_hz=request.frequency_hz,
+        steps_per_period=request.steps_per_period,
+        tolerance=request.tolerance,
+        max_periods=request.max_periods,
+    )
+
+
+def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
+    """March until the motion repeats."""
+    marched = solver.march(
+        Scene.from_dict(spec["scene"]),
+        frequency_hz=spec["frequency_hz"],
+        steps_per_period=spec["steps_per_period"],
+        tolerance=spec["tolerance"],
+        max_periods=spec["max_periods"],
+        on_progress=progress,
+        should_stop=should_stop,
+    )
+    return JobOutput(result=marched.to_json(), shortfall=None if marched.converged else marched.status.value)
+
+
+MARCH = JobKind(
+    name="march",
+    summary="Time marching, the independent referee.",
+    request=MarchRequest,
+    resolve=resolve,
+    run=run,
+)

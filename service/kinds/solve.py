@@ -1,0 +1,44 @@
+"""The kind `solve`: the periodic response at one frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import Field
+
+import solver
+from service.jobs import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from service.kinds.scenes import FrequencyHz, HarmonicRequest, resolve_scene, resolved
+from solver.scene import Scene
+
+
+class SolveRequest(HarmonicRequest):
+    """One response; `frequency_hz` is the excitation frequency [Hz]."""
+
+    frequency_hz: FrequencyHz = Field(description="Excitation frequency [Hz].")
+
+
+def resolve(request: SolveRequest, source: SceneSource) -> Resolved:
+    """Look up the scene."""
+    scene = resolve_scene(request, source)
+    return resolved(scene, frequency_hz=request.frequency_hz, harmonics=request.harmonics)
+
+
+def run(spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    """Solve the balance."""
+    solution = solver.solve(
+        Scene.from_dict(spec["scene"]), frequency_hz=spec["frequency_hz"], harmonics=spec["harmonics"]
+    )
+    return JobOutput(
+        result=solution.to_json(), shortfall=None if solution.converged else solution.status.value
+    )
+
+
+SOLVE = JobKind(
+    name="solve",
+    summary="The periodic response at one frequency.",
+    request=SolveRequest,
+    resolve=resolve,
+    run=run,
+)

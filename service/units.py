@@ -1,0 +1,62 @@
+"""How amplitudes and parameters are shown to people: the unit that fits, and as many digits as mean something."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+_UNITS = {
+    "frequency": "Hz", "N0": "N", "N1": "N", "N1_phase": "rad", "kt": "N/m", "amplitude": "N", "phase": "rad",
+}  # fmt: skip
+_DIGITS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class LengthUnit:
+    """A unit of length: its name, and how many of it make a metre."""
+
+    name: str
+    per_metre: float
+
+    def show(self, metres: float) -> str:
+        """A length in this unit, ``"0.1016 mm"``."""
+        return f"{number(metres * self.per_metre)} {self.name}"
+
+
+_METRE = LengthUnit("m", 1.0)
+_LENGTHS = ((0.1, _METRE), (1e-4, LengthUnit("mm", 1e3)), (1e-7, LengthUnit("µm", 1e6)))
+_SMALLEST = LengthUnit("nm", 1e9)
+
+
+def length_unit(largest: float) -> LengthUnit:
+    """The unit in which `largest` [m] is a number from 0.1 to 100."""
+    size = abs(largest)
+    if not math.isfinite(size) or size == 0.0:
+        return _METRE
+    return next((unit for least, unit in _LENGTHS if size >= least), _SMALLEST)
+
+
+def length(metres: float) -> str:
+    """An amplitude [m] in the unit that fits."""
+    return length_unit(metres).show(metres)
+
+
+def parameter_unit(path: str) -> str:
+    """The unit of the values of a parameter path; empty where there is none, or it depends on the scene."""
+    owner, _, key = path.rpartition(".")
+    return "" if owner == "structure" else _UNITS.get(key, "")
+
+
+def parameter(path: str, value: float) -> str:
+    """A value of a parameter path with its unit."""
+    return f"{number(value, digits=6)} {parameter_unit(path)}".rstrip()
+
+
+def number(value: float, digits: int = _DIGITS) -> str:
+    """A number with so many significant digits, trailing zeros dropped."""
+    return f"{value:.{digits}g}"
+
+
+def duration(seconds: float) -> str:
+    """A time in ms or s."""
+    return f"{seconds * 1e3:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"

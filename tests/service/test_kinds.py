@@ -1,0 +1,177 @@
+"""The kinds that come with the service, on the real solver."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+from test_http import is_problem
+
+import solver
+from service.kinds.records import contact_values
+from service.kinds.scenes import MAX_HARMONICS
+
+WAIT = {"Prefer": "wait=60"}
+
+
+def finished(client: httpx.Client, body: dict[str, Any]) -> dict[str, Any]:
+    answer = client.post("/v1/jobs", json=body, headers=WAIT)
+    assert answer.status_code == 200, answer.text
+    return answer.json()
+
+
+def test_a_sweep_is_the_solver_s_and_is_stored(shipped: httpx.Client) -> None:
+    body = {
+        "kind": "sweep",
+        "scene": "two-dof",
+        "from": 0.5,
+        "to": 1.5,
+        "set": {"damper.N0": 50},
+        "harmonics": 5,
+    }
+    job = finished(shipped, body)
+    assert job["status"] == "successful", job["error"]
+    scene = solver.load_scene("two-dof").with_values({"damper.N0": 50.0})
+    branch = solver.sweep(scene, start=0.5, stop=1.5, harmonics=5)
+    assert branch.peak is not None
+    assert job["result"]["peak"]["value"] == pytest.approx(branch.peak.value, rel=1e-9)
+    assert job["result"]["points"] == len(branch.values)
+    [stored] = job["sweeps"]
+    assert stored["scene"] == "two-dof"
+    assert stored["parameter"] == "frequency"
+    assert (stored["from"], stored["to"], stored["harmonics"]) == (0.5, 1.5, 5)
+    assert stored["contacts"]["damper"] == {"kt": 30.0, "mu": 0.3, "N0": 50.0, "N1": 15.0, "N1_phase": 0.0}
+    assert stored["excitation_amplitude"] == 100.0
+    assert branch.band is not None
+    assert stored["band_hz"] == pytest.approx(branch.band.width, rel=1e-9)
+    detail = shipped.get(stored["links"]["self"]).json()
+    np.testing.assert_allclose(detail["arrays"]["amplitude"], branch.amplitude, rtol=1e-9)
+    np.testing.assert_allclose(detail["arrays"]["coefficients"], branch.coefficients, rtol=1e-6, atol=1e-9)
+    assert set(detail["arrays"]) == {
+        "parameter", "amplitude", "half_peak_to_peak", "mean", "coefficients", "observed",
+    }  # fmt: skip
+
+
+def test_what_is_swept_has_no_single_value(shipped: httpx.Client) -> None:
+    body = {"kind": "sweep", "scene": "two-dof", "parameter": "damper.N0", "from": 20, "to": 200}
+    job = finished(shipped, {**body, "frequency_hz": 1.0, "harmonics": 5})
+    assert job["status"] == "successful", job["error"]
+    [stored] = job["sweeps"]
+    contact = stored["contacts"]["damper"]
+    assert (contact["N0"], contact["N1"], contact["kt"]) == (None, None, 30.0)
+    assert stored["frequency_hz"] == 1.0
+    assert stored["band_hz"] is None
+    matching = shipped.get("/v1/sweeps?N0_min=20&N0_max=200&parameter=damper.N0").json()["items"]
+    assert matching == []
+
+
+@pytest.mark.parametrize(
+    ("parameter", "missing"),
+    [
+        ("shroud.N1", {"N1"}),
+        ("shroud.N1_ratio", {"N1"}),
+        ("shroud.kt", {"kt"}),
+        ("shroud.mu", {"mu"}),
+        ("shroud.N1_phase", {"N1_phase"}),
+        ("shroud.N0", {"N0", "N1"}),
+        ("frequency", set()),
+    ],
+)
+def test_values_that_follow_the_parameter_are_left_out(parameter: str, missing: set[str]) -> None:
+    values = {v.name: v for v in contact_values(solver.load_scene("bladed-disk"), parameter)}
+    names = ("kt", "mu", "N0", "N1", "N1_phase")
+    assert {name for name in names if getattr(values["shroud"], name) is None} == missing
+    assert all(getattr(values["root"], name) is not None for name in names)
+
+
+def test_solve_and_march_agree(shipped: httpx.Client) -> None:
+    solved = finished(shipped, {"kind": "solve", "scene": "two-dof", "frequency_hz": 1.0, "harmonics": 25})
+    marched = finished(shipped, {"kind": "march", "scene": "two-dof", "frequency_hz": 1.0})
+    assert solved["status"] == marched["status"] == "successful", (solved["error"], marched["error"])
+    assert solved["result"]["max_abs"] == pytest.approx(marched["result"]["max_abs"], rel=2e-3)
+
+
+def test_a_march_that_does_not_settle_fails_and_says_so(shipped: httpx.Client) -> None:
+    job = finished(shipped, {"kind": "march", "scene": "two-dof", "frequency_hz": 1.0, "max_periods": 1})
+    assert job["status"] == "failed"
+    assert job["error"]["type"] == "goal-not-reached"
+    assert "max_periods" in job["error"]["detail"]
+    assert job["result"]["periods"] >= 1
+
+
+def test_a_stored_scene_and_an_inline_scene_are_as_good_as_a_shipped_one(shipped: httpx.Client) -> None:
+    scene = shipped.get("/v1/scenes/two-dof").json()["scene"]
+    shipped.post("/v1/scenes", json={**scene, "name": "stored"}).raise_for_status()
+    body = {"kind": "solve", "frequency_hz": 0.9, "harmonics": 5}
+    jobs = [finished(shipped, {**body, "scene": one}) for one in ("two-dof", "stored", scene)]
+    assert len({job["result"]["max_abs"] for job in jobs}) == 1
+    assert jobs[2]["result_of"] == jobs[0]["id"], "the same scene, whoever sends it"
+    assert jobs[1]["result_of"] is None, "another name is another scene"
+    plan = shipped.post("/v1/plan", json={"scene": "stored", "harmonics": 3}).json()
+    assert plan["scene"] == "stored"
+    assert all(effect["reason"] for effect in plan["effects"])
+    assert plan["n_harmonics"] == 3
+
+
+SWEEP: dict[str, Any] = {"kind": "sweep", "scene": "bladed-disk"}
+SOLVE: dict[str, Any] = {"kind": "solve", "scene": "two-dof", "frequency_hz": 1.0}
+N0 = {**SWEEP, "parameter": "shroud.N0", "from": 20, "to": 300, "frequency_hz": 755.0}
+
+
+@pytest.mark.parametrize(
+    ("body", "pointers"),
+    [
+        ({"kind": "sweep"}, ["/scene"]),
+        ({**SWEEP, "scene": "no-such-scene"}, ["/scene"]),
+        ({**SWEEP, "scene": "/etc/passwd"}, ["/scene"]),
+        ({**SWEEP, "scene": "../two-dof.toml"}, ["/scene"]),
+        ({**SWEEP, "scene": 3}, ["/scene"]),
+        ({**SWEEP, "scene": {"name": "empty"}}, ["/scene/structure", "/scene/excitation", "/scene/observe"]),
+        ({**SWEEP, "scene": {"a/b": 1}}, None),
+        ({**SWEEP, "parameter": "shroud.N9"}, ["/parameter"]),
+        ({**SWEEP, "parameter": "x" * 300}, ["/parameter"]),
+        (
+            {**SWEEP, "set": {"shroud.mu": -0.1, "nothing.N0": 1, "root.N0": 2}},
+            ["/set/shroud.mu", "/set/nothing.N0"],
+        ),
+        ({**SWEEP, "set": {"shroud.mu": "high"}}, ["/set/shroud.mu"]),
+        ({**SWEEP, "set": [1]}, ["/set"]),
+        ({**SWEEP, "from": 0, "to": 900}, ["/from"]),
+        ({**SWEEP, "from": 500, "to": 500}, ["/to"]),
+        ({**SWEEP, "from": "low"}, ["/from"]),
+        ({**SWEEP, "frequency_hz": 700}, ["/frequency_hz"]),
+        ({**SWEEP, "harmonics": 0}, ["/harmonics"]),
+        ({**SWEEP, "harmonics": MAX_HARMONICS + 1}, ["/harmonics"]),
+        ({**SWEEP, "harmonics": 5.5}, ["/harmonics"]),
+        ({**SWEEP, "limit": 0}, ["/limit"]),
+        ({**N0, "from": None}, ["/from"]),
+        ({**N0, "to": -5}, ["/to"]),
+        ({**N0, "frequency_hz": None}, ["/frequency_hz"]),
+        ({**N0, "frequency_hz": -1}, ["/frequency_hz"]),
+        ({**SOLVE, "frequency_hz": 1e12}, ["/frequency_hz"]),
+        ({"kind": "solve", "scene": "two-dof"}, ["/frequency_hz"]),
+        ({**SOLVE, "kind": "march", "harmonics": 3}, ["/harmonics"]),
+        ({**SOLVE, "kind": "march", "tolerance": 1.0}, ["/tolerance"]),
+    ],
+)
+def test_a_bad_request_is_refused_where_it_is_bad(
+    shipped: httpx.Client, body: dict[str, Any], pointers: list[str] | None
+) -> None:
+    before = shipped.get("/v1/jobs").json()
+    problem = is_problem(shipped.post("/v1/jobs", json=body), 422)
+    found = [entry["pointer"] for entry in problem["errors"]]
+    if pointers is None:
+        assert "/scene/a~1b" in found
+    else:
+        assert found == pointers
+    assert all(entry["detail"] for entry in problem["errors"])
+    assert shipped.get("/v1/jobs").json() == before, "nothing is written of what is refused"
+
+
+def test_the_plan_refuses_what_the_jobs_refuse(shipped: httpx.Client) -> None:
+    assert (
+        is_problem(shipped.post("/v1/plan", json={"scene": "none"}), 422)["errors"][0]["pointer"] == "/scene"
+    )
+    assert is_problem(shipped.post("/v1/plan", json={"scene": "two-dof", "x": 1}), 422)
