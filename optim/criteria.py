@@ -136,7 +136,7 @@ def evaluate(
 
 
 class Sensitivity:
-    """Derivatives of the amplitude at points of a response by any parameter paths, through the whole solve."""
+    """Derivatives of the amplitude at points of a response by parameter paths, through the whole solve."""
 
     def __init__(self, scene: Scene, paths: Sequence[str], harmonics: int) -> None:
         self._scene = scene

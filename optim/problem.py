@@ -212,7 +212,7 @@ def _merit(criteria: Criteria, max_band_hz: float | None) -> float:
 def _basins(
     good: list[Criteria], variables: tuple[Variable, ...], max_band_hz: float | None
 ) -> list[Criteria]:
-    """Return the best design and, with one variable, the best of the other local minima of the coarse stage."""
+    """Return the best designs of the coarse stage; with one variable the best of its local minima."""
     ranked = sorted(good, key=lambda criteria: _merit(criteria, max_band_hz))
     if len(variables) > 1:
         return ranked[:BASINS]

@@ -15,13 +15,16 @@ class DesignStatus(Enum):
 
     OPTIMAL = "The highest peak can not be lowered further within the bounds."
     KINK = (
-        "The search could not improve the design, but the first-order conditions do not hold there: the response "
-        "has a kink at this design, or more harmonics are needed."
+        "The search could not improve the design, but the first-order conditions do not hold there: the "
+        "response has a kink at this design, or more harmonics are needed."
     )
-    FLAT = "The peak does not depend on these variables (no friction, or contacts that never slip): choose others."
+    FLAT = (
+        "The peak does not depend on these variables (no friction, or contacts that never slip): "
+        "choose others."
+    )
     BAND_INFEASIBLE = (
-        "No design within the bounds keeps the band below its limit; the design with the narrowest band is given: "
-        "allow a wider band, a higher amplitude limit, or wider bounds."
+        "No design within the bounds keeps the band below its limit; the one with the narrowest band is "
+        "given: allow a wider band, a higher amplitude limit, or wider bounds."
     )
     NO_RESPONSE = (
         "The frequency response could not be computed over the whole band for any design tried: "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,10 +89,9 @@ def check_variables(
 
 def _bounds(path: str, bounds: object) -> tuple[float, float]:
     name = f"variables.{path}"
-    try:
-        low, high = bounds  # type: ignore[misc]
-    except (TypeError, ValueError):
-        raise DesignError(name, bounds, "must be two numbers, low and high") from None
+    if not isinstance(bounds, Sequence) or isinstance(bounds, str) or len(bounds) != 2:
+        raise DesignError(name, bounds, "must be two numbers, low and high")
+    low, high = bounds
     for value in (low, high):
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not number or not math.isfinite(value):
@@ -103,7 +102,7 @@ def _bounds(path: str, bounds: object) -> tuple[float, float]:
 
 
 def _default(scene: Scene) -> dict[str, tuple[float, float]]:
-    """Return N0 of the first contact with a tied load (else of the first contact), from a tenth to 15 times."""
+    """Return N0 of the first contact with a tied load (else of the first), a tenth to 15 times its value."""
     if not scene.contacts:
         raise DesignError("variables", None, "must be given: the scene has no contact to design")
     tied = [contact for contact in scene.contacts if contact.N1_ratio is not None]

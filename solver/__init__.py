@@ -1,6 +1,6 @@
 """Periodic response of structures with friction contacts: scenes, balance, continuation, time marching.
 
-The names below are the public interface; they are loaded on first use, so that importing the package is cheap.
+The names below are the public interface, loaded on first use, so that importing the package is cheap.
 """
 
 from __future__ import annotations
@@ -9,14 +9,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from solver.sectors import annulus
     from solver.branch import Band, Branch, BranchStatus, Peak
     from solver.continuation import ContinuationSettings, Predictor, sweep
+    from solver.effects import Plan, plan
     from solver.errors import Issue, SceneError, SettingError, SolverError
     from solver.marching import march
-    from solver.effects import Plan, plan
     from solver.response import Solution, SolutionStatus, solve
     from solver.scene import Scene, load_scene, shipped_scenes
+    from solver.sectors import annulus
 
 _HOME = {
     "Band": "branch", "Branch": "branch", "BranchStatus": "branch", "Peak": "branch",

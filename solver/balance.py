@@ -45,12 +45,12 @@ class Balance:
     @property
     def n_coefficients(self) -> int:
         """Real coefficients kept of each motion."""
-        return 2 * self.system.ks.size - int(self.system.ks[0] == 0)
+        return int(2 * self.system.ks.size - (self.system.ks[0] == 0))
 
     @property
     def n_unknowns(self) -> int:
         """Unknowns of the condensed balance."""
-        return self.system.contacts.shape[0] * self.n_coefficients
+        return int(self.system.contacts.shape[0]) * self.n_coefficients
 
 
 def check_harmonics(harmonics: int) -> int:
@@ -65,7 +65,7 @@ def check_harmonics(harmonics: int) -> int:
         raise SettingError("harmonics", harmonics, "must be a whole number")
     if not 0 <= harmonics <= MOST_HARMONICS:
         raise SettingError("harmonics", harmonics, f"must be from 0 to {MOST_HARMONICS}")
-    return int(harmonics)
+    return harmonics
 
 
 def check_frequency(name: str, frequency_hz: float) -> float:
@@ -131,7 +131,7 @@ def _level(scene: Scene) -> float:
 
 
 def contact_table(scene: Scene) -> Real:
-    """Return the contacts as the compiled loops read them: kt, mu, N0, N1, N1_ratio (NaN: untied), N1_phase."""
+    """Return the contacts as the loops read them: kt, mu, N0, N1, N1_ratio (NaN: untied), N1_phase."""
     rows = [
         (c.kt, c.mu, c.N0, c.N1_value, math.nan if c.N1_ratio is None else c.N1_ratio, c.N1_phase)
         for c in scene.contacts

@@ -102,7 +102,7 @@ def sweep(
     ----------
     scene : what vibrates, with the values that stay fixed.
     parameter : path of the parameter, for example ``frequency`` or ``shroud.N0``.
-    start, stop : the range in user units (Hz for a frequency); for the frequency the scene's band if left out.
+    start, stop : the range in user units (Hz for a frequency, the scene's band if left out).
     harmonics : highest harmonic kept.
     frequency_hz : excitation frequency [Hz], needed unless it is the parameter.
     limit : amplitude [m] above which the resonance band is measured; peak/√2 if left out.
@@ -242,7 +242,7 @@ def _finish(
         spent += more
     return Branch(
         balance=balance, status=status, start=start, stop=stop,
-        values=np.asarray(balance.parameter.outside(solutions[:, -1])), solutions=solutions,
+        values=balance.parameter.all_outside(solutions[:, -1].copy()), solutions=solutions,
         tangents=tangents, observed=np.concatenate([stretch.observed for stretch in stretches]),
         measures=measures, states=np.concatenate([stretch.states for stretch in stretches]), peaks=peaks,
         band=band, newton_iterations=stretches[-1].newton_iterations + spent,

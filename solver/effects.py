@@ -101,7 +101,7 @@ def plan(scene: Scene, *, harmonics: int = 11) -> Plan:
             Effect(
                 name="even harmonics and mean",
                 used=True,
-                reason=f"harmonics 0 to {harmonics} are kept: {balance.n_coefficients} coefficients a contact",
+                reason=f"harmonics 0 to {harmonics}: {balance.n_coefficients} coefficients a contact",
             ),
             Effect(name="linear part", used=True, reason=_FORMS[balance.system.form]),
             _stiffness_shift(balance.system.shift),

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
-from solver.sectors import annulus
 from solver.errors import SettingError
 from solver.kernels import march as kernel
 from solver.march_result import MarchResult, MarchStatus, describe
 from solver.scene import CyclicStructure, End, Excitation, Scene
+from solver.sectors import annulus
 
 FloatArray = NDArray[np.float64]
 LEAST_STEPS = 64

@@ -80,9 +80,13 @@ class Parameter:
         """Convert a user value to the one inside (Hz to rad/s)."""
         return 2.0 * math.pi * value if self.kind is Kind.FREQUENCY else value
 
-    def outside(self, value: Real) -> Real:
-        """Convert inside values to user values (rad/s to Hz)."""
+    def outside(self, value: float) -> float:
+        """Convert an inside value to the user's (rad/s to Hz)."""
         return value / (2.0 * math.pi) if self.kind is Kind.FREQUENCY else value
+
+    def all_outside(self, values: Real) -> Real:
+        """Convert an array of inside values to the user's."""
+        return values / (2.0 * math.pi) if self.kind is Kind.FREQUENCY else values
 
     def check(self, name: str, value: float) -> float:
         """Return `value` as a float if the parameter may have it.

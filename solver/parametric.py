@@ -108,11 +108,11 @@ class LinearModelDerivative:
         The matrices are affine in this parameter, so these derivatives are constant.
     """
 
-    dM: FloatArray  # noqa: N815
-    dC0: FloatArray  # noqa: N815
-    dCp: FloatArray  # noqa: N815
-    dK0: FloatArray  # noqa: N815
-    dKp: FloatArray  # noqa: N815
+    dM: FloatArray
+    dC0: FloatArray
+    dCp: FloatArray
+    dK0: FloatArray
+    dKp: FloatArray
     affine: bool
 
 

@@ -115,7 +115,7 @@ def _pieces(
 
 
 def band_limit(limit: float | None, peaks: tuple[Peak, ...], kind: Kind) -> float | None:
-    """Return the limit a band is measured at: the one asked for, else half power; None if it has no meaning."""
+    """Return the limit of the band: the one asked for, else half power; None where a band has no meaning."""
     if not peaks or kind is not Kind.FREQUENCY:
         return None
     return limit if limit is not None else peaks[0].value * HALF_POWER

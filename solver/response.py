@@ -200,10 +200,11 @@ def contact_responses(workspace: Workspace, u: Real, p: float) -> tuple[ContactR
     ks, top = balance.system.ks, balance.n_harmonics
     slips = fourier.to_full(u.reshape(len(balance.scene.contacts), balance.n_coefficients), ks, top)
     forces = fourier.to_full(point.F, ks, top)
-    return tuple(
-        _contact(contact.name, int(state), slip, force, _load(contact.N0, contact.N1_value, contact.N1_phase), contact.mu)
-        for contact, state, slip, force in zip(balance.scene.contacts, point.states, slips, forces, strict=True)
-    )  # fmt: skip
+    responses = []
+    for contact, state, slip, force in zip(balance.scene.contacts, point.states, slips, forces, strict=True):
+        load = _load(contact.N0, contact.N1_value, contact.N1_phase)
+        responses.append(_contact(contact.name, int(state), slip, force, load, contact.mu))
+    return tuple(responses)
 
 
 def _load(N0: float, N1: float, phase: float) -> Real:

@@ -8,6 +8,7 @@ for every harmonic.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import linalg
@@ -83,8 +84,10 @@ def reduce_model(
     shifted = _Matrices(
         K=held.K + np.einsum("sci,c,scj->sij", held.L.conj(), shift, held.L), C=held.C, M=held.M, L=held.L
     )
-    dense = _dense(shifted, theta, model, forces, derivative)
-    modes = None if derivative is not None else _modes(shifted, forces, which, model.observe)
+    dense: dict[str, Any] = _dense(shifted, theta, model, forces, derivative)
+    modes: dict[str, Any] | None = (
+        None if derivative is not None else _modes(shifted, forces, which, model.observe)
+    )
     if modes is None and derivative is None:
         modes = _poles(shifted, forces, which, model.observe)
     if modes is not None:
@@ -109,7 +112,8 @@ def _matrices(model: LinearModel, theta: Real) -> _Matrices:
     turn = np.exp(1j * theta)[:, None, None]
 
     def at(zero: Real, plus: Real) -> Complex:
-        return zero + plus * turn + plus.T * turn.conj()
+        matrices: Complex = zero + plus * turn + plus.T * turn.conj()
+        return matrices
 
     return _Matrices(
         K=at(model.K0, model.Kp),
@@ -126,7 +130,7 @@ def _shift(held: _Matrices, kt: Real) -> Real:
     return kt.copy() if loose else np.zeros(kt.size)
 
 
-def _modes(held: _Matrices, forces: Complex, which: Integer, observe: Real) -> dict[str, object] | None:
+def _modes(held: _Matrices, forces: Complex, which: Integer, observe: Real) -> dict[str, Any] | None:
     """Return the undamped modes of every structure, or None if the damping is not classical."""
     eigenvalues, dampings, vectors = [], [], []
     for K, C, M in zip(held.K, held.C, held.M, strict=True):
@@ -152,7 +156,7 @@ def _modes(held: _Matrices, forces: Complex, which: Integer, observe: Real) -> d
     }
 
 
-def _poles(held: _Matrices, forces: Complex, which: Integer, observe: Real) -> dict[str, object] | None:
+def _poles(held: _Matrices, forces: Complex, which: Integer, observe: Real) -> dict[str, Any] | None:
     """Return poles and residues of every structure, or None if they do not give Z⁻¹ to rounding.
 
     Z⁻¹(s) = Σ x_m y_mᴴ / (y_mᴴ (C + 2 s_m M) x_m (s − s_m)) for simple poles: Tisseur, Meerbergen, SIAM Rev.
@@ -164,7 +168,7 @@ def _poles(held: _Matrices, forces: Complex, which: Integer, observe: Real) -> d
         inverse = np.linalg.inv(M)
         state = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K, -inverse @ C]])
         values, y, x = linalg.eig(state, left=True, right=True)
-        # Left eigenvectors of the first-order form carry y of the quadratic one in their lower half times M⁻ᴴ.
+        # Left eigenvectors of the first-order form carry those of the quadratic one in their lower half.
         x, y = x[:n], inverse.conj().T @ y[n:]
         norm = np.einsum("nm,nm->m", y.conj(), C @ x + 2.0 * (M @ x) * values)
         if not np.all(np.abs(norm) > 0.0):
@@ -191,7 +195,7 @@ def _poles(held: _Matrices, forces: Complex, which: Integer, observe: Real) -> d
     }
 
 
-def _no_modes(n_structures: int, n_harmonics: int, n_contacts: int) -> dict[str, object]:
+def _no_modes(n_structures: int, n_harmonics: int, n_contacts: int) -> dict[str, Any]:
     """Return empty modes for the dense form."""
     return {
         "form": DENSE,

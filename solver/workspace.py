@@ -1,4 +1,4 @@
-"""The arrays one run works in, and the two compiled operations on a single point everything else is made of."""
+"""The arrays one run works in, and the operations on a single point that everything else is made of."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from solver.balance import Balance
 from solver.fourier import Real
 from solver.kernels.newton import newton, start
 from solver.kernels.observe import MEASURES
+from solver.kernels.receptance import receptance
 from solver.kernels.refine import slope_by_parameter
+from solver.kernels.residual import evaluate
 from solver.kernels.system import (
     Evaluation,
     Receptance,
     System,
     by_reference,
-    evaluate,
     evaluation_by_value,
     new_evaluation,
     new_receptance,
-    receptance,
     receptance_by_value,
 )
 

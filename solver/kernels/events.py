@@ -37,6 +37,12 @@ ROUNDING = 2e-14  # relative to kt max|u| + μ max|N|: below it a limit is not c
 
 
 @compiled
+def segment_capacity(degree: int) -> int:
+    """Return how many segments a period may have; each event is a root of a polynomial of this degree."""
+    return 16 * degree + 64
+
+
+@compiled
 def largest(c: Real, s: Real, degree: int, value: Real, slope: Real) -> tuple[float, float]:
     """Return the maximum of a polynomial over the period and its place, from its values on the grid.
 
@@ -120,7 +126,7 @@ def leave_stick(
     """Return when a stuck contact reaches a limit, and which (0: ξ = +1, 1: ξ = −1), or (end, −1)."""
     n = value.shape[1]
     delta = 2.0 * math.pi / n
-    j = int(math.floor(start / delta)) + 1
+    j = math.floor(start / delta) + 1
     lo = start
     g_lo, slope_lo = np.empty(2), np.empty(2)
     for x in range(2):
@@ -161,7 +167,7 @@ def leave_slip(c: Real, s: Real, degree: int, slope: Real, start: float, end: fl
     """
     n = slope.size
     delta = 2.0 * math.pi / n
-    j = int(math.floor(start / delta)) + 1
+    j = math.floor(start / delta) + 1
     lo = start
     _, rate, curve, _ = at_point(c, s, degree, start)
     if rate < -tol * degree or (rate < tol * degree and curve < 0.0):

@@ -1,6 +1,6 @@
 """Dense linear algebra inside compiled loops: vectors, solves with the sign of the determinant, inverses.
 
-Written as plain loops: an array expression costs Numba a tenth of a second of compilation each time it is used.
+Written as plain loops: an array expression costs Numba a tenth of a second of compilation each time.
 
 Small systems use a loop of our own (a call to LAPACK costs more than the factorisation), larger ones LAPACK's
 ``dgesv`` through the entry Numba itself links, which stays cacheable on disk.
@@ -9,23 +9,21 @@ Small systems use a loop of our own (a call to LAPACK costs more than the factor
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
+import numba
 import numpy as np
-from numba import types
-from numba.core.types import ExternalFunction
 
 from solver.fourier import Complex, Real
 from solver.kernels.compiled import compiled
 
 OWN_UP_TO = 36  # measured crossing of our loop and LAPACK
 
-_gesv = ExternalFunction(
-    "numba_xgesv",
-    types.intc(
-        types.char, types.intp, types.intp, types.CPointer(types.float64), types.intp,
-        types.CPointer(types.int32), types.CPointer(types.float64), types.intp,
-    ),
-)  # fmt: skip
+_int, _index, _doubles = numba.types.intc, numba.types.intp, numba.types.CPointer(numba.types.float64)
+_pivots = numba.types.CPointer(numba.types.int32)
+_gesv: Callable[..., int] = numba.core.types.ExternalFunction(
+    "numba_xgesv", _int(numba.types.char, _index, _index, _doubles, _index, _pivots, _doubles, _index)
+)
 _DOUBLE = np.int8(ord("d"))
 
 

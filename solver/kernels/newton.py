@@ -15,18 +15,9 @@ import numpy as np
 from solver.fourier import Real, coefficient_count, cosine_position
 from solver.kernels.compiled import compiled
 from solver.kernels.linear import copy_block, copy_to, invert, set_to, solve
-from solver.kernels.system import (
-    KT,
-    MU,
-    N0,
-    N1,
-    Evaluation,
-    Receptance,
-    System,
-    contact_values,
-    evaluate,
-    receptance,
-)
+from solver.kernels.receptance import receptance
+from solver.kernels.residual import contact_values, evaluate
+from solver.kernels.system import KT, MU, N0, N1, Evaluation, Receptance, System
 
 TARGET = 1e-11  # relative residual aimed at
 ACCEPTED = 1e-9  # relative residual still a solution when rounding allows no better
@@ -147,7 +138,7 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
     (I + A kt) u = ū harmonic by harmonic; a contact stays stuck while max|kt u| ≤ μ (N0 − |N1| + added).
     """
     nc, n = system.contacts.shape[0], coefficient_count(system.ks)
-    table, load, _, _ = contact_values(system, p, 0.0)
+    table, _, _, _ = contact_values(system, p, 0.0)
     matrix, inverse = np.empty((nc, nc), np.complex128), np.empty((nc, nc), np.complex128)
     for i in range(system.ks.size):
         for c in range(nc):

@@ -9,10 +9,11 @@ by that sign; a gentle one by the angle, because at a branch point of a smooth b
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
+import numba
 import numpy as np
-from numba.core import types
 from numba.experimental import structref
 
 from solver.fourier import Integer, Real
@@ -20,7 +21,9 @@ from solver.kernels.compiled import compiled
 from solver.kernels.linear import copy_to, largest_entry, set_to, solve
 from solver.kernels.newton import arc_newton, border, newton, start
 from solver.kernels.observe import RESIDUAL, measure
-from solver.kernels.system import Evaluation, Receptance, System, evaluate, receptance
+from solver.kernels.receptance import receptance
+from solver.kernels.residual import evaluate
+from solver.kernels.system import Evaluation, Receptance, System
 
 # How a stretch of continuation ended.
 RUNNING, FINISHED, NO_START, STALLED, LEFT_RANGE = 0, 1, 2, 3, 4
@@ -55,7 +58,7 @@ class Walk(NamedTuple):
 
 
 @structref.register
-class _WalkType(types.StructRef):
+class _WalkType(numba.types.StructRef):
     """Numba's type of a `Walk` by reference."""
 
 
@@ -64,6 +67,8 @@ class _WalkReference(structref.StructRefProxy):
 
 
 structref.define_proxy(_WalkReference, _WalkType, list(Walk._fields))
+
+_new_walk: Callable[..., Walk] = _WalkReference
 
 
 @compiled
@@ -81,7 +86,7 @@ def begin_walk(
 ) -> tuple[int, Walk]:
     """Find the first point of a branch (from `guess` if it is not empty) and its tangent."""
     nt = system.contacts.shape[0] * (2 * system.ks.size - (1 if system.ks[0] == 0 else 0))
-    walk = _WalkReference(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(8))
+    walk = _new_walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(8))
     p = control.start
     good, iterations = False, 0
     if guess.size == nt:
@@ -287,13 +292,12 @@ def walk_on(
     Parameters
     ----------
     points, tangents : (most_points, nt + 1), λ last; states : (most_points, nc); observed : (most_points, n)
-        coefficients of the observed DOF; measures : (most_points, MEASURES), slopes along the tangent; filled.
+        coefficients of the observed DOF; measures : (most_points, MEASURES), slopes along it; filled.
 
     Returns
     -------
     (RUNNING or how it ended, number of points appended).
     """
-    n = walk.u.size
     count = 0
     status = RUNNING
     while status == RUNNING and count < most_points:

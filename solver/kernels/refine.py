@@ -73,7 +73,7 @@ def refine(
     Parameters
     ----------
     left, right : (nt + 1,) points, λ last; left_slope, right_slope : their tangents times the chord length.
-    g_left, g_right : the function at both ends, of opposite sign (slope along the chord, or amplitude − level).
+    g_left, g_right : the function at both ends, of opposite sign: slope along the chord, amplitude − level.
     x (n,), out (MEASURES,) : filled at the place found.
 
     Returns

@@ -1,7 +1,7 @@
 """Trigonometric polynomials: values on a grid, values at a point, bracketed roots.
 
-A polynomial of degree H is kept here as two arrays ``c[0…H]``, ``s[0…H]`` (``s[0]`` unused), because the loops
-run over k; the layout ``[q0, c1, s1, …]`` of `solver.fourier` is unpacked once on entry.
+A polynomial of degree H is kept here as two arrays ``c[0…H]``, ``s[0…H]`` (``s[0]`` unused), because the
+loops run over k; the layout ``[q0, c1, s1, …]`` of `solver.fourier` is unpacked once on entry.
 """
 
 from __future__ import annotations

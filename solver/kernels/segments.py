@@ -1,0 +1,217 @@
+"""What one contact does over a period: from motion and load to the table of its stick and slip segments.
+
+The march itself is in `solver.kernels.events`; here its polynomials are built, the intervals of contact found
+and the state classified.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.fourier import Integer, Real
+from solver.kernels.compiled import compiled
+from solver.kernels.events import (
+    AFTER_SEPARATION,
+    AFTER_SLIP,
+    BEGAN,
+    BEGIN,
+    DIRECTION,
+    END,
+    FAILED,
+    LIFTING,
+    MOTION,
+    ONSET,
+    ROUNDING,
+    SEPARATED,
+    SLIPPING,
+    STICK,
+    STUCK,
+    UNLOADED,
+    largest,
+    march,
+)
+from solver.kernels.trigpoly import at_point, bracketed_root, on_grid, unpack
+
+
+@compiled
+def _contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, out: Real) -> int:
+    """Fill `out` with [begin, end] of every interval with N > 0, when N < 0 somewhere; return their number.
+
+    The intervals are unwrapped: an end may exceed 2π. −1 means N never becomes negative.
+    """
+    n = value.size
+    delta = 2.0 * math.pi / n
+    low = 0.0
+    negative = -1
+    for j in range(n):
+        if value[j] < 0.0:
+            negative = j
+            break
+    if negative < 0:
+        above, low = _smallest(c, s, degree, value, slope)
+        if above >= 0.0:
+            return -1
+    else:
+        low = negative * delta
+    count = 0
+    before, at = -1.0, low
+    j = math.floor(low / delta) + 1
+    end = low + 2.0 * math.pi
+    rising_at = 0.0
+    in_contact = False
+    while at < end:
+        hi = min(j * delta, end)
+        now = value[j % n] if hi < end else -1.0
+        if before < 0.0 <= now or before >= 0.0 > now:
+            span = now - before
+            tau = bracketed_root(c, s, degree, 0, 0.0, at, hi, at - (hi - at) * before / span, now >= 0.0)
+            if now >= 0.0:
+                rising_at, in_contact = tau, True
+            elif in_contact:
+                if count < out.shape[0]:
+                    out[count, 0], out[count, 1] = rising_at, tau
+                    count += 1
+                in_contact = False
+        elif before < 0.0 and now < 0.0:
+            tau, top = _turning(c, s, degree, at, hi, False)
+            if top > 0.0 and count < out.shape[0]:
+                out[count, 0] = bracketed_root(c, s, degree, 0, 0.0, at, tau, 0.5 * (at + tau), True)
+                out[count, 1] = bracketed_root(c, s, degree, 0, 0.0, tau, hi, 0.5 * (hi + tau), False)
+                count += 1
+        elif in_contact:
+            tau, bottom = _turning(c, s, degree, at, hi, True)
+            if bottom < 0.0 and count < out.shape[0]:
+                out[count, 0] = rising_at
+                out[count, 1] = bracketed_root(c, s, degree, 0, 0.0, at, tau, 0.5 * (at + tau), False)
+                rising_at = bracketed_root(c, s, degree, 0, 0.0, tau, hi, 0.5 * (hi + tau), True)
+                count += 1
+        before = now
+        at = hi
+        j += 1
+    return count
+
+
+@compiled
+def _smallest(c: Real, s: Real, degree: int, value: Real, slope: Real) -> tuple[float, float]:
+    """Return the minimum of a polynomial over the period and its place, from its values on the grid."""
+    n = value.size
+    minus_c, minus_s = np.empty(degree + 1), np.empty(degree + 1)
+    minus_value, minus_slope = np.empty(n), np.empty(n)
+    for k in range(degree + 1):
+        minus_c[k], minus_s[k] = -c[k], -s[k]
+    for j in range(n):
+        minus_value[j], minus_slope[j] = -value[j], -slope[j]
+    high, place = largest(minus_c, minus_s, degree, minus_value, minus_slope)
+    return -high, place
+
+
+@compiled
+def _turning(c: Real, s: Real, degree: int, lo: float, hi: float, lowest: bool) -> tuple[float, float]:
+    """Return place and value of the lowest (else highest) point inside [lo, hi], (lo, 0) if there is none."""
+    sign = -1.0 if lowest else 1.0
+    if sign * at_point(c, s, degree, lo)[1] <= 0.0 or sign * at_point(c, s, degree, hi)[1] >= 0.0:
+        return lo, 0.0
+    tau = bracketed_root(c, s, degree, 1, 0.0, lo, hi, 0.5 * (lo + hi), lowest)
+    return tau, at_point(c, s, degree, tau)[0]
+
+
+@compiled
+def find_segments(
+    U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, cos_table: Real, sin_table: Real,
+    segments: Real,
+) -> tuple[int, int]:  # fmt: skip
+    """March one period and fill the segment table.
+
+    Parameters
+    ----------
+    U : coefficients of the slip motion u [m] for harmonics `ks`; N : of the normal load [N] for `load_ks`.
+    cos_table, sin_table : of `solver.kernels.trigpoly.grid_tables`.
+    segments : (capacity, SEGMENT_COLUMNS), overwritten.
+
+    Returns
+    -------
+    (state, number of segments); the state is SEPARATED, STUCK, SLIPPING, LIFTING or FAILED.
+    """
+    degree = max(ks[-1], load_ks[-1])
+    n_grid = 2 * (cos_table.shape[1] - 1)
+    uc, us = np.empty(degree + 1), np.empty(degree + 1)
+    nc, ns = np.empty(degree + 1), np.empty(degree + 1)
+    unpack(U, ks, uc, us)
+    unpack(N, load_ks, nc, ns)
+    u, du, load, dload = np.empty(n_grid), np.empty(n_grid), np.empty(n_grid), np.empty(n_grid)
+    on_grid(nc, ns, load_ks[-1], cos_table, sin_table, load, dload)
+    on_grid(uc, us, ks[-1], cos_table, sin_table, u, du)
+    value, slope = np.empty((2, n_grid)), np.empty((2, n_grid))
+    u_max, load_max = 0.0, 0.0
+    for j in range(n_grid):
+        a, b = kt * u[j], mu * load[j]
+        value[0, j], value[1, j] = a - b, -a - b
+        a, b = kt * du[j], mu * dload[j]
+        slope[0, j], slope[1, j] = a - b, -a - b
+        u_max, load_max = max(u_max, abs(u[j])), max(load_max, load[j])
+    if not (math.isfinite(u_max) and math.isfinite(load_max)):
+        return FAILED, 0
+    tol = ROUNDING * (kt * u_max + mu * load_max)
+    c, s = np.empty((2, degree + 1)), np.empty((2, degree + 1))
+    for k in range(degree + 1):
+        c[0, k], c[1, k] = kt * uc[k] - mu * nc[k], -kt * uc[k] - mu * nc[k]
+        s[0, k], s[1, k] = kt * us[k] - mu * ns[k], -kt * us[k] - mu * ns[k]
+    intervals = np.empty((load_ks[-1] + 1, 2))
+    n_intervals = -1
+    if load_ks[-1] > 0 or nc[0] <= 0.0:
+        n_intervals = _contact_intervals(nc, ns, load_ks[-1], load, dload, intervals)
+    if n_intervals == 0 or (n_intervals < 0 and load_max <= 0.0):
+        return SEPARATED, 0
+    if n_intervals < 0:
+        return _march_circle(c, s, degree, value, slope, tol, segments)
+    count = 0
+    for i in range(n_intervals):
+        begin, end = intervals[i, 0], intervals[i, 1]
+        rate_plus = at_point(c[0], s[0], degree, begin)[1]
+        rate_minus = at_point(c[1], s[1], degree, begin)[1]
+        stuck = rate_plus < 0.0 and rate_minus < 0.0
+        direction = 0 if rate_plus >= rate_minus else 1
+        offset = -kt * at_point(uc, us, ks[-1], begin)[0]
+        count = march(
+            c,
+            s,
+            degree,
+            value,
+            slope,
+            begin,
+            end,
+            stuck,
+            direction,
+            offset,
+            AFTER_SEPARATION,
+            tol,
+            segments,
+            count,
+        )
+        if count < 0:
+            return FAILED, 0
+    return LIFTING, count
+
+
+@compiled
+def _march_circle(
+    c: Real, s: Real, degree: int, value: Real, slope: Real, tol: float, segments: Real
+) -> tuple[int, int]:
+    """March a contact that never separates: stuck for ever, or one period from the largest w_−."""
+    high_minus, at_minus = largest(c[1], s[1], degree, value[1], slope[1])
+    high_plus, at_plus = largest(c[0], s[0], degree, value[0], slope[0])
+    if high_minus + high_plus <= tol:
+        row = segments[0]
+        row[MOTION], row[BEGIN], row[END] = STICK, 0.0, 2.0 * math.pi
+        if high_minus > 0.0:
+            row[DIRECTION], row[ONSET], row[BEGAN] = -1.0, at_minus, AFTER_SLIP
+        elif high_plus > 0.0:
+            row[DIRECTION], row[ONSET], row[BEGAN] = 1.0, at_plus, AFTER_SLIP
+        else:
+            row[DIRECTION], row[ONSET], row[BEGAN] = 1.0, 0.0, UNLOADED
+        return STUCK, 1
+    begin, end = at_minus, at_minus + 2.0 * math.pi
+    count = march(c, s, degree, value, slope, begin, end, True, 1, high_minus, AFTER_SLIP, tol, segments, 0)
+    return (SLIPPING, count) if count >= 0 else (FAILED, 0)
