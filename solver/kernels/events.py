@@ -34,6 +34,8 @@ MOTION, DIRECTION, BEGIN, END, ONSET, BEGAN = 0, 1, 2, 3, 4, 5
 SEGMENT_COLUMNS = 6
 
 ROUNDING = 2e-14  # relative to kt max|u| + μ max|N|: below it a limit is not crossed
+# A slope counts as 0 below ROUNDING times degree^2: even where its root is found to the last bit, a curvature
+# of the order of degree^2 leaves that much.
 
 
 @compiled
@@ -105,7 +107,12 @@ def _crosses(
                 begin = tau
                 break
         if begin < 0.0:
-            return lo
+            # Below 0 for less than the first part: the lowest point is there, or the rise begins at once.
+            end = lo + (end - lo) / 16.0
+            begin = bracketed_root(c, s, degree, 1, 0.0, lo, end, 0.5 * (lo + end), True)
+            if at_point(c, s, degree, begin)[0] + shift >= -tol:
+                return begin
+            g_hi = at_point(c, s, degree, end)[0] + shift
     rise = g_hi - g_lo
     guess = begin + (end - begin) * (-g_lo / rise if rise > 0.0 else 0.5)
     return bracketed_root(c, s, degree, 0, shift, begin, end, guess, True)
@@ -133,7 +140,7 @@ def leave_stick(
         q, dq, _, _ = at_point(c[x], s[x], degree, start)
         g_lo[x] = q + (1 - 2 * x) * offset
         slope_lo[x] = dq
-        if g_lo[x] > -tol and dq > tol * degree:
+        if g_lo[x] > -tol and dq > tol * degree * degree:
             return start, x
     while lo < end:
         hi = j * delta
@@ -170,7 +177,7 @@ def leave_slip(c: Real, s: Real, degree: int, slope: Real, start: float, end: fl
     j = math.floor(start / delta) + 1
     lo = start
     _, rate, curve, _ = at_point(c, s, degree, start)
-    if rate < -tol * degree or (rate < tol * degree and curve < 0.0):
+    if rate < -tol * degree * degree or (rate < tol * degree * degree and curve < 0.0):
         return start
     while lo < end:
         hi = j * delta
@@ -180,7 +187,7 @@ def leave_slip(c: Real, s: Real, degree: int, slope: Real, start: float, end: fl
             rate_hi = at_point(c, s, degree, end)[1]
         else:
             rate_hi = slope[j % n]
-        if rate_hi < 0.0:
+        if rate_hi < -tol * degree * degree:
             fall = rate - rate_hi
             guess = lo + (hi - lo) * (rate / fall if fall > 0.0 else 0.5)
             return bracketed_root(c, s, degree, 1, 0.0, lo, hi, guess, False)
