@@ -21,6 +21,7 @@ from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any, cast
 
+from optim.errors import DesignError
 from service import strict_json
 from service.jobs import FailureKind, JobFailure, JobOutput, Run, WarmUp
 from solver.errors import SceneError, SettingError, SolverError
@@ -188,7 +189,7 @@ def _failure(task: Task, error: Exception) -> JobFailure:
     """A deterministic error, as the job keeps it."""
     if isinstance(error, SceneError):
         return JobFailure(kind=FailureKind.SCENE, detail=str(error), issues=error.issues)
-    if isinstance(error, SettingError):
+    if isinstance(error, SettingError | DesignError):
         return JobFailure(kind=FailureKind.SETTING, detail=str(error))
     if isinstance(error, SolverError):
         return JobFailure(kind=FailureKind.GOAL, detail=str(error))

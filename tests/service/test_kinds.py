@@ -23,15 +23,8 @@ def finished(client: httpx.Client, body: dict[str, Any]) -> dict[str, Any]:
 
 
 def test_a_sweep_is_the_solver_s_and_is_stored(shipped: httpx.Client) -> None:
-    body = {
-        "kind": "sweep",
-        "scene": "two-dof",
-        "from": 0.5,
-        "to": 1.5,
-        "set": {"damper.N0": 50},
-        "harmonics": 5,
-    }
-    job = finished(shipped, body)
+    body = {"kind": "sweep", "scene": "two-dof", "from": 0.5, "to": 1.5, "harmonics": 5}
+    job = finished(shipped, {**body, "set": {"damper.N0": 50}})
     assert job["status"] == "successful", job["error"]
     scene = solver.load_scene("two-dof").with_values({"damper.N0": 50.0})
     branch = solver.sweep(scene, start=0.5, stop=1.5, harmonics=5)
@@ -175,3 +168,66 @@ def test_the_plan_refuses_what_the_jobs_refuse(shipped: httpx.Client) -> None:
         is_problem(shipped.post("/v1/plan", json={"scene": "none"}), 422)["errors"][0]["pointer"] == "/scene"
     )
     assert is_problem(shipped.post("/v1/plan", json={"scene": "two-dof", "x": 1}), 422)
+
+
+def test_a_design_keeps_every_response_it_computed(shipped: httpx.Client) -> None:
+    body = {"scene": "two-dof", "variables": {"damper.N0": [20, 1000]}, "harmonics": 5}
+    accepted = shipped.post("/v1/designs", json={**body, "limit": None, "max_band_hz": None}, headers=WAIT)
+    assert accepted.status_code == 200, accepted.text
+    job = accepted.json()
+    assert (job["kind"], job["status"]) == ("design", "successful"), job["error"]
+    result, sweeps = job["result"], job["sweeps"]
+    assert result["reached"]
+    best = result["optimum"]["damper.N0"]
+    assert 20.0 < best < 1000.0
+    assert len(sweeps) == result["evaluations"]
+    assert sweeps[-1]["contacts"]["damper"]["N0"] == best, "the response of the optimum comes last"
+    assert sweeps[-1]["peak"]["value"] == pytest.approx(result["peak"]["value"], rel=1e-6)
+    lowest = shipped.get(f"/v1/sweeps?job={job['id']}&sort=peak&limit=1").json()["items"][0]
+    assert lowest["peak"]["value"] == pytest.approx(result["peak"]["value"], rel=1e-6)
+    near = shipped.get(
+        f"/v1/sweeps?job={job['id']}&contact=damper&N0_min={best - 1e-9}&N0_max={best + 1e-9}"
+    ).json()["items"]
+    assert sweeps[-1]["id"] in [sweep["id"] for sweep in near]
+    again = shipped.post("/v1/designs", json=body).json()
+    assert again["result_of"] == job["id"]
+
+
+def test_a_design_without_variables_takes_the_damper_s_load(shipped: httpx.Client) -> None:
+    job = finished(shipped, {"kind": "design", "scene": "two-dof", "harmonics": 3})
+    assert list(job["result"]["optimum"]) == ["damper.N0"]
+
+
+def test_a_design_that_misses_its_goal_fails_and_keeps_the_best(shipped: httpx.Client) -> None:
+    body = {"kind": "design", "scene": "two-dof", "variables": {"damper.N0": [20, 1000]}, "harmonics": 3}
+    job = finished(shipped, {**body, "limit": 1.0, "max_band_hz": 1e-6})
+    assert job["status"] == "failed"
+    assert job["error"]["type"] == "goal-not-reached"
+    assert "wider band" in job["error"]["detail"]
+    assert job["result"]["optimum"]["damper.N0"] > 0.0
+    assert job["sweeps"]
+
+
+@pytest.mark.parametrize(
+    ("change", "pointers"),
+    [
+        ({"variables": {"damper.N9": [1, 2]}}, ["/variables/damper.N9"]),
+        ({"variables": {"damper.N0": [2, 1]}}, ["/variables/damper.N0"]),
+        (
+            {"variables": {"damper.N0": [-1, 1], "frequency": [1, 2]}},
+            ["/variables/damper.N0", "/variables/frequency"],
+        ),
+        ({"variables": {"damper.N0": [1]}}, ["/variables/damper.N0"]),
+        ({"variables": {"damper.N0": [1, "x"]}}, ["/variables/damper.N0/1"]),
+        ({"variables": {}}, ["/variables"]),
+        ({"limit": -1}, ["/limit"]),
+        ({"max_band_hz": 0}, ["/max_band_hz"]),
+        ({"start": {"damper.N0": 1}}, ["/start/damper.N0"]),
+        ({"start": {}}, ["/start"]),
+        ({"start": {"damper.N0": 30, "damper.kt": 1}}, ["/start/damper.kt"]),
+    ],
+)
+def test_a_bad_design_is_refused(shipped: httpx.Client, change: dict[str, Any], pointers: list[str]) -> None:
+    body = {"scene": "two-dof", "variables": {"damper.N0": [20, 1000]}, **change}
+    problem = is_problem(shipped.post("/v1/designs", json=body), 422)
+    assert [entry["pointer"] for entry in problem["errors"]] == pointers

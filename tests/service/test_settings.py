@@ -1,0 +1,74 @@
+"""Settings, and the sentences they are refused with."""
+
+from __future__ import annotations
+
+import socket
+
+import pytest
+
+from service.errors import ConfigurationError
+from service.server import _bind
+from service.settings import Settings, is_loopback, load_settings
+
+
+def test_defaults_and_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in Settings.model_fields:
+        monkeypatch.delenv(f"STICKSLIP_{name.upper()}", raising=False)
+    settings = load_settings()
+    assert (settings.host, settings.port) == ("127.0.0.1", 8000)
+    assert settings.database == "sqlite:///./stickslip.db"
+    assert settings.max_attempts == 3
+    assert settings.workers >= 1
+    monkeypatch.setenv("STICKSLIP_PORT", "9001")
+    monkeypatch.setenv("STICKSLIP_WORKERS", "3")
+    monkeypatch.setenv("STICKSLIP_ALLOWED_HOSTS", '["example.org"]')
+    settings = load_settings(workers=2)
+    assert (settings.port, settings.workers, settings.hosts) == (9001, 2, ("example.org",))
+    monkeypatch.setenv("STICKSLIP_PORT", "high")
+    with pytest.raises(ConfigurationError, match=r"`port` \(STICKSLIP_PORT\): .* got 'high'"):
+        load_settings()
+
+
+def test_every_setting_is_described() -> None:
+    assert all(field.description for field in Settings.model_fields.values())
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"host": "0.0.0.0"}, "can be reached from other machines and the service has no keys yet"),
+        ({"host": "::"}, "STICKSLIP_ALLOW_REMOTE=true"),
+        ({"host": "example.org"}, "use 127.0.0.1"),
+        ({"database": "postgresql://localhost/x"}, "must be an SQLite URL in this version"),
+        ({"database": "sqlite://"}, "must name a file"),
+        ({"database": "sqlite:///:memory:"}, "must name a file"),
+        ({"database": "sqlite:///x.db?mode=ro"}, "without a driver or options"),
+        ({"database": "x.db"}, "must be a URL such as sqlite:///"),
+        ({"workers": 0}, "`workers`"),
+        ({"lease_seconds": float("nan")}, "`lease_seconds`"),
+        ({"colour": "red"}, "`colour`"),
+    ],
+)
+def test_bad_settings_are_refused_with_a_sentence(values: dict[str, object], words: str) -> None:
+    with pytest.raises(ConfigurationError) as refused:
+        load_settings(**values)
+    assert words in str(refused.value)
+
+
+def test_loopback() -> None:
+    assert all(is_loopback(host) for host in ("127.0.0.1", "127.1.2.3", "::1", "localhost"))
+    assert not any(is_loopback(host) for host in ("0.0.0.0", "::", "10.0.0.1", "example.org", ""))
+
+
+def test_another_address_needs_leave_and_answers_to_every_name() -> None:
+    settings = load_settings(host="0.0.0.0", allow_remote=True)
+    assert settings.hosts == ("*",)
+    assert load_settings(allow_remote=True).hosts == ("localhost", "127.0.0.1", "[::1]")
+
+
+def test_a_port_in_use_is_told() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(ConfigurationError, match="cannot listen on 127"):
+            _bind(load_settings(port=taken.getsockname()[1]))

@@ -1,0 +1,226 @@
+"""Stored sweeps are there to be queried."""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from service import revisions
+from service.answers import SweepDetail
+from service.arrays import encode
+from service.db import Database
+from service.errors import InvalidRequestError
+from service.jobs import ContactValues, JobOutput, SweepRecord
+from service.repository import JobRepository, NewJob, SweepRepository
+from service.repository.jobs import utc_now
+from service.repository.sweeps import insert_sweeps
+from service.settings import load_settings
+from service.sweep_queries import SweepQuery, sweep_page
+from service.validation import validated
+
+ONE = SweepRecord(
+    scene_name="disk",
+    scene_hash="0" * 64,
+    parameter="frequency",
+    from_value=1.0,
+    to_value=2.0,
+    frequency_hz=None,
+    excitation_amplitude=1.0,
+    harmonics=11,
+    points=100,
+    peak=1.0,
+    peak_at=1.5,
+    limit=0.5,
+    band_hz=0.1,
+    newton_iterations=300,
+    rejected_steps=0,
+    seconds=0.1,
+    completed=True,
+    status="done",
+)
+
+
+def contact(name: str, load: float | None) -> ContactValues:
+    return ContactValues(name=name, kt=1e6, mu=0.3, N0=load, N1=0.0, N1_phase=0.0)
+
+
+def random_sweep(generator: random.Random) -> SweepRecord:
+    names = generator.choice((("damper",), ("shroud", "root")))
+    return replace(
+        ONE,
+        scene_name=generator.choice(("disk", "two", "three")),
+        parameter=generator.choice(("frequency", "frequency", "damper.N0")),
+        harmonics=generator.choice((5, 7, 11)),
+        points=generator.randint(50, 500),
+        peak=generator.choice((generator.lognormvariate(0.0, 1.0), 1.0, None)),
+        peak_at=generator.uniform(1.0, 2.0),
+        band_hz=generator.choice((None, generator.uniform(0.0, 1.0))),
+        seconds=generator.uniform(0.0, 1.0),
+        completed=generator.random() < 0.9,
+        contacts=tuple(contact(name, generator.uniform(0.0, 1000.0)) for name in names),
+    )
+
+
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Database, list[SweepRecord]]]:
+    """A database with enough sweeps that some conditions lead a query and others do not."""
+    url = f"sqlite:///{tmp_path_factory.mktemp('sweeps')}/jobs.db"
+    revisions.upgrade(url)
+    database = Database(url)
+    generator = random.Random(5)
+    records = [random_sweep(generator) for _ in range(3000)]
+    new = NewJob(kind="sweep", request={}, spec={}, spec_hash="", request_hash="", max_attempts=1, fresh=True)
+    job, _ = JobRepository(database).submit(new, queue_limit=10)
+    with database.writing() as connection:
+        insert_sweeps(connection, job.id, records, utc_now())
+    yield database, records
+    database.close()
+
+
+def within(value: float | None, query: dict[str, Any], name: str) -> bool:
+    low, high = query.get(f"{name}_min"), query.get(f"{name}_max")
+    if low is None and high is None:
+        return True
+    return value is not None and (low is None or value >= low) and (high is None or value <= high)
+
+
+def meets(record: SweepRecord, query: dict[str, Any]) -> bool:
+    """The same conditions in plain Python."""
+    same = {
+        "scene": "scene_name",
+        "parameter": "parameter",
+        "harmonics": "harmonics",
+        "completed": "completed",
+    }
+    ranges = ("peak", "peak_at", "band_hz", "points", "seconds")
+    loads = [c.N0 for c in record.contacts if query.get("contact") in (None, c.name)]
+    return (
+        all(getattr(record, column) == query[name] for name, column in same.items() if name in query)
+        and all(within(getattr(record, name), query, name) for name in ranges)
+        and any(within(load, query, "N0") for load in loads)
+    )
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        {},
+        {"scene": "two"},
+        {"scene": "nothing"},
+        {"scene": "disk", "peak_max": 0.3, "sort": "peak"},
+        {"peak_max": 0.05},
+        {"peak_min": 1.0, "peak_max": 1.0, "sort": "-peak"},
+        {"peak_min": 0.5, "sort": "-peak", "completed": True},
+        {"N0_min": 100.0, "N0_max": 101.0},
+        {"N0_min": 100.0, "N0_max": 700.0, "contact": "root", "sort": "points"},
+        {"N0_min": 100.0, "N0_max": 200.0, "contact": "nothing"},
+        {"contact": "damper", "sort": "created"},
+        {"N0_max": 500.0, "band_hz_max": 0.2, "sort": "band_hz", "parameter": "damper.N0"},
+        {"harmonics": 7, "completed": False, "sort": "-seconds"},
+        {"points_min": 499, "points_max": 499},
+        {"peak_at_min": 1.2, "peak_at_max": 1.21, "sort": "-peak_at"},
+        {"seconds_max": 0.01, "sort": "seconds"},
+        {"sort": "harmonics", "scene": "three", "limit": 1000},
+    ],
+)
+def test_filters_sorts_and_pages(filled: tuple[Database, list[SweepRecord]], query: dict[str, Any]) -> None:
+    database, records = filled
+    repository, settings = SweepRepository(database), load_settings()
+    positions = {row.id: row.position for row in repository.of_job(JobRepository(database).page()[0].id)}
+    found: list[int] = []
+    asked = SweepQuery(**{"limit": 97, **query})
+    while True:
+        page = sweep_page(repository, asked, settings)
+        found += [positions[item.id] for item in page.items]
+        if page.next is None:
+            break
+        asked = asked.model_copy(update={"cursor": page.next.rpartition("cursor=")[2]})
+    sort = query.get("sort", "-created")
+    name, down = sort.removeprefix("-"), sort.startswith("-")
+    wanted = [
+        index
+        for index, record in enumerate(records)
+        if meets(record, query) and (name == "created" or getattr(record, name) is not None)
+    ]
+    key = (lambda i: (getattr(records[i], name), i)) if name != "created" else (lambda i: (0.0, i))
+    assert found == sorted(wanted, key=key, reverse=down)
+
+
+def test_a_range_is_met_by_one_contact_alone(tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path}/jobs.db"
+    revisions.upgrade(url)
+    database = Database(url)
+    jobs, repository = JobRepository(database), SweepRepository(database)
+    new = NewJob(kind="sweep", request={}, spec={}, spec_hash="", request_hash="", max_attempts=1, fresh=True)
+    jobs.submit(new, queue_limit=10)
+    attempt = jobs.claim("me", utc_now())
+    assert attempt is not None
+    two = replace(ONE, contacts=(contact("shroud", 10.0), contact("root", 1000.0)))
+    mean = encode(np.array([1.0, np.nan]))
+    swept = replace(ONE, contacts=(contact("shroud", None),), arrays={"mean": mean})
+    assert jobs.succeed(attempt, JobOutput(result={}, sweeps=(two, swept)))
+
+    def found(**query: Any) -> int:
+        return len(sweep_page(repository, SweepQuery(**query), load_settings()).items)
+
+    assert found(N0_min=5, N0_max=20) == 1
+    assert found(N0_min=20, N0_max=900) == 0, "10 and 1000 do not make one contact in between"
+    assert found(N0_min=900, contact="shroud") == 0
+    assert found(N0_min=900, contact="root", kt_min=1e6, mu_max=0.3) == 1
+    assert found(N0_max=1e9) == 1, "a load that was swept has no single value"
+    assert found() == 2
+    [whole] = [row for row in repository.page(SweepQuery().to_filter(), 10) if repository.arrays(row.id)]
+    assert SweepDetail.load(whole.id, repository).arrays == {"mean": [1.0, None]}
+    database.close()
+
+
+@pytest.mark.parametrize(
+    "cursor", ["", "x", "eA", "W10", "WzEsMl0", "W3RydWUsICJhIl0", "W051bGwsICJhIl0", "é", "WyJhIiwgImEiXQ"]
+)
+def test_a_cursor_that_is_none(filled: tuple[Database, list[SweepRecord]], cursor: str) -> None:
+    with pytest.raises(InvalidRequestError, match="must come from the `next` link"):
+        sweep_page(SweepRepository(filled[0]), SweepQuery(cursor=cursor), load_settings())
+
+
+def test_an_unknown_filter_is_refused() -> None:
+    with pytest.raises(InvalidRequestError, match="`colour` is not a known key"):
+        validated(SweepQuery, {"colour": "red"})
+
+
+@pytest.mark.long
+def test_a_hundred_thousand_sweeps_are_listed_within_50_ms(tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path}/jobs.db"
+    revisions.upgrade(url)
+    database = Database(url)
+    new = NewJob(kind="sweep", request={}, spec={}, spec_hash="", request_hash="", max_attempts=1, fresh=True)
+    job, _ = JobRepository(database).submit(new, queue_limit=10)
+    generator = random.Random(1)
+    for _ in range(20):
+        records = [random_sweep(generator) for _ in range(5000)]
+        with database.writing() as connection:
+            insert_sweeps(connection, job.id, records, utc_now())
+    repository, settings = SweepRepository(database), load_settings()
+    for query in (
+        {},
+        {"scene": "disk", "peak_max": 0.05},
+        {"peak_max": 0.02},
+        {"peak_min": 1e9},
+        {"N0_min": 100.0, "N0_max": 101.0},
+        {"N0_min": 100.0, "N0_max": 700.0, "contact": "root", "sort": "peak"},
+        {"band_hz_max": 0.001, "sort": "band_hz"},
+        {"harmonics": 7, "sort": "-peak"},
+    ):
+        times = []
+        for _ in range(5):
+            begin = time.perf_counter()
+            sweep_page(repository, SweepQuery(**query), settings)
+            times.append(time.perf_counter() - begin)
+        assert min(times) < 0.05, query
+    database.close()
