@@ -1,0 +1,262 @@
+"""The closed-form contact force: reference values, a crude march, every derivative on every smooth piece."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from contact_cases import Case, crude_force, derivative_errors, evaluate, load_zeros, random_case, values
+
+from solver import fourier
+from solver.kernels import events
+
+REFERENCE = json.loads((Path(__file__).parent / "data" / "contact_force.json").read_text())
+NAMES = [name for name in REFERENCE if name != "about"]
+
+
+def coefficients(table: dict[str, list[float]], n_harmonics: int) -> np.ndarray:
+    """Coefficients from a table harmonic -> [cos, sin]."""
+    q = np.zeros(2 * n_harmonics + 1)
+    for harmonic, (cosine, sine) in table.items():
+        k = int(harmonic)
+        if k == 0:
+            q[0] = cosine
+        else:
+            q[2 * k - 1 : 2 * k + 1] = cosine, sine
+    return q
+
+
+def reference_case(name: str) -> Case:
+    row = REFERENCE[name]
+    return Case(U=coefficients(row["u"], 11), N=coefficients(row["N"], 1), kt=row["kt"], mu=row["mu"])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_reference_values(name: str):
+    answer = evaluate(reference_case(name))
+    np.testing.assert_allclose(answer.F, REFERENCE[name]["force"], rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_reference_derivatives(name: str):
+    errors = derivative_errors(reference_case(name))
+    assert errors is not None
+    assert max(errors.values()) < 1e-6
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_force_against_a_crude_march(seed: int):
+    """Random contacts of every state; the march's own error is judged from two steps."""
+    rng = np.random.default_rng(seed)
+    states: Counter[str] = Counter()
+    errors = []
+    for _ in range(125):
+        case = random_case(rng)
+        answer = evaluate(case)
+        coarse, fine = crude_force(case, 2**12), crude_force(case, 2**14)
+        error = np.abs(answer.F - fine).max() / max(case.scale, 1e-300)
+        assert error < np.abs(fine - coarse).max() / max(case.scale, 1e-300) + 1e-6
+        errors.append(error)
+        states[answer.state] += 1
+    assert min(states[state] for state in ("stuck", "slipping", "lifting", "separated")) >= 1
+    assert np.median(errors) < 1e-6
+
+
+@pytest.mark.parametrize("harmonics", [2, 8, 40, 120])
+def test_every_random_contact_has_an_answer(harmonics: int):
+    """Sticks of any length; the helper refuses a march that fills its table without getting anywhere."""
+    rng = np.random.default_rng(harmonics)
+    for _ in range(3000 if harmonics < 40 else 500):
+        assert np.isfinite(evaluate(random_case(rng, harmonics)).F).all()
+
+
+@pytest.mark.parametrize("kt_over_limit", [0.5, 1.0, 3.0, 1e4])
+@pytest.mark.parametrize("N0", [0.0, 1e-12, 99.0, 100.0 * (1 - 1e-15), 100.0, 100.0 * (1 + 1e-15), 300.0])
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_ties(kt_over_limit: float, N0: float, mu: float):
+    """Limits reached exactly, loads that touch zero, motion in phase with the load, no friction."""
+    for phase, motion in ((0.0, (1.0, 0.0)), (np.pi / 2, (1.0, 0.5)), (np.pi, (1.0, 0.0)), (1.0, (0.0, 0.0))):
+        N = np.array([N0, 100.0 * np.cos(phase), -100.0 * np.sin(phase)])
+        U = np.array([0.0, *motion, 0.0, 0.0, 0.1 * motion[1], 0.0])
+        case = Case(U=U, N=N, kt=kt_over_limit * 30.0, mu=mu)
+        assert np.abs(evaluate(case).F - crude_force(case, 2**13)).max() <= 1e-5 * 100.0
+
+
+def test_short_separations_are_not_missed():
+    """A dip of the load below zero between two grid points, while it is negative elsewhere too."""
+    N = np.array([0.6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0])  # four equal dips
+    N[1] = 0.3985  # only just lifts one of them
+    case = Case(U=np.array([0.0, 3.0, 4.0]), N=100.0 * N, kt=60.0, mu=0.4)
+    assert len(load_zeros(case.N)) == 8
+    assert np.abs(evaluate(case).F - crude_force(case, 2**14)).max() < 1e-5
+
+
+def test_derivatives_of_random_contacts():
+    """All derivatives in all states, to 1e-6 of the largest entry."""
+    rng = np.random.default_rng(7)
+    seen: Counter[str] = Counter()
+    for _ in range(150):
+        case = random_case(rng, 12)
+        best = math.inf
+        for step in (1e-4, 1e-5, 1e-6, 1e-7):
+            errors = derivative_errors(case, step)
+            best = min(best, math.inf if errors is None else max(errors.values()))
+            if best < 1e-6:
+                break
+        assert best < 1e-6
+        seen[evaluate(case).state] += 1
+    assert min(seen[state] for state in ("stuck", "slipping", "lifting", "separated")) >= 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Transition:
+    """A family of contacts over x that changes its smooth piece once between `low` and `high`."""
+
+    family: Callable[[float], Case]
+    low: float
+    high: float
+    before: str
+    after: str
+
+
+def _case(U: list[float], N: list[float], **values: float) -> Case:
+    return Case(U=np.array(U), N=np.array(N), **{"kt": 30.0, "mu": 0.3, **values})
+
+
+TRANSITIONS = {
+    "one-sided slip of a stuck contact": Transition(
+        family=lambda x: _case([0.1, x, 0.3], [100.0, 20.0, 30.0]), low=0.2, high=1.0,
+        before="stuck", after="stuck",
+    ),
+    "first slip, one limit at a time": Transition(
+        family=lambda x: _case([0.1, x, 0.3], [100.0, 20.0, 30.0]), low=0.85, high=1.2,
+        before="stuck", after="slipping",
+    ),
+    "first slip, both limits at once": Transition(
+        family=lambda x: _case([0.0, x, 0.0, 0.0, 0.0, 0.1, 0.05], [100.0]), low=0.5, high=1.5,
+        before="stuck", after="slipping",
+    ),
+    "a second slip within the half period": Transition(
+        family=lambda x: _case([0.0, 3.0, 1.0, 0.0, 0.0, x, 0.4 * x], [100.0, 10.0, 0.0]), low=0.1, high=1.6,
+        before="slipping", after="slipping",
+    ),
+    "first separation while slipping": Transition(
+        family=lambda x: _case([0.0, 3.0, 4.0, 0.0, 0.0, 1.0, 0.0], [100.0, x, 0.0]), low=95.0, high=110.0,
+        before="slipping", after="lifting",
+    ),
+    "first slip as the load falls": Transition(
+        family=lambda x: _case([0.02, -0.1, 0.2], [100.0, x, 0.0]), low=90.0, high=99.9,
+        before="stuck", after="slipping",
+    ),
+    "after separation: stick becomes slip": Transition(
+        family=lambda x: _case([0.0, 0.3, x], [100.0, 200.0, 0.0]), low=3.2, high=5.0,
+        before="lifting", after="lifting",
+    ),
+    "after separation: stick becomes slip the other way": Transition(
+        family=lambda x: _case([0.0, 0.3, -x], [100.0, 200.0, 0.0]), low=0.5, high=4.0,
+        before="lifting", after="lifting",
+    ),
+    "first touch": Transition(
+        family=lambda x: _case([0.0, 3.0, 4.0], [x, 100.0, 0.0]), low=-110.0, high=-90.0,
+        before="separated", after="lifting",
+    ),
+    "second contact interval": Transition(
+        family=lambda x: _case([0.0, 3.0, 4.0], [20.0, 100.0, 0.0, x, 0.0]), low=70.0, high=95.0,
+        before="lifting", after="lifting",
+    ),
+}  # fmt: skip
+
+
+def critical(transition: Transition) -> float:
+    """Return where the family changes its smooth piece."""
+    low, high = transition.low, transition.high
+    pattern = evaluate(transition.family(low)).pattern
+    assert evaluate(transition.family(high)).pattern != pattern
+    while high - low > 1e-13 * abs(high):
+        middle = 0.5 * (low + high)
+        if evaluate(transition.family(middle)).pattern == pattern:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@pytest.mark.parametrize("distance", [-1e-2, -1e-4, 1e-4, 1e-2])
+@pytest.mark.parametrize("name", TRANSITIONS)
+def test_derivatives_on_both_sides_of_a_transition(name: str, distance: float):
+    transition = TRANSITIONS[name]
+    case = transition.family(critical(transition) + abs(transition.high) * distance)
+    assert evaluate(case).state == (transition.before if distance < 0.0 else transition.after)
+    errors = derivative_errors(case, abs(distance) / 40.0)
+    assert errors is not None
+    assert max(errors.values()) < 1e-6, errors
+
+
+@pytest.mark.parametrize("name", TRANSITIONS)
+def test_the_force_is_continuous_across_a_transition(name: str):
+    transition = TRANSITIONS[name]
+    x = critical(transition)
+    gap = 1e-9 * abs(x)
+    before, after = (evaluate(transition.family(x + step)) for step in (-gap, gap))
+    assert before.pattern != after.pattern
+    assert np.abs(after.F - before.F).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", ["after separation: stick becomes slip", "reference"])
+def test_the_onset_after_separation_counts(name: str):
+    """The moment of reattachment moves with the load: without that term dF/dN is wrong by tens of percent."""
+    if name == "reference":
+        case = reference_case("separation")
+        case = replace(case, U=0.5 * case.U)
+    else:
+        case = TRANSITIONS[name].family(1.0)
+    answer = evaluate(case)
+    term = np.zeros_like(answer.dF_dN)
+    after = answer.segments[
+        (answer.segments[:, events.MOTION] == events.STICK)
+        & (answer.segments[:, events.BEGAN] == events.AFTER_SEPARATION)
+    ]
+    assert len(after) == 1
+    begin, end = after[0, [events.BEGIN, events.END]]
+    at = np.array([begin])
+    rate = case.kt * values(fourier.derivative(case.U), at) / values(fourier.derivative(case.N), at)
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    tau = begin + (end - begin) * 0.5 * (nodes + 1.0)
+    moments = fourier.basis(tau, case.n_harmonics).T @ weights * 0.5 * (end - begin) / np.pi
+    moments[0] *= 0.5
+    term = rate * np.outer(moments, fourier.basis(at, (case.N.size - 1) // 2)[0])
+    errors = derivative_errors(case)
+    assert errors is not None
+    assert errors["dF_dN"] < 1e-6
+    assert np.abs(term).max() > 0.1 * np.abs(answer.dF_dN).max()
+
+
+def test_force_and_derivatives_scale():
+    """F is homogeneous of degree one in (u, N), and in (kt, mu); of degree zero in shifts of time."""
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        case = random_case(rng, 9)
+        answer = evaluate(case)
+        twice = evaluate(replace(case, U=2.0 * case.U, N=2.0 * case.N))
+        np.testing.assert_allclose(twice.F, 2.0 * answer.F, atol=1e-12 * case.scale)
+        np.testing.assert_allclose(
+            case.kt * answer.dF_dkt + case.mu * answer.dF_dmu, answer.F, atol=1e-12 * case.scale
+        )
+        euler = answer.dF_dU @ case.U + answer.dF_dN @ case.N
+        np.testing.assert_allclose(euler, answer.F, atol=1e-10 * case.scale)
+        if answer.state in ("slipping", "lifting"):
+            turn = 2.0 * np.pi * rng.uniform()
+            moved = evaluate(replace(case, U=shifted(case.U, turn), N=shifted(case.N, turn)))
+            np.testing.assert_allclose(moved.F, shifted(answer.F, turn), atol=1e-10 * case.scale)
+
+
+def shifted(q: np.ndarray, turn: float) -> np.ndarray:
+    """Coefficients of q(tau + turn)."""
+    amplitudes = fourier.to_complex(q)
+    return fourier.to_real(amplitudes * np.exp(1j * turn * np.arange(amplitudes.size)))
