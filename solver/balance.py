@@ -148,7 +148,8 @@ def _system(scene: Scene, parameter: Parameter, ks: Integer, omega: float) -> Sy
     highest = max(int(ks[-1]), 1)
     cos_table, sin_table = grid_tables(grid_size(highest), highest)
     return System(
-        ks=ks, which=reduced.which, cos_table=cos_table, sin_table=sin_table, contacts=contacts,
+        ks=ks, load_ks=np.arange(2, dtype=np.int64), which=reduced.which, cos_table=cos_table,
+        sin_table=sin_table, contacts=contacts,
         active=parameter.active, shift=reduced.shift, kind=int(parameter.kind), omega=omega,
         level_reference=_level(scene), phase_reference=scene.value("excitation.phase"),
         parameter_reference=scene.value(parameter.path) if derivative is not None else 0.0,

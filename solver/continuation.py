@@ -19,7 +19,7 @@ from solver.errors import SettingError
 from solver.fourier import Integer, Real
 from solver.kernels import path
 from solver.kernels.observe import MEASURES
-from solver.kernels.path import Control, begin_walk, record, walk_by_value, walk_on
+from solver.kernels.path import Control, begin_walk, walk_by_value, walk_on
 from solver.peaks import Points, band_limit, find_band, find_peaks
 from solver.scene import Scene
 from solver.workspace import Workspace
@@ -191,16 +191,12 @@ def walk(
     )  # fmt: skip
     linear, point = workspace.linear, workspace.point
     code, state = begin_walk(system, linear, point, control, np.zeros(0) if guess is None else guess)
-    rows = _rows(balance, 1)
-    if code == path.RUNNING:
-        record(system, linear, point, state, 0, *rows)
-        yield _stretch(rows, 1, None, state)
     while code == path.RUNNING:
         rows = _rows(balance, _STRETCH)
         code, count = walk_on(system, linear, point, control, state, _STRETCH, *rows)
         yield _stretch(rows, count, ENDINGS.get(code), state)
     if code == path.NO_START:
-        yield _stretch(rows, 0, BranchStatus.NO_START, state)
+        yield _stretch(_rows(balance, 0), 0, BranchStatus.NO_START, state)
 
 
 def _rows(balance: Balance, count: int) -> tuple[Real, Real, Integer, Real, Real]:

@@ -24,6 +24,7 @@ HALF_POWER = 1.0 / math.sqrt(2.0)
 # A maximum below this share of the highest point found is left at the resolution of the branch: polishing it
 # would cost without a use, since it competes with nothing.
 WORTH_POLISHING = 0.5
+_MOST_ITERATIONS = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,7 +156,7 @@ def _refine(
         slopes.append(tangent * ((weights * chord) @ chord / along) if along != 0.0 else chord)
     good, point, iterations = refine(
         workspace.system, workspace.linear, workspace.point, left.copy(), slopes[0], right.copy(), slopes[1],
-        what, level, g_left, g_right, observed, values,
+        what, level, g_left, g_right, _MOST_ITERATIONS, observed, values,
     )  # fmt: skip
     if not good or not np.isfinite(values[MAX_ABS]):
         return None, math.nan, int(iterations)

@@ -24,8 +24,6 @@ from solver.kernels.system import (
     receptance_by_value,
 )
 
-_MOST_ITERATIONS = 30
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointSolution:
@@ -85,7 +83,7 @@ class Workspace:
         if guess is not None:
             u = guess.copy()
             receptance(self.system, p, self.linear)
-            good, spent, norm = newton(self.system, self.linear, u, p, 0.0, self.point, _MOST_ITERATIONS)
+            good, spent, norm = newton(self.system, self.linear, u, p, 0.0, self.point)
             if good:
                 return PointSolution(converged=True, u=u, iterations=spent, residual=norm)
         u = np.zeros(self.balance.n_unknowns)

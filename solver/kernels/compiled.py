@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.extending import intrinsic
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -61,3 +62,14 @@ def compiled(function: _Function) -> _Function:
     finally:
         numba.config.CACHE_DIR = before
     return kernel
+
+
+@intrinsic
+def out_of_line(context: Any) -> Any:  # noqa: ARG001
+    """Keep the kernel this is called in out of its callers, which otherwise are compiled with all of it."""
+
+    def mark(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+        builder.function.attributes.add("noinline")
+        return context.get_dummy_value()
+
+    return numba.types.none(), mark

@@ -22,8 +22,8 @@ import math
 import numpy as np
 
 from solver.fourier import Real
-from solver.kernels.compiled import compiled
-from solver.kernels.trigpoly import at_point, bracketed_root
+from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.trigpoly import FALLING, RISING, at_point, bracketed_root
 
 # What a contact does over the period.
 SEPARATED, STUCK, SLIPPING, LIFTING, FAILED = 0, 1, 2, 3, 4
@@ -50,6 +50,7 @@ def largest(c: Real, s: Real, degree: int, value: Real, slope: Real) -> tuple[fl
 
     Every interval whose cubic through values and slopes comes near the best is refined.
     """
+    out_of_line()
     n = value.size
     delta = 2.0 * math.pi / n
     top, bottom = value[0], value[0]
@@ -66,7 +67,7 @@ def largest(c: Real, s: Real, degree: int, value: Real, slope: Real) -> tuple[fl
                 continue
             fall = slope[j] - slope[after]
             guess = delta * (j + (slope[j] / fall if fall > 0.0 else 0.5))
-            tau = bracketed_root(c, s, degree, 1, 0.0, delta * j, delta * (j + 1), guess, False)
+            tau = bracketed_root(c, s, degree, 1, 0.0, delta * j, delta * (j + 1), guess, FALLING)
             here = at_point(c, s, degree, tau)[0]
             if here > best:
                 best, place = here, tau
@@ -94,7 +95,7 @@ def _crosses(
         if min(g_lo + slope_lo * width, g_hi - slope_hi * width) <= tol:
             return np.inf
         guess = lo + width * slope_lo / (slope_lo - slope_hi)
-        end = bracketed_root(c, s, degree, 1, 0.0, lo, hi, guess, False)
+        end = bracketed_root(c, s, degree, 1, 0.0, lo, hi, guess, FALLING)
         g_hi = at_point(c, s, degree, end)[0] + shift
         if g_hi <= tol:
             return np.inf
@@ -109,13 +110,13 @@ def _crosses(
         if begin < 0.0:
             # Below 0 for less than the first part: the lowest point is there, or the rise begins at once.
             end = lo + (end - lo) / 16.0
-            begin = bracketed_root(c, s, degree, 1, 0.0, lo, end, 0.5 * (lo + end), True)
+            begin = bracketed_root(c, s, degree, 1, 0.0, lo, end, 0.5 * (lo + end), RISING)
             if at_point(c, s, degree, begin)[0] + shift >= -tol:
                 return begin
             g_hi = at_point(c, s, degree, end)[0] + shift
     rise = g_hi - g_lo
     guess = begin + (end - begin) * (-g_lo / rise if rise > 0.0 else 0.5)
-    return bracketed_root(c, s, degree, 0, shift, begin, end, guess, True)
+    return bracketed_root(c, s, degree, 0, shift, begin, end, guess, RISING)
 
 
 @compiled
@@ -131,6 +132,7 @@ def leave_stick(
     tol: float,
 ) -> tuple[float, int]:
     """Return when a stuck contact reaches a limit, and which (0: ξ = +1, 1: ξ = −1), or (end, −1)."""
+    out_of_line()
     n = value.shape[1]
     delta = 2.0 * math.pi / n
     j = math.floor(start / delta) + 1
@@ -172,6 +174,7 @@ def leave_slip(c: Real, s: Real, degree: int, slope: Real, start: float, end: fl
 
     Between grid points a dip of w' below 0 is looked for where the grid has a local minimum.
     """
+    out_of_line()
     n = slope.size
     delta = 2.0 * math.pi / n
     j = math.floor(start / delta) + 1
@@ -190,16 +193,16 @@ def leave_slip(c: Real, s: Real, degree: int, slope: Real, start: float, end: fl
         if rate_hi < -tol * degree * degree:
             fall = rate - rate_hi
             guess = lo + (hi - lo) * (rate / fall if fall > 0.0 else 0.5)
-            return bracketed_root(c, s, degree, 1, 0.0, lo, hi, guess, False)
+            return bracketed_root(c, s, degree, 1, 0.0, lo, hi, guess, FALLING)
         if not last and j * delta - start > delta:
             before, after = slope[(j - 1) % n], slope[(j + 1) % n]
             if rate_hi <= before and rate_hi <= after:
                 bend = before + after - 2.0 * rate_hi
                 drop = (before - after) ** 2 / (8.0 * bend) if bend > 0.0 else 0.0
                 if rate_hi < 4.0 * drop + 0.05 * bend:
-                    dip = bracketed_root(c, s, degree, 2, 0.0, hi - delta, hi + delta, hi, True)
+                    dip = bracketed_root(c, s, degree, 2, 0.0, hi - delta, hi + delta, hi, RISING)
                     if dip < end and at_point(c, s, degree, dip)[1] < 0.0:
-                        return bracketed_root(c, s, degree, 1, 0.0, lo, dip, 0.5 * (lo + dip), False)
+                        return bracketed_root(c, s, degree, 1, 0.0, lo, dip, 0.5 * (lo + dip), FALLING)
         rate = rate_hi
         lo = hi
         j += 1
@@ -209,7 +212,7 @@ def leave_slip(c: Real, s: Real, degree: int, slope: Real, start: float, end: fl
 @compiled
 def march(
     c: Real, s: Real, degree: int, value: Real, slope: Real, begin: float, end: float,
-    stuck: bool, direction: int, offset: float, began: float, tol: float, segments: Real, count: int,
+    motion: float, direction: float, offset: float, began: float, tol: float, segments: Real, count: int,
 ) -> int:  # fmt: skip
     """Append the segments of the contact interval [begin, end] to the table; return their number or −1.
 
@@ -217,8 +220,10 @@ def march(
     ----------
     c, s : (2, degree + 1) the polynomials w_+ and w_−.
     value, slope : (2, n) their values and slopes on the grid.
-    stuck, direction, offset, began : the state at `begin` (index of ξ; offset of the stick force).
+    motion, direction, offset, began : the state at `begin`: STICK or SLIP, ξ, offset of the stick force, and
+        what the stick began after.
     """
+    out_of_line()
     tau = begin
     while tau < end:
         if count >= segments.shape[0]:
@@ -226,16 +231,18 @@ def march(
         row = segments[count]
         row[BEGIN] = tau
         row[ONSET] = tau
-        if stuck:
-            row[MOTION], row[BEGAN], row[DIRECTION] = STICK, began, 1.0 - 2.0 * direction
+        row[MOTION], row[DIRECTION] = motion, direction
+        if motion == STICK:
+            row[BEGAN] = began
             tau, hit = leave_stick(c, s, degree, value, slope, offset, tau, end, tol)
             if hit >= 0:
-                direction, stuck = hit, False
+                motion, direction = SLIP, 1.0 - 2.0 * hit
         else:
-            row[MOTION], row[BEGAN], row[DIRECTION] = SLIP, AFTER_SLIP, 1.0 - 2.0 * direction
-            tau = leave_slip(c[direction], s[direction], degree, slope[direction], tau, end, tol)
-            offset = -(1.0 - 2.0 * direction) * at_point(c[direction], s[direction], degree, tau)[0]
-            stuck, began = True, AFTER_SLIP
+            row[BEGAN] = AFTER_SLIP
+            x = 0 if direction > 0.0 else 1
+            tau = leave_slip(c[x], s[x], degree, slope[x], tau, end, tol)
+            offset = -direction * at_point(c[x], s[x], degree, tau)[0]
+            motion, began = STICK, AFTER_SLIP
         row[END] = tau
         count += 1
     return count

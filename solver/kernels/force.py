@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from solver.fourier import Integer, Real, coefficient_count
-from solver.kernels.compiled import compiled
+from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.events import (
     AFTER_SLIP,
     BEGAN,
@@ -47,6 +47,7 @@ def add_moments(begin: float, end: float, weight: float, cosines: Real, sines: R
     Written with half-length and middle, ∫cos qτ = (2/q) sin(q·half) cos(q·middle), which keeps full relative
     precision on the very short segments of stiff contacts.
     """
+    out_of_line()
     half, middle = 0.5 * (end - begin), 0.5 * (end + begin)
     cm1, sm1 = math.cos(middle), math.sin(middle)
     ch1, sh1 = math.cos(half), math.sin(half)
@@ -95,6 +96,7 @@ def _products(
     cosines: Real, sines: Real, row_ks: Integer, column_ks: Integer, scale: float, out: Real
 ) -> None:
     """Fill `out` with scale·∫e_row e_column/π (2π for the mean row): Toeplitz plus Hankel of the moments."""
+    out_of_line()
     half = 0.5 * scale / math.pi
     row = 0
     for a in range(row_ks.size):
@@ -138,6 +140,7 @@ def contact_force(
     -------
     (state, number of segments), see `find_segments`; on FAILED the outputs are NaN.
     """
+    out_of_line()
     state, count = find_segments(U, ks, N, load_ks, kt, mu, cos_table, sin_table, segments)
     n = coefficient_count(ks)
     if state in (SEPARATED, FAILED):
@@ -200,6 +203,7 @@ def _add_onsets(
     dF_dU: Real, dF_dkt: Real, dF_dmu: Real, dF_dN: Real,
 ) -> None:  # fmt: skip
     """Add the rank-one terms of every stick segment: its offset, fixed at its onset."""
+    out_of_line()
     n, m = U.size, N.size
     cosines, sines = np.empty(ks[-1] + 1), np.empty(ks[-1] + 1)
     moment, e_u, e_n, de_u, de_n = np.empty(n), np.empty(n), np.empty(m), np.empty(n), np.empty(m)

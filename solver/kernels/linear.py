@@ -15,7 +15,7 @@ import numba
 import numpy as np
 
 from solver.fourier import Complex, Real
-from solver.kernels.compiled import compiled
+from solver.kernels.compiled import compiled, out_of_line
 
 OWN_UP_TO = 36  # measured crossing of our loop and LAPACK
 
@@ -79,6 +79,7 @@ def invert(matrix: Complex, inverse: Complex) -> bool:
 
     Returns False, with `inverse` meaningless, if the matrix is singular or not finite.
     """
+    out_of_line()
     n = matrix.shape[0]
     for i in range(n):
         for j in range(n):
@@ -112,6 +113,7 @@ def invert(matrix: Complex, inverse: Complex) -> bool:
 @compiled
 def _solve_small(matrix: Real, rhs: Real) -> float:
     """Gauss with partial pivoting on a row-major matrix; the right-hand sides are the rows of `rhs`."""
+    out_of_line()
     n = matrix.shape[0]
     sign = 1.0
     for k in range(n):
@@ -160,6 +162,7 @@ def solve(matrix: Real, rhs: Real) -> float:
     -------
     The sign of the determinant, 0.0 if the matrix is singular or not finite (then `rhs` is meaningless).
     """
+    out_of_line()
     n = matrix.shape[0]
     if n <= OWN_UP_TO:
         return _solve_small(matrix, rhs)

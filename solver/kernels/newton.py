@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from solver.fourier import Real, coefficient_count, cosine_position
-from solver.kernels.compiled import compiled
+from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.linear import copy_block, copy_to, invert, set_to, solve
 from solver.kernels.receptance import receptance
 from solver.kernels.residual import contact_values, evaluate
@@ -23,11 +23,12 @@ TARGET = 1e-11  # relative residual aimed at
 ACCEPTED = 1e-9  # relative residual still a solution when rounding allows no better
 _HALVINGS = 5
 _UPHILL_STEPS = 4
+_MOST = 20
 
 
 @compiled
 def newton(
-    system: System, linear: Receptance, u: Real, p: float, added: float, point: Evaluation, most: int
+    system: System, linear: Receptance, u: Real, p: float, added: float, point: Evaluation
 ) -> tuple[bool, int, float]:
     """Solve r(u, p) = 0 for u, in place, at a fixed λ = p (the receptance is filled already).
 
@@ -35,6 +36,7 @@ def newton(
     -------
     (converged, Newton iterations, relative residual); `point` belongs to the final u.
     """
+    out_of_line()
     n = u.size
     trial, kept, matrix, step = np.empty(n), np.empty(n), np.empty((n, n)), np.empty((1, n))
     copy_to(trial, u)
@@ -63,7 +65,7 @@ def newton(
             copy_to(kept, u)
         if norm <= TARGET:
             return True, iteration, norm
-        if iteration >= most:
+        if iteration >= _MOST:
             break
         copy_block(matrix, point.jacobian)
         copy_to(step[0], point.residual)
@@ -94,6 +96,7 @@ def arc_newton(
     -------
     (converged, iterations, p, relative residual).
     """
+    out_of_line()
     n = u.size
     matrix, rhs = np.empty((n + 1, n + 1)), np.empty((1, n + 1))
     before, norm = np.inf, np.inf
@@ -137,6 +140,7 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
 
     (I + A kt) u = ū harmonic by harmonic; a contact stays stuck while max|kt u| ≤ μ (N0 − |N1| + added).
     """
+    out_of_line()
     nc, n = system.contacts.shape[0], coefficient_count(system.ks)
     table, _, _, _ = contact_values(system, p, 0.0)
     matrix, inverse = np.empty((nc, nc), np.complex128), np.empty((nc, nc), np.complex128)
@@ -181,6 +185,7 @@ def start(
     -------
     (converged, Newton iterations in all, relative residual).
     """
+    out_of_line()
     n = u.size
     stuck, last_u, trial, best = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     receptance(system, p, linear)
@@ -190,9 +195,9 @@ def start(
     copy_to(trial, stuck)
     last, ahead, factor = here, 0.0, 0.25
     floor = 1e-6 * here
-    total, most, predicted = 0, 20, False
+    total, first, predicted = 0, True, False
     for _ in range(400):
-        good, iterations, norm = newton(system, linear, trial, p, ahead, point, most)
+        good, iterations, norm = newton(system, linear, trial, p, ahead, point)
         total += iterations
         if good:
             copy_to(last_u, best)
@@ -207,14 +212,13 @@ def start(
             copy_to(trial, best)
             predicted = False
             continue
-        elif most == 20:
-            most = 12
-        else:
+        elif not first:
             factor = math.sqrt(factor)
             if factor > 0.9999:
                 break
             if here <= floor:
                 floor *= 0.1
+        first = False
         ahead = here * factor if here * factor > floor else 0.0
         copy_to(trial, best)
         predicted = last != here

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from solver.fourier import Real, coefficient_count, cosine_position
-from solver.kernels.compiled import compiled
+from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.events import largest
 from solver.kernels.system import Evaluation, Receptance, System
 from solver.kernels.trigpoly import on_grid, unpack
@@ -20,6 +20,7 @@ MEASURES = 6
 @compiled
 def observed_motion(system: System, linear: Receptance, u: Real, point: Evaluation, x: Real) -> None:
     """Fill `x` (n,) with the coefficients of the observed DOF [m]: x̂ = x̂_linear − B (F̂ − shift û)."""
+    out_of_line()
     nc, n = system.contacts.shape[0], coefficient_count(system.ks)
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
@@ -39,6 +40,7 @@ def observed_slope(
     system: System, linear: Receptance, u: Real, point: Evaluation, du: Real, dp: float, dx: Real
 ) -> None:
     """Fill `dx` with the change of the observed coefficients for a change (du, dλ) of the solution."""
+    out_of_line()
     nc, n = system.contacts.shape[0], coefficient_count(system.ks)
     dF = np.empty((nc, n))
     for c in range(nc):
@@ -66,6 +68,7 @@ def observed_slope(
 @compiled
 def extremes(system: System, x: Real) -> tuple[float, float, float, float]:
     """Return max x and its place, min x and its place, over the period."""
+    out_of_line()
     degree = system.ks[-1]
     n_grid = 2 * (system.cos_table.shape[1] - 1)
     c, s = np.empty(degree + 1), np.empty(degree + 1)
@@ -102,6 +105,7 @@ def measure(
 
     The place of an extremum is stationary, so a slope is the change of the motion at that place.
     """
+    out_of_line()
     observed_motion(system, linear, u, point, x)
     high, at_high, low, at_low = extremes(system, x)
     dx = np.empty(x.size)

@@ -17,7 +17,7 @@ import numpy as np
 from numba.experimental import structref
 
 from solver.fourier import Integer, Real
-from solver.kernels.compiled import compiled
+from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.linear import copy_to, largest_entry, set_to, solve
 from solver.kernels.newton import arc_newton, border, newton, start
 from solver.kernels.observe import RESIDUAL, measure
@@ -54,7 +54,7 @@ class Walk(NamedTuple):
     u: Real  # (nt,)
     before: Real  # (nt + 1,) the point before, λ last
     tangent: Real  # (nt + 1,)
-    numbers: Real  # (8,)
+    numbers: Real  # (9,)
 
 
 @structref.register
@@ -77,7 +77,7 @@ def walk_by_value(walk: Walk) -> Walk:
     return Walk(walk.u, walk.before, walk.tangent, walk.numbers)
 
 
-P, STEP, ORIENTATION, ITERATIONS, REJECTED, STEPPED_OVER, COUNT, NORM = 0, 1, 2, 3, 4, 5, 6, 7
+P, STEP, ORIENTATION, ITERATIONS, REJECTED, STEPPED_OVER, COUNT, NORM, FRESH = 0, 1, 2, 3, 4, 5, 6, 7, 8
 
 
 @compiled
@@ -85,14 +85,15 @@ def begin_walk(
     system: System, linear: Receptance, point: Evaluation, control: Control, guess: Real
 ) -> tuple[int, Walk]:
     """Find the first point of a branch (from `guess` if it is not empty) and its tangent."""
+    out_of_line()
     nt = system.contacts.shape[0] * (2 * system.ks.size - (1 if system.ks[0] == 0 else 0))
-    walk = _new_walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(8))
+    walk = _new_walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(9))
     p = control.start
     good, iterations = False, 0
     if guess.size == nt:
         receptance(system, p, linear)
         copy_to(walk.u, guess)
-        good, iterations, _ = newton(system, linear, walk.u, p, 0.0, point, 20)
+        good, iterations, _ = newton(system, linear, walk.u, p, 0.0, point)
     if not good:
         good, more, _ = start(system, linear, walk.u, p, point)
         iterations += more
@@ -103,8 +104,8 @@ def begin_walk(
     walk.numbers[STEP] = control.first_step
     walk.tangent[nt] = 1.0 if control.stop >= control.start else -1.0
     receptance(system, p, linear)
-    walk.numbers[NORM] = evaluate(system, linear, walk.u, p, 0.0, point)
-    if not _turn(walk, point, control, True):
+    walk.numbers[NORM], walk.numbers[FRESH] = evaluate(system, linear, walk.u, p, 0.0, point), 1.0
+    if not _turn(walk, point, control):
         return NO_START, walk
     set_to(walk.before[:nt], walk.u, -control.first_step, walk.tangent)
     walk.before[nt] = p - control.first_step * walk.tangent[nt]
@@ -121,8 +122,9 @@ def _weights(u: Real, control: Control) -> tuple[float, float]:
 
 
 @compiled
-def _turn(walk: Walk, point: Evaluation, control: Control, first: bool) -> bool:
+def _turn(walk: Walk, point: Evaluation, control: Control) -> bool:
     """Replace the tangent by the one at the new point (`point` is evaluated there), oriented onward."""
+    out_of_line()
     n = walk.u.size
     weight_u, weight_p = _weights(walk.u, control)
     matrix, rhs = np.empty((n + 1, n + 1)), np.zeros((1, n + 1))
@@ -137,7 +139,7 @@ def _turn(walk: Walk, point: Evaluation, control: Control, first: bool) -> bool:
         old += weight_u * walk.tangent[i] ** 2
         new += weight_u * rhs[0, i] ** 2
     length = math.sqrt(new)
-    if first:
+    if walk.numbers[ORIENTATION] == 0.0:
         walk.numbers[ORIENTATION] = sign
     elif sign != walk.numbers[ORIENTATION]:
         if 1.0 / (length * math.sqrt(old)) > 0.3:
@@ -186,12 +188,13 @@ def _accept(walk: Walk, trial: Real, p: float, norm: float) -> None:
     copy_to(walk.u, trial)
     walk.numbers[P] = p
     walk.numbers[COUNT] += 1
-    walk.numbers[NORM] = norm
+    walk.numbers[NORM], walk.numbers[FRESH] = norm, 1.0
 
 
 @compiled
 def _step(system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk) -> int:
     """Make one step; return RUNNING, FINISHED, STALLED or LEFT_RANGE."""
+    out_of_line()
     n = walk.u.size
     guess, trial = np.empty(n), np.empty(n)
     forward = 1.0 if control.stop >= control.start else -1.0
@@ -208,9 +211,7 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
             step *= share
             copy_to(trial, guess)
             receptance(system, p_guess, linear)
-            good, iterations, norm = newton(
-                system, linear, trial, p_guess, 0.0, point, control.most_iterations
-            )
+            good, iterations, norm = newton(system, linear, trial, p_guess, 0.0, point)
             p = p_guess
         else:
             copy_to(trial, guess)
@@ -235,17 +236,18 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
         )
         _accept(walk, trial, p, norm)
         if last:
-            _turn(walk, point, control, False)
+            _turn(walk, point, control)
             return FINISHED
         if (p - control.start) * forward < -1e-9 * abs(control.stop - control.start):
             return LEFT_RANGE
-        return RUNNING if _turn(walk, point, control, False) else STALLED
+        return RUNNING if _turn(walk, point, control) else STALLED
     return STALLED
 
 
 @compiled
 def _step_over(system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk) -> int:
     """Get past a kink: look for a solution a little further in λ, in the direction of the last advance."""
+    out_of_line()
     n = walk.u.size
     span = control.stop - control.start
     forward = math.copysign(1.0, span)
@@ -262,7 +264,7 @@ def _step_over(system: System, linear: Receptance, point: Evaluation, control: C
             break
         receptance(system, p, linear)
         copy_to(trial, walk.u)
-        good, iterations, norm = newton(system, linear, trial, p, 0.0, point, 30)
+        good, iterations, norm = newton(system, linear, trial, p, 0.0, point)
         walk.numbers[ITERATIONS] += iterations
         if not good:
             continue
@@ -274,8 +276,9 @@ def _step_over(system: System, linear: Receptance, point: Evaluation, control: C
         for i in range(n):
             walk.tangent[i] = walk.u[i] - walk.before[i]
         walk.tangent[n] = p - walk.before[n]
+        walk.numbers[ORIENTATION] = 0.0
         walk.numbers[STEP] = max(control.first_step * 0.1, 256.0 * control.smallest_step)
-        turned = _turn(walk, point, control, True)
+        turned = _turn(walk, point, control)
         if last:
             return FINISHED
         return RUNNING if turned else STALLED
@@ -301,22 +304,24 @@ def walk_on(
     count = 0
     status = RUNNING
     while status == RUNNING and count < most_points:
-        seen = walk.numbers[COUNT]
-        status = _step(system, linear, point, control, walk)
-        if status == STALLED:
-            status = _step_over(system, linear, point, control, walk)
-        if walk.numbers[COUNT] > seen:
-            record(system, linear, point, walk, count, points, tangents, states, observed, measures)
+        if walk.numbers[FRESH] == 0.0:
+            status = _step(system, linear, point, control, walk)
+            if status == STALLED:
+                status = _step_over(system, linear, point, control, walk)
+        if walk.numbers[FRESH] > 0.0:
+            _record(system, linear, point, walk, count, points, tangents, states, observed, measures)
+            walk.numbers[FRESH] = 0.0
             count += 1
     return status, count
 
 
 @compiled
-def record(
+def _record(
     system: System, linear: Receptance, point: Evaluation, walk: Walk, row: int,
     points: Real, tangents: Real, states: Integer, observed: Real, measures: Real,
 ) -> None:  # fmt: skip
     """Write the walk's present point, with what is observed there, into one row of the result."""
+    out_of_line()
     n = walk.u.size
     copy_to(points[row, :n], walk.u)
     points[row, n] = walk.numbers[P]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from solver.fourier import Complex
-from solver.kernels.compiled import compiled
+from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.linear import invert
 from solver.kernels.system import DENSE, FORCE_PHASE, FREQUENCY, LEVEL, MODES, STRUCTURE, Receptance, System
 
@@ -27,6 +27,7 @@ def excitation(system: System, p: float) -> tuple[complex, complex]:
 @compiled
 def receptance(system: System, p: float, out: Receptance) -> None:
     """Fill `out` with the condensed linear part at λ = p and its derivative by λ."""
+    out_of_line()
     if system.form == DENSE:
         _dense_receptance(system, p, out)
     else:
@@ -61,6 +62,7 @@ def _clear(out: Receptance) -> None:
 @compiled
 def _modal_receptance(system: System, p: float, out: Receptance) -> None:
     """Sum the modes: Z⁻¹ = Σ x_m y_mᴴ / d_m with d_m = ω_m² − (kω)² + ikω c_m, or ikω − s_m for poles."""
+    out_of_line()
     omega = p if system.kind == FREQUENCY else system.omega
     by_omega = 1.0 if system.kind == FREQUENCY else 0.0
     nc = system.contacts.shape[0]
@@ -95,6 +97,7 @@ def _modal_receptance(system: System, p: float, out: Receptance) -> None:
 @compiled
 def _dense_receptance(system: System, p: float, out: Receptance) -> None:
     """Invert Z_k itself; λ may be the frequency or a structural parameter: dZ⁻¹ = −Z⁻¹ dZ Z⁻¹."""
+    out_of_line()
     omega = p if system.kind == FREQUENCY else system.omega
     moved = p - system.parameter_reference if system.kind == STRUCTURE else 0.0
     n = system.observe.size

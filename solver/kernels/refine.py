@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from solver.fourier import Real
-from solver.kernels.compiled import compiled
+from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.linear import copy_block, copy_to, largest_entry, set_to, solve
 from solver.kernels.newton import arc_newton, border
 from solver.kernels.observe import MAX_ABS, RESIDUAL, SLOPE, measure
@@ -21,6 +21,7 @@ def slope_by_parameter(
     system: System, linear: Receptance, u: Real, point: Evaluation, x: Real, out: Real
 ) -> bool:
     """Measure a solution with its slopes by λ, du/dλ = −(dr/du)⁻¹ dr/dλ; False where dr/du is singular."""
+    out_of_line()
     n = u.size
     matrix, rhs = np.empty((n, n)), np.empty((1, n))
     copy_block(matrix, point.jacobian)
@@ -35,9 +36,10 @@ def slope_by_parameter(
 @compiled
 def _correct(
     system: System, linear: Receptance, point: Evaluation, left: Real, chord: Real, share: float,
-    guess: Real, out_u: Real, x: Real, out: Real,
+    guess: Real, most: int, out_u: Real, x: Real, out: Real,
 ) -> tuple[bool, float, int]:  # fmt: skip
     """Solve on the plane across the chord at `share` of it, and measure there; slope along the chord."""
+    out_of_line()
     n = out_u.size
     size, span = largest_entry(left[:n]), abs(chord[n])
     weight_u = 1.0 / (size * size) if size > 0.0 else 1.0
@@ -46,7 +48,7 @@ def _correct(
     set_to(plane_u, left, share, chord)
     copy_to(out_u, guess)
     good, iterations, p, norm = arc_newton(
-        system, linear, out_u, guess[n], plane_u, plane_p, chord, weight_u, weight_p, point, 12
+        system, linear, out_u, guess[n], plane_u, plane_p, chord, weight_u, weight_p, point, most
     )
     if not good:
         return False, p, iterations
@@ -66,7 +68,7 @@ def _correct(
 @compiled
 def refine(
     system: System, linear: Receptance, point: Evaluation, left: Real, left_slope: Real, right: Real,
-    right_slope: Real, what: int, level: float, g_left: float, g_right: float, x: Real, out: Real,
+    right_slope: Real, what: int, level: float, g_left: float, g_right: float, most: int, x: Real, out: Real,
 ) -> tuple[bool, Real, int]:  # fmt: skip
     """Find the peak (slope 0) or the edge (amplitude = level) between two points of a branch.
 
@@ -74,6 +76,7 @@ def refine(
     ----------
     left, right : (nt + 1,) points, λ last; left_slope, right_slope : their tangents times the chord length.
     g_left, g_right : the function at both ends, of opposite sign: slope along the chord, amplitude − level.
+    most : Newton iterations of a trial.
     x (n,), out (MEASURES,) : filled at the place found.
 
     Returns
@@ -81,6 +84,7 @@ def refine(
     (found, point (nt + 1,), Newton iterations). A bracketed secant (Illinois) on the arc, every trial a
     converged solution.
     """
+    out_of_line()
     n = left.size - 1
     u, guess, found, chord = np.empty(n), np.empty(n + 1), np.empty(n + 1), np.empty(n + 1)
     copy_to(found, left)
@@ -97,7 +101,7 @@ def refine(
                 (1.0 + 2.0 * t) * r * r * left[i] + t * r * r * left_slope[i]
                 + t * t * (3.0 - 2.0 * t) * right[i] - t * t * r * right_slope[i]
             )  # fmt: skip
-        good, p, iterations = _correct(system, linear, point, left, chord, share, guess, u, x, out)
+        good, p, iterations = _correct(system, linear, point, left, chord, share, guess, most, u, x, out)
         total += iterations
         if not good:
             return False, found, total

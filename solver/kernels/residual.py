@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from solver.fourier import Real, coefficient_count, cosine_position
-from solver.kernels.compiled import compiled
+from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.events import FAILED
 from solver.kernels.force import contact_force
 from solver.kernels.linear import copy_block, fill_block
@@ -16,7 +16,6 @@ from solver.kernels.system import (
     KT,
     LOAD_AMPLITUDE,
     LOAD_COEFFICIENTS,
-    LOAD_HARMONICS,
     LOAD_PHASE,
     LOAD_RATIO,
     MU,
@@ -38,6 +37,7 @@ def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, 
 
     `added` [N] is put on every mean load (the start-up ladder presses the contacts into full stick).
     """
+    out_of_line()
     nc = system.contacts.shape[0]
     table, slope = np.empty((nc, 6)), np.zeros((nc, 6))
     copy_block(table, system.contacts)
@@ -79,12 +79,13 @@ def evaluate(system: System, linear: Receptance, u: Real, p: float, added: float
     -------
     The relative residual: max|r| over the largest of |u|, |ū| and |A F| (NaN if a contact failed).
     """
+    out_of_line()
     nc, n = system.contacts.shape[0], coefficient_count(system.ks)
     table, load, slope, dload = contact_values(system, p, added)
     for c in range(nc):
         U = u[c * n : (c + 1) * n]
         state, _ = contact_force(
-            U, system.ks, load[c], LOAD_HARMONICS, table[c, KT], table[c, MU], system.cos_table,
+            U, system.ks, load[c], system.load_ks, table[c, KT], table[c, MU], system.cos_table,
             system.sin_table, out.segments, out.dF_dU[c], out.dF_dkt[c], out.dF_dmu[c], out.dF_dN[c],
             out.F[c],
         )  # fmt: skip

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from solver.fourier import Integer, Real
-from solver.kernels.compiled import compiled
+from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.events import (
     AFTER_SEPARATION,
     AFTER_SLIP,
@@ -25,6 +25,7 @@ from solver.kernels.events import (
     ONSET,
     ROUNDING,
     SEPARATED,
+    SLIP,
     SLIPPING,
     STICK,
     STUCK,
@@ -32,7 +33,7 @@ from solver.kernels.events import (
     largest,
     march,
 )
-from solver.kernels.trigpoly import at_point, bracketed_root, on_grid, unpack
+from solver.kernels.trigpoly import FALLING, RISING, at_point, bracketed_root, on_grid, unpack
 
 
 @compiled
@@ -66,7 +67,8 @@ def _contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, 
         now = value[j % n] if hi < end else -1.0
         if before < 0.0 <= now or before >= 0.0 > now:
             span = now - before
-            tau = bracketed_root(c, s, degree, 0, 0.0, at, hi, at - (hi - at) * before / span, now >= 0.0)
+            way = RISING if now >= 0.0 else FALLING
+            tau = bracketed_root(c, s, degree, 0, 0.0, at, hi, at - (hi - at) * before / span, way)
             if now >= 0.0:
                 rising_at, in_contact = tau, True
             elif in_contact:
@@ -75,17 +77,17 @@ def _contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, 
                     count += 1
                 in_contact = False
         elif before < 0.0 and now < 0.0:
-            tau, top = _turning(c, s, degree, at, hi, False)
+            tau, top = _turning(c, s, degree, at, hi, FALLING)
             if top > 0.0 and count < out.shape[0]:
-                out[count, 0] = bracketed_root(c, s, degree, 0, 0.0, at, tau, 0.5 * (at + tau), True)
-                out[count, 1] = bracketed_root(c, s, degree, 0, 0.0, tau, hi, 0.5 * (hi + tau), False)
+                out[count, 0] = bracketed_root(c, s, degree, 0, 0.0, at, tau, 0.5 * (at + tau), RISING)
+                out[count, 1] = bracketed_root(c, s, degree, 0, 0.0, tau, hi, 0.5 * (hi + tau), FALLING)
                 count += 1
         elif in_contact:
-            tau, bottom = _turning(c, s, degree, at, hi, True)
+            tau, bottom = _turning(c, s, degree, at, hi, RISING)
             if bottom < 0.0 and count < out.shape[0]:
                 out[count, 0] = rising_at
-                out[count, 1] = bracketed_root(c, s, degree, 0, 0.0, at, tau, 0.5 * (at + tau), False)
-                rising_at = bracketed_root(c, s, degree, 0, 0.0, tau, hi, 0.5 * (hi + tau), True)
+                out[count, 1] = bracketed_root(c, s, degree, 0, 0.0, at, tau, 0.5 * (at + tau), FALLING)
+                rising_at = bracketed_root(c, s, degree, 0, 0.0, tau, hi, 0.5 * (hi + tau), RISING)
                 count += 1
         before = now
         at = hi
@@ -108,12 +110,14 @@ def _smallest(c: Real, s: Real, degree: int, value: Real, slope: Real) -> tuple[
 
 
 @compiled
-def _turning(c: Real, s: Real, degree: int, lo: float, hi: float, lowest: bool) -> tuple[float, float]:
-    """Return place and value of the lowest (else highest) point inside [lo, hi], (lo, 0) if there is none."""
-    sign = -1.0 if lowest else 1.0
-    if sign * at_point(c, s, degree, lo)[1] <= 0.0 or sign * at_point(c, s, degree, hi)[1] >= 0.0:
+def _turning(c: Real, s: Real, degree: int, lo: float, hi: float, way: float) -> tuple[float, float]:
+    """Return place and value of an extremum inside [lo, hi], (lo, 0) if there is none.
+
+    A minimum is looked for if the slope is to be RISING, a maximum if it is to be FALLING.
+    """
+    if way * at_point(c, s, degree, lo)[1] >= 0.0 or way * at_point(c, s, degree, hi)[1] <= 0.0:
         return lo, 0.0
-    tau = bracketed_root(c, s, degree, 1, 0.0, lo, hi, 0.5 * (lo + hi), lowest)
+    tau = bracketed_root(c, s, degree, 1, 0.0, lo, hi, 0.5 * (lo + hi), way)
     return tau, at_point(c, s, degree, tau)[0]
 
 
@@ -134,6 +138,7 @@ def find_segments(
     -------
     (state, number of segments); the state is SEPARATED, STUCK, SLIPPING, LIFTING or FAILED.
     """
+    out_of_line()
     degree = max(ks[-1], load_ks[-1])
     n_grid = 2 * (cos_table.shape[1] - 1)
     uc, us = np.empty(degree + 1), np.empty(degree + 1)
@@ -171,8 +176,8 @@ def find_segments(
         begin, end = intervals[i, 0], intervals[i, 1]
         rate_plus = at_point(c[0], s[0], degree, begin)[1]
         rate_minus = at_point(c[1], s[1], degree, begin)[1]
-        stuck = rate_plus < 0.0 and rate_minus < 0.0
-        direction = 0 if rate_plus >= rate_minus else 1
+        motion = STICK if rate_plus < 0.0 and rate_minus < 0.0 else SLIP
+        direction = 1.0 if rate_plus >= rate_minus else -1.0
         offset = -kt * at_point(uc, us, ks[-1], begin)[0]
         count = march(
             c,
@@ -182,7 +187,7 @@ def find_segments(
             slope,
             begin,
             end,
-            stuck,
+            motion,
             direction,
             offset,
             AFTER_SEPARATION,
@@ -213,5 +218,21 @@ def _march_circle(
             row[DIRECTION], row[ONSET], row[BEGAN] = 1.0, 0.0, UNLOADED
         return STUCK, 1
     begin, end = at_minus, at_minus + 2.0 * math.pi
-    count = march(c, s, degree, value, slope, begin, end, True, 1, high_minus, AFTER_SLIP, tol, segments, 0)
+    none = int(np.int64(0))  # a literal 0 would compile the march a second time
+    count = march(
+        c,
+        s,
+        degree,
+        value,
+        slope,
+        begin,
+        end,
+        STICK,
+        -1.0,
+        high_minus,
+        AFTER_SLIP,
+        tol,
+        segments,
+        none,
+    )
     return (SLIPPING, count) if count >= 0 else (FAILED, 0)

@@ -31,7 +31,6 @@ MODES, POLES, DENSE = 0, 1, 2
 # Columns of the contact table.
 KT, MU, N0, N1, RATIO, PHASE = 0, 1, 2, 3, 4, 5
 LOAD_COEFFICIENTS = 3
-LOAD_HARMONICS = np.array([0, 1], dtype=np.int64)
 
 
 class System(NamedTuple):
@@ -41,6 +40,7 @@ class System(NamedTuple):
     """
 
     ks: Integer  # (nk,) harmonics kept, ascending
+    load_ks: Integer  # harmonics of the normal load
     which: Integer  # (nk,) structure of each harmonic
     cos_table: Real
     sin_table: Real

@@ -11,8 +11,9 @@ import math
 import numpy as np
 
 from solver.fourier import Integer, Real
-from solver.kernels.compiled import compiled
+from solver.kernels.compiled import compiled, out_of_line
 
+RISING, FALLING = 1.0, -1.0
 POINTS_PER_WAVE = 12  # grid points for the shortest wave kept; the grid only brackets the events
 SMALLEST_GRID = 48
 
@@ -37,6 +38,7 @@ def on_grid(
 
     Even and odd part are summed on half the grid only: q(−τ) = even − odd.
     """
+    out_of_line()
     n = value.size
     half = n // 2
     even = np.zeros(half + 1)
@@ -93,13 +95,14 @@ def order_at(c: Real, s: Real, degree: int, tau: float, order: int, shift: float
 
 @compiled
 def bracketed_root(
-    c: Real, s: Real, degree: int, order: int, shift: float, lo: float, hi: float, guess: float, rising: bool
+    c: Real, s: Real, degree: int, order: int, shift: float, lo: float, hi: float, guess: float, way: float
 ) -> float:
     """Return the root in [lo, hi] of the order-th derivative of (polynomial + shift).
 
-    Newton's method kept inside a bracket: `rising` says that the function goes from negative at `lo` to
-    positive at `hi`; the end values themselves are never evaluated, so an end may itself be a zero.
+    Newton's method kept inside a bracket: `way` is RISING if the function goes from negative at `lo` to
+    positive at `hi`, else FALLING; the end values are never evaluated, so an end may itself be a zero.
     """
+    out_of_line()
     x = guess
     if not (lo < x < hi):
         x = 0.5 * (lo + hi)
@@ -107,7 +110,7 @@ def bracketed_root(
         f, slope = order_at(c, s, degree, x, order, shift)
         if f == 0.0:
             return x
-        if (f > 0.0) == rising:
+        if (f > 0.0) == (way > 0.0):
             hi = x
         else:
             lo = x
