@@ -59,12 +59,7 @@ class Answer:
         real = self.segments[self.segments[:, events.END] - self.segments[:, events.BEGIN] > 1e-11]
         kinds = real[:, [events.MOTION, events.BEGAN, events.DIRECTION]].tolist()
         rows = [
-            (
-                row[events.MOTION],
-                row[events.BEGAN],
-                row[events.DIRECTION] * (row[events.BEGAN] == events.AFTER_SLIP),
-            )
-            for row in real
+            (motion, began, direction * (began == events.AFTER_SLIP)) for motion, began, direction in kinds
         ]
         turns = [tuple(rows[i:] + rows[:i]) for i in range(len(rows))]
         return (self.state, min(turns, default=()))
