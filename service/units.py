@@ -1,4 +1,4 @@
-"""How amplitudes and parameters are shown to people: the unit that fits, and as many digits as mean something."""
+"""How amplitudes and parameters are shown to people: in the unit that fits, with the digits that count."""
 
 from __future__ import annotations
 

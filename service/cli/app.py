@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated
 
 import typer
@@ -14,7 +14,7 @@ from service.cli.inputs import join_variables
 
 app = typer.Typer(
     name="stickslip",
-    help="Design friction dampers: periodic responses, continuation, the best normal load, as a command and a service.",
+    help="Design friction dampers: periodic responses, continuation, and the best normal load.",
     rich_markup_mode=None,
     add_completion=False,
     no_args_is_help=True,
@@ -23,19 +23,22 @@ app = typer.Typer(
 _database = typer.Typer(help="Look after the database.", no_args_is_help=True, rich_markup_mode=None)
 _submit = typer.Typer(help="Hand a job to a running service.", no_args_is_help=True, rich_markup_mode=None)
 
-for _command in (
+_ALONE: tuple[Callable[..., None], ...] = (
     solver_commands.scenes, solver_commands.plan, solver_commands.solve, solver_commands.sweep,
     solver_commands.design, solver_commands.march, service_commands.demo, service_commands.serve,
-    service_commands.worker,
-):  # fmt: skip
+    service_commands.worker, submit_commands.watch, submit_commands.results,
+)  # fmt: skip
+_SUBMITTED: tuple[Callable[..., None], ...] = (
+    submit_commands.design, submit_commands.sweep, submit_commands.solve, submit_commands.march,
+)  # fmt: skip
+
+for _command in _ALONE:
     app.command()(_command)
-app.add_typer(_submit, name="submit")
-app.command()(submit_commands.watch)
-app.command()(submit_commands.results)
-app.add_typer(_database, name="db")
-_database.command()(service_commands.upgrade)
-for _command in (submit_commands.design, submit_commands.sweep, submit_commands.solve, submit_commands.march):
+for _command in _SUBMITTED:
     _submit.command()(_command)
+_database.command()(service_commands.upgrade)
+app.add_typer(_submit, name="submit")
+app.add_typer(_database, name="db")
 
 
 def _print_version(wanted: bool) -> None:

@@ -24,7 +24,7 @@ def serve(
     database: options.Database = None,
     workers: options.Workers = None,
 ) -> None:
-    """Serve the REST API and work off its queue, until interrupted."""
+    """Serve the REST API and work off its queue."""
     from service.server import serve as run
 
     run(_settings(host=host, port=port, database=database, workers=workers))
@@ -37,14 +37,17 @@ def worker(
         bool, typer.Option("--until-empty", help="End when no job waits or runs.")
     ] = False,
 ) -> None:
-    """Work off the queue of a database without HTTP, while no service does."""
+    """Work off a queue without HTTP.
+
+    On SQLite only while no service uses the file.
+    """
     from service.server import work
 
     work(_settings(database=database, workers=workers), until_empty=until_empty)
 
 
 def upgrade(database: options.Database = None) -> None:
-    """Bring a database to the revision this version works with."""
+    """Bring a database to this version's revision."""
     from service.revisions import upgrade as bring_up
 
     url = _settings(database=database).database
@@ -56,7 +59,10 @@ def demo(
         str, typer.Option("--out", metavar="DIR", help="Folder of the database and the pictures.")
     ] = "demo-output",
 ) -> None:
-    """Run the main job end to end on an embedded service, with pictures."""
+    """Run the main job end to end, with pictures.
+
+    Designs the dampers of two-dof and bladed-disk on an embedded service and its database.
+    """
     from service.demo import run
 
     folder = Path(out)

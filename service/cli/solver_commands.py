@@ -12,8 +12,7 @@ from service.cli import inputs, options, reports
 from service.cli.failures import FELL_SHORT
 from service.cli.output import print_json
 from service.cli.progress import bar, patience
-
-PICTURES = (".png", ".svg", ".pdf")
+from service.plots import SUFFIXES
 
 
 def scenes(as_json: options.Json = False) -> None:
@@ -33,7 +32,7 @@ def plan(
     harmonics: options.Harmonics = 11,
     as_json: options.Json = False,
 ) -> None:
-    """Say which effects a scene calls for, which are left out, and why; sizes and estimated cost."""
+    """Say which effects a scene calls for, and why."""
     import solver
 
     found = solver.plan(inputs.scene(name, values), harmonics=harmonics)
@@ -54,7 +53,7 @@ def solve(
     """Compute one periodic response."""
     import solver
 
-    picture = inputs.output_path("--plot", plot, PICTURES)
+    picture = inputs.output_path("--plot", plot, SUFFIXES)
     scene = inputs.scene(name, values)
     with patience():
         solution = solver.solve(scene, frequency_hz=frequency, harmonics=harmonics)
@@ -82,10 +81,13 @@ def sweep(
     plot: options.Plot = None,
     as_json: options.Json = False,
 ) -> None:
-    """Follow the response over a range of one parameter, by continuation."""
+    """Follow the response over a parameter.
+
+    By continuation: folds are passed, and only converged points count.
+    """
     import solver
 
-    picture = inputs.output_path("--plot", plot, PICTURES)
+    picture = inputs.output_path("--plot", plot, SUFFIXES)
     scene = inputs.scene(name, values)
     with bar("sweep") as on_progress:
         branch = solver.sweep(
@@ -93,7 +95,8 @@ def sweep(
             on_progress=on_progress,
         )  # fmt: skip
     if picture is not None and len(branch.values):
-        from service.plots.responses import Response, response_figure
+        from service.plots.curves import Response
+        from service.plots.responses import response_figure
         from service.plots.style import save
 
         save(response_figure(Response.of_branch(branch), limit=limit), picture)
@@ -114,8 +117,11 @@ def design(
     plot: options.Plot = None,
     as_json: options.Json = False,
 ) -> None:
-    """Choose parameters within bounds so that the highest peak over the scene's band is least."""
-    picture = inputs.output_path("--plot", plot, PICTURES)
+    """Find the best damper.
+
+    Parameters are chosen within bounds so that the highest peak over the scene's band is least.
+    """
+    picture = inputs.output_path("--plot", plot, SUFFIXES)
     bounds = inputs.bounds(variables)
     scene = inputs.scene(name, values)
     with bar("design", "responses") as on_progress:
@@ -126,7 +132,8 @@ def design(
             on_progress=on_progress,
         )  # fmt: skip
     if picture is not None and result.sweeps:
-        from service.plots.responses import Response, response_figure
+        from service.plots.curves import Response
+        from service.plots.responses import response_figure
         from service.plots.style import save
 
         save(response_figure(Response.of_branch(result.sweeps[-1]), limit=limit), picture)
@@ -146,10 +153,13 @@ def march(
     plot: options.Plot = None,
     as_json: options.Json = False,
 ) -> None:
-    """March in time until the motion repeats: the independent referee of solve."""
+    """March in time until the motion repeats.
+
+    The independent referee of solve; of a cyclic scene the whole annulus is marched.
+    """
     import solver
 
-    picture = inputs.output_path("--plot", plot, PICTURES)
+    picture = inputs.output_path("--plot", plot, SUFFIXES)
     scene = inputs.scene(name, values)
     with bar("march", "periods") as on_progress:
         marched = solver.march(
@@ -160,7 +170,7 @@ def march(
         from service.plots.motion import Motion, motion_figure
         from service.plots.style import save
 
-        save(motion_figure(Motion.of_march(marched)), picture)
+        save(motion_figure(Motion.of_march(marched, scene.name, scene.observe.dof)), picture)
     if as_json:
         print_json(marched.to_json())
     else:

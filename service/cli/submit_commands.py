@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli import inputs, options, reports
-from service.cli.failures import BAD_INPUT, FELL_SHORT
+from service.cli.failures import BAD_INPUT, FELL_SHORT, InputError
 from service.cli.output import print_json, print_table, say
 from service.cli.progress import bar
 
@@ -113,8 +113,8 @@ def results(
     as_json: options.Json = False,
     url: options.Url = options.DEFAULT_URL,
 ) -> None:
-    """Print what a job computed, and the sweeps it stored."""
-    from service.plots.formats import SUFFIXES
+    """Print what a job computed."""
+    from service.plots import SUFFIXES
 
     file = inputs.output_path("--out", out)
     picture = inputs.output_path("--plot", plot, SUFFIXES)
@@ -190,12 +190,13 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
 
 def _draw(client: Client, answer: ResultsAnswer, picture: Path) -> None:
     """Draw the sweep with the peak of the result (a design stores many)."""
-    from service.plots.responses import Response, response_figure
+    from service.plots.curves import Response
+    from service.plots.responses import response_figure
     from service.plots.style import save
 
     peak = answer.result.get("peak")
     if not answer.sweeps or peak is None:
-        raise inputs.InputError(f"`--plot`: job {answer.job} stored no sweep to draw")
+        raise InputError(f"`--plot`: job {answer.job} stored no sweep to draw")
     best = min(answer.sweeps, key=lambda s: abs(s.peak.value - peak["value"]) if s.peak else float("inf"))
     save(response_figure(Response.of_stored(client.sweep(best.id))), picture)
 

@@ -1,0 +1,186 @@
+"""The main job end to end: designs through the embedded service, stored sweeps read back, pictures.
+
+This is what ``stickslip demo`` and ``make demo`` run, and an example of the service inside a program.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import solver
+from service.answers import JobAnswer, SweepDetail
+from service.cli import reports
+from service.cli.failures import InputError, ShortfallError
+from service.cli.output import say
+from service.cli.progress import OnProgress, bars, patience
+from service.embedded import EmbeddedService
+from service.kinds import warm_up
+from service.models import JobState
+from service.plots.curves import Response
+from service.plots.responses import Family, family_figure, peak_figure
+from service.plots.style import save
+from service.settings import load_settings
+
+REMOVED, STUCK = 0.0, 1e9
+"""Normal loads [N] at which a contact does nothing, and never slips."""
+
+_LOOK_SECONDS = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """What the demonstration designs and draws of a scene.
+
+    Attributes
+    ----------
+    scene : str
+        Name of a shipped scene.
+    contact : str
+        The contact whose normal load is chosen.
+    bounds : (float, float)
+        Between which it is chosen [N].
+    shown : tuple of float
+        Loads whose responses are drawn beside the optimum's [N].
+    steps : int
+        Loads at which the peak is drawn, over the bounds.
+    """
+
+    scene: str
+    contact: str
+    bounds: tuple[float, float]
+    shown: tuple[float, ...]
+    steps: int = 24
+
+    @property
+    def variable(self) -> str:
+        """Path of the design variable."""
+        return f"{self.contact}.N0"
+
+    @property
+    def loads(self) -> tuple[float, ...]:
+        """Every load a sweep is wanted for [N]."""
+        grid = np.geomspace(*self.bounds, self.steps)
+        return (REMOVED, STUCK, *self.shown, *(float(f"{load:.4g}") for load in grid))
+
+
+CASES = (
+    Case(scene="two-dof", contact="damper", bounds=(20.0, 1000.0), shown=(30.0, 60.0, 200.0, 500.0)),
+    Case(scene="bladed-disk", contact="shroud", bounds=(20.0, 3000.0), shown=(40.0, 90.0, 500.0, 2000.0)),
+)
+
+
+def run(folder: Path, cases: Sequence[Case] = CASES) -> list[Path]:
+    """Design, read back, draw; everything goes into `folder`. Returns the pictures.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be used.
+    ShortfallError
+        A job did not reach its goal.
+    DatabaseError
+        The database in the folder cannot be used.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"`--out`: {str(folder)!r} cannot be used: {error.strerror}") from error
+    # Here first: several workers would otherwise each compile the same kernels on a first run.
+    with patience():
+        warm_up()
+    with EmbeddedService(load_settings(database=f"sqlite:///{folder / 'demo.db'}")) as service:
+        designs = _designs(service, cases)
+        sweeps = _sweeps(service, cases)
+        pictures: list[Path] = []
+        for case, design, jobs in zip(cases, designs, sweeps, strict=True):
+            optimum = service.results(design.id).result["optimum"][case.variable]
+            stored = _read_back(service, case, [design, *jobs])
+            pictures += _draw(folder, case, optimum, stored)
+    say("\n".join(["Pictures:", *(f"  {picture}" for picture in pictures)]))
+    return pictures
+
+
+def _designs(service: EmbeddedService, cases: Sequence[Case]) -> list[JobAnswer]:
+    """Have the dampers designed, and say what came out."""
+    specs = [{"scene": c.scene, "variables": {c.variable: list(c.bounds)}, "fresh": True} for c in cases]
+    groups = [[service.submit("design", spec)] for spec in specs]
+    with bars([f"design {case.scene}" for case in cases], "responses") as reporters:
+        ended = [group[0] for group in _follow(service, groups, reporters)]
+    for job in ended:
+        reports.design(service.results(job.id).result)
+        say("")
+    return ended
+
+
+def _sweeps(service: EmbeddedService, cases: Sequence[Case]) -> list[list[JobAnswer]]:
+    """Have the other responses of the pictures computed; one that is stored is not computed again."""
+    groups = [
+        [service.submit("sweep", {"scene": case.scene, "set": {case.variable: load}}) for load in case.loads]
+        for case in cases
+    ]
+    with bars([f"responses {case.scene}" for case in cases], "points") as reporters:
+        return _follow(service, groups, reporters)
+
+
+def _follow(
+    service: EmbeddedService, groups: Sequence[Sequence[str]], reporters: Sequence[OnProgress | None]
+) -> list[list[JobAnswer]]:
+    """Wait for groups of jobs, each with its progress bar; ShortfallError if one was not successful."""
+    ended: dict[str, JobAnswer] = {}
+    while True:
+        for group, report in zip(groups, reporters, strict=True):
+            jobs = [ended.get(job) or service.job(job) for job in group]
+            ended |= {job.id: job for job in jobs if job.status.finished}
+            if report is not None:
+                shares = [1.0 if job.status.finished else job.progress for job in jobs]
+                report(sum(shares) / len(shares), sum(job.points for job in jobs))
+        if all(job in ended for group in groups for job in group):
+            break
+        time.sleep(_LOOK_SECONDS)
+    for job in ended.values():
+        if job.status is not JobState.SUCCESSFUL:
+            reason = (job.error or {}).get("detail", "for no known reason")
+            raise ShortfallError(f"the {job.kind} of {job.scene} is {job.status.value}: {reason}")
+    return [[ended[job] for job in group] for group in groups]
+
+
+def _read_back(service: EmbeddedService, case: Case, jobs: Sequence[JobAnswer]) -> dict[float, SweepDetail]:
+    """The stored sweeps of some jobs by their load [N], ascending."""
+    answers = [sweep for job in jobs for sweep in service.results(job.id).sweeps]
+    details = [service.sweep(sweep.id) for sweep in answers]
+    points = sum(sweep.points for sweep in details)
+    say(f"{case.scene}: {len(details)} stored sweeps read back, {points} points")
+    by_load = {sweep.contacts[case.contact].N0: sweep for sweep in details}
+    return {load: by_load[load] for load in sorted(load for load in by_load if load is not None)}
+
+
+def _draw(folder: Path, case: Case, optimum: float, stored: Mapping[float, SweepDetail]) -> tuple[Path, Path]:
+    """Write the two pictures of a case."""
+    dof = solver.load_scene(case.scene).observe.dof
+    family = Family(
+        variable=case.variable,
+        members=tuple((load, Response.of_stored(stored[load])) for load in sorted((*case.shown, optimum))),
+        optimum=optimum,
+        free=Response.of_stored(stored[REMOVED]),
+        stuck=Response.of_stored(stored[STUCK]),
+        dof=dof,
+    )
+    low, high = case.bounds
+    peaks = {load: sweep.peak.value for load, sweep in stored.items() if sweep.peak and low <= load <= high}
+    curve = peak_figure(
+        case.scene,
+        case.variable,
+        np.array(list(peaks)),
+        np.array(list(peaks.values())),
+        optimum=(optimum, peaks[optimum]),
+        dof=dof,
+    )
+    pictures = (folder / f"{case.scene}-responses.png", folder / f"{case.scene}-peak.png")
+    save(family_figure(family), pictures[0])
+    save(curve, pictures[1])
+    return pictures

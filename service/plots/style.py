@@ -1,0 +1,104 @@
+"""How every picture looks, and how it is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from service import units
+from service.files import whole
+
+# Okabe and Ito's colours, which the colour-blind can tell apart (jfly.uni-koeln.de/color).
+BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
+SKY = "#56B4E9"
+INK, GREY = "#222222", "#7A7A7A"
+
+DOTS_PER_INCH = 200
+_STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "mathtext.fontset": "dejavusans",
+    "text.color": INK,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "axes.titlepad": 8.0,
+    "axes.labelsize": 9.0,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": GREY,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#ECECEC",
+    "grid.linewidth": 0.6,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "xtick.minor.width": 0.5,
+    "ytick.minor.width": 0.5,
+    "lines.linewidth": 1.4,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "legend.handlelength": 1.6,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "stickslip",
+    "pdf.fonttype": 42,
+}
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw in the house style inside the block."""
+    with mpl.rc_context(_STYLE):
+        yield
+
+
+def figure(width: float, height: float, columns: int = 1) -> tuple[Figure, list[Axes]]:
+    """An empty figure of so many inches with axes side by side; call it inside `styled`."""
+    page = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(page)
+    axes = page.subplots(1, columns, squeeze=False)
+    return page, list(axes[0])
+
+
+def label(axes: Axes, x: str, y: str) -> None:
+    """Name both axes."""
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+
+
+def quantity(path: str, value: float, digits: int) -> str:
+    """A parameter value with its unit, rounded for a picture."""
+    return f"{units.number(value, digits)} {units.parameter_unit(path)}".rstrip()
+
+
+def plain_log(axis: Axis) -> None:
+    """Label a logarithmic axis with plain numbers, as many as fit."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=9))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def save(page: Figure, path: Path) -> None:
+    """Write a picture, whole or not at all; the suffix chooses the format."""
+    # No date in the file: the same picture gives the same bytes.
+    date = "CreationDate" if path.suffix.lower() == ".pdf" else "Date"
+    metadata = {} if path.suffix.lower() == ".png" else {date: None}
+    with styled(), whole(path) as temporary:
+        page.savefig(temporary, dpi=DOTS_PER_INCH, metadata=metadata)
