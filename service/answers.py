@@ -51,7 +51,7 @@ class JobAnswer(Answer):
     finished: datetime | None
     result_of: str | None = Field(description="The earlier job whose stored result answers this one.")
     error: dict[str, Any] | None = Field(description="Why it failed: type, detail, issues.")
-    request: dict[str, Any] = Field(description="What was asked.")
+    request: dict[str, Any] | None = Field(description="What was asked; null in lists.")
     links: dict[str, str]
 
     @classmethod

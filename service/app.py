@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager
 from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 
-from service import problems
+from service import openapi, problems
 from service.core import SOLVER_VERSION, Service
 from service.http import HostCheck
 from service.jobs import Registry
@@ -53,4 +53,5 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
     app.add_middleware(HostCheck, hosts=service.settings.hosts)
     for module in (jobs, sweeps, scenes, plan, health):
         app.include_router(module.router)
+    openapi.install(app, registry)
     return app

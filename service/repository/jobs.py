@@ -20,6 +20,7 @@ from service.repository.sweeps import insert_sweeps
 __all__ = ["Attempt", "JobRepository", "JobRow", "NewJob", "Recovered"]
 
 _COLUMNS = [getattr(Job, field.name) for field in fields(JobRow)]
+_LISTED = [getattr(Job, field.name) for field in fields(JobRow) if field.name != "request"]
 _FREE: dict[str, Any] = {"lease_owner": None, "lease_until": None}
 
 
@@ -96,7 +97,7 @@ class JobRepository:
         limit: int = 100,
     ) -> list[JobRow]:
         """Jobs, newest first, older than the job `before`."""
-        query = select(*_COLUMNS).order_by(Job.id.desc()).limit(limit)
+        query = select(*_LISTED).order_by(Job.id.desc()).limit(limit)
         for column, value in ((Job.state, state), (Job.kind, kind), (Job.scene_name, scene)):
             if value is not None:
                 query = query.where(column == value)

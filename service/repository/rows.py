@@ -11,7 +11,7 @@ from service.models import JobState
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobRow:
-    """A job as lists show it: without its spec and its result."""
+    """A job without its spec and its result; `request` is None in lists, it may hold a whole scene."""
 
     id: str
     kind: str
@@ -32,7 +32,7 @@ class JobRow:
     finished: datetime | None
     result_of: str | None
     error: dict[str, Any] | None
-    request: dict[str, Any]
+    request: dict[str, Any] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -147,7 +147,18 @@ _RUNS = {
     "threads": threads,
 }
 
+
+def confused(_request: IterationRequest, _source: object) -> Resolved:
+    raise RuntimeError("a mistake in the program")
+
+
 PRIVATE = Registry(
     JobKind(name=name, summary=name, request=IterationRequest, resolve=as_it_is, run=run)
     for name, run in _RUNS.items()
+).extended(
+    JobKind(name="confused", summary="", request=IterationRequest, resolve=confused, run=power_iteration)
 )
+
+
+def cannot_warm_up() -> None:
+    raise RuntimeError("the numerical packages are not there")

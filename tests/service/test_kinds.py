@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import httpx
@@ -231,3 +232,18 @@ def test_a_bad_design_is_refused(shipped: httpx.Client, change: dict[str, Any], 
     body = {"scene": "two-dof", "variables": {"damper.N0": [20, 1000]}, **change}
     problem = is_problem(shipped.post("/v1/designs", json=body), 422)
     assert [entry["pointer"] for entry in problem["errors"]] == pointers
+
+
+def test_the_description_is_whole(shipped: httpx.Client) -> None:
+    answer = shipped.get("/openapi.json")
+    description = answer.json()
+    for reference in re.findall(r'"\$ref":\s*"#/([^"]+)"', answer.text):
+        found = description
+        for key in reference.split("/"):
+            found = found[key]
+    body = description["paths"]["/v1/jobs"]["post"]["requestBody"]["content"]["application/json"]["schema"]
+    kinds = {one["properties"]["kind"]["const"]: one for one in body["oneOf"]}
+    assert set(kinds) == {"sweep", "design", "solve", "march"}
+    assert {"from", "to", "set", "harmonics", "frequency_hz"} <= set(kinds["sweep"]["properties"])
+    assert "requestBody" in description["paths"]["/v1/designs"]["post"]
+    assert shipped.get("/openapi.json").json() == description

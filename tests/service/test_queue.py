@@ -9,11 +9,15 @@ from pathlib import Path
 
 import pytest
 from conftest import MakeSettings, pids, until
-from private_kinds import PRIVATE
+from private_kinds import PRIVATE, cannot_warm_up
+from sqlalchemy import update
 
+from service.core import Service
 from service.embedded import EmbeddedService
-from service.errors import ConflictError, JobFailedError
-from service.models import JobState
+from service.errors import ConflictError, JobFailedError, QueueFullError
+from service.health import check
+from service.jobs import Registry
+from service.models import Job, JobState
 
 
 def gone(pid: int) -> bool:
@@ -181,7 +185,7 @@ def test_stopping_gives_running_jobs_back_without_an_attempt(
     make_settings: MakeSettings, tmp_path: Path
 ) -> None:
     file = tmp_path / "pids"
-    spec = {"seconds": 1.0, "pid_file": str(file)}
+    spec = {"seconds": 0.5, "pid_file": str(file)}
     with EmbeddedService(make_settings(), PRIVATE) as service:
         jobs = [service.submit(kind, spec) for kind in ("deaf", "iteration")]
         until(lambda: pids(file))
@@ -216,3 +220,49 @@ def test_a_spec_computed_before_is_answered_at_once(embedded: EmbeddedService, t
     fresh = embedded.submit("iteration", {**spec, "fresh": True})
     assert embedded.wait(fresh).result_of is None
     assert len(pids(file)) == 2
+
+
+def test_a_lease_is_renewed_while_a_silent_job_runs(make_settings: MakeSettings) -> None:
+    settings = make_settings(lease_seconds=1.0, progress_seconds=60.0)
+    with EmbeddedService(settings, PRIVATE) as service:
+        done = service.wait(service.submit("deaf", {"seconds": 1.6}), timeout=30.0)
+    assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 1)
+
+
+def test_an_attempt_whose_job_was_taken_is_stopped_and_writes_nothing(make_settings: MakeSettings) -> None:
+    service = Service(make_settings(), PRIVATE)
+    service.start()
+    try:
+        job, _ = service.submit({"kind": "iteration", "seconds": 60.0, "sweeps": 1})
+        until(lambda: service.job(job.id).state is JobState.RUNNING)
+        with service.database.writing() as connection:
+            connection.execute(update(Job).values(lease_owner="another", attempt=7, progress=0.25))
+        until(lambda: service.queue.status().busy == 0)
+        row = service.job(job.id)
+        assert (row.state, row.attempt, row.progress) == (JobState.RUNNING, 7, 0.25)
+        assert service.jobs.result(job.id) is None
+    finally:
+        service.stop()
+
+
+def test_a_full_queue_takes_no_more(make_settings: MakeSettings) -> None:
+    with EmbeddedService(make_settings(queue_limit=2), PRIVATE) as service:
+        blocker = service.submit("iteration", {"seconds": 30.0})
+        until(lambda: service.job(blocker).status is JobState.RUNNING)
+        known = service.submit("iteration", {"seed": 1}, idempotency_key="known")
+        service.submit("iteration", {"seed": 2})
+        with pytest.raises(QueueFullError, match="2 jobs wait already"):
+            service.submit("iteration", {"seed": 3})
+        assert service.submit("iteration", {"seed": 1}, idempotency_key="known") == known
+
+
+def test_workers_that_do_not_come_up_are_told(make_settings: MakeSettings) -> None:
+    service = Service(make_settings(), Registry(PRIVATE, warm_up=cannot_warm_up))
+    service.start()
+    try:
+        until(lambda: service.queue.status().trouble)
+        health = check(service)
+        assert not health.ready
+        assert "ended with status 1 before it was ready" in health.trouble[0]
+    finally:
+        service.stop()

@@ -80,7 +80,7 @@ def test_a_service_killed_loses_nothing_and_leaves_no_worker(
     until(lambda: answers(client))
     specs = [{"kind": "iteration", "seconds": 1.0, "seed": n, "pid_file": str(file)} for n in range(4)]
     jobs = [client.submit(spec).id for spec in specs]
-    until(lambda: len(pids(file)) == 2)
+    until(lambda: pids(file))
     process.kill()
     process.wait()
     until(lambda: not any(alive(pid) for pid in pids(file)), seconds=2.0)
@@ -89,10 +89,11 @@ def test_a_service_killed_loses_nothing_and_leaves_no_worker(
     until(lambda: answers(client))
     done = [client.wait(job, timeout=30.0) for job in jobs]
     assert [job.status for job in done] == [JobState.SUCCESSFUL] * 4
-    assert sorted(job.attempt for job in done) == [1, 1, 2, 2]
+    assert max(job.attempt for job in done) == 2
+    assert sum(job.attempt for job in done) == len(pids(file)), "each attempt is counted, none is made twice"
 
     running = client.submit({"kind": "deaf", "seconds": 60.0, "pid_file": str(file)}).id
-    until(lambda: len(pids(file)) == 7)
+    until(lambda: len(pids(file)) > sum(job.attempt for job in done))
     asked = time.monotonic()
     process.terminate()
     assert process.wait(10.0) == 0

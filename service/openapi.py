@@ -1,0 +1,87 @@
+"""The description of the API: what FastAPI gathers, and the bodies that the routes check themselves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import FastAPI
+from pydantic import BaseModel
+
+from service.jobs import Registry
+from service.routes.plan import PlanRequest
+from solver.scene import Scene
+
+_REFERENCE = "#/components/schemas/{model}"
+_PROBLEM: dict[str, Any] = {
+    "type": "object",
+    "description": "RFC 9457",
+    "required": ["type", "title", "status", "detail", "instance", "errors"],
+    "properties": {
+        "type": {"type": "string"},
+        "title": {"type": "string"},
+        "status": {"type": "integer"},
+        "detail": {"type": "string"},
+        "instance": {"type": "string"},
+        "errors": {
+            "type": "array",
+            "items": {
+                "type": "object",
+                "required": ["pointer", "detail"],
+                "properties": {
+                    "pointer": {"type": "string", "description": "RFC 6901 pointer of the bad field."},
+                    "detail": {"type": "string"},
+                    "in": {"type": "string", "description": "query or header; the body if left out."},
+                },
+            },
+        },
+    },
+}
+
+
+def install(app: FastAPI, registry: Registry) -> None:
+    """Have ``/openapi.json`` describe the request bodies and the problem documents."""
+    gather = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            _complete(gather(), registry)
+        described: dict[str, Any] = app.openapi_schema or gather()
+        return described
+
+    app.openapi = openapi  # type: ignore[method-assign]
+
+
+def _complete(description: dict[str, Any], registry: Registry) -> None:
+    schemas = description.setdefault("components", {}).setdefault("schemas", {})
+    schemas["Problem"] = _PROBLEM
+    kinds = {kind.name: _with_kind(_schema(kind.request, schemas), kind.name) for kind in registry}
+    bodies: dict[str, dict[str, Any]] = {
+        "/v1/jobs": {"oneOf": list(kinds.values())},
+        "/v1/plan": _schema(PlanRequest, schemas),
+        "/v1/scenes": _schema(Scene, schemas),
+    }
+    if "design" in kinds:
+        bodies["/v1/designs"] = _schema(registry["design"].request, schemas)
+    for path, schema in bodies.items():
+        content = {"application/json": {"schema": schema}}
+        description["paths"][path]["post"]["requestBody"] = {"required": True, "content": content}
+    problem = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
+    for operations in description["paths"].values():
+        for operation in operations.values():
+            operation["responses"].pop("422", None)
+            operation["responses"]["default"] = {"description": "A problem.", "content": problem}
+
+
+def _schema(model: type[BaseModel], schemas: dict[str, Any]) -> dict[str, Any]:
+    """The schema of a model; the models it refers to go to `schemas`."""
+    schema = model.model_json_schema(by_alias=True, ref_template=_REFERENCE)
+    schemas.update(schema.pop("$defs", {}))
+    return schema
+
+
+def _with_kind(schema: dict[str, Any], name: str) -> dict[str, Any]:
+    return {
+        **schema,
+        "properties": {"kind": {"const": name}, **schema["properties"]},
+        "required": ["kind", *schema.get("required", [])],
+    }
