@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from solver.branch import Band, Branch, BranchStatus, Peak
     from solver.continuation import ContinuationSettings, Predictor, sweep
     from solver.effects import Plan, plan
+    from solver.energy import PowerBalance, power_balance
     from solver.errors import Issue, SceneError, SettingError, SolverError
+    from solver.histories import hysteresis_loop, motion, time_history
     from solver.marching import march
     from solver.response import Solution, SolutionStatus, solve
     from solver.scene import Scene, load_scene, shipped_scenes
@@ -24,7 +26,8 @@ _HOME = {
     "Issue": "errors", "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
     "Plan": "effects", "plan": "effects", "Scene": "scene", "load_scene": "scene", "shipped_scenes": "scene",
     "Solution": "response", "SolutionStatus": "response", "solve": "response",
-    "annulus": "sectors", "march": "marching",
+    "annulus": "sectors", "march": "marching", "PowerBalance": "energy", "power_balance": "energy",
+    "hysteresis_loop": "histories", "motion": "histories", "time_history": "histories",
 }  # fmt: skip
 
 __all__ = [
@@ -35,6 +38,7 @@ __all__ = [
     "Issue",
     "Peak",
     "Plan",
+    "PowerBalance",
     "Predictor",
     "Scene",
     "SceneError",
@@ -43,12 +47,16 @@ __all__ = [
     "SolutionStatus",
     "SolverError",
     "annulus",
+    "hysteresis_loop",
     "load_scene",
     "march",
+    "motion",
     "plan",
+    "power_balance",
     "shipped_scenes",
     "solve",
     "sweep",
+    "time_history",
 ]
 
 

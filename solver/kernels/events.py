@@ -61,7 +61,7 @@ def largest(c: Real, s: Real, degree: int, value: Real, slope: Real) -> tuple[fl
     best, place = -np.inf, 0.0
     for j in range(n):
         after = j + 1 if j + 1 < n else 0
-        if slope[j] >= 0.0 and slope[after] <= 0.0:
+        if slope[j] > 0.0 and slope[after] <= 0.0:
             above = min(value[j] + delta * slope[j], value[after] - delta * slope[after])
             if max(above, max(value[j], value[after])) < near:
                 continue
@@ -144,6 +144,7 @@ def leave_stick(
         slope_lo[x] = dq
         if g_lo[x] > -tol and dq > tol * degree * degree:
             return start, x
+    at = j % n
     while lo < end:
         hi = j * delta
         last = hi >= end
@@ -151,20 +152,23 @@ def leave_stick(
             hi = end
         first, which = np.inf, -1
         for x in range(2):
+            shift = offset if x == 0 else -offset
             if last:
                 q, dq, _, _ = at_point(c[x], s[x], degree, end)
             else:
-                q, dq = value[x, j % n], slope[x, j % n]
-            shift = (1 - 2 * x) * offset
+                q, dq = value[x, at], slope[x, at]
             g_hi = q + shift
-            tau = _crosses(c[x], s[x], degree, shift, tol, lo, hi, g_lo[x], slope_lo[x], g_hi, dq)
-            if tau < first:
-                first, which = tau, x
+            # Nearly every interval ends below the limit without a maximum inside: nothing to look for there.
+            if g_hi > tol or (slope_lo[x] > 0.0 and dq < 0.0):
+                tau = _crosses(c[x], s[x], degree, shift, tol, lo, hi, g_lo[x], slope_lo[x], g_hi, dq)
+                if tau < first:
+                    first, which = tau, x
             g_lo[x], slope_lo[x] = g_hi, dq
         if which >= 0:
             return first, which
         lo = hi
         j += 1
+        at = at + 1 if at + 1 < n else 0
     return end, -1
 
 
@@ -178,6 +182,7 @@ def leave_slip(c: Real, s: Real, degree: int, slope: Real, start: float, end: fl
     n = slope.size
     delta = 2.0 * math.pi / n
     j = math.floor(start / delta) + 1
+    at = j % n
     lo = start
     _, rate, curve, _ = at_point(c, s, degree, start)
     if rate < -tol * degree * degree or (rate < tol * degree * degree and curve < 0.0):
@@ -189,13 +194,13 @@ def leave_slip(c: Real, s: Real, degree: int, slope: Real, start: float, end: fl
             hi = end
             rate_hi = at_point(c, s, degree, end)[1]
         else:
-            rate_hi = slope[j % n]
+            rate_hi = slope[at]
         if rate_hi < -tol * degree * degree:
             fall = rate - rate_hi
             guess = lo + (hi - lo) * (rate / fall if fall > 0.0 else 0.5)
             return bracketed_root(c, s, degree, 1, 0.0, lo, hi, guess, FALLING)
         if not last and j * delta - start > delta:
-            before, after = slope[(j - 1) % n], slope[(j + 1) % n]
+            before, after = slope[at - 1], slope[at + 1 if at + 1 < n else 0]
             if rate_hi <= before and rate_hi <= after:
                 bend = before + after - 2.0 * rate_hi
                 drop = (before - after) ** 2 / (8.0 * bend) if bend > 0.0 else 0.0
@@ -206,6 +211,7 @@ def leave_slip(c: Real, s: Real, degree: int, slope: Real, start: float, end: fl
         rate = rate_hi
         lo = hi
         j += 1
+        at = at + 1 if at + 1 < n else 0
     return end
 
 

@@ -64,16 +64,17 @@ def add_moments(begin: float, end: float, weight: float, cosines: Real, sines: R
 @compiled
 def _basis_at(tau: float, ks: Integer, out: Real) -> None:
     """Fill `out` with the basis for the harmonics `ks` at `tau`."""
-    here = 0
+    cos1, sin1 = math.cos(tau), math.sin(tau)
+    cosine, sine, k, here = 1.0, 0.0, 0, 0
     for i in range(ks.size):
-        k = ks[i]
-        if k == 0:
-            out[here] = 1.0
+        while k < ks[i]:
+            cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
+            k += 1
+        out[here] = cosine
+        if k > 0:
+            out[here + 1] = sine
             here += 1
-        else:
-            out[here] = math.cos(k * tau)
-            out[here + 1] = math.sin(k * tau)
-            here += 2
+        here += 1
 
 
 @compiled
@@ -206,7 +207,7 @@ def _add_onsets(
     out_of_line()
     n, m = U.size, N.size
     cosines, sines = np.empty(ks[-1] + 1), np.empty(ks[-1] + 1)
-    moment, e_u, e_n, de_u, de_n = np.empty(n), np.empty(n), np.empty(m), np.empty(n), np.empty(m)
+    moment, e_u, e_n = np.empty(n), np.empty(n), np.empty(m)
     for index in range(count):
         row = segments[index]
         if row[MOTION] == SLIP or row[BEGAN] == UNLOADED:
@@ -222,9 +223,7 @@ def _add_onsets(
         slipped = row[BEGAN] == AFTER_SLIP
         rate = 0.0
         if not slipped:
-            _basis_slope(tau, ks, de_u)
-            _basis_slope(tau, load_ks, de_n)
-            rate = kt * _dot(de_u, U) / _dot(de_n, N)
+            rate = kt * _slope_at(e_u, ks, U) / _slope_at(e_n, load_ks, N)
         for i in range(n):
             here = moment[i]
             dF_dkt[i] -= u_onset * here
@@ -241,15 +240,13 @@ def _add_onsets(
 
 
 @compiled
-def _basis_slope(tau: float, ks: Integer, out: Real) -> None:
-    """Fill `out` with the τ-derivative of the basis for the harmonics `ks` at `tau`."""
-    here = 0
+def _slope_at(e: Real, ks: Integer, q: Real) -> float:
+    """Return dq/dτ of coefficients `q` where the basis is `e`."""
+    total, here = 0.0, 0
     for i in range(ks.size):
         k = ks[i]
-        if k == 0:
-            out[here] = 0.0
+        if k > 0:
+            total += k * (q[here + 1] * e[here] - q[here] * e[here + 1])
             here += 1
-        else:
-            out[here] = -k * math.sin(k * tau)
-            out[here + 1] = k * math.cos(k * tau)
-            here += 2
+        here += 1
+    return total

@@ -96,6 +96,25 @@ def _contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, 
 
 
 @compiled
+def _one_wave(mean: float, cosine: float, sine: float, out: Real) -> int:
+    """Fill `out` with the interval where mean + cosine cos τ + sine sin τ > 0; as `_contact_intervals`.
+
+    With ψ its phase and R its amplitude it is |τ − ψ| < h, tan²(h/2) = (R + mean)/(R − mean).
+    """
+    amplitude = math.hypot(cosine, sine)
+    if mean >= amplitude:
+        return -1 if mean > 0.0 else 0
+    if mean <= -amplitude:
+        return 0
+    half = 2.0 * math.atan2(math.sqrt(amplitude + mean), math.sqrt(amplitude - mean))
+    begin = math.atan2(sine, cosine) - half
+    if begin < 0.0:
+        begin += 2.0 * math.pi
+    out[0, 0], out[0, 1] = begin, begin + 2.0 * half
+    return 1
+
+
+@compiled
 def _smallest(c: Real, s: Real, degree: int, value: Real, slope: Real) -> tuple[float, float]:
     """Return the minimum of a polynomial over the period and its place, from its values on the grid."""
     n = value.size
@@ -164,10 +183,12 @@ def find_segments(
         c[0, k], c[1, k] = kt * uc[k] - mu * nc[k], -kt * uc[k] - mu * nc[k]
         s[0, k], s[1, k] = kt * us[k] - mu * ns[k], -kt * us[k] - mu * ns[k]
     intervals = np.empty((load_ks[-1] + 1, 2))
-    n_intervals = -1
-    if load_ks[-1] > 0 or nc[0] <= 0.0:
+    n_intervals = 0 if load_max <= 0.0 else -1
+    if load_ks[-1] == 1:
+        n_intervals = _one_wave(nc[0], nc[1], ns[1], intervals)
+    elif load_ks[-1] > 1:
         n_intervals = _contact_intervals(nc, ns, load_ks[-1], load, dload, intervals)
-    if n_intervals == 0 or (n_intervals < 0 and load_max <= 0.0):
+    if n_intervals == 0 or load_max <= 0.0:
         return SEPARATED, 0
     if n_intervals < 0:
         return _march_circle(c, s, degree, value, slope, tol, segments)

@@ -106,6 +106,7 @@ def bracketed_root(
     x = guess
     if not (lo < x < hi):
         x = 0.5 * (lo + hi)
+    moved = 4.0 * (hi - lo)
     for _ in range(80):
         f, slope = order_at(c, s, degree, x, order, shift)
         if f == 0.0:
@@ -117,9 +118,11 @@ def bracketed_root(
         step_to = x - f / slope if slope != 0.0 else lo - 1.0
         if not (lo <= step_to <= hi):
             step_to = 0.5 * (lo + hi)
-        moved = abs(step_to - x)
+        before, moved = moved, abs(step_to - x)
         x = step_to
-        if moved <= 4e-16 * (1.0 + abs(x)) or hi - lo <= 4e-16 * (1.0 + abs(x)):
+        # A quadratically converging step leaves an error of about moved³/before².
+        small = 1e-16 * (1.0 + abs(x))
+        if moved <= 4.0 * small or moved * moved * moved <= small * before * before or hi - lo <= 4.0 * small:
             break
     return x
 

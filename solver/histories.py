@@ -1,0 +1,156 @@
+"""What moves behind a solution: every degree of freedom, time histories, the loop of force over slip.
+
+A solution keeps the contacts and the observed DOF; the rest of the structure follows from the contact forces,
+Z_k x̂_k = f̂_k − Lᴴ F̂_k for each harmonic k.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver import fourier
+from solver.errors import SettingError
+from solver.fourier import Complex, Integer, Real
+from solver.kernels.events import (
+    AFTER_SLIP,
+    BEGAN,
+    BEGIN,
+    DIRECTION,
+    END,
+    MOTION,
+    ONSET,
+    SEGMENT_COLUMNS,
+    SLIP,
+    UNLOADED,
+    segment_capacity,
+)
+from solver.kernels.segments import find_segments
+from solver.kernels.trigpoly import grid_size, grid_tables
+from solver.parametric import LinearModel, linear_model
+from solver.response import ContactResponse, Solution
+from solver.scene_checks import listing
+from solver.structure import force_amplitudes
+
+LARGEST_SAMPLES = 10_000_000
+
+
+def motion(solution: Solution) -> Real:
+    """Return the coefficients of every DOF [m], (n_dofs, 2H + 1), of one sector if the structure is cyclic.
+
+    Raises
+    ------
+    SettingError
+        The solution did not converge.
+    """
+    amplitudes = [response(solution, k) for k in range(solution.n_harmonics + 1)]
+    return fourier.to_real(np.array(amplitudes).T)
+
+
+def time_history(solution: Solution, dof: str, *, samples: int = 512) -> tuple[Real, Real]:
+    """Return instants [s] and motion [m] of a DOF over one period, (samples,) each, evenly spaced from 0.
+
+    Raises
+    ------
+    SettingError
+        The solution did not converge, an unknown DOF, or a bad number of samples.
+    """
+    dofs = solution.scene.structure.dofs
+    if dof not in dofs:
+        raise SettingError("dof", dof, f"must be one of {listing(dofs)}")
+    tau = _angles(samples)
+    x = fourier.basis(tau, solution.n_harmonics) @ motion(solution)[dofs.index(dof)]
+    return tau / (2.0 * math.pi * solution.frequency_hz), x
+
+
+def hysteresis_loop(solution: Solution, contact: str, *, samples: int = 512) -> tuple[Real, Real]:
+    """Return slip [m] and friction force [N] of a contact over one period, (samples,) each.
+
+    The force is the one the law gives for the slip motion of the solution, with its corners, not the sum of
+    the harmonics kept.
+
+    Raises
+    ------
+    SettingError
+        The solution did not converge, an unknown contact, or a bad number of samples.
+    """
+    tau = _angles(samples)
+    _check_converged(solution)
+    names = [each.name for each in solution.contacts]
+    if contact not in names:
+        raise SettingError("contact", contact, f"must be one of {listing(names)}")
+    at = names.index(contact)
+    given, found = solution.scene.contacts[at], solution.contacts[at]
+    return fourier.basis(tau, solution.n_harmonics) @ found.slip, _force_at(found, given.kt, given.mu, tau)
+
+
+def response(solution: Solution, k: int) -> Complex:
+    """Return the complex amplitudes x̂_k [m] of all DOFs, (n_dofs,), behind a converged solution.
+
+    The mean is found with contact stiffnesses on both sides, (K + Lᵀ kt L) x̂_0 = f̂_0 − Lᵀ (F̂_0 − kt û_0),
+    because a part may be held in place by its contacts alone.
+    """
+    _check_converged(solution)
+    model = linear_model(solution.scene)
+    K, C, L = matrices(model, k)
+    force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]
+    friction = np.array([fourier.to_complex(c.force)[k] for c in solution.contacts], dtype=np.complex128)
+    if k == 0 and solution.contacts:
+        kt = np.array([contact.kt for contact in solution.scene.contacts])
+        friction = friction - kt * np.array([c.slip[0] for c in solution.contacts])
+        K = K + L.conj().T @ (kt[:, None] * L)
+    speed = 2.0 * math.pi * solution.frequency_hz * k
+    dynamic = K - speed**2 * model.M + 1j * speed * C
+    return np.asarray(np.linalg.solve(dynamic, force - L.conj().T @ friction), dtype=np.complex128)
+
+
+def matrices(model: LinearModel, k: int) -> tuple[Complex, Complex, Complex]:
+    """Return K [N/m], C [N s/m] and the contact rows L as harmonic k sees them (its interblade phase)."""
+    turn = np.exp(1j * k * model.interblade_phase)
+    return (
+        model.K0 + model.Kp * turn + model.Kp.T / turn,
+        model.C0 + model.Cp * turn + model.Cp.T / turn,
+        model.contact_here + model.contact_next * turn,
+    )
+
+
+def _check_converged(solution: Solution) -> None:
+    if not solution.converged:
+        raise SettingError("solution", solution.status.value, "must have converged")
+
+
+def _angles(samples: int) -> Real:
+    good = isinstance(samples, (int, np.integer)) and not isinstance(samples, bool)
+    if not good or not 2 <= samples <= LARGEST_SAMPLES:
+        raise SettingError("samples", samples, f"must be a whole number from 2 to {LARGEST_SAMPLES}")
+    return np.asarray(2.0 * math.pi / samples * np.arange(samples))
+
+
+def _force_at(contact: ContactResponse, kt: float, mu: float, tau: Real) -> Real:
+    """Return the friction force [N] at the angles `tau` in [0, 2π), segment by segment."""
+    ks: Integer = fourier.all_harmonics((contact.slip.size - 1) // 2)
+    top = max(int(ks[-1]), 1)
+    segments = np.zeros((segment_capacity(top), SEGMENT_COLUMNS))
+    load_ks, tables = fourier.all_harmonics(1), grid_tables(grid_size(top), top)
+    _, count = find_segments(contact.slip, ks, contact.load, load_ks, kt, mu, *tables, segments)
+
+    def slip(angle: Real) -> Real:
+        return np.asarray(fourier.basis(angle, ks.size - 1) @ contact.slip)
+
+    def load(angle: Real) -> Real:
+        return np.asarray(fourier.basis(angle, 1) @ contact.load)
+
+    force = np.zeros(tau.size)
+    for row in segments[:count]:
+        # A segment may reach beyond the period it began in.
+        inside = (tau - row[BEGIN]) % (2.0 * math.pi) <= row[END] - row[BEGIN]
+        here, onset = tau[inside], np.array([row[ONSET]])
+        if row[MOTION] == SLIP:
+            force[inside] = row[DIRECTION] * mu * load(here)
+        elif row[BEGAN] == UNLOADED:
+            force[inside] = kt * slip(here)
+        else:
+            kept = row[DIRECTION] * mu * load(onset) if row[BEGAN] == AFTER_SLIP else 0.0
+            force[inside] = kt * (slip(here) - slip(onset)) + kept
+    return force
