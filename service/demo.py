@@ -63,9 +63,15 @@ class Case:
 
     @property
     def loads(self) -> tuple[float, ...]:
-        """Every load a sweep is wanted for [N]."""
+        """The loads responses are wanted for [N]."""
         grid = np.geomspace(*self.bounds, self.steps)
-        return (REMOVED, STUCK, *self.shown, *(float(f"{load:.4g}") for load in grid))
+        return (*self.shown, *(float(f"{load:.4g}") for load in grid))
+
+    @property
+    def limits(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Values that make the scene linear: the contact removed, and stuck; every other contact stuck."""
+        stuck = {f"{contact.name}.N0": STUCK for contact in solver.load_scene(self.scene).contacts}
+        return {**stuck, self.variable: REMOVED}, stuck
 
 
 CASES = (
@@ -99,8 +105,7 @@ def run(folder: Path, cases: Sequence[Case] = CASES) -> list[Path]:
         pictures: list[Path] = []
         for case, design, jobs in zip(cases, designs, sweeps, strict=True):
             optimum = service.results(design.id).result["optimum"][case.variable]
-            stored = _read_back(service, case, [design, *jobs])
-            pictures += _draw(folder, case, optimum, stored)
+            pictures += _draw(folder, case, optimum, _read_back(service, [design, *jobs]))
     say("\n".join(["Pictures:", *(f"  {picture}" for picture in pictures)]))
     return pictures
 
@@ -120,7 +125,10 @@ def _designs(service: EmbeddedService, cases: Sequence[Case]) -> list[JobAnswer]
 def _sweeps(service: EmbeddedService, cases: Sequence[Case]) -> list[list[JobAnswer]]:
     """Have the other responses of the pictures computed; one that is stored is not computed again."""
     groups = [
-        [service.submit("sweep", {"scene": case.scene, "set": {case.variable: load}}) for load in case.loads]
+        [
+            service.submit("sweep", {"scene": case.scene, "set": values})
+            for values in (*case.limits, *({case.variable: load} for load in case.loads))
+        ]
         for case in cases
     ]
     with bars([f"responses {case.scene}" for case in cases], "points") as reporters:
@@ -149,38 +157,45 @@ def _follow(
     return [[ended[job] for job in group] for group in groups]
 
 
-def _read_back(service: EmbeddedService, case: Case, jobs: Sequence[JobAnswer]) -> dict[float, SweepDetail]:
-    """The stored sweeps of some jobs by their load [N], ascending."""
-    answers = [sweep for job in jobs for sweep in service.results(job.id).sweeps]
-    details = [service.sweep(sweep.id) for sweep in answers]
-    points = sum(sweep.points for sweep in details)
-    say(f"{case.scene}: {len(details)} stored sweeps read back, {points} points")
-    by_load = {sweep.contacts[case.contact].N0: sweep for sweep in details}
-    return {load: by_load[load] for load in sorted(load for load in by_load if load is not None)}
+def _read_back(service: EmbeddedService, jobs: Sequence[JobAnswer]) -> list[SweepDetail]:
+    """The stored sweeps of some jobs, in their order."""
+    stored = [service.sweep(sweep.id) for job in jobs for sweep in service.results(job.id).sweeps]
+    points = sum(sweep.points for sweep in stored)
+    say(f"{stored[0].scene}: {len(stored)} stored sweeps read back, {points} points")
+    return stored
 
 
-def _draw(folder: Path, case: Case, optimum: float, stored: Mapping[float, SweepDetail]) -> tuple[Path, Path]:
-    """Write the two pictures of a case."""
-    dof = solver.load_scene(case.scene).observe.dof
-    family = Family(
-        variable=case.variable,
-        members=tuple((load, Response.of_stored(stored[load])) for load in sorted((*case.shown, optimum))),
-        optimum=optimum,
-        free=Response.of_stored(stored[REMOVED]),
-        stuck=Response.of_stored(stored[STUCK]),
-        dof=dof,
-    )
-    low, high = case.bounds
-    peaks = {load: sweep.peak.value for load, sweep in stored.items() if sweep.peak and low <= load <= high}
+def _draw(folder: Path, case: Case, optimum: float, stored: Sequence[SweepDetail]) -> tuple[Path, Path]:
+    """Write the two pictures of a case: a family of responses, and the peak against the load."""
+    family, peaks = _select(case, optimum, stored)
     curve = peak_figure(
         case.scene,
         case.variable,
         np.array(list(peaks)),
         np.array(list(peaks.values())),
         optimum=(optimum, peaks[optimum]),
-        dof=dof,
+        dof=family.dof,
     )
     pictures = (folder / f"{case.scene}-responses.png", folder / f"{case.scene}-peak.png")
     save(family_figure(family), pictures[0])
     save(curve, pictures[1])
     return pictures
+
+
+def _select(
+    case: Case, optimum: float, stored: Sequence[SweepDetail]
+) -> tuple[Family, Mapping[float, float]]:
+    """The responses to draw together; the highest peak [m] at every load [N] within the bounds, ascending."""
+    loads = [sweep.contacts[case.contact].N0 for sweep in stored]
+    by_load = {load: sweep for load, sweep in zip(loads, stored, strict=True) if load is not None}
+    low, high = case.bounds
+    family = Family(
+        variable=case.variable,
+        members=tuple((load, Response.of_stored(by_load[load])) for load in sorted({*case.shown, optimum})),
+        optimum=optimum,
+        free=Response.of_stored(by_load[REMOVED]),
+        stuck=Response.of_stored(by_load[STUCK]),
+        dof=solver.load_scene(case.scene).observe.dof,
+    )
+    inside = {load: by_load[load].peak for load in sorted(by_load) if low <= load <= high}
+    return family, {load: peak.value for load, peak in inside.items() if peak is not None}

@@ -18,6 +18,7 @@ _OPTIONS = {
     "frequency_hz": "--frequency",
     "start": "--from",
     "stop": "--to",
+    "to": "--to",
     "harmonics": "--harmonics",
     "limit": "--limit",
     "max_band_hz": "--max-band",
@@ -26,8 +27,19 @@ _OPTIONS = {
     "max_periods": "--max-periods",
 }
 # What is not the user's input: the state of a file or of a service.
-_STATE = (errors.DatabaseError, errors.ConflictError, errors.QueueFullError, errors.JobFailedError)
+_STATE = (
+    errors.DatabaseInUseError,
+    errors.WrongRevisionError,
+    errors.ConflictError,
+    errors.QueueFullError,
+    errors.JobFailedError,
+)
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+
+
+def option_name(name: str) -> str:
+    """The option that sets an argument of the Python interface."""
+    return _OPTIONS.get(name, name)
 
 
 class InputError(Exception):
@@ -73,8 +85,7 @@ def _issue(issue: Issue) -> str:
 
 
 def _as_option(message: str, name: str) -> str:
-    option = _OPTIONS.get(name)
-    return message if option is None else message.replace(f"`{name}`", f"`{option}`", 1)
+    return message.replace(f"`{name}`", f"`{option_name(name)}`", 1)
 
 
 def _problem(error: errors.ServiceProblem) -> list[str]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
 from service.cli.failures import InputError
+from solver.errors import SettingError
 
 if TYPE_CHECKING:
     from solver.scene import Scene
@@ -84,7 +86,19 @@ def scene(name: str, texts: Sequence[str] | None) -> Scene:
     """A shipped scene or a file, with the values of ``--set``."""
     import solver
 
-    return solver.load_scene(name).with_values(settings(texts))
+    with path_of("--set"):
+        return solver.load_scene(name).with_values(settings(texts))
+
+
+@contextmanager
+def path_of(option: str) -> Iterator[None]:
+    """Name `option` in the refusal of an unknown parameter path."""
+    try:
+        yield
+    except SettingError as error:
+        if error.name == "path":
+            raise InputError(str(error).replace("`path`", f"`{option}`", 1)) from error
+        raise
 
 
 def output_path(option: str, text: str | None, suffixes: Sequence[str] = ()) -> Path | None:

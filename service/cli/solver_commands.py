@@ -89,7 +89,7 @@ def sweep(
 
     picture = inputs.output_path("--plot", plot, SUFFIXES)
     scene = inputs.scene(name, values)
-    with bar("sweep") as on_progress:
+    with inputs.path_of("--parameter"), bar("sweep") as on_progress:
         branch = solver.sweep(
             scene, parameter, start, stop, harmonics=harmonics, frequency_hz=frequency, limit=limit,
             on_progress=on_progress,
@@ -124,7 +124,7 @@ def design(
     picture = inputs.output_path("--plot", plot, SUFFIXES)
     bounds = inputs.bounds(variables)
     scene = inputs.scene(name, values)
-    with bar("design", "responses") as on_progress:
+    with inputs.path_of("--variable"), bar("design", "responses") as on_progress:
         import optim
 
         result = optim.design(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli import inputs, options, reports
-from service.cli.failures import BAD_INPUT, FELL_SHORT, InputError
+from service.cli.failures import BAD_INPUT, FELL_SHORT, InputError, option_name
 from service.cli.output import print_json, print_table, say
 from service.cli.progress import bar
 
@@ -137,6 +138,9 @@ def _body(kind: str, name: str, values: list[str] | None, **fields: Any) -> dict
 
         scene = solver.load_scene(name).to_dict()
     given = {key: value for key, value in fields.items() if value is not None}
+    for key, value in given.items():
+        if isinstance(value, float) and not math.isfinite(value):
+            raise InputError(f"`{option_name(key)}` must be a finite number, got {value!r}")
     return {"kind": kind, "scene": scene, "set": inputs.settings(values), **given}
 
 
@@ -160,9 +164,16 @@ def _announce(job: JobAnswer, *, as_json: bool) -> None:
 
 
 def _client(url: str) -> Client:
+    import httpx
+
     from service.client import Client
 
-    return Client(url)
+    try:
+        return Client(url)
+    except httpx.InvalidURL as error:
+        raise InputError(
+            f"`--url` must be a web address such as {options.DEFAULT_URL}, got {url!r}"
+        ) from error
 
 
 def _follow(client: Client, job: str) -> JobAnswer:

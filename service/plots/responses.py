@@ -75,14 +75,14 @@ def family_figure(family: Family) -> Figure:
     first = family.members[0][1]
     with style.styled():
         page, (axes,) = style.figure(6.6, 4.0)
-        _draw(axes, family.free, unit, "contact removed", color=style.GREY, dashes=_DOTTED)
+        _draw(axes, family.free, unit, "removed (linear)", color=style.GREY, dashes=_DOTTED)
         shades = _shades(len(family.members))
         for (value, curve), shade in zip(family.members, shades, strict=True):
             if value == family.optimum:
                 _draw(axes, curve, unit, f"{value:.4g} (optimum)", color=style.VERMILION, width=2.2, order=3)
             else:
                 _draw(axes, curve, unit, f"{value:.4g}", color=shade)
-        _draw(axes, family.stuck, unit, "contact stuck", color=style.GREY, dashes=_DASHED)
+        _draw(axes, family.stuck, unit, "stuck (linear)", color=style.GREY, dashes=_DASHED)
         axes.set_yscale("log")
         style.plain_log(axes.yaxis)
         style.label(axes, axis_name(first.parameter), _amplitude_name("amplitude", family.dof, unit))

@@ -1,0 +1,57 @@
+# stickslip. Everything runs in the virtual environment .venv, which is made when it is missing or out of date.
+
+PYTHON ?= python3
+BIN := .venv/bin
+STAMP := .venv/.up-to-date
+# What pytest gets in addition, for example: make test PYTEST="-k march -x"
+PYTEST ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-long lint bench serve clean
+
+help:
+	@echo "make setup      set up .venv; the command is then $(BIN)/stickslip"
+	@echo "make demo       run the main job end to end; pictures go to demo-output/"
+	@echo "make test       check the code and run every test but the long ones"
+	@echo "make test-long  run the long studies"
+	@echo "make lint       check the code: ruff, mypy, import-linter"
+	@echo "make bench      measure the solver and print a table"
+	@echo "make serve      start the service on http://127.0.0.1:8000"
+	@echo "make clean      remove .venv, caches and demo-output/"
+
+setup: $(STAMP)
+
+$(STAMP): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "stickslip needs Python 3.11 or newer, as in: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r constraints.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@echo "Compiling the kernels: a minute or two, once."
+	$(BIN)/python -m service.warm_up
+	@touch $@
+
+demo: setup
+	$(BIN)/stickslip demo
+
+test: setup lint
+	$(BIN)/python -m pytest $(PYTEST)
+
+test-long: setup
+	$(BIN)/python -m pytest -m long $(PYTEST)
+
+lint: setup
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: setup
+	$(BIN)/python -m benchmarks
+
+serve: setup
+	$(BIN)/stickslip serve
+
+clean:
+	rm -rf .venv demo-output build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find solver optim service migrations tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
