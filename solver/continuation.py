@@ -32,6 +32,7 @@ class Predictor(IntEnum):
 
     TANGENT = path.TANGENT
     SECANT = path.SECANT
+    CUBIC = path.CUBIC
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +57,7 @@ class ContinuationSettings:
         Points after which the branch ends with a status.
     """
 
-    predictor: Predictor = Predictor.TANGENT
+    predictor: Predictor = Predictor.CUBIC
     first_step: float = 0.02
     largest_step: float = 0.2
     smallest_step: float = 1e-8
@@ -190,13 +191,26 @@ def walk(
         largest_turn=settings.largest_turn, range_weight=settings.range_length,
     )  # fmt: skip
     linear, point = workspace.linear, workspace.point
-    code, state = begin_walk(system, linear, point, control, np.zeros(0) if guess is None else guess)
+    found = workspace.solve(control.start, guess)
+    if not found.converged:
+        yield _no_start(balance, found.iterations)
+        return
+    code, state = begin_walk(system, linear, point, control, found.u)
     while code == path.RUNNING:
         rows = _rows(balance, _STRETCH)
         code, count = walk_on(system, linear, point, control, state, _STRETCH, *rows)
-        yield _stretch(rows, count, ENDINGS.get(code), state)
+        yield _stretch(rows, count, ENDINGS.get(code), state, found.iterations)
     if code == path.NO_START:
-        yield _stretch(_rows(balance, 0), 0, BranchStatus.NO_START, state)
+        yield _no_start(balance, found.iterations)
+
+
+def _no_start(balance: Balance, iterations: int) -> Stretch:
+    """Return the stretch of a branch that could not begin."""
+    rows = _rows(balance, 0)
+    return Stretch(
+        solutions=rows[0], tangents=rows[1], states=rows[2], observed=rows[3], measures=rows[4],
+        status=BranchStatus.NO_START, newton_iterations=iterations, rejected_steps=0, stepped_over=0,
+    )  # fmt: skip
 
 
 def _rows(balance: Balance, count: int) -> tuple[Real, Real, Integer, Real, Real]:
@@ -210,12 +224,13 @@ def _rows(balance: Balance, count: int) -> tuple[Real, Real, Integer, Real, Real
 
 
 def _stretch(
-    rows: tuple[Real, Real, Integer, Real, Real], count: int, status: BranchStatus | None, state: path.Walk
-) -> Stretch:
+    rows: tuple[Real, Real, Integer, Real, Real], count: int, status: BranchStatus | None, state: path.Walk,
+    spent: int,
+) -> Stretch:  # fmt: skip
     numbers = walk_by_value(state).numbers
     return Stretch(
         solutions=rows[0][:count], tangents=rows[1][:count], states=rows[2][:count], observed=rows[3][:count],
-        measures=rows[4][:count], status=status, newton_iterations=int(numbers[path.ITERATIONS]),
+        measures=rows[4][:count], status=status, newton_iterations=spent + int(numbers[path.ITERATIONS]),
         rejected_steps=int(numbers[path.REJECTED]), stepped_over=int(numbers[path.STEPPED_OVER]),
     )  # fmt: skip
 
