@@ -49,8 +49,8 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
         telemetry={"tracing": False, "metrics": False, "logs": False, "auto_configure": False},
     )
     app.state.service = service
-    problems.install(app)
     app.add_middleware(HostCheck, hosts=service.settings.hosts)
+    problems.install(app)
     for module in (jobs, sweeps, scenes, plan, health):
         app.include_router(module.router)
     openapi.install(app, registry)

@@ -13,6 +13,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service import errors
 from service.validation import issues_of
@@ -67,7 +68,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(errors.ServiceError, _service_error)
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(HTTPException, _http_error)
-    app.add_exception_handler(Exception, _unexpected_error)
+    app.add_middleware(_Boundary)
 
 
 def service_problem(request: Request, error: errors.ServiceError) -> JSONResponse:
@@ -144,8 +145,27 @@ def _allowed(request: Request) -> list[str]:
     ]
 
 
-async def _unexpected_error(request: Request, error: Exception) -> JSONResponse:
-    return _unexpected(request, error)
+class _Boundary:
+    """Answers what nothing else caught; Starlette's own boundary would break the connection afterwards."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on; answer 500 if that fails before an answer began."""
+        began = False
+
+        async def watch(message: Message) -> None:
+            nonlocal began
+            began = True
+            await send(message)
+
+        try:
+            await self._app(scope, receive, watch)
+        except Exception as error:
+            if began or scope["type"] != "http":
+                raise
+            await _unexpected(Request(scope), error)(scope, receive, send)
 
 
 def _unexpected(request: Request, error: Exception) -> JSONResponse:

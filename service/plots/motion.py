@@ -55,8 +55,9 @@ class Motion:
 
     @classmethod
     def of_solution(cls, solution: Solution) -> Self:
-        """The motion of a converged balance, from its harmonics."""
+        """The motion of a converged balance; the loops have the corners of the friction law."""
         from solver.fourier import basis
+        from solver.histories import hysteresis_loop
 
         share = np.linspace(0.0, 1.0, _SAMPLES + 1)
         functions = basis(2.0 * np.pi * share, solution.n_harmonics)
@@ -66,7 +67,7 @@ class Motion:
             time=share / solution.frequency_hz,
             displacement=functions @ solution.observed,
             loops=tuple(
-                Loop(contact=contact.name, slip=functions @ contact.slip, force=functions @ contact.force)
+                _loop(contact.name, *hysteresis_loop(solution, contact.name, samples=_SAMPLES))
                 for contact in solution.contacts
             ),
         )
@@ -83,11 +84,7 @@ class Motion:
             time=np.append(march.time, period),
             displacement=_closed(march.displacement),
             loops=tuple(
-                Loop(
-                    contact=march.contacts[i].partition("@")[0],
-                    slip=_closed(march.slip[i]),
-                    force=_closed(march.contact_force[i]),
-                )
+                _loop(march.contacts[i].partition("@")[0], march.slip[i], march.contact_force[i])
                 for i in first
             ),
         )
@@ -110,6 +107,10 @@ def motion_figure(motion: Motion) -> Figure:
             axes.set_title(f"contact {loop.contact}")
             style.label(axes, f"slip motion [{slip.name}]", "friction force [N]")
     return page
+
+
+def _loop(contact: str, slip: FloatArray, force: FloatArray) -> Loop:
+    return Loop(contact=contact, slip=_closed(slip), force=_closed(force))
 
 
 def _closed(samples: FloatArray) -> FloatArray:

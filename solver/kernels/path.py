@@ -236,23 +236,28 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
         step = walk.numbers[STEP]
         p_guess = _predict(walk, control, step, guess)
         last = (p_guess - control.stop) * forward >= 0.0
-        if last:
-            share = (control.stop - walk.numbers[P]) / (p_guess - walk.numbers[P])
-            for i in range(n):
-                guess[i] = walk.u[i] + share * (guess[i] - walk.u[i])
-            p_guess = control.stop
-            step *= share
-            copy_to(trial, guess)
-            receptance(system, p_guess, linear)
-            good, iterations, norm = newton(system, linear, trial, p_guess, 0.0, point)
-            p = p_guess
-        else:
+        good, iterations, p, norm = False, 0, p_guess, np.inf
+        if not last:
             copy_to(trial, guess)
             good, iterations, p, norm = arc_newton(
                 system, linear, trial, p_guess, guess, p_guess, walk.tangent, weight_u, weight_p, point,
                 control.most_iterations,
             )  # fmt: skip
-        walk.numbers[ITERATIONS] += iterations
+            walk.numbers[ITERATIONS] += iterations
+            if good and (p - control.stop) * forward > 0.0:
+                last, p_guess = True, p
+                copy_to(guess, trial)
+        if last:
+            # The end itself, from between here and the point found (or predicted) beyond it.
+            share = (control.stop - walk.numbers[P]) / (p_guess - walk.numbers[P])
+            for i in range(n):
+                guess[i] = walk.u[i] + share * (guess[i] - walk.u[i])
+            p = p_guess = control.stop
+            step *= share
+            copy_to(trial, guess)
+            receptance(system, p, linear)
+            good, iterations, norm = newton(system, linear, trial, p, 0.0, point)
+            walk.numbers[ITERATIONS] += iterations
         if good:
             off = _distance(trial, p, guess, p_guess, weight_u, weight_p)
             turned = off / (step + 1e-300)
@@ -270,12 +275,12 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
         walk.numbers[STEP] = (
             min(control.largest_step, step * min(max(growth, 0.5), 2.0)) if not last else step
         )
+        if (p - control.start) * forward < -1e-9 * abs(control.stop - control.start):
+            return LEFT_RANGE
         _accept(walk, trial, p, norm)
         if last:
             _turn(walk, point, control)
             return FINISHED
-        if (p - control.start) * forward < -1e-9 * abs(control.stop - control.start):
-            return LEFT_RANGE
         return RUNNING if _turn(walk, point, control) else STALLED
     return STALLED
 

@@ -60,6 +60,14 @@ def _clear(out: Receptance) -> None:
 
 
 @compiled
+def _inverse(z: complex) -> complex:
+    """Return 1/z; NaN, not an exception, where an undamped mode is met exactly."""
+    if z.real == 0.0 and z.imag == 0.0:
+        return complex(np.nan, np.nan)
+    return 1.0 / z
+
+
+@compiled
 def _modal_receptance(system: System, p: float, out: Receptance) -> None:
     """Sum the modes: Z⁻¹ = Σ x_m y_mᴴ / d_m with d_m = ω_m² − (kω)² + ikω c_m, or ikω − s_m for poles."""
     out_of_line()
@@ -73,10 +81,10 @@ def _modal_receptance(system: System, p: float, out: Receptance) -> None:
         for m in range(system.eigenvalues.shape[1]):
             if system.form == MODES:
                 damping = system.dampings[s, m]
-                inverse = 1.0 / complex(system.eigenvalues[s, m].real - speed * speed, speed * damping)
+                inverse = _inverse(complex(system.eigenvalues[s, m].real - speed * speed, speed * damping))
                 dinverse = -by_omega * inverse * inverse * complex(-2.0 * k * speed, k * damping)
             else:
-                inverse = 1.0 / (complex(0.0, speed) - system.eigenvalues[s, m])
+                inverse = _inverse(complex(0.0, speed) - system.eigenvalues[s, m])
                 dinverse = -by_omega * inverse * inverse * complex(0.0, float(k))
             force, seen = system.modal_forces[i, m], system.observe_modes[s, m]
             out.x_linear[0, i] += seen * inverse * force

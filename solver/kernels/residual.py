@@ -77,10 +77,14 @@ def evaluate(system: System, linear: Receptance, u: Real, p: float, added: float
 
     Returns
     -------
-    The relative residual: max|r| over the largest of |u|, |ū| and |A F| (NaN if a contact failed).
+    The relative residual: max|r| over the largest of |u|, |ū| and |A F| (NaN if a contact failed, or Z is
+    singular).
     """
     out_of_line()
     nc, n = system.contacts.shape[0], coefficient_count(system.ks)
+    for i in range(system.ks.size):
+        if not math.isfinite(linear.x_linear[0, i].real):
+            return np.nan
     table, load, slope, dload = contact_values(system, p, added)
     for c in range(nc):
         U = u[c * n : (c + 1) * n]

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
-from conftest import MakeSettings
 from private_kinds import PRIVATE
+from service_helpers import MakeSettings
 from sqlalchemy import insert, select, text
 from sqlalchemy.exc import OperationalError, StatementError
 

@@ -10,7 +10,7 @@ import time
 
 import httpx
 import pytest
-from conftest import until
+from service_helpers import is_problem, job_ids, until
 from starlette.requests import Request
 
 from service.client import Client
@@ -19,17 +19,6 @@ from service.models import JobState
 from service.problems import service_problem
 
 SLOW = {"kind": "iteration", "seconds": 60.0}
-
-
-def is_problem(response: httpx.Response, status: int) -> dict:
-    assert response.status_code == status
-    assert response.headers["content-type"] == "application/problem+json"
-    body = response.json()
-    assert list(body) == ["type", "title", "status", "detail", "instance", "errors"]
-    assert body["status"] == status
-    assert body["detail"]
-    assert body["instance"] == response.request.url.path
-    return body
 
 
 def newest(client: httpx.Client) -> dict:
@@ -149,12 +138,12 @@ def test_a_key_used_at_the_same_time_makes_one_job(http: httpx.Client) -> None:
 def test_a_bad_body_is_refused_with_a_pointer(
     http: httpx.Client, body: dict, pointer: str, words: str
 ) -> None:
-    before = http.get("/v1/jobs").json()
+    before = job_ids(http)
     problem = is_problem(http.post("/v1/jobs", json=body), 422)
     assert problem["type"] == "urn:stickslip:problem:invalid-request"
     assert [entry["pointer"] for entry in problem["errors"]] == [pointer]
     assert words in problem["errors"][0]["detail"]
-    assert http.get("/v1/jobs").json() == before, "nothing is written of what is refused"
+    assert job_ids(http) == before, "nothing is written of what is refused"
 
 
 @pytest.mark.parametrize(

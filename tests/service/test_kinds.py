@@ -8,7 +8,7 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
-from test_http import is_problem
+from service_helpers import is_problem, job_ids
 
 import solver
 from service.kinds.records import contact_values
@@ -153,7 +153,7 @@ N0 = {**SWEEP, "parameter": "shroud.N0", "from": 20, "to": 300, "frequency_hz": 
 def test_a_bad_request_is_refused_where_it_is_bad(
     shipped: httpx.Client, body: dict[str, Any], pointers: list[str] | None
 ) -> None:
-    before = shipped.get("/v1/jobs").json()
+    before = job_ids(shipped)
     problem = is_problem(shipped.post("/v1/jobs", json=body), 422)
     found = [entry["pointer"] for entry in problem["errors"]]
     if pointers is None:
@@ -161,7 +161,7 @@ def test_a_bad_request_is_refused_where_it_is_bad(
     else:
         assert found == pointers
     assert all(entry["detail"] for entry in problem["errors"])
-    assert shipped.get("/v1/jobs").json() == before, "nothing is written of what is refused"
+    assert job_ids(shipped) == before, "nothing is written of what is refused"
 
 
 def test_the_plan_refuses_what_the_jobs_refuse(shipped: httpx.Client) -> None:

@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import MakeSettings, pids, until
 from private_kinds import PRIVATE, cannot_warm_up
+from service_helpers import MakeSettings, pids, until
 from sqlalchemy import update
 
 from service.core import Service

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from conftest import pids, until
+from service_helpers import pids, until
 
 from service.client import Client
 from service.errors import ServiceProblem

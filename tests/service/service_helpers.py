@@ -1,0 +1,73 @@
+"""What the tests of the service share."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+
+from service.app import create_app
+from service.core import Service
+from service.jobs import Registry
+from service.server import _bind, _config, _Server
+from service.settings import Settings, load_settings
+
+MakeSettings = Callable[..., Settings]
+
+
+@contextmanager
+def serving(folder: Path, registry: Registry) -> Iterator[httpx.Client]:
+    """A client of a real server on loopback."""
+    settings = load_settings(
+        database=f"sqlite:///{folder}/jobs.db", workers=1, port=0, max_body_bytes=20_000, page_limit=50
+    )
+    app = create_app(settings, registry)
+    service: Service = app.state.service
+    listener = _bind(settings)
+    service.open()
+    server = _Server(_config(app, settings), service)
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+    thread.start()
+    try:
+        with httpx.Client(base_url=f"http://127.0.0.1:{listener.getsockname()[1]}", timeout=60.0) as client:
+            until(lambda: server.started)
+            until(lambda: client.get("/health/ready").status_code == 200, seconds=600.0)
+            yield client
+    finally:
+        server.should_exit = True
+        thread.join()
+        listener.close()
+
+
+def is_problem(response: httpx.Response, status: int) -> dict:
+    assert response.status_code == status
+    assert response.headers["content-type"] == "application/problem+json"
+    body = response.json()
+    assert list(body) == ["type", "title", "status", "detail", "instance", "errors"]
+    assert body["status"] == status
+    assert body["detail"]
+    assert body["instance"] == response.request.url.path
+    return body
+
+
+def job_ids(client: httpx.Client) -> list[str]:
+    return [job["id"] for job in client.get("/v1/jobs").json()["items"]]
+
+
+def until(condition: Callable[[], object], seconds: float = 20.0) -> None:
+    """Wait for something; fail loudly if it does not happen."""
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            pytest.fail(f"{condition} did not come true within {seconds} s")
+        time.sleep(0.005)
+
+
+def pids(file: Path) -> list[int]:
+    """Process numbers that the private kinds wrote, one for each attempt."""
+    return [int(line) for line in file.read_text().split()] if file.exists() else []

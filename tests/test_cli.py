@@ -1,0 +1,271 @@
+"""The command: what it prints, its exit statuses, bad input, and what it does not load."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import COMMAND
+
+import optim
+import solver
+from service.cli import main
+
+Run = Callable[..., tuple[int, str, str]]
+GOOD = Path(solver.__file__).parent / "scenes" / "two-dof.toml"
+
+KEYS = {
+    "scenes": {"scenes"},
+    "plan two-dof": {"effects", "unknowns"},
+    "solve two-dof --frequency 1.2": {
+        "max_abs", "half_peak_to_peak", "mean", "harmonics", "flags", "residual", "error_estimate",
+        "n_harmonics", "seconds",
+    },
+    "sweep two-dof --from 0.5 --to 1": {
+        "parameter", "amplitude", "peak", "band_hz", "points", "newton_iterations", "rejected_steps",
+        "seconds", "status",
+    },
+    "design two-dof --variable damper.N0 80 130": {
+        "optimum", "peak", "band_hz", "evaluations", "seconds", "active",
+    },
+    "march two-dof --frequency 1.2": {"max_abs", "half_peak_to_peak", "mean"},
+}  # fmt: skip
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run the command in an empty folder: exit status, standard output, standard error."""
+    monkeypatch.chdir(tmp_path)
+
+    def command(arguments: str, *more: str) -> tuple[int, str, str]:
+        status = main([*arguments.split(), *more])
+        captured = capsys.readouterr()
+        return status, captured.out, captured.err
+
+    return command
+
+
+@pytest.mark.parametrize("arguments", KEYS)
+def test_json_is_one_object_with_the_documented_keys(run: Run, arguments: str) -> None:
+    status, out, err = run(f"{arguments} --json")
+    assert (status, err) == (0, "")
+    assert out.endswith("}\n")
+    assert out.count("\n") == 1
+    assert KEYS[arguments] <= json.loads(out).keys()
+
+
+def test_solve_is_the_solver(run: Run) -> None:
+    arguments = "solve two-dof --frequency 1.1 --set damper.N0=60 --set damper.N1=5 --harmonics 7 --json"
+    answer = json.loads(run(arguments)[1])
+    scene = solver.load_scene("two-dof").with_values({"damper.N0": 60.0, "damper.N1": 5.0})
+    direct = solver.solve(scene, frequency_hz=1.1, harmonics=7)
+    assert answer["max_abs"] == direct.max_abs
+    assert answer["n_harmonics"] == 7
+
+
+def test_sweep_of_a_load_is_the_solver(run: Run) -> None:
+    arguments = "sweep two-dof --parameter damper.N0 --from 50 --to 60 --frequency 1.1 --harmonics 5 --json"
+    answer = json.loads(run(arguments)[1])
+    direct = solver.sweep(
+        solver.load_scene("two-dof"), "damper.N0", 50.0, 60.0, frequency_hz=1.1, harmonics=5
+    )
+    assert answer["amplitude"] == direct.amplitude.tolist()
+    assert answer["band_hz"] is None
+
+
+def test_design_takes_several_variables(run: Run) -> None:
+    variables = "--variable damper.N0 90 120 --variable damper.kt 25 30"
+    status, out, _ = run(f"design two-dof {variables} --harmonics 3 --limit 2 --json")
+    answer = json.loads(out)
+    assert status == (0 if answer["reached"] else 1)
+    assert answer["optimum"].keys() == {"damper.N0", "damper.kt"}
+    assert 90.0 <= answer["optimum"]["damper.N0"] <= 120.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("scenes", ["bladed-disk", "cyclic", "500 to 900 Hz"]),
+        ("plan bladed-disk", ["one sector for the annulus", "unknowns", "46"]),
+        ("solve bladed-disk --frequency 755", ["max|x|", "0.1016 mm", "stick and slip"]),
+        ("sweep two-dof --limit 2", ["peak", "2.35 m at 1.037", "Hz above 2 m"]),
+        (
+            "design two-dof --variable damper.N0 80 130",
+            ["damper.N0", " N", "2.346 m at 1.04", "responses in"],
+        ),
+        ("march two-dof --frequency 1.2", ["1.85 m", "periods"]),
+        ("--version", ["0.1.0"]),
+        ("--help", ["design", "sweep", "submit", "db"]),
+        ("design --help", ["PATH LO HI", "--max-band"]),
+    ],
+)
+def test_people_read_values_with_units(run: Run, arguments: str, words: list[str]) -> None:
+    status, out, err = run(arguments)
+    assert (status, err) == (0, "")
+    assert [word for word in words if word not in out] == []
+
+
+BAD_SCENES = {
+    "unknown key": ('name = "two-dof"', 'name = "two-dof"\ncolour = "red"', ["colour", "red"]),
+    "negative mass": ("m1 = 1.0", "m1 = -1.0", ["m1", "-1.0"]),
+    "negative friction": ("mu = 0.3", "mu = -0.3", ["mu", "-0.3"]),
+    "unknown DOF": ('between = ["m2", "ground"]', 'between = ["m7", "ground"]', ["between", "m7"]),
+    "zero sectors": ('kind = "lumped"', 'kind = "cyclic"\nsectors = 0', ["sectors", "0"]),
+    "not a number": ("N0 = 100.0", "N0 = nan", ["N0", "nan"]),
+    "empty band": ("band = [0.2, 2.6]", "band = [2.6, 0.2]", ["band", "[2.6, 0.2]"]),
+    "not TOML": ("[structure]", "[structure", ["scene.toml", "TOML", "line"]),
+}
+
+
+@pytest.mark.parametrize("case", BAD_SCENES)
+@pytest.mark.parametrize("command", ["solve scene.toml --frequency 1", "design scene.toml --json"])
+def test_bad_scenes_are_named(run: Run, tmp_path: Path, command: str, case: str) -> None:
+    right, wrong, words = BAD_SCENES[case]
+    text = GOOD.read_text()
+    assert right in text
+    (tmp_path / "scene.toml").write_text(text.replace(right, wrong))
+    status, out, err = run(f"{command} --plot picture.png")
+    assert (status, out) == (2, "")
+    assert "Traceback" not in err
+    assert [word for word in words if word not in err] == []
+    assert [file.name for file in tmp_path.iterdir()] == ["scene.toml"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("solve nowhere.toml --frequency 1", ["nowhere.toml"]),
+        ("solve two-duf --frequency 1", ["two-duf", "did you mean 'two-dof'"]),
+        ("solve two-dof", ["--frequency"]),
+        ("solve two-dof --frequency abc", ["--frequency", "abc"]),
+        ("solve two-dof --frequency nan", ["--frequency", "nan"]),
+        ("solve two-dof --frequency -1", ["--frequency", "-1.0"]),
+        ("solve two-dof --frequency 1 --harmonics 1.5", ["--harmonics", "1.5"]),
+        ("solve two-dof --frequency 1 --harmonics -2", ["--harmonics", "-2"]),
+        ("solve two-dof --frequency 1 --set damper.N0", ["--set", "damper.N0"]),
+        ("solve two-dof --frequency 1 --set damper.N0=much", ["--set", "much"]),
+        ("solve two-dof --frequency 1 --set damper.N0=-5", ["damper.N0", "-5.0"]),
+        ("solve two-dof --frequency 1 --set bumper.N0=5", ["--set", "bumper.N0", "damper.N0"]),
+        ("solve two-dof --frequency 1 --plot picture.gif", ["--plot", "picture.gif", ".png"]),
+        ("solve two-dof --frequency 1 --plot nowhere/picture.png", ["--plot", "nowhere"]),
+        ("sweep two-dof --from 1 --to 1", ["--to", "1.0"]),
+        ("sweep two-dof --from 0 --to 1", ["--from", "0.0"]),
+        ("sweep two-dof --limit -1", ["--limit", "-1.0"]),
+        ("sweep two-dof --parameter bumper.N0 --from 1 --to 2 --frequency 1", ["--parameter", "bumper.N0"]),
+        ("sweep two-dof --parameter damper.N0 --from 1 --to 2", ["--frequency", "damper.N0"]),
+        ("sweep two-dof --parameter damper.N0 --frequency 1 --to 2", ["--from", "damper.N0"]),
+        ("design two-dof --variable damper.N0 20", ["--variable", "damper.N0 20"]),
+        ("design two-dof --variable damper.N0 20 --json", ["--variable", "damper.N0 20"]),
+        ("design two-dof --variable damper.N0 20 many", ["--variable", "many"]),
+        ("design two-dof --variable damper.N0 100 20", ["damper.N0", "100"]),
+        ("design two-dof --variable bumper.N0 1 2", ["--variable", "bumper.N0"]),
+        ("design two-dof --variable damper.N0 1 2 --variable damper.N0 1 3", ["damper.N0", "twice"]),
+        ("design two-dof --max-band 0", ["--max-band", "0.0"]),
+        ("march two-dof --frequency 1 --steps 3", ["--steps", "3"]),
+        ("march two-dof --frequency 1 --max-periods 0", ["--max-periods", "0"]),
+        ("serve --port 99999", ["port", "99999"]),
+        ("serve --database nothing", ["database", "nothing"]),
+        ("serve --host 0.0.0.0", ["host", "0.0.0.0"]),
+        ("db upgrade --database sqlite:////nowhere/jobs.db", ["/nowhere", "jobs.db"]),
+        ("demo --out file", ["--out", "file"]),
+        ("submit solve two-dof --frequency inf", ["--frequency", "inf"]),
+        ("submit solve nowhere.toml --frequency 1", ["nowhere.toml"]),
+        ("watch job --url ::", ["--url", "::"]),
+        ("results job --plot picture.gif", ["--plot", "picture.gif"]),
+        ("dance", ["dance"]),
+        ("", ["Usage"]),
+    ],
+)  # fmt: skip
+def test_bad_options_are_named(run: Run, tmp_path: Path, arguments: str, words: list[str]) -> None:
+    (tmp_path / "file").write_text("in the way")
+    status, out, err = run(arguments)
+    assert status == 2
+    assert "Traceback" not in err
+    assert [word for word in words if word not in out + err] == []
+    assert [file.name for file in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_a_goal_not_reached_is_status_1_with_the_reason(run: Run, tmp_path: Path, as_json: bool) -> None:
+    arguments = "march two-dof --frequency 1.2 --max-periods 3 --plot picture.png"
+    status, out, err = run(arguments, *["--json"][:as_json])
+    assert status == 1
+    assert "allow more periods" in err
+    assert not as_json or json.loads(out)["status"] in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_band_nobody_can_keep_is_status_1(run: Run) -> None:
+    arguments = "design two-dof --variable damper.N0 90 110 --limit 0.5 --max-band 0.01 --harmonics 3 --json"
+    status, out, err = run(arguments)
+    assert status == 1
+    assert json.loads(out)["reached"] is False
+    assert optim.DesignStatus.BAND_INFEASIBLE.value in err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "solve two-dof --frequency 1.2 --plot picture.png",
+        "sweep two-dof --from 0.5 --to 1.5 --limit 1 --plot picture.svg",
+        "design two-dof --variable damper.N0 90 110 --harmonics 3 --plot picture.pdf",
+        "march two-dof --frequency 1.2 --plot picture.png",
+    ],
+)
+def test_pictures(run: Run, tmp_path: Path, arguments: str) -> None:
+    assert run(arguments)[0] == 0
+    (picture,) = tmp_path.iterdir()
+    beginnings = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
+    assert picture.read_bytes().startswith(beginnings[picture.suffix])
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["scenes"], ["solve", "two-dof", "--frequency", "1.2"]])
+def test_small_commands_load_nothing_heavy(arguments: list[str]) -> None:
+    heavy = ["cvxpy", "matplotlib", "fastapi", "sqlalchemy", "alembic", "httpx", "uvicorn"]
+    code = (
+        f"import sys; from service.cli import main; main({arguments!r}); "
+        f"sys.stderr.write(' '.join(set({heavy!r}) & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+
+
+def test_a_pipe_gets_no_progress() -> None:
+    done = subprocess.run([*COMMAND, "sweep", "two-dof"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "\x1b" not in done.stdout
+
+
+def test_a_terminal_gets_a_progress_bar_and_a_pipe_the_result() -> None:
+    master, slave = pty.openpty()
+    arguments = ["sweep", "bladed-disk", "--harmonics", "15", "--json"]
+    with subprocess.Popen(
+        [*COMMAND, *arguments], stdout=subprocess.PIPE, stderr=slave, env={**os.environ, "TERM": "xterm"}
+    ) as process:
+        os.close(slave)
+        seen = _read_all(master)
+        out = process.communicate()[0]
+    assert "sweep" in seen
+    assert "points" in seen
+    answer: dict[str, Any] = json.loads(out)
+    assert answer["completed"] is True
+
+
+def _read_all(terminal: int) -> str:
+    seen = b""
+    while True:
+        try:
+            some = os.read(terminal, 4096)
+        except OSError:  # how Linux says that the other side is closed
+            some = b""
+        if not some:
+            os.close(terminal)
+            return seen.decode()
+        seen += some

@@ -1,0 +1,127 @@
+"""The commands that talk to a service, against one that runs as `stickslip serve`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import solver
+from service.cli import main
+
+Run = Callable[[str], tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, server: str
+) -> Run:
+    """Run the command against the service: exit status, standard output, standard error."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("STICKSLIP_URL", server)
+
+    def command(arguments: str) -> tuple[int, str, str]:
+        status = main(arguments.split())
+        captured = capsys.readouterr()
+        return status, captured.out, captured.err
+
+    return command
+
+
+def test_a_design_from_submission_to_picture(run: Run, tmp_path: Path) -> None:
+    status, out, err = run("submit design two-dof --variable damper.N0 80 130 --harmonics 5")
+    assert (status, err) == (0, "")
+    job = out.strip()
+
+    status, out, err = run(f"watch {job}")
+    assert (status, err) == (0, "")
+    assert out.split() == [job, "design", "successful"]
+
+    status, out, err = run(f"results {job} --json --out results.json --plot optimum.png")
+    assert (status, err) == (0, "")
+    answer = json.loads(out)
+    assert answer == json.loads((tmp_path / "results.json").read_text())
+    assert 80.0 <= answer["result"]["optimum"]["damper.N0"] <= 130.0
+    assert (tmp_path / "optimum.png").read_bytes().startswith(b"\x89PNG")
+    assert {file.name for file in tmp_path.iterdir()} == {"results.json", "optimum.png"}
+
+    status, out, err = run(f"results {job}")
+    assert (status, err) == (0, "")
+    assert "damper.N0" in out
+    assert answer["sweeps"][0]["id"] in out
+
+
+def test_a_scene_file_goes_with_the_job(run: Run, tmp_path: Path) -> None:
+    scene = solver.load_scene("two-dof").with_values({"damper.N0": 70.0})
+    (tmp_path / "mine.json").write_text(json.dumps(scene.to_dict()))
+    status, out, _ = run("submit solve mine.json --frequency 1.2 --wait --json")
+    assert status == 0
+    direct = solver.solve(scene, frequency_hz=1.2)
+    assert json.loads(out)["result"]["max_abs"] == pytest.approx(direct.max_abs, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "sweep two-dof --from 0.5 --to 1.5 --set damper.N0=60 --limit 1",
+        "sweep two-dof --parameter damper.N0 --from 50 --to 60 --frequency 1.2",
+        "solve two-dof --frequency 1.2",
+        "march two-dof --frequency 1.2",
+    ],
+)
+def test_waiting_prints_what_the_command_prints(run: Run, arguments: str) -> None:
+    status, waited, err = run(f"submit {arguments} --wait")
+    assert (status, err) == (0, "")
+    here = run(arguments)[1]
+    assert _without_time(waited)[: len(_without_time(here))] == _without_time(here)
+
+
+def _without_time(report: str) -> list[str]:
+    lines = [line.rstrip() for line in report.splitlines()]
+    return [line for line in lines if line and not line.startswith("time")]
+
+
+def test_submitted_jobs_can_be_read_by_programs(run: Run) -> None:
+    status, out, _ = run("submit solve two-dof --frequency 1.25 --json")
+    job = json.loads(out)
+    assert status == 0
+    assert job["kind"] == "solve"
+    status, out, _ = run(f"watch {job['id']} --json")
+    assert (status, json.loads(out)["status"]) == (0, "successful")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("submit solve two-duf --frequency 1", ["/scene", "two-duf"]),
+        ("submit solve two-dof --frequency -1", ["/frequency_hz", "-1"]),
+        ("submit sweep two-dof --from 1 --to 1", ["/to", "1.0"]),
+        ("submit design two-dof --variable bumper.N0 1 2", ["bumper.N0"]),
+        ("submit solve two-dof --frequency 1 --set damper.mu=-1", ["damper.mu", "-1"]),
+        ("watch nobody", ["nobody"]),
+        ("results nobody", ["nobody"]),
+    ],
+)
+def test_what_the_service_refuses_is_status_2(run: Run, arguments: str, words: list[str]) -> None:
+    status, out, err = run(arguments)
+    assert (status, out) == (2, "")
+    assert [word for word in words if word not in err] == []
+
+
+def test_a_job_that_falls_short_is_status_1(run: Run) -> None:
+    arguments = "submit march two-dof --frequency 1.2 --max-periods 3"
+    status, out, err = run(f"{arguments} --wait --json")
+    assert status == 1
+    assert json.loads(out)["status"] == "failed"
+    assert "allow more periods" in err
+    job = run(arguments)[1].strip()
+    assert run(f"watch {job}")[0] == 1
+    assert run(f"results {job}")[0] == 1
+
+
+def test_a_service_that_is_not_there_is_status_1(run: Run) -> None:
+    status, out, err = run("submit solve two-dof --frequency 1 --url http://127.0.0.1:1")
+    assert (status, out) == (1, "")
+    assert "http://127.0.0.1:1 cannot be reached" in err
