@@ -20,7 +20,7 @@ from solver.fourier import Integer, Real
 from solver.kernels import path
 from solver.kernels.observe import MEASURES
 from solver.kernels.path import Control, begin_walk, walk_by_value, walk_on
-from solver.peaks import Points, band_limit, find_band, find_peaks
+from solver.peaks import Points, Survey, band_limit
 from solver.scene import Scene
 from solver.workspace import Workspace
 
@@ -245,18 +245,16 @@ def _finish(
     tangents = np.concatenate([stretch.tangents for stretch in stretches])
     measures = np.concatenate([stretch.measures for stretch in stretches])
     points = Points(solutions=solutions, tangents=tangents, measures=measures)
-    peaks, spent = find_peaks(workspace, points)
-    at = band_limit(limit, peaks, balance.parameter.kind)
-    band = None
-    if at is not None:
-        band, more = find_band(workspace, points, at)
-        spent += more
+    survey = Survey(workspace, points)
+    at = band_limit(limit, survey.peaks, balance.parameter.kind)
+    band = None if at is None else survey.band(at)
     return Branch(
         balance=balance, status=status, start=start, stop=stop,
         values=balance.parameter.all_outside(solutions[:, -1].copy()), solutions=solutions,
         tangents=tangents, observed=np.concatenate([stretch.observed for stretch in stretches]),
-        measures=measures, states=np.concatenate([stretch.states for stretch in stretches]), peaks=peaks,
-        band=band, newton_iterations=stretches[-1].newton_iterations + spent,
+        measures=measures, states=np.concatenate([stretch.states for stretch in stretches]),
+        peaks=survey.peaks,
+        band=band, newton_iterations=stretches[-1].newton_iterations + survey.spent,
         rejected_steps=stretches[-1].rejected_steps, stepped_over=stretches[-1].stepped_over,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
