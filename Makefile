@@ -34,8 +34,10 @@ $(STAMP): pyproject.toml constraints.txt
 demo: setup
 	$(BIN)/stickslip demo
 
+# Two processes: the kernels are compiled before, so that not both do it.
 test: setup lint
-	$(BIN)/python -m pytest $(PYTEST)
+	$(BIN)/python -m service.warm_up
+	$(BIN)/python -m pytest -n 2 $(PYTEST)
 
 test-long: setup
 	$(BIN)/python -m pytest -m long $(PYTEST)

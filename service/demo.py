@@ -131,14 +131,17 @@ def _sweeps(service: EmbeddedService, cases: Sequence[Case]) -> list[list[JobAns
         ]
         for case in cases
     ]
-    with bars([f"responses {case.scene}" for case in cases], "points") as reporters:
+    with bars([f"responses {case.scene}" for case in cases], "done") as reporters:
         return _follow(service, groups, reporters)
 
 
 def _follow(
     service: EmbeddedService, groups: Sequence[Sequence[str]], reporters: Sequence[OnProgress | None]
 ) -> list[list[JobAnswer]]:
-    """Wait for groups of jobs, each with its progress bar; ShortfallError if one was not successful."""
+    """Wait for groups of jobs, each with its progress bar; ShortfallError if one was not successful.
+
+    A bar counts the points of a single job, or the jobs that are done.
+    """
     ended: dict[str, JobAnswer] = {}
     while True:
         for group, report in zip(groups, reporters, strict=True):
@@ -146,7 +149,8 @@ def _follow(
             ended |= {job.id: job for job in jobs if job.status.finished}
             if report is not None:
                 shares = [1.0 if job.status.finished else job.progress for job in jobs]
-                report(sum(shares) / len(shares), sum(job.points for job in jobs))
+                count = jobs[0].points if len(jobs) == 1 else sum(job.status.finished for job in jobs)
+                report(sum(shares) / len(shares), count)
         if all(job in ended for group in groups for job in group):
             break
         time.sleep(_LOOK_SECONDS)

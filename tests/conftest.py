@@ -2,14 +2,12 @@ from __future__ import annotations
 
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 
 import httpx
 import pytest
-
-COMMAND = (sys.executable, "-c", "import sys; from service.cli import main; sys.exit(main())")
+from launch import COMMAND
 
 
 @pytest.fixture(scope="session")
