@@ -26,6 +26,7 @@ HALF_POWER = 1.0 / math.sqrt(2.0)
 # would cost without a use, since it competes with nothing.
 WORTH_POLISHING = 0.5
 NEAR_THE_TOP = 0.97  # share of the highest point from which the branch has to be dense
+FAR_BELOW = 0.7  # share below which no step of a branch can reach the top
 PREDICTED = 1e-4  # relative error of the cubics up to which it is
 MOST_HALVINGS = 5
 _MOST_ITERATIONS = 12
@@ -79,6 +80,8 @@ class Survey:
 
     def _halved(self, left: _Node, right: _Node, top: float, depth: int) -> list[_Node]:
         """Return the nodes to be inserted between two."""
+        if max(left.measures[MAX_ABS], right.measures[MAX_ABS]) < FAR_BELOW * top:
+            return []
         by_share = _scales(left, right)
         reach = 0.0
         for value, slope, _ in _CURVES:
