@@ -1,6 +1,7 @@
 """Compile the kernels once, so that no later command waits for it: ``python -m service.warm_up``.
 
-Part of ``make setup`` and ``make test``. The machine code is cached on disk and serves every process from then on.
+Part of ``make setup`` and ``make test``. The machine code is cached on disk and serves every process from
+then on.
 """
 
 from __future__ import annotations
