@@ -33,6 +33,7 @@ UNLOADED, AFTER_SLIP, AFTER_SEPARATION = 0.0, 1.0, 2.0
 MOTION, DIRECTION, BEGIN, END, ONSET, BEGAN = 0, 1, 2, 3, 4, 5
 SEGMENT_COLUMNS = 6
 
+NO_LENGTH = 1e-11  # rad
 ROUNDING = 2e-14  # relative to kt max|u| + μ max|N|: below it a limit is not crossed
 # A slope counts as 0 below ROUNDING times degree^2: even where its root is found to the last bit, a curvature
 # of the order of degree^2 leaves that much.
@@ -252,3 +253,24 @@ def march(
         row[END] = tau
         count += 1
     return count
+
+
+@compiled
+def piece_of(segments: Real, count: int) -> int:
+    """Return a number for what happens over the period: how many segments there are of each kind.
+
+    The law is smooth where it stays the same. A segment as short as rounding does not count: the period need
+    not close on itself to the last bit.
+    """
+    piece = 0
+    for i in range(count):
+        row = segments[i]
+        if row[END] - row[BEGIN] <= NO_LENGTH:
+            continue
+        kind = 2 if row[DIRECTION] > 0.0 else 3
+        if row[MOTION] == STICK and row[BEGAN] != AFTER_SLIP:
+            kind = 0 if row[BEGAN] == UNLOADED else 1
+        elif row[MOTION] == SLIP:
+            kind += 2
+        piece += 1 << (8 * kind)
+    return piece

@@ -3,7 +3,8 @@
 Orientation. At a kink the branch turns, and the turn may exceed a right angle. Across a facet between two
 smooth pieces the sign of det [dr/du dr/dλ; tᵀ] stays the same for tangents t that cross the facet in the same
 direction (Eaves, Scarf, Math. Oper. Res. 1 (1976) 1, for piecewise linear paths), so a sharp turn is oriented
-by that sign; a gentle one by the angle, because at a branch point of a smooth branch the sign does flip.
+by that sign. At a branch point of a smooth branch the sign does flip: there, all contacts still on the same
+piece of their law and the branch all but straight, the angle decides.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from solver.kernels.receptance import receptance
 from solver.kernels.residual import evaluate
 from solver.kernels.system import Evaluation, Receptance, System
 
+STRAIGHT_ON = 0.98  # cosine of the turn at a branch point; more than that is a step across a sharp peak
 # How a stretch of continuation ended.
 RUNNING, FINISHED, NO_START, STALLED, LEFT_RANGE = 0, 1, 2, 3, 4
 TANGENT, SECANT, CUBIC = 0, 1, 2
@@ -55,7 +57,7 @@ class Walk(NamedTuple):
     before: Real  # (nt + 1,) the point before, λ last
     tangent: Real  # (nt + 1,)
     before_tangent: Real  # (nt + 1,) at the point before
-    numbers: Real  # (10,)
+    numbers: Real  # (11,)
 
 
 @structref.register
@@ -78,18 +80,7 @@ def walk_by_value(walk: Walk) -> Walk:
     return Walk(walk.u, walk.before, walk.tangent, walk.before_tangent, walk.numbers)
 
 
-P, STEP, ORIENTATION, ITERATIONS, REJECTED, STEPPED_OVER, COUNT, NORM, FRESH, ROUGH = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-    7,
-    8,
-    9,
-)
+P, STEP, ORIENTATION, ITERATIONS, REJECTED, STEPPED_OVER, COUNT, NORM, FRESH, ROUGH, PIECE = range(11)
 
 
 @compiled
@@ -99,7 +90,7 @@ def begin_walk(
     """Begin a branch at a solution `u` for the start of the range: its first point and tangent."""
     out_of_line()
     nt, p = u.size, control.start
-    walk = _new_walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(10))
+    walk = _new_walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(11))
     copy_to(walk.u, u)
     walk.numbers[P] = p
     walk.numbers[STEP] = control.first_step
@@ -123,6 +114,15 @@ def _weights(u: Real, control: Control) -> tuple[float, float]:
 
 
 @compiled
+def _piece(point: Evaluation) -> float:
+    """Return one number for the smooth pieces all contacts are on."""
+    mixed = 0
+    for c in range(point.pieces.size):
+        mixed = (31 * mixed + point.pieces[c]) & 0xFFFFFFFFFFFF
+    return float(mixed)
+
+
+@compiled
 def _turn(walk: Walk, point: Evaluation, control: Control) -> bool:
     """Replace the tangent by the one at the new point (`point` is evaluated there), oriented onward."""
     out_of_line()
@@ -143,10 +143,11 @@ def _turn(walk: Walk, point: Evaluation, control: Control) -> bool:
     if walk.numbers[ORIENTATION] == 0.0:
         walk.numbers[ORIENTATION] = sign
     elif sign != walk.numbers[ORIENTATION]:
-        if 1.0 / (length * math.sqrt(old)) > 0.3:
+        if _piece(point) == walk.numbers[PIECE] and 1.0 / (length * math.sqrt(old)) > STRAIGHT_ON:
             walk.numbers[ORIENTATION] = sign
         else:
             length = -length
+    walk.numbers[PIECE] = _piece(point)
     for i in range(n + 1):
         walk.tangent[i] = rhs[0, i] / length
     return True
@@ -287,13 +288,12 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
 
 @compiled
 def _step_over(system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk) -> int:
-    """Get past a kink: look for a solution a little further in λ, in the direction of the last advance."""
+    """Get past a kink: look for a solution a little further in λ, where the tangent points."""
     out_of_line()
     n = walk.u.size
     span = control.stop - control.start
     forward = math.copysign(1.0, span)
-    heading = walk.numbers[P] - walk.before[n]
-    direction = math.copysign(1.0, heading if heading != 0.0 else walk.tangent[n])
+    direction = math.copysign(1.0, walk.tangent[n])
     trial = np.empty(n)
     for rung in range(24):
         away = direction * abs(span) * 1e-7 * 2.0**rung

@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.fourier import Real, coefficient_count, cosine_position
 from solver.kernels.compiled import compiled, out_of_line
-from solver.kernels.events import FAILED
+from solver.kernels.events import FAILED, piece_of
 from solver.kernels.force import contact_force
 from solver.kernels.linear import copy_block, fill_block
 from solver.kernels.system import (
@@ -88,12 +88,12 @@ def evaluate(system: System, linear: Receptance, u: Real, p: float, added: float
     table, load, slope, dload = contact_values(system, p, added)
     for c in range(nc):
         U = u[c * n : (c + 1) * n]
-        state, _ = contact_force(
+        state, count = contact_force(
             U, system.ks, load[c], system.load_ks, table[c, KT], table[c, MU], system.cos_table,
             system.sin_table, out.segments, out.dF_dU[c], out.dF_dkt[c], out.dF_dmu[c], out.dF_dN[c],
             out.F[c],
         )  # fmt: skip
-        out.states[c] = state
+        out.states[c], out.pieces[c] = state, piece_of(out.segments, count)
         if state == FAILED:
             return np.nan
         for i in range(n):

@@ -92,6 +92,7 @@ class Evaluation(NamedTuple):
     dF_dN: Real  # (nc, n, 3)
     dF_dp: Real  # (nc, n) partial derivative of the force by λ
     states: Integer  # (nc,)
+    pieces: Integer  # (nc,) which smooth piece of its law a contact is on, see `events.piece_of`
     segments: Real  # scratch
 
 
@@ -146,7 +147,7 @@ def evaluation_by_value(point: Evaluation) -> Evaluation:
     """Return the arrays of an evaluation as a tuple that Python can read (views, not copies)."""
     return Evaluation(
         point.residual, point.jacobian, point.dr_dp, point.F, point.dF_dU, point.dF_dkt, point.dF_dmu,
-        point.dF_dN, point.dF_dp, point.states, point.segments,
+        point.dF_dN, point.dF_dp, point.states, point.pieces, point.segments,
     )  # fmt: skip
 
 
@@ -176,5 +177,5 @@ def new_evaluation(system: System) -> Evaluation:
         np.zeros(nc * n), np.zeros((nc * n, nc * n)), np.zeros(nc * n),
         np.zeros((nc, n)), np.zeros((nc, n, n)), np.zeros((nc, n)), np.zeros((nc, n)),
         np.zeros((nc, n, LOAD_COEFFICIENTS)), np.zeros((nc, n)), np.zeros(nc, np.int64),
-        np.zeros((segment_capacity(max(system.ks[-1], 1)), SEGMENT_COLUMNS)),
+        np.zeros(nc, np.int64), np.zeros((segment_capacity(max(system.ks[-1], 1)), SEGMENT_COLUMNS)),
     )  # fmt: skip
