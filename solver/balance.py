@@ -125,6 +125,19 @@ def for_parameter(balance: Balance, path: str, frequency_hz: float) -> Balance:
     return replace(balance, parameter=parameter, system=system)
 
 
+def fewer_harmonics(balance: Balance, count: int) -> Balance:
+    """Return the same balance with its lowest `count` harmonics (the mean counts as one)."""
+    system = balance.system
+    ks = system.ks[:count]
+    highest = max(int(ks[-1]), 1)
+    cos_table, sin_table = grid_tables(grid_size(highest), highest)
+    smaller = system._replace(
+        ks=ks, which=system.which[:count], cos_table=cos_table, sin_table=sin_table,
+        modal_forces=system.modal_forces[:count], forces=system.forces[:count],
+    )  # fmt: skip
+    return replace(balance, system=smaller)
+
+
 def _level(scene: Scene) -> float:
     """Return the excitation amplitude the unit excitation stands for (1 where it is zero: nothing scales)."""
     return scene.value("excitation.amplitude") or 1.0

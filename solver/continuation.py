@@ -20,7 +20,7 @@ from solver.fourier import Integer, Real
 from solver.kernels import path
 from solver.kernels.observe import MEASURES
 from solver.kernels.path import Control, begin_walk, walk_by_value, walk_on
-from solver.peaks import Points, band_limit, find_band, find_peaks
+from solver.peaks import Points, Survey, band_limit
 from solver.scene import Scene
 from solver.workspace import Workspace
 
@@ -32,6 +32,7 @@ class Predictor(IntEnum):
 
     TANGENT = path.TANGENT
     SECANT = path.SECANT
+    CUBIC = path.CUBIC
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +57,7 @@ class ContinuationSettings:
         Points after which the branch ends with a status.
     """
 
-    predictor: Predictor = Predictor.TANGENT
+    predictor: Predictor = Predictor.CUBIC
     first_step: float = 0.02
     largest_step: float = 0.2
     smallest_step: float = 1e-8
@@ -190,13 +191,26 @@ def walk(
         largest_turn=settings.largest_turn, range_weight=settings.range_length,
     )  # fmt: skip
     linear, point = workspace.linear, workspace.point
-    code, state = begin_walk(system, linear, point, control, np.zeros(0) if guess is None else guess)
+    found = workspace.solve(control.start, guess)
+    if not found.converged:
+        yield _no_start(balance, found.iterations)
+        return
+    code, state = begin_walk(system, linear, point, control, found.u)
     while code == path.RUNNING:
         rows = _rows(balance, _STRETCH)
         code, count = walk_on(system, linear, point, control, state, _STRETCH, *rows)
-        yield _stretch(rows, count, ENDINGS.get(code), state)
+        yield _stretch(rows, count, ENDINGS.get(code), state, found.iterations)
     if code == path.NO_START:
-        yield _stretch(_rows(balance, 0), 0, BranchStatus.NO_START, state)
+        yield _no_start(balance, found.iterations)
+
+
+def _no_start(balance: Balance, iterations: int) -> Stretch:
+    """Return the stretch of a branch that could not begin."""
+    rows = _rows(balance, 0)
+    return Stretch(
+        solutions=rows[0], tangents=rows[1], states=rows[2], observed=rows[3], measures=rows[4],
+        status=BranchStatus.NO_START, newton_iterations=iterations, rejected_steps=0, stepped_over=0,
+    )  # fmt: skip
 
 
 def _rows(balance: Balance, count: int) -> tuple[Real, Real, Integer, Real, Real]:
@@ -210,12 +224,13 @@ def _rows(balance: Balance, count: int) -> tuple[Real, Real, Integer, Real, Real
 
 
 def _stretch(
-    rows: tuple[Real, Real, Integer, Real, Real], count: int, status: BranchStatus | None, state: path.Walk
-) -> Stretch:
+    rows: tuple[Real, Real, Integer, Real, Real], count: int, status: BranchStatus | None, state: path.Walk,
+    spent: int,
+) -> Stretch:  # fmt: skip
     numbers = walk_by_value(state).numbers
     return Stretch(
         solutions=rows[0][:count], tangents=rows[1][:count], states=rows[2][:count], observed=rows[3][:count],
-        measures=rows[4][:count], status=status, newton_iterations=int(numbers[path.ITERATIONS]),
+        measures=rows[4][:count], status=status, newton_iterations=spent + int(numbers[path.ITERATIONS]),
         rejected_steps=int(numbers[path.REJECTED]), stepped_over=int(numbers[path.STEPPED_OVER]),
     )  # fmt: skip
 
@@ -230,18 +245,16 @@ def _finish(
     tangents = np.concatenate([stretch.tangents for stretch in stretches])
     measures = np.concatenate([stretch.measures for stretch in stretches])
     points = Points(solutions=solutions, tangents=tangents, measures=measures)
-    peaks, spent = find_peaks(workspace, points)
-    at = band_limit(limit, peaks, balance.parameter.kind)
-    band = None
-    if at is not None:
-        band, more = find_band(workspace, points, at)
-        spent += more
+    survey = Survey(workspace, points)
+    at = band_limit(limit, survey.peaks, balance.parameter.kind)
+    band = None if at is None else survey.band(at)
     return Branch(
         balance=balance, status=status, start=start, stop=stop,
         values=balance.parameter.all_outside(solutions[:, -1].copy()), solutions=solutions,
         tangents=tangents, observed=np.concatenate([stretch.observed for stretch in stretches]),
-        measures=measures, states=np.concatenate([stretch.states for stretch in stretches]), peaks=peaks,
-        band=band, newton_iterations=stretches[-1].newton_iterations + spent,
+        measures=measures, states=np.concatenate([stretch.states for stretch in stretches]),
+        peaks=survey.peaks,
+        band=band, newton_iterations=stretches[-1].newton_iterations + survey.spent,
         rejected_steps=stretches[-1].rejected_steps, stepped_over=stretches[-1].stepped_over,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip

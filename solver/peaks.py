@@ -1,8 +1,10 @@
 """Peaks of a branch and the band above a limit, polished on the branch itself.
 
-Between two points of a branch a maximum of the amplitude shows as a change of sign of its slope along the
-arc, a band edge as a change of sign of amplitude − limit; both are refined by solving on the arc between the
-points, so that folds need no special care.
+max|x| is the larger of max x and −min x, and each of these is smooth along a branch between changes of
+contact state. A maximum of one shows between two points as a change of sign of its slope along the arc, a
+band edge as a change of sign of amplitude − limit; both are refined by solving on the arc between the points,
+so that folds need no special care. Two maxima may hide between two points: near the top the branch is first
+made dense enough that cubics through its points predict the solutions between them.
 """
 
 from __future__ import annotations
@@ -11,12 +13,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.branch import Band, Edge, Peak
 from solver.fourier import Real
-from solver.kernels.observe import MAX_ABS, MEASURES, SLOPE
-from solver.kernels.refine import EDGE, PEAK, refine
+from solver.kernels.observe import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS, MEASURES
+from solver.kernels.refine import EDGE, HIGH_PEAK, LOW_PEAK, between, refine
 from solver.parameter import Kind
 from solver.workspace import Workspace
 
@@ -24,95 +25,194 @@ HALF_POWER = 1.0 / math.sqrt(2.0)
 # A maximum below this share of the highest point found is left at the resolution of the branch: polishing it
 # would cost without a use, since it competes with nothing.
 WORTH_POLISHING = 0.5
+NEAR_THE_TOP = 0.97  # share of the highest point from which the branch has to be dense
+FAR_BELOW = 0.7  # share below which no step of a branch can reach the top
+PREDICTED = 1e-4  # relative error of the cubics up to which it is
+MOST_HALVINGS = 5
 _MOST_ITERATIONS = 12
+_CURVES = ((HIGH, HIGH_SLOPE, HIGH_PEAK), (LOW, LOW_SLOPE, LOW_PEAK))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Points:
-    """The arrays of a branch that peaks are looked for in; see `solver.branch.Branch`."""
+    """The rows of a branch that peaks are looked for in; see `solver.branch.Branch`."""
 
     solutions: Real
     tangents: Real
     measures: Real
 
 
-def find_peaks(workspace: Workspace, points: Points) -> tuple[tuple[Peak, ...], int]:
-    """Return every local maximum of max|x|, highest first, ends included, and the Newton iterations spent."""
-    amplitude, slope = points.measures[:, MAX_ABS], points.measures[:, SLOPE]
-    if amplitude.size == 0:
-        return (), 0
-    outside = workspace.balance.parameter.outside
-    found, spent = [], 0
-    top = amplitude.max()
-    for i in range(amplitude.size - 1):
-        if not (slope[i] > 0.0 >= slope[i + 1]):
-            continue
-        highest = i if amplitude[i] > amplitude[i + 1] else i + 1
-        point, value = points.solutions[highest], float(amplitude[highest])
-        if value >= WORTH_POLISHING * top:
-            length = _length(points, i)
-            polished = _refine(workspace, points, i, PEAK, 0.0, slope[i] * length, slope[i + 1] * length)
-            spent += polished[2]
-            # Where polishing fails, or a kink is the maximum, the best converged point stands.
-            if polished[0] is not None and polished[1] >= value:
-                point, value = polished[0], polished[1]
-        found.append(
-            Peak(value=value, at=float(outside(point[-1])), solution=point[:-1].copy(), interior=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Node:
+    """One row of `Points`."""
+
+    solution: Real
+    tangent: Real
+    measures: Real
+
+
+class Survey:
+    """Looks for peaks and band edges on a branch; counts the Newton iterations it spends."""
+
+    def __init__(self, workspace: Workspace, points: Points) -> None:
+        self.spent = 0
+        self._workspace = workspace
+        rows = zip(points.solutions, points.tangents, points.measures, strict=True)
+        self._nodes = [_Node(solution=s, tangent=t, measures=m) for s, t, m in rows]
+        self._peaks: list[Peak] = []
+        if self._nodes:
+            self._densify()
+            self._find_peaks()
+
+    @property
+    def peaks(self) -> tuple[Peak, ...]:
+        """Every local maximum of max|x|, highest first; the ends of the branch are in it too."""
+        return tuple(sorted(self._peaks, key=lambda peak: -peak.value))
+
+    def _densify(self) -> None:
+        """Halve the intervals near the top until cubics predict what lies between."""
+        top = max(node.measures[MAX_ABS] for node in self._nodes)
+        dense = [self._nodes[0]]
+        for right in self._nodes[1:]:
+            dense.extend(self._halved(dense[-1], right, top, MOST_HALVINGS))
+            dense.append(right)
+        self._nodes = dense
+
+    def _halved(self, left: _Node, right: _Node, top: float, depth: int) -> list[_Node]:
+        """Return the nodes to be inserted between two."""
+        if max(left.measures[MAX_ABS], right.measures[MAX_ABS]) < FAR_BELOW * top:
+            return []
+        by_share = _scales(left, right)
+        reach = 0.0
+        for value, slope, _ in _CURVES:
+            rise = max(left.measures[slope] * by_share[0], 0.0) + max(
+                -right.measures[slope] * by_share[1], 0.0
+            )
+            reach = max(reach, max(left.measures[value], right.measures[value]) + 0.25 * rise)
+        if depth == 0 or reach < NEAR_THE_TOP * top:
+            return []
+        middle = self._between(left, right, 0.5)
+        if middle is None:
+            return []
+        error = 0.0
+        for value, slope, _ in _CURVES:
+            turn = left.measures[slope] * by_share[0] - right.measures[slope] * by_share[1]
+            cubic = 0.5 * (left.measures[value] + right.measures[value]) + turn / 8.0
+            error = max(error, abs(cubic - middle.measures[value]))
+        if error <= PREDICTED * top:
+            return [middle]
+        before = self._halved(left, middle, top, depth - 1)
+        after = self._halved(middle, right, top, depth - 1)
+        return [*before, middle, *after]
+
+    def _find_peaks(self) -> None:
+        """Collect the maxima of both curves where they are max|x|, and the ends the branch falls from."""
+        top = max(node.measures[MAX_ABS] for node in self._nodes)
+        refined: list[_Node] = [self._nodes[0]]
+        for left, right in zip(self._nodes[:-1], self._nodes[1:], strict=True):
+            inside = []
+            for value, slope, what in _CURVES:
+                if left.measures[slope] > 0.0 >= right.measures[slope]:
+                    node = self._peak_between(left, right, value, slope, what, top)
+                    if node.measures[value] >= node.measures[MAX_ABS] * (1.0 - 1e-12):
+                        inside.append(node)
+            for node in _distinct(inside):
+                self._peaks.append(self._peak(node, interior=True))
+                if node is not left and node is not right:
+                    refined.append(node)
+            refined.append(right)
+        self._nodes = refined
+        first, last = self._nodes[0], self._nodes[-1]
+        if len(self._nodes) == 1 or _slope(first) <= 0.0:
+            self._peaks.append(self._peak(first, interior=False))
+        if len(self._nodes) > 1 and _slope(last) >= 0.0:
+            self._peaks.append(self._peak(last, interior=False))
+
+    def _peak_between(
+        self, left: _Node, right: _Node, value: int, slope: int, what: int, top: float
+    ) -> _Node:
+        """Return the maximum of one curve between two nodes; where polishing fails, the higher of the two."""
+        higher = left if left.measures[value] > right.measures[value] else right
+        if higher.measures[value] < WORTH_POLISHING * top:
+            return higher
+        by_share = _scales(left, right)
+        g_left, g_right = left.measures[slope] * by_share[0], right.measures[slope] * by_share[1]
+        node = self._refine(left, right, what, 0.0, g_left, g_right)
+        return node if node is not None and node.measures[value] >= higher.measures[value] else higher
+
+    def _peak(self, node: _Node, *, interior: bool) -> Peak:
+        at = float(self._workspace.balance.parameter.outside(float(node.solution[-1])))
+        return Peak(
+            value=float(node.measures[MAX_ABS]), at=at, solution=node.solution[:-1].copy(), interior=interior
         )
-    for end, falls in ((0, slope[0] <= 0.0), (amplitude.size - 1, slope[-1] >= 0.0)):
-        if falls or amplitude.size == 1:
-            point = points.solutions[end]
-            found.append(
-                Peak(
-                    value=float(amplitude[end]), at=float(outside(point[-1])), solution=point[:-1].copy(),
-                    interior=False,
-                )
-            )  # fmt: skip
-    return tuple(sorted(found, key=lambda peak: -peak.value)), spent
 
+    def band(self, limit: float) -> Band:
+        """Return where the amplitude exceeds `limit` [m], anywhere on the branch."""
+        outside = self._workspace.balance.parameter.outside
+        pieces, crossings = [], []
+        for left, right in zip(self._nodes[:-1], self._nodes[1:], strict=True):
+            gaps = left.measures[MAX_ABS] - limit, right.measures[MAX_ABS] - limit
+            begin, end = left.solution, right.solution
+            if gaps[0] <= 0.0 and gaps[1] <= 0.0:
+                continue
+            if (gaps[0] > 0.0) != (gaps[1] > 0.0):
+                edge = self._edge(left, right, limit, gaps)
+                crossings.append(edge)
+                begin, end = (begin, edge) if gaps[0] > 0.0 else (edge, end)
+            ends = float(outside(float(begin[-1]))), float(outside(float(end[-1])))
+            pieces.append((min(ends), max(ends)))
+        merged = _merge(pieces)
+        edges = []
+        for edge in crossings:
+            at = float(outside(float(edge[-1])))
+            for low, high in merged:
+                if at in (low, high):
+                    edges.append(Edge(at=at, solution=edge[:-1].copy(), opens=at == low))
+        width = float(sum(high - low for low, high in merged))
+        return Band(limit=limit, width=width, intervals=tuple(merged), edges=tuple(edges))
 
-def find_band(workspace: Workspace, points: Points, limit: float) -> tuple[Band, int]:
-    """Return where the amplitude exceeds `limit` [m] (anywhere on the branch), and the iterations spent."""
-    amplitude, place = points.measures[:, MAX_ABS], points.solutions[:, -1]
-    above = amplitude > limit
-    crossings, spent = [], 0
-    for i in np.flatnonzero(above[:-1] != above[1:]):
-        gap = amplitude[i : i + 2] - limit
-        point, _, iterations = _refine(workspace, points, int(i), EDGE, limit, gap[0], gap[1])
-        spent += iterations
-        if point is None:
-            # Between two converged points the straight line stands in; its error is that of the branch.
-            share = gap[0] / (gap[0] - gap[1])
-            point = points.solutions[i] + share * (points.solutions[i + 1] - points.solutions[i])
-        crossings.append((int(i), point))
-    pieces = _pieces(place, above, crossings)
-    outside = workspace.balance.parameter.outside
-    merged = tuple((float(outside(low)), float(outside(high))) for low, high in _merge(pieces))
-    edges = []
-    for _, point in crossings:
-        at = float(outside(point[-1]))
-        for low, high in merged:
-            if at in (low, high):
-                edges.append(Edge(at=at, solution=point[:-1].copy(), opens=at == low))
-    width = float(sum(high - low for low, high in merged))
-    return Band(limit=limit, width=width, intervals=merged, edges=tuple(edges)), spent
+    def _edge(self, left: _Node, right: _Node, limit: float, gaps: tuple[float, float]) -> Real:
+        """Return the point where the amplitude equals the limit."""
+        node = self._refine(left, right, EDGE, limit, float(gaps[0]), float(gaps[1]))
+        if node is not None:
+            return node.solution
+        # Between two converged points the straight line stands in; its error is that of the branch.
+        share = gaps[0] / (gaps[0] - gaps[1])
+        straight: Real = left.solution + share * (right.solution - left.solution)
+        return straight
 
+    def _between(self, left: _Node, right: _Node, share: float) -> _Node | None:
+        """Return the node at a share of the way between two, or None if there is no solution there."""
+        found, tangent, observed, values = self._rows(left)
+        by_share = _scales(left, right)
+        workspace = self._workspace
+        good, iterations = between(
+            workspace.system, workspace.linear, workspace.point, left.solution, left.tangent * by_share[0],
+            right.solution, right.tangent * by_share[1], share, _MOST_ITERATIONS, found, tangent, observed,
+            values,
+        )  # fmt: skip
+        self.spent += int(iterations)
+        return _Node(solution=found, tangent=tangent, measures=values) if good else None
 
-def _pieces(
-    place: Real, above: NDArray[np.bool_], crossings: list[tuple[int, Real]]
-) -> list[tuple[float, float]]:
-    """Return the stretches of λ passed above the limit, segment by segment of the branch."""
-    at = {i: float(point[-1]) for i, point in crossings}
-    pieces = []
-    for i in range(place.size - 1):
-        if not (above[i] or above[i + 1]):
-            continue
-        ends = (
-            at.get(i, float(place[i])) if not above[i] else float(place[i]),
-            at.get(i, float(place[i + 1])) if not above[i + 1] else float(place[i + 1]),
-        )
-        pieces.append((min(ends), max(ends)))
-    return pieces
+    def _refine(
+        self, left: _Node, right: _Node, what: int, level: float, g_left: float, g_right: float
+    ) -> _Node | None:
+        """Return the peak or edge between two nodes, or None if there is no solution on the way."""
+        found, tangent, observed, values = self._rows(left)
+        by_share = _scales(left, right)
+        workspace = self._workspace
+        good, iterations = refine(
+            workspace.system, workspace.linear, workspace.point, left.solution, left.tangent * by_share[0],
+            right.solution, right.tangent * by_share[1], what, level, g_left, g_right, _MOST_ITERATIONS,
+            found, tangent, observed, values,
+        )  # fmt: skip
+        self.spent += int(iterations)
+        return _Node(solution=found, tangent=tangent, measures=values) if good else None
+
+    def _rows(self, like: _Node) -> tuple[Real, Real, Real, Real]:
+        size = like.solution.size
+        n = self._workspace.balance.n_coefficients
+        return np.zeros(size), np.zeros(size), np.zeros(n), np.zeros(MEASURES)
 
 
 def band_limit(limit: float | None, peaks: tuple[Peak, ...], kind: Kind) -> float | None:
@@ -120,6 +220,35 @@ def band_limit(limit: float | None, peaks: tuple[Peak, ...], kind: Kind) -> floa
     if not peaks or kind is not Kind.FREQUENCY:
         return None
     return limit if limit is not None else peaks[0].value * HALF_POWER
+
+
+def _slope(node: _Node) -> float:
+    """Return the slope of max|x| along the node's tangent."""
+    higher = HIGH_SLOPE if node.measures[HIGH] >= node.measures[LOW] else LOW_SLOPE
+    return float(node.measures[higher])
+
+
+def _scales(left: _Node, right: _Node) -> tuple[float, float]:
+    """Return the factors that turn both tangents into derivatives by the share of the chord between them."""
+    chord = right.solution - left.solution
+    weights = np.full(chord.size, 1.0 / max(float(np.abs(left.solution[:-1]).max(initial=0.0)) ** 2, 1e-300))
+    weights[-1] = 1.0 / max(float(chord[-1]) ** 2, 1e-300)
+    weighted = weights * chord
+    length = float(weighted @ chord)
+    factors = []
+    for node in (left, right):
+        along = float(weighted @ node.tangent)
+        factors.append(length / along if along != 0.0 else 0.0)
+    return factors[0], factors[1]
+
+
+def _distinct(nodes: list[_Node]) -> list[_Node]:
+    """Return the nodes without a second one at the same place (both curves agree in a symmetric motion)."""
+    if len(nodes) == 2:
+        first, second = (node.solution[-1] for node in nodes)
+        if abs(first - second) <= 1e-7 * abs(first):
+            return [max(nodes, key=lambda node: float(node.measures[MAX_ABS]))]
+    return nodes
 
 
 def _merge(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -131,33 +260,3 @@ def _merge(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
         else:
             merged.append((low, high))
     return merged
-
-
-def _length(points: Points, i: int) -> float:
-    """Return the chord from point i to the next, measured along the unit tangents at its ends."""
-    chord = points.solutions[i + 1] - points.solutions[i]
-    size = np.abs(chord) @ np.abs(points.tangents[i]) / (points.tangents[i] @ points.tangents[i])
-    return float(size)
-
-
-def _refine(
-    workspace: Workspace, points: Points, i: int, what: int, level: float, g_left: float, g_right: float
-) -> tuple[Real | None, float, int]:
-    """Polish between points i and i + 1; return (point or None, its max|x|, iterations)."""
-    left, right = points.solutions[i], points.solutions[i + 1]
-    chord = right - left
-    observed, values = np.zeros(workspace.balance.n_coefficients), np.zeros(MEASURES)
-    slopes = []
-    for tangent in (points.tangents[i], points.tangents[i + 1]):
-        # The tangent as the derivative by the share of the chord, in the scaling of the chord itself.
-        weights = np.full(chord.size, 1.0 / max(np.abs(left[:-1]).max(initial=0.0) ** 2, 1e-300))
-        weights[-1] = 1.0 / max(chord[-1] ** 2, 1e-300)
-        along = (weights * chord) @ tangent
-        slopes.append(tangent * ((weights * chord) @ chord / along) if along != 0.0 else chord)
-    good, point, iterations = refine(
-        workspace.system, workspace.linear, workspace.point, left.copy(), slopes[0], right.copy(), slopes[1],
-        what, level, g_left, g_right, _MOST_ITERATIONS, observed, values,
-    )  # fmt: skip
-    if not good or not np.isfinite(values[MAX_ABS]):
-        return None, math.nan, int(iterations)
-    return point, float(values[MAX_ABS]), int(iterations)

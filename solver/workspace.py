@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.balance import Balance
+from solver.balance import Balance, fewer_harmonics
 from solver.fourier import Real
-from solver.kernels.newton import newton, start
+from solver.kernels.newton import from_stuck, ladder, newton
 from solver.kernels.observe import MEASURES
 from solver.kernels.receptance import receptance
 from solver.kernels.refine import slope_by_parameter
@@ -22,6 +22,10 @@ from solver.kernels.system import (
     new_evaluation,
     new_receptance,
     receptance_by_value,
+)
+
+FEWEST_HARMONICS = (
+    2  # the mean and the first: with these Newton's method from full stick nearly always ends well
 )
 
 
@@ -79,16 +83,62 @@ class Workspace:
         return cls(balance, system, new_receptance(system), new_evaluation(system))
 
     def solve(self, p: float, guess: Real | None = None) -> PointSolution:
-        """Solve at λ = `p` (inside unit), from `guess` if it is given and good, else from the ladder."""
+        """Solve at λ = `p` (inside unit): from `guess` if given, else from nothing.
+
+        From nothing, Newton starts at the fully stuck response; if that fails, the harmonics are added
+        little by little, beginning with the first alone; if that fails too, the load is walked down rung by
+        rung from full stick.
+        """
+        system, linear, point = self.system, self.linear, self.point
+        u, spent = np.zeros(self.balance.n_unknowns), 0
         if guess is not None:
-            u = guess.copy()
-            receptance(self.system, p, self.linear)
-            good, spent, norm = newton(self.system, self.linear, u, p, 0.0, self.point)
+            good, spent, norm = self._newton(guess, u, p)
             if good:
                 return PointSolution(converged=True, u=u, iterations=spent, residual=norm)
-        u = np.zeros(self.balance.n_unknowns)
-        good, spent, norm = start(self.system, self.linear, u, p, self.point)
+        good, more, norm = from_stuck(system, linear, u, p, point)
+        spent += more
+        if not good:
+            coarse = self._with_fewer_harmonics(p)
+            spent += coarse.iterations
+            if coarse.converged:
+                good, more, norm = self._newton(self._padded(coarse.u), u, p)
+                spent += more
+        if not good:
+            good, more, norm = ladder(system, linear, u, p, point)
+            spent += more
         return PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
+
+    def _with_fewer_harmonics(self, p: float) -> PointSolution:
+        """Solve with about two thirds of the harmonics, found in the same way from still fewer."""
+        count = self.balance.system.ks.size
+        fewer = max(2 * count // 3, FEWEST_HARMONICS)
+        if fewer >= count:
+            nothing = np.zeros(self.balance.n_unknowns)
+            return PointSolution(converged=False, u=nothing, iterations=0, residual=np.inf)
+        smaller = Workspace.of(fewer_harmonics(self.balance, fewer))
+        coarse = smaller._with_fewer_harmonics(p)
+        u, good, norm, spent = np.zeros(smaller.balance.n_unknowns), False, np.inf, coarse.iterations
+        if coarse.converged:
+            good, more, norm = smaller._newton(smaller._padded(coarse.u), u, p)
+            spent += more
+        if not good:
+            good, more, norm = from_stuck(smaller.system, smaller.linear, u, p, smaller.point)
+            spent += more
+        return PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
+
+    def _newton(self, guess: Real, u: Real, p: float) -> tuple[bool, int, float]:
+        """Run Newton's method from `guess`, the result in `u`."""
+        u[:] = guess
+        receptance(self.system, p, self.linear)
+        return newton(self.system, self.linear, u, p, 0.0, self.point)
+
+    def _padded(self, u: Real) -> Real:
+        """Return a solution with fewer harmonics, filled up with zeros."""
+        contacts = len(self.balance.scene.contacts)
+        kept = u.reshape(contacts, -1)
+        full = np.zeros((contacts, self.balance.n_coefficients))
+        full[:, : kept.shape[1]] = kept
+        return full.reshape(-1)
 
     def evaluate(self, u: Real, p: float) -> tuple[float, Evaluation]:
         """Return the relative residual at (u, p) and everything evaluated there (views of scratch arrays)."""

@@ -128,7 +128,7 @@ def test_a_search_can_be_stopped_and_keeps_the_best_so_far() -> None:
     def stop() -> bool:
         nonlocal count
         count += 1
-        return count > 40
+        return count > 12
 
     result = optim.design(solver.load_scene("two-dof"), should_stop=stop)
     assert result.status is DesignStatus.STOPPED

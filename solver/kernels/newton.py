@@ -1,8 +1,8 @@
-"""Newton's method on the balance: at fixed λ, along an arc, and from nothing (the start-up ladder).
+"""Newton's method on the balance: at fixed λ, along an arc, and from nothing (stuck response, then ladder).
 
 The balance is piecewise smooth (contacts change state), so the fixed-λ iteration is a damped semismooth
-Newton method: full steps, halved while the residual does not fall, and a full step after all where even a
-short one does not help, because the way past a kink may lead uphill. Convergence is judged by the true
+Newton method: full steps, halved while the residual does not fall, and the least bad of them where none
+helps, because the way past a kink may lead uphill. Convergence is judged by the true
 residual alone.
 """
 
@@ -22,8 +22,8 @@ from solver.kernels.system import KT, MU, N0, N1, Evaluation, Receptance, System
 TARGET = 1e-11  # relative residual aimed at
 ACCEPTED = 1e-9  # relative residual still a solution when rounding allows no better
 _HALVINGS = 5
-_UPHILL_STEPS = 4
-_MOST = 20
+_UPHILL_STEPS = 8
+_MOST = 25
 
 
 @compiled
@@ -40,20 +40,22 @@ def newton(
     n = u.size
     trial, kept, matrix, step = np.empty(n), np.empty(n), np.empty((n, n)), np.empty((1, n))
     copy_to(trial, u)
-    norm, best, length = np.inf, np.inf, 0.0
+    norm, best, length, least, least_length = np.inf, np.inf, 0.0, np.inf, 1.0
     iteration, halvings, uphill, must_take = 0, 0, 0, True
     while True:
         fresh = evaluate(system, linear, trial, p, added, point)
         if not must_take and not fresh < (1.0 - 0.1 * length) * norm:
             if best <= ACCEPTED:
                 break
+            if fresh < least:
+                least, least_length = fresh, length
             halvings += 1
             length *= 0.5
             if halvings > _HALVINGS:
                 uphill += 1
                 if uphill > _UPHILL_STEPS:
                     break
-                length, must_take = 1.0, True
+                length, must_take = least_length, True
             set_to(trial, u, -length, step[0])
             continue
         if not math.isfinite(fresh):
@@ -73,6 +75,7 @@ def newton(
             break
         iteration += 1
         length, halvings, must_take = 1.0, 0, False
+        least, least_length = np.inf, 1.0
         set_to(trial, u, -length, step[0])
     if not math.isfinite(best):
         return False, iteration, best
@@ -172,14 +175,33 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
 
 
 @compiled
-def start(
+def load_scale(system: System, p: float) -> float:
+    """Return the largest normal load any contact sees at λ = p [N]."""
+    table, _, _, _ = contact_values(system, p, 0.0)
+    scale = 0.0
+    for c in range(table.shape[0]):
+        scale = max(scale, table[c, N0] + abs(table[c, N1]))
+    return scale
+
+
+@compiled
+def from_stuck(
     system: System, linear: Receptance, u: Real, p: float, point: Evaluation
 ) -> tuple[bool, int, float]:
-    """Find a first solution at λ = p from nothing, in place in `u`.
+    """Try Newton's method from the response of fully stuck contacts, in place in `u`; as `newton`."""
+    receptance(system, p, linear)
+    stuck_start(system, linear, p, u)
+    return newton(system, linear, u, p, 0.0, point)
 
-    Newton from the stuck response is tried first. Then the ladder: the fully stuck response is exact under a
-    large enough added load, which is walked down to 0, each rung predicted from the two before and the steps
-    shortened where Newton fails.
+
+@compiled
+def ladder(
+    system: System, linear: Receptance, u: Real, p: float, point: Evaluation
+) -> tuple[bool, int, float]:
+    """Find a solution at λ = p from nothing, in place in `u`, whatever it takes.
+
+    The fully stuck response is exact under a large enough added load, which is walked down to 0, each rung
+    predicted from the two before and the steps shortened where Newton fails.
 
     Returns
     -------
@@ -192,11 +214,15 @@ def start(
     here = stuck_start(system, linear, p, stuck)
     copy_to(best, stuck)
     copy_to(last_u, stuck)
-    copy_to(trial, stuck)
-    last, ahead, factor = here, 0.0, 0.25
-    floor = 1e-6 * here
-    total, first, predicted = 0, True, False
+    last, factor, total = here, 0.7, 0
+    floor = 0.02 * load_scale(system, p)
     for _ in range(400):
+        ahead = here * factor if here * factor > floor else 0.0
+        copy_to(trial, best)
+        if last != here:
+            step = (ahead - here) / (here - last)
+            for i in range(n):
+                trial[i] += step * (best[i] - last_u[i])
         good, iterations, norm = newton(system, linear, trial, p, ahead, point)
         total += iterations
         if good:
@@ -207,25 +233,12 @@ def start(
                 copy_to(u, best)
                 return True, total, norm
             factor = max(0.1, factor * factor) if iterations <= 6 else factor
-        elif predicted:
-            # The same rung once more, from the last solution instead of the prediction.
-            copy_to(trial, best)
-            predicted = False
-            continue
-        elif not first:
+        else:
             factor = math.sqrt(factor)
             if factor > 0.9999:
                 break
-            if here <= floor:
+            if here <= floor or ahead == 0.0:
                 floor *= 0.1
-        first = False
-        ahead = here * factor if here * factor > floor else 0.0
-        copy_to(trial, best)
-        predicted = last != here
-        if predicted:
-            step = (ahead - here) / (here - last)
-            for i in range(n):
-                trial[i] += step * (best[i] - last_u[i])
     copy_to(u, best)
     norm = evaluate(system, linear, u, p, 0.0, point)
     return False, total, norm

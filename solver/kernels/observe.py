@@ -12,9 +12,10 @@ from solver.kernels.events import largest
 from solver.kernels.system import Evaluation, Receptance, System
 from solver.kernels.trigpoly import on_grid, unpack
 
-# Columns of the measures of a point.
-MAX_ABS, HALF_RANGE, MEAN, SLOPE, RANGE_SLOPE, RESIDUAL = 0, 1, 2, 3, 4, 5
-MEASURES = 6
+# Columns of the measures of a point. HIGH is max x and LOW is −min x: each is smooth along a branch, while
+# max|x|, the larger of the two, has a kink where they cross.
+MAX_ABS, HALF_RANGE, MEAN, SLOPE, RANGE_SLOPE, RESIDUAL, HIGH, LOW, HIGH_SLOPE, LOW_SLOPE = range(10)
+MEASURES = 10
 
 
 @compiled
@@ -112,6 +113,7 @@ def measure(
     observed_slope(system, linear, u, point, du, dp, dx)
     rise, sink = _along(system, dx, at_high), _along(system, dx, at_low)
     out[HALF_RANGE], out[RANGE_SLOPE] = 0.5 * (high - low), 0.5 * (rise - sink)
+    out[HIGH], out[LOW], out[HIGH_SLOPE], out[LOW_SLOPE] = high, -low, rise, -sink
     out[MEAN] = x[0] if system.ks[0] == 0 else 0.0
     if high >= -low:
         out[MAX_ABS], out[SLOPE] = high, rise

@@ -20,7 +20,7 @@ from numba.experimental import structref
 from solver.fourier import Integer, Real
 from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.linear import copy_to, largest_entry, set_to, solve
-from solver.kernels.newton import arc_newton, border, newton, start
+from solver.kernels.newton import arc_newton, border, newton
 from solver.kernels.observe import RESIDUAL, measure
 from solver.kernels.receptance import receptance
 from solver.kernels.residual import evaluate
@@ -29,7 +29,7 @@ from solver.kernels.system import Evaluation, Receptance, System
 STRAIGHT_ON = 0.98  # cosine of the turn at a branch point; more than that is a step across a sharp peak
 # How a stretch of continuation ended.
 RUNNING, FINISHED, NO_START, STALLED, LEFT_RANGE = 0, 1, 2, 3, 4
-TANGENT, SECANT = 0, 1
+TANGENT, SECANT, CUBIC = 0, 1, 2
 
 
 class Control(NamedTuple):
@@ -56,7 +56,8 @@ class Walk(NamedTuple):
     u: Real  # (nt,)
     before: Real  # (nt + 1,) the point before, λ last
     tangent: Real  # (nt + 1,)
-    numbers: Real  # (10,)
+    before_tangent: Real  # (nt + 1,) at the point before
+    numbers: Real  # (11,)
 
 
 @structref.register
@@ -76,32 +77,21 @@ _new_walk: Callable[..., Walk] = _WalkReference
 @compiled
 def walk_by_value(walk: Walk) -> Walk:
     """Return the arrays of a walk as a tuple that Python can read (views, not copies)."""
-    return Walk(walk.u, walk.before, walk.tangent, walk.numbers)
+    return Walk(walk.u, walk.before, walk.tangent, walk.before_tangent, walk.numbers)
 
 
-P, STEP, ORIENTATION, ITERATIONS, REJECTED, STEPPED_OVER, COUNT, NORM, FRESH, PIECE = range(10)
+P, STEP, ORIENTATION, ITERATIONS, REJECTED, STEPPED_OVER, COUNT, NORM, FRESH, ROUGH, PIECE = range(11)
 
 
 @compiled
 def begin_walk(
-    system: System, linear: Receptance, point: Evaluation, control: Control, guess: Real
+    system: System, linear: Receptance, point: Evaluation, control: Control, u: Real
 ) -> tuple[int, Walk]:
-    """Find the first point of a branch (from `guess` if it is not empty) and its tangent."""
+    """Begin a branch at a solution `u` for the start of the range: its first point and tangent."""
     out_of_line()
-    nt = system.contacts.shape[0] * (2 * system.ks.size - (1 if system.ks[0] == 0 else 0))
-    walk = _new_walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(10))
-    p = control.start
-    good, iterations = False, 0
-    if guess.size == nt:
-        receptance(system, p, linear)
-        copy_to(walk.u, guess)
-        good, iterations, _ = newton(system, linear, walk.u, p, 0.0, point)
-    if not good:
-        good, more, _ = start(system, linear, walk.u, p, point)
-        iterations += more
-    walk.numbers[ITERATIONS] = iterations
-    if not good:
-        return NO_START, walk
+    nt, p = u.size, control.start
+    walk = _new_walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(11))
+    copy_to(walk.u, u)
     walk.numbers[P] = p
     walk.numbers[STEP] = control.first_step
     walk.tangent[nt] = 1.0 if control.stop >= control.start else -1.0
@@ -178,8 +168,38 @@ def _predict(walk: Walk, control: Control, step: float, guess: Real) -> float:
             for i in range(n):
                 guess[i] = walk.u[i] + scale * (walk.u[i] - walk.before[i])
             return p + scale * (p - walk.before[n])
+    if control.predictor == CUBIC and walk.numbers[COUNT] > 0 and walk.numbers[ROUGH] == 0.0:
+        return _extrapolate(walk, control, step, guess)
     set_to(guess, walk.u, step, walk.tangent)
     return p + step * walk.tangent[n]
+
+
+@compiled
+def _extrapolate(walk: Walk, control: Control, step: float, guess: Real) -> float:
+    """Predict by the cubic through the last two points and their tangents; return the predicted λ."""
+    n = walk.u.size
+    p = walk.numbers[P]
+    weight_u, weight_p = _weights(walk.u, control)
+    chord = weight_p * (p - walk.before[n]) ** 2
+    here, there = weight_p * walk.tangent[n] ** 2, weight_p * walk.before_tangent[n] ** 2
+    for i in range(n):
+        chord += weight_u * (walk.u[i] - walk.before[i]) ** 2
+        here += weight_u * walk.tangent[i] ** 2
+        there += weight_u * walk.before_tangent[i] ** 2
+    length = math.sqrt(chord)
+    if not step < 3.0 * length:
+        set_to(guess, walk.u, step, walk.tangent)
+        return p + step * walk.tangent[n]
+    t = 1.0 + step / length
+    value0, value1 = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
+    slope0 = t * (1.0 - t) ** 2 * length / math.sqrt(there)
+    slope1 = t * t * (t - 1.0) * length / math.sqrt(here)
+    for i in range(n):
+        guess[i] = (
+            value0 * walk.before[i] + value1 * walk.u[i]
+            + slope0 * walk.before_tangent[i] + slope1 * walk.tangent[i]
+        )  # fmt: skip
+    return value0 * walk.before[n] + value1 * p + slope0 * walk.before_tangent[n] + slope1 * walk.tangent[n]
 
 
 @compiled
@@ -197,8 +217,10 @@ def _accept(walk: Walk, trial: Real, p: float, norm: float) -> None:
     n = trial.size
     copy_to(walk.before[:n], walk.u)
     walk.before[n] = walk.numbers[P]
+    copy_to(walk.before_tangent, walk.tangent)
     copy_to(walk.u, trial)
     walk.numbers[P] = p
+    walk.numbers[ROUGH] = 0.0
     walk.numbers[COUNT] += 1
     walk.numbers[NORM], walk.numbers[FRESH] = norm, 1.0
 
@@ -244,7 +266,10 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
                 good = False
         if not good:
             walk.numbers[REJECTED] += 1
-            walk.numbers[STEP] *= 0.5
+            # The first retry keeps the length and trusts the tangent alone: the cubic may reach over a kink.
+            smooth = control.predictor == CUBIC and walk.numbers[ROUGH] == 0.0
+            walk.numbers[STEP] *= 0.75 if smooth else 0.5
+            walk.numbers[ROUGH] = 1.0
             continue
         growth = (control.wanted_iterations + 0.5) / (iterations + 0.5)
         growth = min(growth, math.sqrt(0.3 * control.largest_turn / (turned + 1e-12)))
@@ -292,7 +317,7 @@ def _step_over(system: System, linear: Receptance, point: Evaluation, control: C
         for i in range(n):
             walk.tangent[i] = walk.u[i] - walk.before[i]
         walk.tangent[n] = p - walk.before[n]
-        walk.numbers[ORIENTATION] = 0.0
+        walk.numbers[ORIENTATION], walk.numbers[ROUGH] = 0.0, 1.0
         walk.numbers[STEP] = max(control.first_step * 0.1, 256.0 * control.smallest_step)
         turned = _turn(walk, point, control)
         if last:
