@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.linalg import eigvalsh
 
-from solver.sectors import annulus
 from solver.errors import SettingError
 from solver.parametric import linear_model
 from solver.scene import CyclicStructure, LumpedStructure, Scene, load_scene
+from solver.sectors import annulus
 
 
 def disk(sectors: int = 8, order: int = 3) -> Scene:
