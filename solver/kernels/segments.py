@@ -192,30 +192,27 @@ def find_segments(
         return SEPARATED, 0
     if n_intervals < 0:
         return _march_circle(c, s, degree, value, slope, tol, segments)
+    return _march_intervals(c, s, degree, value, slope, tol, intervals, n_intervals, segments)
+
+
+@compiled
+def _march_intervals(
+    c: Real, s: Real, degree: int, value: Real, slope: Real, tol: float, intervals: Real, n_intervals: int,
+    segments: Real,
+) -> tuple[int, int]:  # fmt: skip
+    """March every interval of contact from its beginning, where the force is 0."""
     count = 0
     for i in range(n_intervals):
         begin, end = intervals[i, 0], intervals[i, 1]
-        rate_plus = at_point(c[0], s[0], degree, begin)[1]
-        rate_minus = at_point(c[1], s[1], degree, begin)[1]
+        plus, rate_plus, _, _ = at_point(c[0], s[0], degree, begin)
+        minus, rate_minus, _, _ = at_point(c[1], s[1], degree, begin)
         motion = STICK if rate_plus < 0.0 and rate_minus < 0.0 else SLIP
         direction = 1.0 if rate_plus >= rate_minus else -1.0
-        offset = -kt * at_point(uc, us, ks[-1], begin)[0]
+        offset = 0.5 * (minus - plus)  # −kt u
         count = march(
-            c,
-            s,
-            degree,
-            value,
-            slope,
-            begin,
-            end,
-            motion,
-            direction,
-            offset,
-            AFTER_SEPARATION,
-            tol,
-            segments,
-            count,
-        )
+            c, s, degree, value, slope, begin, end, motion, direction, offset, AFTER_SEPARATION, tol,
+            segments, count,
+        )  # fmt: skip
         if count < 0:
             return FAILED, 0
     return LIFTING, count
@@ -241,19 +238,6 @@ def _march_circle(
     begin, end = at_minus, at_minus + 2.0 * math.pi
     none = int(np.int64(0))  # a literal 0 would compile the march a second time
     count = march(
-        c,
-        s,
-        degree,
-        value,
-        slope,
-        begin,
-        end,
-        STICK,
-        -1.0,
-        high_minus,
-        AFTER_SLIP,
-        tol,
-        segments,
-        none,
+        c, s, degree, value, slope, begin, end, STICK, -1.0, high_minus, AFTER_SLIP, tol, segments, none
     )
     return (SLIPPING, count) if count >= 0 else (FAILED, 0)
