@@ -35,9 +35,12 @@ class SceneError(SolverError):
 
 
 class SettingError(SolverError):
-    """A bad argument of a computation (a frequency, a number of harmonics, a parameter path)."""
+    """A bad argument of a computation (a frequency, a number of harmonics, a parameter path).
 
-    def __init__(self, name: str, value: object, wanted: str) -> None:
+    The message is "`name` wanted, got value", followed by `hint`.
+    """
+
+    def __init__(self, name: str, value: object, wanted: str, hint: str = "") -> None:
         self.name = name
         self.value = value
-        super().__init__(f"`{name}` {wanted}, got {value!r}")
+        super().__init__(f"`{name}` {wanted}, got {value!r}{hint}")

@@ -182,7 +182,7 @@ def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
     owners = [part.name for part in parts]
     if not name or name not in owners:
         known = structure_names(structure)
-        raise SettingError("name", name, f"must be one of {listing(known)}{nearest(str(name), known)}")
+        raise SettingError("name", name, f"must be one of {listing(known)}", nearest(str(name), known))
     return _derivative(_topology(structure), _numbers(structure), owners.index(name))
 
 

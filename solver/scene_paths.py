@@ -179,4 +179,4 @@ def _unknown(scene: Scene, path: object) -> SettingError:
     if path == FREQUENCY:
         return SettingError("path", path, "must name a value of the scene; the frequency belongs to the run")
     known = (FREQUENCY, *parameter_paths(scene))
-    return SettingError("path", path, f"must be one of {listing(known)}{nearest(str(path), known)}")
+    return SettingError("path", path, f"must be one of {listing(known)}", nearest(str(path), known))
