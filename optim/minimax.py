@@ -25,6 +25,7 @@ LARGEST_RADIUS = 0.5
 SMALLEST_RADIUS = 1e-9
 STATIONARY = 1e-11  # predicted relative decrease below which a design is optimal
 COLLAPSED_RADIUS = 1e-4  # a radius below this says that the model was wrong, not that a step is useless
+SNAP = 1e-7  # scaled distance within which a variable is put on its bound
 ACTIVE = 1e-6  # relative distance from the highest peak within which a peak is active
 KKT_TOLERANCE = 1e-3  # relative peak per scaled variable
 FLAT_SLOPE = 1e-9  # relative peak per scaled variable below which there is nothing to choose
@@ -95,7 +96,7 @@ def local_search(
         decrease = model.merit() - step.predicted
         if decrease <= STATIONARY * model.merit() or radius <= SMALLEST_RADIUS:
             return _ended(here, model, z, radius <= COLLAPSED_RADIUS)
-        trial_z = np.clip(z + step.step, 0.0, 1.0)
+        trial_z = _snapped(z + step.step)
         trial = evaluate(_values(trial_z, variables))
         if not trial.good:
             radius *= 0.25
@@ -198,6 +199,14 @@ def _update(hessian: Real, s: Real, y: Real) -> Real:
         curvature = float(s @ y)
     updated: Real = hessian - np.outer(Bs, Bs) / quadratic + np.outer(y, y) / curvature
     return updated
+
+
+def _snapped(z: Real) -> Real:
+    """Return scaled variables within their bounds; the conic solver stops a hair's breadth inside them."""
+    inside = np.clip(z, 0.0, 1.0)
+    inside[inside <= SNAP] = 0.0
+    inside[inside >= 1.0 - SNAP] = 1.0
+    return inside
 
 
 def _root(hessian: Real) -> Real:

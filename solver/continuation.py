@@ -61,7 +61,7 @@ class ContinuationSettings:
     first_step: float = 0.02
     largest_step: float = 0.2
     smallest_step: float = 1e-8
-    range_length: float = 6.0
+    range_length: float = 14.0
     wanted_iterations: int = 3
     most_iterations: int = 8
     largest_turn: float = 0.3
