@@ -34,9 +34,9 @@ def test_the_peak_does_not_depend_on_the_way_along_the_branch(
     assert coarse.peak.value == pytest.approx(fine.peak.value, rel=1e-8)
 
 
-# m = 1, both masses to ground by k1, coupled by k2, 100 N on the first, friction on the second: peak max|x2| and
-# its frequency, found with other codes by time marching.
-CASE_A = [
+# m = 1, both masses to ground by k1, coupled by k2, 100 N on the first, friction on the second: peak max|x2|
+# and its frequency, found with other codes by time marching.
+CHAIN = [
     (100.0, 0.0, 10.2358, 1.01436),
     (100.0, 80.0, 10.6409, None),
     (100.0, 150.0, 10.3278, 1.0190),
