@@ -118,7 +118,7 @@ def _matrices(model: LinearModel, theta: Real) -> _Matrices:
     return _Matrices(
         K=at(model.K0, model.Kp),
         C=at(model.C0, model.Cp),
-        M=np.broadcast_to(model.M, (theta.size, *model.M.shape)).astype(np.complex128),
+        M=np.ascontiguousarray(np.broadcast_to(model.M, (theta.size, *model.M.shape)), dtype=np.complex128),
         L=model.contact_here + model.contact_next * turn,
     )
 
