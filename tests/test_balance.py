@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 import pytest
 from contact_cases import central_difference
@@ -103,6 +104,15 @@ def test_every_form_and_state_is_met():
     assert forms == {MODES, POLES, DENSE}
     assert min(states[state] for state in (1, 2, 3)) >= 5
     assert {resolve(SCENES[name][0], path).kind for name, path in CASES} == set(Kind)
+
+
+def test_every_balance_has_the_same_types():
+    """The loops are compiled for one set of array types; another set would cost a minute at first use."""
+    types = {
+        tuple(str(numba.typeof(value)) for value in point(name, path).workspace.balance.system)
+        for name, path in CASES
+    }
+    assert len(types) == 1
 
 
 @pytest.mark.parametrize("name", SCENES)
