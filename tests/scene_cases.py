@@ -69,7 +69,7 @@ def mixed_disk() -> Scene:
     }
     raw["structure"]["masses"]["tip"] = {"m": 0.02, "name": "tip_mass"}  # type: ignore[index]
     raw["excitation"] = [
-        {"dof": "middle", "amplitude": 50.0, "phase": 0.3, "engine_order": 2},
+        {"dof": "middle", "amplitude": 400.0, "phase": 0.3, "engine_order": 2},
         {"dof": "tip", "amplitude": 8.0, "harmonic": 2, "phase": -0.4, "engine_order": 2},
         {"dof": "root", "amplitude": 30.0, "harmonic": 0, "engine_order": 2},
     ]
