@@ -1,4 +1,4 @@
-"""Checks to rounding: energy, scaling, symmetry, linear limits, one sector against the annulus, time marching."""
+"""Checks to rounding: energy, scaling, symmetry, linear limits, one sector and the annulus, time marching."""
 
 from __future__ import annotations
 
