@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from solver.scene import Scene, load_scene
 
 DATA = Path(__file__).parent / "data"
@@ -95,3 +97,43 @@ def loose_mass() -> Scene:
             "observe": {"dof": "loose", "band": [0.5, 4.0]},
         }
     )
+
+
+def joined_by_a_damper(c: float) -> Scene:
+    """Two oscillators joined by a dashpot, with a contact on the second."""
+    return Scene.from_dict(
+        {
+            "name": "joined-by-a-damper",
+            "structure": {
+                "kind": "lumped",
+                "masses": {"a": 1.0, "b": 1.0},
+                "springs": [
+                    {"between": ["a", "ground"], "k": 1.0},
+                    {"between": ["b", "ground"], "k": 2.0, "name": "k"},
+                ],
+                "dampers": [{"between": ["a", "b"], "c": c}],
+            },
+            "contacts": [
+                {"name": "damper", "between": ["b", "ground"], "kt": 1.0, "mu": 0.5, "N0": 0.3, "N1": 0.1}
+            ],
+            "excitation": {"dof": "a", "amplitude": 1.0},
+            "observe": {"dof": "b", "band": [0.05, 0.5]},
+        }
+    )
+
+
+def critically_damped() -> Scene:
+    """The dashpot at which two poles become one: below it they oscillate, above it they do not."""
+
+    def creeps(c: float) -> bool:
+        K, C = np.diag([1.0, 2.0]), c * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        poles = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-K, -C]]))
+        return bool((np.abs(poles.imag) < 1e-12).any())
+
+    low, high = 0.5, 5.0
+    while high - low > 1e-15:
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
+        low, high = (low, middle) if creeps(middle) else (middle, high)
+    return joined_by_a_damper(high)

@@ -10,7 +10,15 @@ import numba
 import numpy as np
 import pytest
 from contact_cases import central_difference
-from scene_cases import bladed_disk, loose_mass, mixed_disk, oscillator, two_dof
+from scene_cases import (
+    bladed_disk,
+    critically_damped,
+    joined_by_a_damper,
+    loose_mass,
+    mixed_disk,
+    oscillator,
+    two_dof,
+)
 
 from solver import fourier
 from solver.balance import build, for_parameter
@@ -34,6 +42,8 @@ SCENES = {
     "bladed-disk separating": (bladed_disk(N1_ratio=1.6), 640.0),
     "mixed disk": (mixed_disk(), 620.0),
     "loose mass": (loose_mass(), 1.7),
+    "critically damped": (critically_damped(), 0.2),
+    "nearly so": (joined_by_a_damper(critically_damped().structure.dampers[0].c * (1.0 + 1e-7)), 0.2),
 }
 CASES = [
     (name, path)
