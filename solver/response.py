@@ -15,12 +15,15 @@ from solver.balance import Balance, build, check_frequency
 from solver.fourier import Real
 from solver.kernels.events import LIFTING, SEPARATED, STUCK
 from solver.kernels.observe import HALF_RANGE, MAX_ABS, MEAN
+from solver.kernels.system import evaluation_by_value
 from solver.scene import Scene
 from solver.workspace import PointSolution, Workspace
 
 # A stuck contact below this share of its friction limit cannot have slipped while the vibration built up from
 # rest: a suddenly started linear vibration overshoots its steady amplitude at most twofold.
 SAFELY_STUCK = 0.5
+# Smallest singular value of dr/du, relative to the largest, that counts as a part nothing holds.
+FREE = 1e-7
 
 
 class ContactState(Enum):
@@ -185,7 +188,7 @@ def describe(workspace: Workspace, found: PointSolution, frequency_hz: float, be
         harmonics=np.abs(fourier.to_complex(observed)),
         observed=observed,
         contacts=contacts,
-        flags=_flags(contacts),
+        flags=_flags(contacts, nothing_holds=_nothing_holds_a_part(workspace)),
         residual=found.residual,
         error_estimate=error,
         newton_iterations=found.iterations,
@@ -228,10 +231,19 @@ def _contact(name: str, state: int, slip: Real, force: Real, load: Real, mu: flo
     )
 
 
-def _flags(contacts: tuple[ContactResponse, ...]) -> tuple[str, ...]:
+def _nothing_holds_a_part(workspace: Workspace) -> bool:
+    """Return whether a part that contacts alone hold is free to stand anywhere, where last evaluated."""
+    system = workspace.balance.system
+    if not np.any(system.shift > 0.0):
+        return False
+    values = np.linalg.svd(evaluation_by_value(workspace.point).jacobian, compute_uv=False)
+    return bool(values[-1] < FREE * values[0])
+
+
+def _flags(contacts: tuple[ContactResponse, ...], *, nothing_holds: bool) -> tuple[str, ...]:
     stuck = [contact for contact in contacts if contact.state is ContactState.STUCK]
     flags = []
-    if any(contact.utilisation > SAFELY_STUCK for contact in stuck):
+    if nothing_holds or any(contact.utilisation > SAFELY_STUCK for contact in stuck):
         flags.append("mean_undetermined")
     if stuck and len(stuck) == len(contacts):
         flags.append("all_stuck")
