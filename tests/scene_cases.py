@@ -78,8 +78,12 @@ def mixed_disk() -> Scene:
     return Scene.from_dict(raw)
 
 
-def loose_mass() -> Scene:
-    """A mass that nothing but two contacts holds, one of them stuck, beside a mass that a spring holds."""
+def loose_mass(floor: float = 3000.0, **link: float) -> Scene:
+    """A mass that nothing but two contacts holds, beside one that a spring holds.
+
+    `floor` is the load of its contact with the ground, which sticks unless another one is given; `link` are
+    values of the contact between the masses.
+    """
     return Scene.from_dict(
         {
             "name": "loose-mass",
@@ -90,8 +94,16 @@ def loose_mass() -> Scene:
                 "dampers": [{"name": "drag", "between": ["loose", "ground"], "c": 0.3}],
             },
             "contacts": [
-                {"name": "link", "between": ["held", "loose"], "kt": 60.0, "mu": 0.4, "N0": 20.0, "N1": 5.0},
-                {"name": "floor", "between": ["loose", "ground"], "kt": 40.0, "mu": 0.3, "N0": 3000.0},
+                {
+                    "name": "link",
+                    "between": ["held", "loose"],
+                    "kt": 60.0,
+                    "mu": 0.4,
+                    "N0": 20.0,
+                    "N1": 5.0,
+                    **link,
+                },
+                {"name": "floor", "between": ["loose", "ground"], "kt": 40.0, "mu": 0.3, "N0": floor},
             ],
             "excitation": {"dof": "held", "amplitude": 40.0},
             "observe": {"dof": "loose", "band": [0.5, 4.0]},

@@ -20,9 +20,10 @@ from scene_cases import (
     two_dof,
 )
 
-from solver import Scene, SettingError, SolutionStatus, solve
+from solver import Scene, SettingError, SolutionStatus, march, solve
 from solver.accuracy import truncation_error
 from solver.balance import build
+from solver.march_result import MarchStatus
 from solver.response import ContactState
 from solver.workspace import Workspace
 
@@ -128,6 +129,22 @@ def test_other_scenes_converge_with_harmonics(scene: Scene):
         solution = solve(scene, frequency_hz=frequency_hz, harmonics=harmonics)
         assert solution.residual <= 1e-9
         assert abs(solution.max_abs - truth) <= 1.5 * solution.error_estimate + 1e-8 * truth
+
+
+def test_a_part_that_nothing_holds_has_no_mean():
+    """Both contacts of the loose mass slip: it may vibrate about any place, and the answer says so."""
+    solution = solve(loose_mass(floor=30.0, N1=0.0), frequency_hz=1.7, harmonics=31)
+    assert solution.converged
+    assert solution.flags == ("mean_undetermined",)
+    assert solution.half_peak_to_peak == pytest.approx(0.3201523, rel=1e-6)
+    assert abs(solution.mean) < 1e-5
+
+
+def test_a_part_that_creeps_has_no_periodic_motion():
+    """Under a varying load the loose mass ratchets away; time marching sees it move for ever."""
+    solution = solve(loose_mass(floor=30.0), frequency_hz=1.7)
+    assert solution.status is SolutionStatus.NOT_CONVERGED
+    assert march(loose_mass(floor=30.0), frequency_hz=1.7, max_periods=50).status is MarchStatus.MAX_PERIODS
 
 
 def random_scene(rng: np.random.Generator, disk: bool) -> tuple[Scene, float]:
