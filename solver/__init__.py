@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     from solver.errors import Issue, SceneError, SettingError, SolverError
     from solver.histories import hysteresis_loop, motion, time_history
     from solver.marching import march
+    from solver.mistuning import BladeAmplitudes, blade_amplitudes, mistuned
     from solver.response import Solution, SolutionStatus, solve
     from solver.scene import Scene, load_scene, shipped_scenes
-    from solver.sectors import annulus
+    from solver.sectors import Extent, annulus, sectors_needed
 
 _HOME = {
     "Band": "branch", "Branch": "branch", "BranchStatus": "branch", "Peak": "branch",
@@ -26,15 +27,19 @@ _HOME = {
     "Issue": "errors", "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
     "Plan": "effects", "plan": "effects", "Scene": "scene", "load_scene": "scene", "shipped_scenes": "scene",
     "Solution": "response", "SolutionStatus": "response", "solve": "response",
-    "annulus": "sectors", "march": "marching", "PowerBalance": "energy", "power_balance": "energy",
+    "BladeAmplitudes": "mistuning", "blade_amplitudes": "mistuning", "mistuned": "mistuning",
+    "Extent": "sectors", "sectors_needed": "sectors", "annulus": "sectors",
+    "march": "marching", "PowerBalance": "energy", "power_balance": "energy",
     "hysteresis_loop": "histories", "motion": "histories", "time_history": "histories",
 }  # fmt: skip
 
 __all__ = [
     "Band",
+    "BladeAmplitudes",
     "Branch",
     "BranchStatus",
     "ContinuationSettings",
+    "Extent",
     "Issue",
     "Peak",
     "Plan",
@@ -47,12 +52,15 @@ __all__ = [
     "SolutionStatus",
     "SolverError",
     "annulus",
+    "blade_amplitudes",
     "hysteresis_loop",
     "load_scene",
     "march",
+    "mistuned",
     "motion",
     "plan",
     "power_balance",
+    "sectors_needed",
     "shipped_scenes",
     "solve",
     "sweep",

@@ -14,6 +14,7 @@ from solver.kernels.trigpoly import grid_size, grid_tables
 from solver.parameter import Kind, Parameter, resolve
 from solver.parametric import linear_model, structure_derivative
 from solver.scene import Scene
+from solver.sectors import check_in_annulus, written_out
 from solver.structure import reduce_model
 
 MOST_HARMONICS = 1000
@@ -99,6 +100,10 @@ def build(
     SettingError
         Unknown path, a missing or bad frequency, or a bad number of harmonics.
     """
+    whole = written_out(scene)
+    if whole is not scene:
+        check_in_annulus(scene, path)
+    scene = whole
     parameter = resolve(scene, path)
     ks = all_harmonics(check_harmonics(harmonics))
     omega = 0.0

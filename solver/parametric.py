@@ -20,6 +20,7 @@ from solver.errors import SettingError
 from solver.scene import CyclicStructure, Damper, End, Mass, Scene, Spring, Structure, parse_end
 from solver.scene_checks import listing, nearest
 from solver.scene_paths import structure_names
+from solver.sectors import written_out
 
 FloatArray = NDArray[np.float64]
 _Ends = tuple[End, End]
@@ -143,8 +144,10 @@ class _Expression(NamedTuple):
 def linear_model(scene: Scene) -> LinearModel:
     """The matrices, contacts and forces of a scene, with the values it has now.
 
-    The matrices are cached: changing contacts or excitation costs microseconds.
+    Where one sector does not stand for all they are those of the whole annulus. The matrices are cached:
+    changing contacts or excitation costs microseconds.
     """
+    scene = written_out(scene)
     structure = scene.structure
     dofs = structure.dofs
     matrices = _matrices(_topology(structure), _numbers(structure))

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import Field, ModelWrapValidatorHandler, ValidationError, field_validator, model_validator
 
 from solver import scene_paths
+from solver.cyclic_checks import cyclic_issues
 from solver.errors import Issue, SceneError
 from solver.scene_checks import cross_issues, field_issues, plain
 from solver.scene_io import load_raw, shipped_scenes
@@ -20,6 +21,7 @@ from solver.scene_parts import (
     Excitation,
     LumpedStructure,
     Mass,
+    Mistuning,
     Name,
     Observe,
     Part,
@@ -37,6 +39,7 @@ __all__ = [
     "Excitation",
     "LumpedStructure",
     "Mass",
+    "Mistuning",
     "Observe",
     "Scene",
     "Spring",
@@ -101,7 +104,7 @@ class Scene(Part):
             scene, issues = handler(data), []
         except ValidationError as error:
             scene, issues = None, field_issues(error, raw)
-        issues = [*issues, *cross_issues(raw)]
+        issues = [*issues, *cross_issues(raw), *cyclic_issues(raw)]
         if scene is None or issues:
             raise SceneError(issues)
         return scene

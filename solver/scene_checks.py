@@ -23,6 +23,7 @@ from solver.scene_parts import (
     Damper,
     Excitation,
     LumpedStructure,
+    Mistuning,
     Observe,
     Spring,
     parse_end,
@@ -38,6 +39,7 @@ _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     ("structure", "masses"): ("a mass", ("m", "name")),
     ("structure", "springs"): ("a spring", tuple(Spring.model_fields)),
     ("structure", "dampers"): ("a damper", tuple(Damper.model_fields)),
+    ("structure", "mistuning"): ("mistuning", tuple(Mistuning.model_fields)),
     ("contacts",): ("a contact", tuple(Contact.model_fields)),
     ("excitation",): ("an excitation", tuple(Excitation.model_fields)),
     ("observe",): ("observe", tuple(Observe.model_fields)),
@@ -170,7 +172,7 @@ def cross_issues(raw: dict[str, Any]) -> list[Issue]:
     found = chain(
         _reserved_dofs(dofs or (), cyclic),
         _end_issues(raw, structure, dofs, cyclic),
-        _dof_issues(raw, dofs),
+        _dof_issues(raw, dofs, structure.get("sectors") if cyclic else 0),
         _duplicates(_structure_names(structure), "structure"),
         _contact_name_issues(raw, cyclic),
         _engine_order_issues(raw, structure.get("kind")),
@@ -236,11 +238,15 @@ def _unknown_dof(key: str, text: str, dof: str, known: Sequence[str]) -> str:
     return f"`{key}`: there is no DOF {quoted(text)}; known: {listing(known)}{nearest(dof, known)}"
 
 
-def _dof_issues(raw: dict[str, Any], dofs: _Known | None) -> Iterator[Issue]:
+def _dof_issues(raw: dict[str, Any], dofs: _Known | None, sectors: object) -> Iterator[Issue]:
     if dofs is None:
         return
     for steps, row in [*_rows(raw, "excitation"), *_rows(raw, "observe")]:
         dof = row.get("dof")
+        if isinstance(dof, str) and steps[0] == "observe" and isinstance(sectors, int):
+            base, _, sector = dof.rpartition("@")
+            if base in dofs and sector.isdecimal() and int(sector[:10]) < sectors:
+                continue
         if isinstance(dof, str) and dof not in dofs:
             yield Issue(pointer=_pointer([*steps, "dof"]), message=_unknown_dof("dof", dof, dof, list(dofs)))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, NamedTuple, cast
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, field_validator, model_validator
 from pydantic_core import CoreSchema, core_schema
 
@@ -22,6 +23,7 @@ Signed = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST, allow_inf_
 Friction = Annotated[float, Field(strict=True, ge=0.0, le=100.0, allow_inf_nan=False)]
 Angle = Annotated[float, Field(strict=True, ge=-1e4, le=1e4, allow_inf_nan=False)]
 Sectors = Annotated[int, Field(strict=True, ge=1, le=10_000)]
+Seed = Annotated[int, Field(strict=True, ge=0, le=2**63 - 1)]
 Order = Annotated[int, Field(strict=True, ge=0, le=10_000)]
 HarmonicIndex = Annotated[int, Field(strict=True, ge=0, le=1_000)]
 
@@ -151,11 +153,55 @@ class LumpedStructure(_Structure):
     kind: Literal["lumped"]
 
 
+class Mistuning(Part):
+    """Blades that are not quite equal: one factor for each sector, on the parts `of` names.
+
+    Attributes
+    ----------
+    of : tuple of str
+        Names of springs (the factor multiplies k), dashpots (c) and masses, or DOFs (their mass).
+    spread : float or None
+        Standard deviation of the factors: 1 + spread * z, z independent and normal.
+    seed : int or None
+        Of the random numbers z: numpy's Generator with PCG64; 1 if left out.
+    values : tuple of float or None
+        The factors themselves, one for each sector, instead of `spread` and `seed`.
+    """
+
+    of: Annotated[tuple[MemberName, ...], Field(min_length=1)]
+    spread: NonNegative | None = None
+    seed: Seed | None = None
+    values: tuple[Positive, ...] | None = None
+
+    @model_validator(mode="after")
+    def _drawn_or_given(self) -> Mistuning:
+        if self.values is None and self.spread is None:
+            raise ValueError("`mistuning` needs `spread` (with an optional `seed`) or `values`, got neither")
+        if self.values is not None and (self.spread is not None or self.seed is not None):
+            other = "spread" if self.spread is not None else "seed"
+            raise ValueError(
+                f"`values` and `{other}` of `mistuning` exclude each other: give one, "
+                f"got {other} = {getattr(self, other)!r} beside {len(self.values)} values"
+            )
+        return self
+
+    def factors(self, sectors: int) -> tuple[float, ...]:
+        """The factor of each sector; those drawn may be 0 or less if the spread is large."""
+        if self.values is not None:
+            return self.values
+        draw = np.random.Generator(np.random.PCG64(1 if self.seed is None else self.seed))
+        return tuple((1.0 + (self.spread or 0.0) * draw.standard_normal(sectors)).tolist())
+
+
 class CyclicStructure(_Structure):
-    """One sector of a disk of `sectors` equal sectors; ``X@next`` is DOF X of the next one."""
+    """One sector of a disk of `sectors` sectors; ``X@next`` is DOF X of the next one.
+
+    The sectors are equal but for `mistuning`.
+    """
 
     kind: Literal["cyclic"]
     sectors: Sectors
+    mistuning: Mistuning | None = None
 
 
 Structure = LumpedStructure | CyclicStructure
@@ -227,6 +273,11 @@ class Excitation(Part):
         Multiple of the excitation frequency.
     engine_order : int or None
         Cyclic structures only: sector j has harmonic * engine_order * j * 2 pi / sectors added to the phase.
+        A wave that runs backward with the order i is the engine order sectors - i: the forces are the same.
+    pattern : "travelling", "standing" or None
+        Cyclic structures only: a travelling wave (also if left out), or the same angle as a factor
+        cos(harmonic * engine_order * j * 2 pi / sectors) instead of a phase, half the sum of the two waves
+        that run forward and backward. The loads of the contacts follow the same pattern.
     """
 
     dof: MemberName
@@ -234,6 +285,7 @@ class Excitation(Part):
     phase: Angle = 0.0
     harmonic: HarmonicIndex = 1
     engine_order: Order | None = None
+    pattern: Literal["travelling", "standing"] | None = None
 
     @model_validator(mode="after")
     def _static_has_no_phase(self) -> Excitation:
@@ -243,7 +295,10 @@ class Excitation(Part):
 
 
 class Observe(Part):
-    """The observed DOF and the frequency band of interest [Hz]."""
+    """The observed DOF and the frequency band of interest [Hz].
+
+    ``tip@3`` in a cyclic scene is the tip of sector 3, ``tip`` that of sector 0.
+    """
 
     dof: MemberName
     band: tuple[Positive, Positive]

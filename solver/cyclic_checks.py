@@ -1,0 +1,89 @@
+"""What is wrong with mistuning and wave patterns, on the plain tables and lists of a scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic import ValidationError
+
+from solver.errors import Issue
+from solver.scene_checks import listing, nearest, quoted
+from solver.scene_parts import Mistuning
+
+
+def cyclic_issues(raw: dict[str, Any]) -> list[Issue]:
+    """Patterns that do not fit, mistuned parts that do not exist, factors that are too few or not > 0."""
+    structure = raw.get("structure")
+    structure = structure if isinstance(structure, dict) else {}
+    found = [*_pattern_issues(raw.get("excitation"), structure.get("kind"))]
+    mistuning = structure.get("mistuning")
+    if structure.get("kind") == "cyclic" and isinstance(mistuning, dict):
+        found += [*_name_issues(structure, mistuning), *_factor_issues(mistuning, structure.get("sectors"))]
+    return found
+
+
+def _pattern_issues(excitation: object, kind: object) -> Iterator[Issue]:
+    one = isinstance(excitation, dict)
+    rows = [excitation] if one else excitation if isinstance(excitation, list) else []
+    first: object = None
+    for i, row in enumerate(rows):
+        pattern = row.get("pattern") if isinstance(row, dict) else None
+        if pattern is None:
+            continue
+        pointer = "/excitation/pattern" if one else f"/excitation/{i}/pattern"
+        if kind == "lumped":
+            message = f"`pattern` = {quoted(pattern)} needs a cyclic structure; remove it from a lumped one"
+            yield Issue(pointer=pointer, message=message)
+        elif first is not None and pattern != first:
+            message = f"`pattern` must be the same everywhere, got {quoted(pattern)} after {quoted(first)}"
+            yield Issue(pointer=pointer, message=message)
+        first = pattern if first is None else first
+
+
+def _name_issues(structure: dict[str, Any], mistuning: dict[str, Any]) -> Iterator[Issue]:
+    """Names in `of` that are neither a DOF nor the name of a spring, dashpot or mass, or stand twice."""
+    masses = structure.get("masses")
+    masses = masses if isinstance(masses, dict) else {}
+    rows = [*masses.values()]
+    for key in ("springs", "dampers"):
+        table = structure.get(key)
+        rows += table if isinstance(table, list) else []
+    names = [row["name"] for row in rows if isinstance(row, dict) and isinstance(row.get("name"), str)]
+    known = [*names, *map(str, masses)]
+    of = mistuning.get("of")
+    named = of if isinstance(of, list) else []
+    for i, name in enumerate(named):
+        if not isinstance(name, str):
+            continue
+        pointer = f"/structure/mistuning/of/{i}"
+        if name not in known:
+            message = (
+                f"`of`: there is no spring, damper, mass or DOF {quoted(name)} (parts need a `name`); "
+                f"known: {listing(known)}{nearest(name, known)}"
+            )
+            yield Issue(pointer=pointer, message=message)
+        elif name in named[:i]:
+            yield Issue(pointer=pointer, message=f"`of` has {name!r} twice: its factor would count twice")
+
+
+def _factor_issues(mistuning: dict[str, Any], sectors: object) -> Iterator[Issue]:
+    """Factors of another number than sectors, or drawn ones that are not above 0."""
+    try:
+        read = Mistuning.model_validate(mistuning)
+    except ValidationError:
+        return
+    if not isinstance(sectors, int) or isinstance(sectors, bool) or not 1 <= sectors <= 10_000:
+        return
+    factors = read.factors(sectors)
+    if len(factors) != sectors:
+        message = f"`values` must have one factor for each of the {sectors} sectors, got {len(factors)}"
+        yield Issue(pointer="/structure/mistuning/values", message=message)
+    bad = next((j for j, factor in enumerate(factors) if not 0.0 < factor < math.inf), None)
+    if bad is not None:
+        message = (
+            f"`spread` = {read.spread:g} gives sector {bad} the factor {factors[bad]:.3g}, which must be "
+            "> 0: choose a smaller spread or another `seed`"
+        )
+        yield Issue(pointer="/structure/mistuning/spread", message=message)
