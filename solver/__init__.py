@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from solver.accuracy import ErrorEstimate, branch_errors
     from solver.branch import Band, Branch, BranchStatus, Peak
     from solver.continuation import ContinuationSettings, Predictor, sweep
     from solver.effects import Plan, plan
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from solver.sectors import Extent, annulus, sectors_needed
 
 _HOME = {
+    "ErrorEstimate": "accuracy", "branch_errors": "accuracy",
     "Band": "branch", "Branch": "branch", "BranchStatus": "branch", "Peak": "branch",
     "ContinuationSettings": "continuation", "Predictor": "continuation", "sweep": "continuation",
     "Issue": "errors", "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
@@ -39,6 +41,7 @@ __all__ = [
     "Branch",
     "BranchStatus",
     "ContinuationSettings",
+    "ErrorEstimate",
     "Extent",
     "Issue",
     "Peak",
@@ -53,6 +56,7 @@ __all__ = [
     "SolverError",
     "annulus",
     "blade_amplitudes",
+    "branch_errors",
     "hysteresis_loop",
     "load_scene",
     "march",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -121,6 +122,9 @@ class Branch:
         All local maxima, highest first; the ends of the branch are in it too.
     band : Band or None
         Where the amplitude exceeds the limit asked for (peak/√2 if none was); None without a peak.
+    error_estimate : float
+        Estimated error of the highest peak's value, by the harmonics left out and the residual [m]; NaN
+        without a peak. `solver.branch_errors` gives that of every point.
     """
 
     balance: Balance
@@ -135,6 +139,7 @@ class Branch:
     states: Integer
     peaks: tuple[Peak, ...]
     band: Band | None
+    error_estimate: float
     newton_iterations: int
     rejected_steps: int
     stepped_over: int
@@ -209,6 +214,7 @@ class Branch:
             "band_intervals_hz": None if band is None else [list(interval) for interval in band.intervals],
             "points": len(self.values),
             "n_harmonics": self.balance.n_harmonics,
+            "error_estimate": float(self.error_estimate) if math.isfinite(self.error_estimate) else None,
             "newton_iterations": self.newton_iterations,
             "rejected_steps": self.rejected_steps,
             "folds": self.folds,

@@ -13,6 +13,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from solver.accuracy import peak_error
 from solver.balance import Balance, build
 from solver.branch import ENDINGS, Branch, BranchStatus
 from solver.errors import SettingError
@@ -254,7 +255,8 @@ def _finish(
         tangents=tangents, observed=np.concatenate([stretch.observed for stretch in stretches]),
         measures=measures, states=np.concatenate([stretch.states for stretch in stretches]),
         peaks=survey.peaks,
-        band=band, newton_iterations=stretches[-1].newton_iterations + survey.spent,
+        band=band, error_estimate=peak_error(workspace, survey.peaks),
+        newton_iterations=stretches[-1].newton_iterations + survey.spent,
         rejected_steps=stretches[-1].rejected_steps, stepped_over=stretches[-1].stepped_over,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip

@@ -24,6 +24,7 @@ from solver.workspace import PointSolution, Workspace
 SAFELY_STUCK = 0.5
 # Smallest singular value of dr/du, relative to the largest, that counts as a part nothing holds.
 FREE = 1e-7
+MEAN_UNDETERMINED = "mean_undetermined"
 
 
 class ContactState(Enum):
@@ -97,7 +98,8 @@ class Solution:
     residual : float
         Relative residual of the balance.
     error_estimate : float
-        Estimated error of `max_abs` by the harmonics left out [m].
+        Estimated error of `max_abs` by the harmonics left out and the residual [m]; of `half_peak_to_peak`
+        where the mean is not determined. See `solver.accuracy`.
     """
 
     scene: Scene
@@ -177,6 +179,7 @@ def describe(workspace: Workspace, found: PointSolution, frequency_hz: float, be
         return _failure(balance, frequency_hz, found, time.perf_counter() - begun)
     contacts = contact_responses(workspace, found.u, omega)
     observed = fourier.to_full(measures.observed, balance.system.ks, balance.n_harmonics)
+    flags = _flags(contacts, nothing_holds=_nothing_holds_a_part(workspace))
     return Solution(
         scene=balance.scene,
         frequency_hz=frequency_hz,
@@ -188,9 +191,9 @@ def describe(workspace: Workspace, found: PointSolution, frequency_hz: float, be
         harmonics=np.abs(fourier.to_complex(observed)),
         observed=observed,
         contacts=contacts,
-        flags=_flags(contacts, nothing_holds=_nothing_holds_a_part(workspace)),
+        flags=flags,
         residual=found.residual,
-        error_estimate=error,
+        error_estimate=error.half_peak_to_peak if MEAN_UNDETERMINED in flags else error.max_abs,
         newton_iterations=found.iterations,
         seconds=time.perf_counter() - begun,
     )
@@ -244,7 +247,7 @@ def _flags(contacts: tuple[ContactResponse, ...], *, nothing_holds: bool) -> tup
     stuck = [contact for contact in contacts if contact.state is ContactState.STUCK]
     flags = []
     if nothing_holds or any(contact.utilisation > SAFELY_STUCK for contact in stuck):
-        flags.append("mean_undetermined")
+        flags.append(MEAN_UNDETERMINED)
     if stuck and len(stuck) == len(contacts):
         flags.append("all_stuck")
     if any(contact.state in (_STATES[LIFTING], _STATES[SEPARATED]) for contact in contacts):
