@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from solver.effects import Plan, plan
     from solver.energy import PowerBalance, power_balance
     from solver.errors import Issue, SceneError, SettingError, SolverError
+    from solver.floquet import Growth, Stability, branch_stability, stability
     from solver.histories import hysteresis_loop, motion, time_history
     from solver.marching import march
     from solver.mistuning import BladeAmplitudes, blade_amplitudes, mistuned
@@ -29,6 +30,7 @@ _HOME = {
     "Issue": "errors", "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
     "Plan": "effects", "plan": "effects", "Scene": "scene", "load_scene": "scene", "shipped_scenes": "scene",
     "Solution": "response", "SolutionStatus": "response", "solve": "response",
+    "Growth": "floquet", "Stability": "floquet", "branch_stability": "floquet", "stability": "floquet",
     "BladeAmplitudes": "mistuning", "blade_amplitudes": "mistuning", "mistuned": "mistuning",
     "Extent": "sectors", "sectors_needed": "sectors", "annulus": "sectors",
     "march": "marching", "PowerBalance": "energy", "power_balance": "energy",
@@ -43,6 +45,7 @@ __all__ = [
     "ContinuationSettings",
     "ErrorEstimate",
     "Extent",
+    "Growth",
     "Issue",
     "Peak",
     "Plan",
@@ -54,9 +57,11 @@ __all__ = [
     "Solution",
     "SolutionStatus",
     "SolverError",
+    "Stability",
     "annulus",
     "blade_amplitudes",
     "branch_errors",
+    "branch_stability",
     "hysteresis_loop",
     "load_scene",
     "march",
@@ -67,6 +72,7 @@ __all__ = [
     "sectors_needed",
     "shipped_scenes",
     "solve",
+    "stability",
     "sweep",
     "time_history",
 ]
