@@ -33,8 +33,8 @@ def _pattern_issues(excitation: object, kind: object) -> Iterator[Issue]:
         if pattern is None:
             continue
         pointer = "/excitation/pattern" if one else f"/excitation/{i}/pattern"
-        if kind == "lumped":
-            message = f"`pattern` = {quoted(pattern)} needs a cyclic structure; remove it from a lumped one"
+        if kind in ("lumped", "matrices"):
+            message = f"`pattern` = {quoted(pattern)} needs a cyclic structure; remove it from a {kind} one"
             yield Issue(pointer=pointer, message=message)
         elif first is not None and pattern != first:
             message = f"`pattern` must be the same everywhere, got {quoted(pattern)} after {quoted(first)}"

@@ -102,7 +102,8 @@ def response(solution: Solution, k: int) -> Complex:
         K = K + L.conj().T @ (kt[:, None] * L)
     speed = 2.0 * math.pi * solution.frequency_hz * k
     dynamic = K - speed**2 * model.M + 1j * speed * C
-    return np.asarray(np.linalg.solve(dynamic, force - L.conj().T @ friction), dtype=np.complex128)
+    q = np.linalg.solve(dynamic, force - L.conj().T @ friction)
+    return np.asarray(model.shapes @ q, dtype=np.complex128)
 
 
 def matrices(model: LinearModel, k: int) -> tuple[Complex, Complex, Complex]:

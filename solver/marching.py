@@ -19,13 +19,15 @@ from scipy.sparse import csr_array, diags_array
 from solver.errors import SettingError
 from solver.kernels import march as kernel
 from solver.march_result import MarchResult, MarchStatus, describe
-from solver.scene import CyclicStructure, End, Excitation, Scene
+from solver.matrices.equations import equations
+from solver.scene import CyclicStructure, End, Excitation, LumpedStructure, MatricesStructure, Scene
 from solver.sectors import annulus
 
 FloatArray = NDArray[np.float64]
 LEAST_STEPS = 64
 MOST_STEPS = 1_000_000
 SAMPLES_PER_PERIOD = 2048
+BALANCING = 30  # products with full matrices, of mixed units, in the bound of the fastest motion
 MOST_PERIODS, WORK = 50, 2e6  # between two looks at progress and stop: periods, and their rough work
 _STATUS = {
     kernel.SETTLED: MarchStatus.CONVERGED,
@@ -106,11 +108,11 @@ def march(
     _check(frequency_hz, tolerance, max_periods)
     whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
     omega = 2.0 * math.pi * frequency_hz
-    system = _system(whole, omega)
+    system, dof = _system(whole, omega)
     steps = _steps(system, scene.excitation, steps_per_period)
     plan = _Plan(
         system=system,
-        dof=whole.structure.dofs.index(whole.observe.dof),
+        dof=dof,
         tolerance=tolerance,
         max_periods=max_periods,
         on_progress=on_progress,
@@ -146,7 +148,8 @@ def _check(frequency_hz: float, tolerance: float, max_periods: int) -> None:
 
 def _steps(system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None) -> int:
     """Steps of the finer run: the fastest motion turns less than 0.375 rad in one of them."""
-    turns = 2.0 * math.pi * _fastest(system)
+    full = system.W_value.size > system.W_start.size - 1
+    turns = 2.0 * math.pi * _fastest(system, BALANCING if full else 1)
     least = max(LEAST_STEPS, 2 * math.ceil(turns / 1.5), 16 * max(force.harmonic for force in forces))
     chosen = max(2 * LEAST_STEPS, 2 * least) if wanted is None else wanted
     if isinstance(chosen, Integral) and chosen % 2 == 0 and least <= chosen <= MOST_STEPS:
@@ -155,24 +158,43 @@ def _steps(system: kernel.System, forces: tuple[Excitation, ...], wanted: int | 
     raise SettingError("steps_per_period", chosen, f"must be an even number up to {MOST_STEPS}; {needs}")
 
 
-def _fastest(system: kernel.System) -> float:
+def _fastest(system: kernel.System, products: int) -> float:
     """Bound of the largest rate of the motion with every contact stuck, per omega: vibration or decay."""
-    stiffness = _row_sums(system.A_start, system.A_value)
-    damping = _row_sums(system.B_start, system.B_value)
+    n = system.A_start.size - 1
+    sizes = [
+        csr_array((np.abs(value), column, start), shape=(n, n))
+        for start, column, value in (
+            (system.A_start, system.A_column, system.A_value),
+            (system.B_start, system.B_column, system.B_value),
+            (system.W_start, system.W_column, system.W_value),
+        )
+    ]
+    stuck = np.zeros(n)
     for ends in (system.first, system.second):
-        moving = ends >= 0
-        np.add.at(stiffness, ends[moving], 2.0 * system.kt[moving] * system.inverse_mass[ends[moving]])
-    return float(max(math.sqrt(stiffness.max()), damping.max()))
+        np.add.at(stuck, ends[ends >= 0], 2.0 * system.kt[ends >= 0])
+    stiffness = _largest(sizes[0] + sizes[2] @ diags_array(stuck), products)
+    return float(max(math.sqrt(stiffness), _largest(sizes[1], products)))
 
 
-def _row_sums(start: NDArray[np.int64], value: FloatArray) -> FloatArray:
-    sums = np.concatenate([[0.0], np.cumsum(np.abs(value))])
-    return np.asarray(sums[start[1:]] - sums[start[:-1]])
+def _largest(matrix: csr_array, products: int) -> float:
+    """Bound of the spectral radius of a matrix that is not negative: its largest row sum, units balanced.
+
+    Collatz: min max (P d)_i / d_i over d > 0 is the radius (Math. Z. 48 (1942) 221); powers of P give d.
+    """
+    scale = np.ones(matrix.shape[0])
+    least = float("inf")
+    for _ in range(products):
+        grown = matrix @ scale
+        least = min(least, float(np.max(grown / scale, initial=0.0)))
+        if least == 0.0:
+            break
+        scale = grown / grown.max() + 1e-12 * scale
+    return least
 
 
-def _rows(scene: Scene, ends: Sequence[tuple[End, End]]) -> csr_array:
+def _rows(dofs: tuple[str, ...], ends: Sequence[tuple[End, End]]) -> csr_array:
     """Relative displacement x(first) - x(second) of each pair of ends as rows."""
-    index = {dof: i for i, dof in enumerate(scene.structure.dofs)}
+    index = {dof: i for i, dof in enumerate(dofs)}
     signed = [
         (row, index[end.dof], sign)
         for row, pair in enumerate(ends)
@@ -184,37 +206,52 @@ def _rows(scene: Scene, ends: Sequence[tuple[End, End]]) -> csr_array:
     return csr_array((sign, places), shape=(len(ends), len(index)))
 
 
-def _matrices(scene: Scene) -> tuple[FloatArray, csr_array, csr_array]:
-    """Masses [kg], damping and stiffness of a lumped scene."""
-    structure = scene.structure
+def _matrices(structure: LumpedStructure) -> tuple[FloatArray, csr_array, csr_array]:
+    """Masses [kg], damping and stiffness of a lumped structure."""
     M = np.array([mass.m for mass in structure.masses])
     k = np.array([spring.k for spring in structure.springs])
     c = np.array([spring.c for spring in structure.springs]) + structure.stiffness_proportional_damping * k
     dashpots = np.array([damper.c for damper in structure.dampers])
-    springs = _rows(scene, [spring.ends for spring in structure.springs])
-    dampers = _rows(scene, [damper.ends for damper in structure.dampers])
+    springs = _rows(structure.dofs, [spring.ends for spring in structure.springs])
+    dampers = _rows(structure.dofs, [damper.ends for damper in structure.dampers])
     K = springs.T @ diags_array(k) @ springs
     C = springs.T @ diags_array(c) @ springs + dampers.T @ diags_array(dashpots) @ dampers
     return M, csr_array(C), csr_array(K)
 
 
-def _system(scene: Scene, omega: float) -> kernel.System:
-    """The equations of a lumped scene in the angle tau = omega t."""
-    M, C, K = _matrices(scene)
-    A = csr_array(diags_array(1.0 / (M * omega**2)) @ K)
-    B = csr_array(diags_array(1.0 / (M * omega)) @ C)
-    index = {dof: i for i, dof in enumerate(scene.structure.dofs)}
+def _equations(scene: Scene) -> tuple[csr_array, csr_array, csr_array, dict[str, int]]:
+    """A = M⁻¹ K, B = M⁻¹ C, W = M⁻¹ and the coordinate of each DOF in use."""
+    structure = scene.structure
+    if isinstance(structure, MatricesStructure):
+        ends = [end.dof for contact in scene.contacts for end in contact.ends if end.dof is not None]
+        used = [*ends, *(force.dof for force in scene.excitation), scene.observe.dof]
+        found = equations(structure, used)
+        return csr_array(found.A), csr_array(found.B), csr_array(found.W), found.index
+    if not isinstance(structure, LumpedStructure):
+        raise SettingError("scene", scene.name, "must be written out as its annulus to be marched")
+    M, C, K = _matrices(structure)
+    inverse = diags_array(1.0 / M)
+    index = {dof: i for i, dof in enumerate(structure.dofs)}
+    return csr_array(inverse @ K), csr_array(inverse @ C), csr_array(inverse), index
+
+
+def _system(scene: Scene, omega: float) -> tuple[kernel.System, int]:
+    """The equations of a scene in the angle tau = omega t, and the coordinate observed."""
+    A, B, W, index = _equations(scene)
+    A, B, W = A / omega**2, B / omega, W / omega**2
     forces, contacts = scene.excitation, scene.contacts
     places = [[-1 if end.dof is None else index[end.dof] for end in contact.ends] for contact in contacts]
     first, second = np.array(places, dtype=np.int64).reshape(-1, 2).T
-    return kernel.System(
+    system = kernel.System(
         A_start=A.indptr.astype(np.int64),
         A_column=A.indices.astype(np.int64),
         A_value=A.data,
         B_start=B.indptr.astype(np.int64),
         B_column=B.indices.astype(np.int64),
         B_value=B.data,
-        inverse_mass=1.0 / (M * omega**2),
+        W_start=W.indptr.astype(np.int64),
+        W_column=W.indices.astype(np.int64),
+        W_value=W.data,
         force_dof=np.array([index[force.dof] for force in forces], dtype=np.int64),
         force_amplitude=np.array([force.amplitude for force in forces]),
         force_phase=np.array([force.phase for force in forces]),
@@ -227,11 +264,12 @@ def _system(scene: Scene, omega: float) -> kernel.System:
         N1=np.array([contact.N1_value for contact in contacts]),
         N1_phase=np.array([contact.N1_phase for contact in contacts]),
     )
+    return system, index[scene.observe.dof]
 
 
 def _at_rest(system: kernel.System) -> kernel.State:
     """No motion, no contact force; open where the load pulls at tau = 0 or friction never acts."""
-    n, n_contacts = system.inverse_mass.size, system.kt.size
+    n, n_contacts = system.A_start.size - 1, system.kt.size
     load = system.mu * (system.N0 + system.N1 * np.cos(system.N1_phase))
     mode = np.where(load > 0.0, kernel.STICK, kernel.SEPARATED).astype(np.int64)
     return kernel.State(np.zeros(n), np.zeros(n), np.zeros(n_contacts), mode)

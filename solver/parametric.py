@@ -17,13 +17,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.errors import SettingError
-from solver.scene import CyclicStructure, Damper, End, Mass, Scene, Spring, Structure, parse_end
+from solver.matrices.model import matrix_model
+from solver.scene import (
+    CyclicStructure,
+    Damper,
+    End,
+    LumpedStructure,
+    Mass,
+    MatricesStructure,
+    Scene,
+    Spring,
+    parse_end,
+)
 from solver.scene_checks import listing, nearest
-from solver.scene_paths import structure_names
+from solver.scene_paths import PROPORTIONAL, structure_names
 from solver.sectors import written_out
 
 FloatArray = NDArray[np.float64]
 _Ends = tuple[End, End]
+_Assembled = LumpedStructure | CyclicStructure
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +62,7 @@ class ForceTerm:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinearModel:
-    """The structure without its contacts: one sector of a tuned disk, or the whole lumped structure.
+    """The structure without its contacts: one sector of a tuned disk, or the whole structure.
 
     A matrix at interblade phase theta is X(theta) = X0 + Xp e^{j theta} + Xp^T e^{-j theta}; the neighbour
     x of the next sector is X e^{j k i phi} for harmonic k, engine order i and phi = 2 pi / sectors. All
@@ -59,7 +71,10 @@ class LinearModel:
     Attributes
     ----------
     dofs : tuple of str
-        Order of rows and columns.
+        Names of the DOFs.
+    shapes : (n_dofs, n) array
+        The DOFs in the coordinates of the matrices: the identity, or what a structure given by matrices or
+        modes names.
     M : (n, n) array
         Mass [kg].
     C0, Cp : (n, n) array
@@ -67,7 +82,7 @@ class LinearModel:
     K0, Kp : (n, n) array
         Stiffness [N/m]; `Kp` couples to the next sector, 0 if lumped.
     contact_here, contact_next : (n_contacts, n) array
-        L(theta) = contact_here + contact_next e^{j theta}; slip u = L x.
+        L(theta) = contact_here + contact_next e^{j theta}; slip u = L x, x the coordinates.
     forces : tuple of ForceTerm
         The excitation.
     observe : (n,) array
@@ -79,6 +94,7 @@ class LinearModel:
     """
 
     dofs: tuple[str, ...]
+    shapes: FloatArray
     M: FloatArray
     C0: FloatArray
     Cp: FloatArray
@@ -149,27 +165,53 @@ def linear_model(scene: Scene) -> LinearModel:
     """
     scene = written_out(scene)
     structure = scene.structure
-    dofs = structure.dofs
+    if isinstance(structure, MatricesStructure):
+        found = matrix_model(structure)
+        nothing = _nothing(found.M.shape[0])
+        return _model(scene, _Matrices(found.M, found.C, nothing, found.K, nothing), found.shapes)
     matrices = _matrices(_topology(structure), _numbers(structure))
+    return _model(scene, matrices, _identity(len(structure.dofs)))
+
+
+def _model(scene: Scene, matrices: _Matrices, shapes: FloatArray) -> LinearModel:
+    """Add contacts and forces to the matrices."""
+    structure = scene.structure
+    dofs = tuple(structure.dofs)
     here, beyond = _contact_selection(dofs, tuple(contact.between for contact in scene.contacts))
+    whole = isinstance(structure, MatricesStructure)
+
+    def rows(selected: FloatArray) -> FloatArray:
+        return _frozen(selected @ shapes) if whole else selected
+
     forces = tuple(
-        ForceTerm(vector=_unit(dofs, e.dof), amplitude=e.amplitude, phase=e.phase, harmonic=e.harmonic)
+        ForceTerm(vector=rows(_unit(dofs, e.dof)), amplitude=e.amplitude, phase=e.phase, harmonic=e.harmonic)
         for e in scene.excitation
     )
     return LinearModel(
         dofs=dofs,
+        shapes=shapes,
         M=matrices.M,
         C0=matrices.C0,
         Cp=matrices.Cp,
         K0=matrices.K0,
         Kp=matrices.Kp,
-        contact_here=here,
-        contact_next=beyond,
+        contact_here=rows(here),
+        contact_next=rows(beyond),
         forces=forces,
-        observe=_unit(dofs, scene.observe.dof),
+        observe=rows(_unit(dofs, scene.observe.dof)),
         engine_order=scene.engine_order,
         sectors=structure.sectors if isinstance(structure, CyclicStructure) else 1,
     )
+
+
+@lru_cache(maxsize=16)
+def _nothing(n: int) -> FloatArray:
+    return _frozen(np.zeros((n, n)))
+
+
+@lru_cache(maxsize=64)
+def _identity(n: int) -> FloatArray:
+    return _frozen(np.eye(n))
 
 
 def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
@@ -181,20 +223,35 @@ def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
         The structure has no parameter of that name.
     """
     structure = scene.structure
+    if isinstance(structure, MatricesStructure):
+        return _proportional(structure, name)
     parts: tuple[Mass | Spring | Damper, ...] = (*structure.masses, *structure.springs, *structure.dampers)
     owners = [part.name for part in parts]
     if not name or name not in owners:
-        known = structure_names(structure)
-        raise SettingError("name", name, f"must be one of {listing(known)}", nearest(str(name), known))
+        raise _unknown(name, structure_names(structure))
     return _derivative(_topology(structure), _numbers(structure), owners.index(name))
 
 
-def _topology(structure: Structure) -> _Topology:
+def _proportional(structure: MatricesStructure, name: str) -> LinearModelDerivative:
+    """Derivatives by the proportional damping, the only parameter of a structure given by its matrices."""
+    if name not in PROPORTIONAL:
+        raise _unknown(name, PROPORTIONAL)
+    found = matrix_model(structure)
+    nothing = _nothing(found.M.shape[0])
+    dC = found.K if name == PROPORTIONAL[0] else found.M
+    return LinearModelDerivative(dM=nothing, dC0=dC, dCp=nothing, dK0=nothing, dKp=nothing, affine=True)
+
+
+def _unknown(name: str, known: Sequence[str]) -> SettingError:
+    return SettingError("name", name, f"must be one of {listing(known)}", nearest(str(name), known))
+
+
+def _topology(structure: _Assembled) -> _Topology:
     springs = tuple(spring.ends for spring in structure.springs)
     return _Topology(structure.dofs, springs, tuple(damper.ends for damper in structure.dampers))
 
 
-def _numbers(structure: Structure) -> tuple[float, ...]:
+def _numbers(structure: _Assembled) -> tuple[float, ...]:
     """All numbers: masses, stiffnesses, dashpots, dashpots of springs, proportional damping."""
     return (
         *(mass.m for mass in structure.masses),

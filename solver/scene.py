@@ -11,7 +11,7 @@ from solver import scene_paths
 from solver.cyclic_checks import cyclic_issues
 from solver.errors import Issue, SceneError
 from solver.scene_checks import cross_issues, field_issues, plain
-from solver.scene_io import load_raw, shipped_scenes
+from solver.scene_io import load_raw, scene_folder, shipped_scenes
 from solver.scene_parts import (
     KINDS,
     Contact,
@@ -21,6 +21,7 @@ from solver.scene_parts import (
     Excitation,
     LumpedStructure,
     Mass,
+    MatricesStructure,
     Mistuning,
     Name,
     Observe,
@@ -39,6 +40,7 @@ __all__ = [
     "Excitation",
     "LumpedStructure",
     "Mass",
+    "MatricesStructure",
     "Mistuning",
     "Observe",
     "Scene",
@@ -57,8 +59,8 @@ class Scene(Part):
     ----------
     name : str
         Name of the scene.
-    structure : LumpedStructure or CyclicStructure
-        Masses, springs and dashpots.
+    structure : LumpedStructure, CyclicStructure or MatricesStructure
+        Masses, springs and dashpots, or matrices.
     contacts : tuple of Contact
         The friction contacts; may be empty.
     excitation : tuple of Excitation
@@ -168,9 +170,17 @@ class Scene(Part):
 def load_scene(name_or_path: object) -> Scene:
     """Load a shipped scene by name, or a scene file (.toml or .json) by path.
 
+    Files of matrices that the scene names are read too, relative to its own folder.
+
     Raises
     ------
     SceneError
         No such scene, a file that cannot be read, or everything that is wrong with its content.
     """
-    return Scene.from_dict(load_raw(name_or_path))
+    raw = load_raw(name_or_path)
+    structure = raw.get("structure")
+    if isinstance(structure, Mapping) and structure.get("kind") == "matrices":
+        from solver.matrices.loading import with_files
+
+        raw = with_files(raw, scene_folder(name_or_path))
+    return Scene.from_dict(raw)

@@ -23,8 +23,10 @@ from solver.scene_parts import (
     Damper,
     Excitation,
     LumpedStructure,
+    MatricesStructure,
     Mistuning,
     Observe,
+    Reduction,
     Spring,
     parse_end,
 )
@@ -36,6 +38,8 @@ _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     (): ("a scene", _SCENE_KEYS),
     ("structure", "lumped"): ("a lumped structure", tuple(LumpedStructure.model_fields)),
     ("structure", "cyclic"): ("a cyclic structure", tuple(CyclicStructure.model_fields)),
+    ("structure", "matrices"): ("a matrices structure", tuple(MatricesStructure.model_fields)),
+    ("structure", "matrices", "reduction"): ("reduction", tuple(Reduction.model_fields)),
     ("structure", "masses"): ("a mass", ("m", "name")),
     ("structure", "springs"): ("a spring", tuple(Spring.model_fields)),
     ("structure", "dampers"): ("a damper", tuple(Damper.model_fields)),
@@ -166,11 +170,11 @@ def cross_issues(raw: dict[str, Any]) -> list[Issue]:
     """What is wrong between the parts of a scene: unknown DOFs, duplicate names, engine orders."""
     structure = raw.get("structure")
     structure = structure if isinstance(structure, dict) else {}
-    masses = structure.get("masses")
-    dofs = dict.fromkeys(map(str, masses)) if isinstance(masses, dict) else None
+    table = "dofs" if structure.get("kind") == "matrices" else "masses"
+    dofs = _dof_names(structure.get(table), table)
     cyclic = structure.get("kind") == "cyclic"
     found = chain(
-        _reserved_dofs(dofs or (), cyclic),
+        _reserved_dofs(dofs or (), table, cyclic),
         _end_issues(raw, structure, dofs, cyclic),
         _dof_issues(raw, dofs, structure.get("sectors") if cyclic else 0),
         _duplicates(_structure_names(structure), "structure"),
@@ -183,11 +187,21 @@ def cross_issues(raw: dict[str, Any]) -> list[Issue]:
 _Known = dict[str, None]
 
 
-def _reserved_dofs(dofs: Iterable[str], cyclic: bool) -> Iterator[Issue]:
+def _dof_names(given: object, table: str) -> _Known | None:
+    """The names of the DOFs: keys of a table, or (of matrices) a list; None if they cannot be told."""
+    if isinstance(given, dict):
+        return dict.fromkeys(map(str, given))
+    if table == "dofs" and isinstance(given, list | tuple) and all(isinstance(name, str) for name in given):
+        return dict.fromkeys(given)
+    return None
+
+
+def _reserved_dofs(dofs: Iterable[str], table: str, cyclic: bool) -> Iterator[Issue]:
     for dof in dofs:
-        pointer = _pointer(["structure", "masses", dof])
+        pointer = _pointer(["structure", table, dof])
         if dof == GROUND:
-            yield Issue(pointer=pointer, message=f"`{GROUND}` is reserved: give the mass another name")
+            what = "mass" if table == "masses" else "DOF"
+            yield Issue(pointer=pointer, message=f"`{GROUND}` is reserved: give the {what} another name")
         if cyclic and "@" in dof:
             yield Issue(pointer=pointer, message=f"`{dof}`: no '@' in a DOF of a cyclic structure")
 
@@ -228,7 +242,7 @@ def _end_issues(
 def _one_end(steps: list[int | str], text: str, dofs: _Known | None, cyclic: bool) -> Iterator[Issue]:
     end = parse_end(text)
     if end.next and not cyclic:
-        message = f"`between`: {text!r} needs a cyclic structure; a lumped one has no next sector"
+        message = f"`between`: {text!r} needs a cyclic structure; this one has no next sector"
         yield Issue(pointer=_pointer(steps), message=message)
     if end.dof is not None and dofs is not None and end.dof not in dofs:
         yield Issue(pointer=_pointer(steps), message=_unknown_dof("between", text, end.dof, [*dofs, GROUND]))
@@ -301,9 +315,9 @@ def _engine_order_issues(raw: dict[str, Any], kind: object) -> Iterator[Issue]:
         if order is None:
             continue
         pointer = _pointer([*steps, "engine_order"])
-        if kind == "lumped":
+        if kind in ("lumped", "matrices"):
             message = (
-                f"`engine_order` = {quoted(order)} needs a cyclic structure; remove it from a lumped one"
+                f"`engine_order` = {quoted(order)} needs a cyclic structure; remove it from a {kind} one"
             )
             yield Issue(pointer=pointer, message=message)
         elif first is not None and order != first:

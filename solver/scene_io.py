@@ -19,6 +19,13 @@ def shipped_scenes() -> tuple[str, ...]:
     return tuple(sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml")))
 
 
+def scene_folder(name_or_path: object) -> Path:
+    """Where relative names of files in a scene begin: the folder of its file, the current one if shipped."""
+    if isinstance(name_or_path, str | Path) and name_or_path not in shipped_scenes():
+        return Path(name_or_path).parent
+    return Path()
+
+
 def load_raw(name_or_path: object) -> dict[str, object]:
     """The tables and lists of a shipped scene or a file, not yet checked.
 

@@ -6,19 +6,28 @@ import math
 from typing import Annotated, Literal, NamedTuple, cast
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, field_validator, model_validator
+from pydantic import (
+    Field,
+    GetCoreSchemaHandler,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import CoreSchema, core_schema
+
+from solver.matrices.part import MatricesStructure as MatricesStructure
+from solver.matrices.part import Reduction as Reduction
+from solver.scene_fields import LARGEST as LARGEST
+from solver.scene_fields import NonNegative as NonNegative
+from solver.scene_fields import Part as Part
 
 GROUND = "ground"
 NEXT = "next"
-LARGEST = 1e15
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+\z", max_length=100)]
 MemberName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(@[0-9]+)?\z", max_length=100)]
 EndName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(@([0-9]+|next))?\z", max_length=105)]
 Between = tuple[EndName, EndName]
 Positive = Annotated[float, Field(strict=True, gt=0.0, le=LARGEST, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(strict=True, ge=0.0, le=LARGEST, allow_inf_nan=False)]
 Signed = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Friction = Annotated[float, Field(strict=True, ge=0.0, le=100.0, allow_inf_nan=False)]
 Angle = Annotated[float, Field(strict=True, ge=-1e4, le=1e4, allow_inf_nan=False)]
@@ -41,12 +50,6 @@ def parse_end(text: str) -> End:
         return End(None, False)
     base, at, suffix = text.partition("@")
     return End(base, True) if at and suffix == NEXT else End(text, False)
-
-
-class Part(BaseModel):
-    """Root of everything in a scene: frozen, no unknown keys, no NaN."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class _Element(Part):
@@ -204,8 +207,8 @@ class CyclicStructure(_Structure):
     mistuning: Mistuning | None = None
 
 
-Structure = LumpedStructure | CyclicStructure
-KINDS: tuple[str, ...] = ("lumped", "cyclic")
+Structure = LumpedStructure | CyclicStructure | MatricesStructure
+KINDS: tuple[str, ...] = ("lumped", "cyclic", "matrices")
 
 
 class Contact(_Element):

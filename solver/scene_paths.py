@@ -10,7 +10,17 @@ from pydantic import ValidationError
 
 from solver.errors import SettingError
 from solver.scene_checks import listing, nearest
-from solver.scene_parts import Contact, Damper, Excitation, Mass, Part, Spring, Structure
+from solver.scene_parts import (
+    LARGEST,
+    Contact,
+    Damper,
+    Excitation,
+    Mass,
+    MatricesStructure,
+    Part,
+    Spring,
+    Structure,
+)
 
 if TYPE_CHECKING:
     from solver.scene import Scene
@@ -18,6 +28,7 @@ if TYPE_CHECKING:
 FREQUENCY = "frequency"
 AMPLITUDE = "excitation.amplitude"
 PHASE = "excitation.phase"
+PROPORTIONAL = ("stiffness_proportional_damping", "mass_proportional_damping")
 CONTACT_KEYS = ("N0", "N1", "N1_ratio", "N1_phase", "kt", "mu")
 _RANGES = {
     "N0": "must be a number >= 0 and <= 1e15 [N]",
@@ -45,7 +56,12 @@ def parameter_paths(scene: Scene) -> tuple[str, ...]:
 
 
 def structure_names(structure: Structure) -> tuple[str, ...]:
-    """Names of the springs, dashpots and masses that are parameters, in the order of the tables."""
+    """Names of the springs, dashpots and masses that are parameters, in the order of the tables.
+
+    Of a structure given by its matrices, the proportional damping is what can be changed.
+    """
+    if isinstance(structure, MatricesStructure):
+        return PROPORTIONAL
     parts: tuple[_Named, ...] = (*structure.masses, *structure.springs, *structure.dampers)
     return tuple(part.name for part in parts if part.name is not None)
 
@@ -63,6 +79,8 @@ def value(scene: Scene, path: str) -> float:
     if path == PHASE:
         return next((force.phase for force in scene.excitation if force.harmonic), 0.0)
     owner, _, key = path.rpartition(".") if isinstance(path, str) else ("", "", "")
+    if owner == "structure" and isinstance(scene.structure, MatricesStructure) and key in PROPORTIONAL:
+        return cast(float, getattr(scene.structure, key))
     if owner == "structure":
         part = _structure_part(scene, key)
         if part is None:
@@ -103,6 +121,11 @@ def _with_value(scene: Scene, path: str, new: float) -> Scene:
 
 
 def _with_structure(scene: Scene, path: str, name: str, new: float) -> Structure:
+    if isinstance(scene.structure, MatricesStructure) and name in PROPORTIONAL:
+        if not 0.0 <= new <= LARGEST:
+            unit = "s" if name == PROPORTIONAL[0] else "1/s"
+            raise SettingError(path, new, f"must be a number >= 0 and <= 1e15 [{unit}]")
+        return scene.structure.model_copy(update={name: new})
     part = _structure_part(scene, name)
     if part is None:
         raise _unknown(scene, path)
@@ -157,6 +180,8 @@ def _contact_value(contact: Contact, key: str) -> float:
 
 def _structure_part(scene: Scene, name: str) -> _Named | None:
     structure = scene.structure
+    if isinstance(structure, MatricesStructure):
+        return None
     parts: tuple[_Named, ...] = (*structure.springs, *structure.dampers, *structure.masses)
     return next((part for part in parts if part.name == name), None)
 

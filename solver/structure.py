@@ -1,8 +1,9 @@
 """The linear part as the compiled loops use it: modes, poles or matrices for each nodal diameter in play.
 
 Harmonic k of a travelling wave of engine order i has the interblade phase k·i·2π/sectors, so one sector with
-a Hermitian stiffness stands for the whole tuned annulus; a lumped structure is the case of one real structure
-for every harmonic.
+a Hermitian stiffness stands for the whole tuned annulus; any other structure is the case of one real
+structure for every harmonic. What does not depend on contacts and forces is found once for a structure and
+kept (`solver.decomposition`).
 """
 
 from __future__ import annotations
@@ -11,15 +12,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import linalg
 
+from solver.decomposition import Decomposition, Held, decompose, held_alone, held_by, matrices_of
 from solver.fourier import Complex, Integer, Real
-from solver.kernels.system import DENSE, MODES, POLES
+from solver.kernels.system import DENSE
 from solver.parametric import LinearModel, LinearModelDerivative
 
-CLASSICAL = 1e-11  # largest off-diagonal modal damping, relative to the diagonal, that counts as none
-SPAN_ERROR = 1e-11  # largest relative error of the pole form against the direct inverse
-SINGULAR = 1e-11  # smallest eigenvalue of K, relative to the largest, that counts as held in place
+CANCELLED = 1e-3  # a relative residual of 1e-11 of this share of what cancels in a motion is its rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,6 +27,7 @@ class Reduced:
 
     which: Integer
     shift: Real
+    least_size: float
     form: int
     eigenvalues: Complex
     dampings: Real
@@ -46,30 +46,23 @@ class Reduced:
     forces: Complex
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Matrices:
-    """The matrices of each nodal diameter: (ns, n, n) each, L (ns, nc, n)."""
-
-    K: Complex
-    C: Complex
-    M: Complex
-    L: Complex
-
-
 def reduce_model(
     model: LinearModel,
     ks: Integer,
     kt: Real,
     derivative: LinearModelDerivative | None = None,
+    *,
+    whole_matrices: bool = False,
 ) -> Reduced:
     """Bring a linear model into the form of the compiled loops.
 
     Parameters
     ----------
-    model : the matrices of one sector, or of the whole lumped structure.
+    model : the matrices of one sector, or of the whole structure.
     ks : (nk,) harmonics kept.
     kt : (nc,) contact stiffnesses [N/m], used as the shift where contacts alone hold a part in place.
     derivative : by the structural parameter that is continued in; then the dense form is kept.
+    whole_matrices : keep the dense form whatever the damping is.
 
     Raises
     ------
@@ -79,27 +72,39 @@ def reduce_model(
     diameters, which = np.unique((ks * model.engine_order) % model.sectors, return_inverse=True)
     theta = 2.0 * np.pi * diameters / model.sectors
     forces = force_amplitudes(model, ks)
-    held = _matrices(model, theta)
-    shift = _shift(held, kt) if 0 in ks else np.zeros(kt.size)
-    shifted = _Matrices(
-        K=held.K + np.einsum("sci,c,scj->sij", held.L.conj(), shift, held.L), C=held.C, M=held.M, L=held.L
-    )
-    dense: dict[str, Any] = _dense(shifted, theta, model, forces, derivative)
-    modes: dict[str, Any] | None = (
-        None if derivative is not None else _modes(shifted, forces, which, model.observe)
-    )
-    if modes is None and derivative is None:
-        modes = _poles(shifted, forces, which, model.observe)
-    if modes is not None:
-        dense = {name: np.zeros((0,) * value.ndim, np.complex128) for name, value in dense.items()}
+    L = model.contact_here + model.contact_next * np.exp(1j * theta)[:, None, None]
+    held = matrices_of(model, theta)
+    shift = np.zeros(kt.size)
+    if 0 in ks and not held_alone(held):
+        shift, held = kt.copy(), held_by(held, L, kt)
+    found = None if whole_matrices or derivative is not None else decompose(held)
+    if found is None:
+        modes: dict[str, Any] = _no_modes(theta.size, ks.size, kt.size)
+        dense: dict[str, Any] = _dense(held, theta, L, model, forces, derivative)
     else:
-        modes = _no_modes(theta.size, ks.size, kt.size)
-    return Reduced(which=which.astype(np.int64), shift=shift, **modes, **dense)
+        modes = _projected(found, L, model.observe, forces, which)
+        dense = {name: np.zeros((0,) * axes, np.complex128) for name, axes in _DENSE_AXES.items()}
+    least = _least_size(modes["contact_modes"], modes["modal_forces"], modes["eigenvalues"], which)
+    return Reduced(which=which.astype(np.int64), shift=shift, least_size=least, **modes, **dense)
+
+
+def _least_size(contact_modes: Complex, modal_forces: Complex, eigenvalues: Complex, which: Integer) -> float:
+    """Return the size below which a motion of the contacts is rounding [m]; 0 without modes.
+
+    A share of Σ |L x_m| |f_m| / |λ_m|, the static motion of a contact if its modes did not cancel.
+    """
+    sizes = np.maximum(np.abs(eigenvalues), 1e-12 * np.abs(eigenvalues).max(initial=0.0))
+    shares, largest = np.abs(contact_modes), 0.0
+    for i, s in enumerate(which):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sums = shares[s] @ (np.abs(modal_forces[i]) / sizes[s])
+        largest = max(largest, float(np.nan_to_num(sums, posinf=0.0).max(initial=0.0)))
+    return CANCELLED * largest
 
 
 def force_amplitudes(model: LinearModel, ks: Integer) -> Complex:
     """Return the complex force amplitudes f̂_k, (nk, n), of cos(hωt + phase) terms: amplitude·e^{i phase}."""
-    amplitudes = np.zeros((ks.size, len(model.dofs)), dtype=np.complex128)
+    amplitudes = np.zeros((ks.size, model.observe.size), dtype=np.complex128)
     for term in model.forces:
         rows = np.flatnonzero(ks == term.harmonic)
         turn = np.exp(1j * term.phase) if term.harmonic else 1.0
@@ -107,92 +112,33 @@ def force_amplitudes(model: LinearModel, ks: Integer) -> Complex:
     return amplitudes
 
 
-def _matrices(model: LinearModel, theta: Real) -> _Matrices:
-    """Return the matrices at each interblade phase."""
-    turn = np.exp(1j * theta)[:, None, None]
-
-    def at(zero: Real, plus: Real) -> Complex:
-        matrices: Complex = zero + plus * turn + plus.T * turn.conj()
-        return matrices
-
-    return _Matrices(
-        K=at(model.K0, model.Kp),
-        C=at(model.C0, model.Cp),
-        M=np.ascontiguousarray(np.broadcast_to(model.M, (theta.size, *model.M.shape)), dtype=np.complex128),
-        L=model.contact_here + model.contact_next * turn,
-    )
-
-
-def _shift(held: _Matrices, kt: Real) -> Real:
-    """Return kt where the static stiffness alone does not hold every part in place, else 0."""
-    values = np.linalg.eigvalsh(held.K[0])
-    loose = values.size > 0 and values[0] <= SINGULAR * max(values[-1], 0.0)
-    return kt.copy() if loose else np.zeros(kt.size)
-
-
-def _modes(held: _Matrices, forces: Complex, which: Integer, observe: Real) -> dict[str, Any] | None:
-    """Return the undamped modes of every structure, or None if the damping is not classical."""
-    eigenvalues, dampings, vectors = [], [], []
-    for K, C, M in zip(held.K, held.C, held.M, strict=True):
-        values, phi = linalg.eigh(K, M)
-        damping = phi.conj().T @ C @ phi
-        diagonal = np.diag(damping).real
-        if np.abs(damping - np.diag(diagonal)).max(initial=0.0) > CLASSICAL * np.abs(diagonal).max(
-            initial=0.0
-        ):
-            return None
-        eigenvalues.append(values.astype(np.complex128))
-        dampings.append(diagonal)
-        vectors.append(phi)
-    phi = np.array(vectors)
+def _projected(
+    found: Decomposition, L: Complex, observe: Real, forces: Complex, which: Integer
+) -> dict[str, Any]:
+    """Return what the loops need of the modes: their share at contacts, forces and the observed DOF."""
+    contact_modes = L @ found.right
+    contact_duals = L.conj() @ found.left
+    observe_modes = observe @ found.right
+    modal_forces = np.zeros((which.size, found.eigenvalues.shape[1]), np.complex128)
+    for s in range(L.shape[0]):
+        rows = np.flatnonzero(which == s)
+        modal_forces[rows] = forces[rows] @ found.left[s]
+    # Exact zeros only: a mode that no contact, and not both force and observer, can see adds nothing.
+    touched = np.any(contact_modes != 0.0, axis=(0, 1)) | np.any(contact_duals != 0.0, axis=(0, 1))
+    seen = touched | (np.any(observe_modes != 0.0, axis=0) & np.any(modal_forces != 0.0, axis=0))
     return {
-        "form": MODES,
-        "eigenvalues": np.array(eigenvalues),
-        "dampings": np.array(dampings),
-        "contact_modes": np.ascontiguousarray(held.L @ phi),
-        "contact_duals": np.ascontiguousarray((held.L @ phi).conj()),
-        "observe_modes": np.ascontiguousarray(observe @ phi),
-        "modal_forces": np.ascontiguousarray(np.einsum("knm,kn->km", phi[which].conj(), forces)),
+        "form": found.form,
+        "eigenvalues": np.ascontiguousarray(found.eigenvalues[:, seen]),
+        "dampings": np.ascontiguousarray(found.dampings[:, seen]),
+        "contact_modes": _contiguous(contact_modes[:, :, seen]),
+        "contact_duals": _contiguous(contact_duals[:, :, seen]),
+        "observe_modes": _contiguous(observe_modes[:, seen]),
+        "modal_forces": _contiguous(modal_forces[:, seen]),
     }
 
 
-def _poles(held: _Matrices, forces: Complex, which: Integer, observe: Real) -> dict[str, Any] | None:
-    """Return poles and residues of every structure, or None if they do not give Z⁻¹ to rounding.
-
-    Z⁻¹(s) = Σ x_m y_mᴴ / (y_mᴴ (C + 2 s_m M) x_m (s − s_m)) for simple poles: Tisseur, Meerbergen, SIAM Rev.
-    43 (2001) 235, doi:10.1137/S0036144500381988.
-    """
-    n = held.K.shape[1]
-    poles, right, left = [], [], []
-    for K, C, M in zip(held.K, held.C, held.M, strict=True):
-        inverse = np.linalg.inv(M)
-        state = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K, -inverse @ C]])
-        values, y, x = linalg.eig(state, left=True, right=True)
-        # Left eigenvectors of the first-order form carry those of the quadratic one in their lower half.
-        x, y = x[:n], inverse.conj().T @ y[n:]
-        norm = np.einsum("nm,nm->m", y.conj(), C @ x + 2.0 * (M @ x) * values)
-        if not np.all(np.abs(norm) > 0.0):
-            return None
-        y = y / norm.conj()
-        scale = np.sqrt(np.abs(np.linalg.eigvalsh(K)).max() / np.abs(np.linalg.eigvalsh(M)).max())
-        for s in (0.3j * scale, 1.7j * scale, 0.01j * scale):
-            direct = np.linalg.inv(K + s * C + s * s * M)
-            summed = (x / (s - values)) @ y.conj().T
-            if np.abs(summed - direct).max() > SPAN_ERROR * np.abs(direct).max():
-                return None
-        poles.append(values)
-        right.append(x)
-        left.append(y)
-    x, yh = np.array(right), np.array(left).conj()
-    return {
-        "form": POLES,
-        "eigenvalues": np.array(poles, dtype=np.complex128),
-        "dampings": np.zeros(np.array(poles).shape),
-        "contact_modes": np.ascontiguousarray(held.L @ x),
-        "contact_duals": np.ascontiguousarray(held.L.conj() @ yh),
-        "observe_modes": np.ascontiguousarray(observe @ x),
-        "modal_forces": np.ascontiguousarray(np.einsum("knm,kn->km", yh[which], forces)),
-    }
+def _contiguous(array: Any) -> Complex:
+    return np.ascontiguousarray(array, dtype=np.complex128)
 
 
 def _no_modes(n_structures: int, n_harmonics: int, n_contacts: int) -> dict[str, Any]:
@@ -208,21 +154,25 @@ def _no_modes(n_structures: int, n_harmonics: int, n_contacts: int) -> dict[str,
     }
 
 
+_DENSE_AXES = {"K": 3, "C": 3, "M": 3, "dK": 3, "dC": 3, "dM": 3, "L": 3, "observe": 1, "forces": 2}
+
+
 def _dense(
-    held: _Matrices,
+    held: Held,
     theta: Real,
+    L: Complex,
     model: LinearModel,
     forces: Complex,
     derivative: LinearModelDerivative | None,
 ) -> dict[str, Complex]:
     """Return the matrices and their derivatives by the structural parameter (zero if there is none)."""
     turn = np.exp(1j * theta)[:, None, None]
-    dK, dC, dM = np.zeros_like(held.K), np.zeros_like(held.K), np.zeros_like(held.K)
+    dK = dC = dM = np.zeros(held.K.shape, np.complex128)
     if derivative is not None:
         dK = dK + derivative.dK0 + derivative.dKp * turn + derivative.dKp.T * turn.conj()
         dC = dC + derivative.dC0 + derivative.dCp * turn + derivative.dCp.T * turn.conj()
         dM = dM + derivative.dM
     return {
-        "K": held.K, "C": held.C, "M": held.M, "dK": dK, "dC": dC, "dM": dM,
-        "L": np.ascontiguousarray(held.L), "observe": model.observe.astype(np.complex128), "forces": forces,
+        "K": _contiguous(held.K), "C": _contiguous(held.C), "M": _contiguous(held.M), "dK": dK, "dC": dC,
+        "dM": dM, "L": _contiguous(L), "observe": _contiguous(model.observe), "forces": forces,
     }  # fmt: skip

@@ -113,7 +113,7 @@ WRONG = [
     ("name", 3, "/name", "must be a text, got 3"),
     ("nam", 3, "/nam", "did you mean `name`"),
     ("structure", 3, "/structure", "must be a table"),
-    ("structure/kind", "matrices", "/structure/kind", "one of lumped, cyclic, got 'matrices'"),
+    ("structure/kind", "mesh", "/structure/kind", "one of lumped, cyclic, matrices, got 'mesh'"),
     ("structure/sectors", 8, "/structure/sectors", "not a key of a lumped structure"),
     ("structure/masses", {}, "/structure/masses", "must not be empty"),
     ("structure/masses", [1.0], "/structure/masses", "must be a table"),

@@ -35,7 +35,10 @@ RAN, SETTLED, CHATTER, NOT_FINITE = 0, 1, 2, 3
 
 
 class System(NamedTuple):
-    """The equations in tau: x'' = force - A x - B x' - W L^T F, with A and B as compressed sparse rows."""
+    """The equations in tau: x'' = W (force - L^T F) - A x - B x', with A, B and W as compressed sparse rows.
+
+    W is the inverse of the mass matrix times omega^-2.
+    """
 
     A_start: Whole
     A_column: Whole
@@ -43,7 +46,9 @@ class System(NamedTuple):
     B_start: Whole
     B_column: Whole
     B_value: Real
-    inverse_mass: Real
+    W_start: Whole
+    W_column: Whole
+    W_value: Real
     force_dof: Whole
     force_amplitude: Real
     force_phase: Real
@@ -67,12 +72,13 @@ class State(NamedTuple):
 
 
 class Series(NamedTuple):
-    """Taylor coefficients over a step, row k belongs to s^k, s = 0..1."""
+    """Taylor coefficients over a step, row k belongs to s^k, s = 0..1; `pull` is scratch, a force a DOF."""
 
     x: Real
     v: Real
     force: Real
     load: Real
+    pull: Real
 
 
 class Record(NamedTuple):
@@ -132,6 +138,24 @@ def _contact_series(system: System, state: State, series: Series, k: int) -> Non
 
 
 @compiled
+def _pull(system: System, tau: float, k: int, scale: float, series: Series) -> None:
+    """Fill in coefficient k of what forces and contacts pull at each DOF."""
+    f, pull = series.force[k], series.pull
+    for i in range(pull.size):
+        pull[i] = 0.0
+    for e in range(system.force_dof.size):
+        harmonic = system.force_harmonic[e]
+        wave = _wave(k, harmonic * tau + system.force_phase[e])
+        pull[system.force_dof[e]] += system.force_amplitude[e] * wave * scale * float(harmonic) ** k
+    for c in range(system.kt.size):
+        first, second = system.first[c], system.second[c]
+        if first >= 0:
+            pull[first] -= f[c]
+        if second >= 0:
+            pull[second] += f[c]
+
+
+@compiled
 def _expand(system: System, state: State, tau: float, h: float, series: Series) -> None:
     """Fill the Taylor series of motion and contact forces from `tau` over a step `h`."""
     n = state.x.size
@@ -142,23 +166,12 @@ def _expand(system: System, state: State, tau: float, h: float, series: Series) 
     _contact_series(system, state, series, 0)
     scale = 1.0  # h^k / k!
     for k in range(ORDER):
-        x, v, f, rise = series.x[k], series.v[k], series.force[k], series.v[k + 1]
+        x, v, rise, pull = series.x[k], series.v[k], series.v[k + 1], series.pull
+        _pull(system, tau, k, scale, series)
         for i in range(n):
-            rise[i] = -_product(system.A_start, system.A_column, system.A_value, x, i)
+            rise[i] = _product(system.W_start, system.W_column, system.W_value, pull, i)
+            rise[i] -= _product(system.A_start, system.A_column, system.A_value, x, i)
             rise[i] -= _product(system.B_start, system.B_column, system.B_value, v, i)
-        for e in range(system.force_dof.size):
-            harmonic, i = system.force_harmonic[e], system.force_dof[e]
-            wave = _wave(k, harmonic * tau + system.force_phase[e])
-            rise[i] += (
-                system.inverse_mass[i] * system.force_amplitude[e] * wave * scale * float(harmonic) ** k
-            )
-        for c in range(system.kt.size):
-            first, second = system.first[c], system.second[c]
-            if first >= 0:
-                rise[first] -= system.inverse_mass[first] * f[c]
-            if second >= 0:
-                rise[second] += system.inverse_mass[second] * f[c]
-        for i in range(n):
             rise[i] *= h / (k + 1)
             series.x[k + 1, i] = h / (k + 1) * v[i]
         scale *= h / (k + 1)
@@ -340,8 +353,9 @@ def run_periods(
     """
     n, n_contacts, rows = state.x.size, system.kt.size, ORDER + 1
     series = Series(
-        np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, n_contacts)), np.empty((rows, n_contacts))
-    )
+        np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, n_contacts)), np.empty((rows, n_contacts)),
+        np.empty(n),
+    )  # fmt: skip
     q = np.empty(rows)
     for period in range(change.size):
         x, v, force = state.x.copy(), state.v.copy(), state.force.copy()

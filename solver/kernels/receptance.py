@@ -6,10 +6,12 @@ import math
 
 import numpy as np
 
-from solver.fourier import Complex
+from solver.fourier import Complex, Real
 from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.linear import invert
 from solver.kernels.system import DENSE, FORCE_PHASE, FREQUENCY, LEVEL, MODES, STRUCTURE, Receptance, System
+
+BLOCK = 512  # modes summed at a time: their weights stay in the near cache
 
 
 @compiled
@@ -40,7 +42,7 @@ def receptance(system: System, p: float, out: Receptance) -> None:
             f, df = complex(1.0), complex(0.0)
         out.x_linear[1, k] = f * out.x_linear[1, k] + df * out.x_linear[0, k]
         out.x_linear[0, k] *= f
-        for c in range(system.contacts.shape[0]):
+        for c in range(out.B.shape[2]):
             out.u_linear[1, k, c] = f * out.u_linear[1, k, c] + df * out.u_linear[0, k, c]
             out.u_linear[0, k, c] *= f
 
@@ -60,46 +62,162 @@ def _clear(out: Receptance) -> None:
 
 
 @compiled
-def _inverse(z: complex) -> complex:
-    """Return 1/z; NaN, not an exception, where an undamped mode is met exactly."""
-    if z.real == 0.0 and z.imag == 0.0:
-        return complex(np.nan, np.nan)
-    return 1.0 / z
-
-
-@compiled
 def _modal_receptance(system: System, p: float, out: Receptance) -> None:
-    """Sum the modes: Z⁻¹ = Σ x_m y_mᴴ / d_m with d_m = ω_m² − (kω)² + ikω c_m, or ikω − s_m for poles."""
+    """Sum the modes: Z⁻¹ = Σ x_m y_mᴴ / d_m with d_m = ω_m² − (kω)² + ikω c_m, or ikω − s_m for poles.
+
+    Block by block: the products of modes at pairs of contacts once for all harmonics of a structure, then one
+    real sum over the block for each of them, which the compiler vectorises.
+    """
     out_of_line()
     omega = p if system.kind == FREQUENCY else system.omega
     by_omega = 1.0 if system.kind == FREQUENCY else 0.0
-    nc = system.contacts.shape[0]
+    nc, most = out.B.shape[2], min(BLOCK, system.eigenvalues.shape[1])
     _clear(out)
-    for i in range(system.ks.size):
-        k, s = system.ks[i], system.which[i]
-        speed = k * omega
-        for m in range(system.eigenvalues.shape[1]):
-            if system.form == MODES:
-                damping = system.dampings[s, m]
-                inverse = _inverse(complex(system.eigenvalues[s, m].real - speed * speed, speed * damping))
-                dinverse = -by_omega * inverse * inverse * complex(-2.0 * k * speed, k * damping)
-            else:
-                inverse = _inverse(complex(0.0, speed) - system.eigenvalues[s, m])
-                dinverse = -by_omega * inverse * inverse * complex(0.0, float(k))
-            force, seen = system.modal_forces[i, m], system.observe_modes[s, m]
-            out.x_linear[0, i] += seen * inverse * force
-            out.x_linear[1, i] += seen * dinverse * force
-            for c in range(nc):
-                phi = system.contact_modes[s, c, m]
-                out.u_linear[0, i, c] += phi * inverse * force
-                out.u_linear[1, i, c] += phi * dinverse * force
-                back = seen * system.contact_duals[s, c, m]
-                out.B[0, i, c] += back * inverse
-                out.B[1, i, c] += back * dinverse
-                for d in range(nc):
-                    pair = phi * system.contact_duals[s, d, m]
-                    out.A[0, i, c, d] += pair * inverse
-                    out.A[1, i, c, d] += pair * dinverse
+    weights, driven = np.empty((2 * (nc * nc + nc), most)), np.empty((2 * (nc + 1), most))
+    terms = np.empty((4, most))
+    for s in range(system.eigenvalues.shape[0]):
+        for first in range(0, system.eigenvalues.shape[1], BLOCK):
+            size = min(BLOCK, system.eigenvalues.shape[1] - first)
+            turns = _fill_weights(system, s, first, size, weights)
+            for i in range(system.ks.size):
+                if system.which[i] == s:
+                    _fill_terms(system, s, first, size, float(system.ks[i]), omega, by_omega, terms)
+                    _add_pairs(system, size, i, turns, weights, terms, out)
+                    if _fill_driven(system, s, first, size, i, driven):
+                        _add_driven(size, i, driven, terms, out)
+
+
+@compiled
+def _fill_weights(system: System, s: int, first: int, size: int, weights: Real) -> bool:
+    """Fill in real and imaginary rows of x_m y_mᴴ at pairs of contacts, then from contacts to the observer.
+
+    For modes, whose y is x, pairs with d ≤ c are enough. Returns whether any imaginary part is not zero.
+    """
+    nc, symmetric = system.contact_modes.shape[1], system.form == MODES
+    modes, duals, seen = system.contact_modes[s], system.contact_duals[s], system.observe_modes[s]
+    turns = 0.0
+    for c in range(nc):
+        for d in range(c + 1 if symmetric else nc):
+            row = 2 * (c * nc + d)
+            turns += _products(modes[c], duals[d], first, size, weights[row], weights[row + 1])
+        row = 2 * (nc * nc + c)
+        turns += _products(seen, duals[c], first, size, weights[row], weights[row + 1])
+    return turns > 0.0
+
+
+@compiled
+def _products(left: Complex, right: Complex, first: int, size: int, real: Real, imag: Real) -> float:
+    """Fill in real and imaginary parts of the products of a block; return the sum of |imaginary|."""
+    turns = 0.0
+    for m in range(size):
+        x, y = left[first + m], right[first + m]
+        real[m] = x.real * y.real - x.imag * y.imag
+        imag[m] = x.real * y.imag + x.imag * y.real
+        turns += abs(imag[m])
+    return turns
+
+
+@compiled
+def _fill_driven(system: System, s: int, first: int, size: int, i: int, driven: Real) -> bool:
+    """Fill in real and imaginary rows of x_m y_mᴴ f̂_k at contacts and observer; False without a force."""
+    nc, modes, seen = system.contact_modes.shape[1], system.contact_modes[s], system.observe_modes[s]
+    forces = system.modal_forces[i]
+    moved = 0.0
+    for m in range(first, first + size):
+        moved += abs(forces[m].real) + abs(forces[m].imag)
+    if moved == 0.0:
+        return False
+    for c in range(nc):
+        _products(modes[c], forces, first, size, driven[2 * c], driven[2 * c + 1])
+    _products(seen, forces, first, size, driven[2 * nc], driven[2 * nc + 1])
+    return True
+
+
+@compiled
+def _fill_terms(
+    system: System, s: int, first: int, size: int, k: float, omega: float, by_omega: float, terms: Real
+) -> None:
+    """Fill in 1/d_m and its derivative by λ: real, imaginary, real, imaginary; NaN where d_m is zero."""
+    speed, values = k * omega, system.eigenvalues[s]
+    for m in range(size):
+        terms[0, m] = values[first + m].real
+        terms[1, m] = values[first + m].imag
+    a, b, da, db = terms[0], terms[1], terms[2], terms[3]
+    if system.form == MODES:
+        dampings = system.dampings[s]
+        for m in range(size):
+            a[m] -= speed * speed
+            b[m] = speed * dampings[first + m]
+            da[m] = -2.0 * k * speed * by_omega
+            db[m] = k * dampings[first + m] * by_omega
+    else:
+        for m in range(size):
+            a[m] = -a[m]
+            b[m] = speed - b[m]
+            da[m] = 0.0
+            db[m] = k * by_omega
+    for m in range(size):
+        inverse = 1.0 / (a[m] * a[m] + b[m] * b[m])
+        re, im = a[m] * inverse, -b[m] * inverse
+        re2, im2 = re * re - im * im, 2.0 * re * im
+        a[m], b[m] = re, im
+        da[m], db[m] = im2 * db[m] - re2 * da[m], -re2 * db[m] - im2 * da[m]
+
+
+@compiled
+def _sums(weights: Real, terms: Real, size: int) -> tuple[complex, complex]:
+    """Return Σ w_m / d_m and its derivative for real weights."""
+    a, b, da, db = terms[0], terms[1], terms[2], terms[3]
+    re, im, dre, dim = 0.0, 0.0, 0.0, 0.0
+    for m in range(size):
+        w = weights[m]
+        re += w * a[m]
+        im += w * b[m]
+        dre += w * da[m]
+        dim += w * db[m]
+    return complex(re, im), complex(dre, dim)
+
+
+@compiled
+def _add_pairs(
+    system: System, size: int, i: int, turns: bool, weights: Real, terms: Real, out: Receptance
+) -> None:
+    """Add a block of modes to A and B of harmonic number i."""
+    nc = out.B.shape[2]
+    symmetric = system.form == MODES
+    turned, dturned = complex(0.0), complex(0.0)
+    for c in range(nc):
+        for d in range(c + 1 if symmetric else nc):
+            row = 2 * (c * nc + d)
+            value, dvalue = _sums(weights[row], terms, size)
+            if turns:
+                turned, dturned = _sums(weights[row + 1], terms, size)
+            out.A[0, i, c, d] += value + 1j * turned
+            out.A[1, i, c, d] += dvalue + 1j * dturned
+            if symmetric and c != d:
+                out.A[0, i, d, c] += value - 1j * turned
+                out.A[1, i, d, c] += dvalue - 1j * dturned
+        row = 2 * (nc * nc + c)
+        value, dvalue = _sums(weights[row], terms, size)
+        if turns:
+            turned, dturned = _sums(weights[row + 1], terms, size)
+        out.B[0, i, c] += value + 1j * turned
+        out.B[1, i, c] += dvalue + 1j * dturned
+
+
+@compiled
+def _add_driven(size: int, i: int, driven: Real, terms: Real, out: Receptance) -> None:
+    """Add a block of modes to ū and x̄ of harmonic number i."""
+    nc = out.B.shape[2]
+    for c in range(nc + 1):
+        value, dvalue = _sums(driven[2 * c], terms, size)
+        turned, dturned = _sums(driven[2 * c + 1], terms, size)
+        if c == nc:
+            out.x_linear[0, i] += value + 1j * turned
+            out.x_linear[1, i] += dvalue + 1j * dturned
+        else:
+            out.u_linear[0, i, c] += value + 1j * turned
+            out.u_linear[1, i, c] += dvalue + 1j * dturned
 
 
 @compiled
@@ -153,7 +271,7 @@ def _project(
     system: System, s: int, i: int, sign: float, green: Complex, order: int, out: Receptance
 ) -> None:
     """Project Z⁻¹ (or its derivative) of harmonic number i on contacts, excitation and observed DOF."""
-    nc, n = system.contacts.shape[0], green.shape[0]
+    nc, n = out.B.shape[2], green.shape[0]
     out.x_linear[order, i] = 0.0
     for c in range(nc):
         out.u_linear[order, i, c] = 0.0

@@ -1,0 +1,104 @@
+"""A scene file of kind ``matrices`` with its files read: their names replaced by what they hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array
+
+from solver.errors import Issue, SceneError
+from solver.matrices.files import MatrixFileError, read_matrix, read_modes
+from solver.matrices.reduction import craig_bampton
+from solver.matrices.structure import DofTable
+from solver.matrices.values import MOST_DOFS, Matrix, Modes
+
+KEEP_MODES = "keep_modes"
+_MATRICES = ("M", "K", "C")
+
+
+def with_files(raw: Mapping[str, object], folder: Path) -> dict[str, object]:
+    """The tables of a scene with the files of its structure read; a scene of another kind as it is.
+
+    Parameters
+    ----------
+    folder : where relative names of files begin.
+
+    Raises
+    ------
+    SceneError
+        A file that cannot be used, or a model too large as it stands; the pointer is that of the key.
+    """
+    structure = raw.get("structure")
+    if not isinstance(structure, dict) or structure.get("kind") != "matrices":
+        return dict(raw)
+    tables, sparse, issues = dict(structure), {}, []
+    for key in (*_MATRICES, "modes"):
+        if not isinstance(tables.get(key), str):
+            continue
+        try:
+            if key == "modes":
+                tables[key] = read_modes(folder / tables[key])
+            else:
+                sparse[key] = read_matrix(folder / tables[key], key)
+        except MatrixFileError as error:
+            issues.append(_issue(key, f"`{key}`: {error}"))
+    if issues:
+        raise SceneError(issues)
+    if isinstance(tables.get("modes"), Modes):
+        tables = _rows_in_use(tables)
+    return {**raw, "structure": _reduced(tables, sparse)}
+
+
+def _issue(key: str, message: str) -> Issue:
+    return Issue(pointer=f"/structure/{key}", message=message)
+
+
+def _rows_in_use(tables: dict[str, Any]) -> dict[str, Any]:
+    """Modes without the rows that no DOF of the scene names; as they are if the table of DOFs is bad."""
+    try:
+        dofs = DofTable.read(tables.get("dofs"))
+    except ValueError:
+        return tables
+    modes: Modes = tables["modes"]
+    if max(dofs.rows) >= modes.size:
+        return tables
+    kept = Modes(omega2=modes.omega2, modes=modes.modes[list(dofs.rows)], damping_ratio=modes.damping_ratio)
+    return {**tables, "modes": kept, "dofs": {name: row for row, name in enumerate(dofs)}}
+
+
+def _reduced(tables: dict[str, Any], sparse: dict[str, coo_array]) -> dict[str, Any]:
+    """Matrices as the scene keeps them: as they are, or reduced onto the DOFs in use if asked for."""
+    keep = tables.pop(KEEP_MODES, None)
+    sizes = {key: matrix.shape[0] for key, matrix in sparse.items()}
+    if keep is None:
+        large = next((key for key in sizes if sizes[key] > MOST_DOFS), None)
+        if large is not None:
+            raise SceneError([_issue(large, _too_large(large, sizes[large]))])
+        return {**tables, **{key: Matrix(matrix.toarray()) for key, matrix in sparse.items()}}
+    if isinstance(keep, bool) or not isinstance(keep, int) or not 0 <= keep <= MOST_DOFS:
+        message = f"`{KEEP_MODES}` must be a whole number from 0 to {MOST_DOFS}, got {keep!r}"
+        raise SceneError([_issue(KEEP_MODES, message)])
+    if not {"M", "K"} <= set(sparse) or len(set(sizes.values())) != 1:
+        what = ", ".join(f"{key} with {size} rows" for key, size in sizes.items()) or "none"
+        message = f"`{KEEP_MODES}` needs M and K (and C) from files, of one size, got {what}"
+        raise SceneError([_issue(KEEP_MODES, message)])
+    try:
+        dofs = DofTable.read(tables.get("dofs"))
+        found = craig_bampton(sparse["M"], sparse["K"], sparse.get("C"), dofs, keep)
+    except ValueError as error:
+        raise SceneError([_issue("dofs" if "`dofs`" in str(error) else KEEP_MODES, str(error))]) from error
+    matrices = {key: Matrix(np.asarray(value)) for key, value in found.matrices.items()}
+    reduction = {"dofs": sizes["M"], "modes": found.modes, "highest_hz": found.highest_hz}
+    return {**tables, **matrices, "dofs": {n: i for i, n in enumerate(dofs)}, "reduction": reduction}
+
+
+def _too_large(key: str, size: int) -> str:
+    return (
+        f"`{key}` has {size} rows, {MOST_DOFS} are the most without reduction: set `{KEEP_MODES}` = 40 (say) "
+        "in [structure] to keep the DOFs named in `dofs` and that many modes of the rest, whose highest "
+        "frequency "
+        "should lie well above the harmonics that matter"
+    )

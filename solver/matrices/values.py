@@ -1,0 +1,285 @@
+"""Matrices and modes as values of a scene: frozen, compared by content, written as plain lists.
+
+In a request they are lists or a table of entries; only `solver.load_scene` replaces the names of files by
+what they hold (`solver.matrices.loading`), so that a scene from somewhere else never opens a path.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+FloatArray = NDArray[np.float64]
+MOST_DOFS = 2000
+MOST_MODES = 2000
+_ENTRY_KEYS = ("size", "rows", "columns", "values")
+_MODES_KEYS = ("omega2", "frequencies_hz", "modes", "damping_ratio")
+_SPARSE_BELOW = 0.3  # share of entries that are not zero below which a matrix is written entry by entry
+_INLINE = "must be given inline here, as rows or as a table of entries: files are read by load_scene only"
+
+
+def _schema(read: Callable[[object], Any], write: Callable[[Any], Any], key: str | None) -> CoreSchema:
+    """Read and write for pydantic; a refusal names the key."""
+
+    def reader(data: object) -> Any:
+        try:
+            return read(data)
+        except ValueError as error:
+            raise ValueError(f"`{key}`: {error}" if key else str(error)) from error
+
+    return core_schema.no_info_plain_validator_function(
+        reader, serialization=core_schema.plain_serializer_function_ser_schema(write)
+    )
+
+
+def _frozen(array: FloatArray) -> FloatArray:
+    array = np.ascontiguousarray(array, dtype=np.float64)
+    array.setflags(write=False)
+    return array
+
+
+def _digest(*arrays: FloatArray) -> str:
+    found = hashlib.sha256()
+    for array in arrays:
+        found.update(repr(array.shape).encode() + array.tobytes())
+    return found.hexdigest()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Matrix:
+    """A square matrix of a scene; equal to another with the same entries.
+
+    Attributes
+    ----------
+    array : (n, n) array
+        Read-only.
+    digest : str
+        Hash of the content.
+    """
+
+    array: FloatArray
+    digest: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        array = np.asarray(self.array)
+        if array.ndim != 2 or array.shape[0] != array.shape[1] or not array.size:
+            shape = " x ".join(map(str, array.shape))
+            raise ValueError(f"a matrix must be square, with as many rows as columns, got {shape}")
+        if array.shape[0] > MOST_DOFS:
+            raise ValueError(
+                f"a matrix may have {MOST_DOFS} rows, got {array.shape[0]}: set `keep_modes` in a scene "
+                "file, which reduces it onto the DOFs in use, or give the modes instead"
+            )
+        bad = np.argwhere(~np.isfinite(array))
+        if bad.size:
+            i, j = bad[0]
+            raise ValueError(f"a matrix must be finite, got {array[i, j]} in row {i}, column {j}")
+        object.__setattr__(self, "array", _frozen(array))
+        object.__setattr__(self, "digest", _digest(self.array))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Matrix) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __repr__(self) -> str:
+        return f"Matrix({self.size} x {self.size}, {self.digest[:12]})"
+
+    @property
+    def size(self) -> int:
+        """Number of rows."""
+        return int(self.array.shape[0])
+
+    @classmethod
+    def read(cls, data: object) -> Matrix:
+        """Read rows, or a table `size`, `rows`, `columns`, `values` of entries (zero-based, summed)."""
+        if isinstance(data, Matrix):
+            return data
+        if isinstance(data, dict):
+            return cls(_entries(data))
+        if isinstance(data, list | tuple):
+            return cls(_rows(data, "a matrix", MOST_DOFS))
+        if isinstance(data, str):
+            raise ValueError(f"a matrix {_INLINE}, got the path {data[:80]!r}")
+        raise ValueError(f"a matrix must be a list of rows or a table of entries, got {type(data).__name__}")
+
+    def write(self) -> list[list[float]] | dict[str, object]:
+        """Rows, or the entries that are not zero where these are few; `read` gives back the same matrix."""
+        rows, columns = np.nonzero(self.array)
+        if rows.size >= _SPARSE_BELOW * self.array.size:
+            dense: list[list[float]] = self.array.tolist()
+            return dense
+        return {
+            "size": self.size,
+            "rows": rows.tolist(),
+            "columns": columns.tolist(),
+            "values": self.array[rows, columns].tolist(),
+        }
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return _schema(cls.read, cls.write, handler.field_name)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Modes:
+    """Mass-normalised modes of a structure: q'' + 2 ζ ω q' + ω² q = φᵀ f, x = φ q.
+
+    Attributes
+    ----------
+    omega2 : (m,) array
+        Squares of the natural frequencies [rad²/s²]; 0 of a rigid body.
+    modes : (n, m) array
+        One mode a column, φᵀ M φ = 1 [kg^-1/2].
+    damping_ratio : (m,) array or None
+        ζ of each mode.
+    digest : str
+        Hash of the content.
+    """
+
+    omega2: FloatArray
+    modes: FloatArray
+    damping_ratio: FloatArray | None = None
+    digest: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        omega2, modes = np.asarray(self.omega2), np.asarray(self.modes)
+        if omega2.ndim != 1 or modes.ndim != 2 or modes.shape[1] != omega2.size or not modes.size:
+            raise ValueError(
+                f"`modes` must have one column for each of the {omega2.size} frequencies, got {modes.shape}"
+            )
+        if omega2.size > MOST_MODES or modes.shape[0] > MOST_DOFS:
+            raise ValueError(f"`modes` may have {MOST_DOFS} rows and {MOST_MODES} columns, got {modes.shape}")
+        if not (np.isfinite(omega2).all() and np.isfinite(modes).all()):
+            raise ValueError("`modes` must be finite, frequencies and shapes alike")
+        if omega2.min() < 0.0:
+            raise ValueError(f"`omega2` must be >= 0, got {omega2.min():g}")
+        object.__setattr__(self, "omega2", _frozen(omega2))
+        object.__setattr__(self, "modes", _frozen(modes))
+        ratio = self.damping_ratio
+        if ratio is not None:
+            given = np.asarray(ratio, dtype=np.float64)
+            if given.ndim > 1 or given.size not in (1, omega2.size):
+                raise ValueError(f"`damping_ratio` must have 1 or {omega2.size} entries, got {given.size}")
+            if not np.all((given >= 0.0) & (given <= 10.0)):
+                raise ValueError(
+                    f"`damping_ratio` must be from 0 to 10, got {given.min():g} to {given.max():g}"
+                )
+            object.__setattr__(self, "damping_ratio", _frozen(np.broadcast_to(given, omega2.shape).copy()))
+        kept = [a for a in (self.omega2, self.modes, self.damping_ratio) if a is not None]
+        object.__setattr__(self, "digest", _digest(*kept))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Modes) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __repr__(self) -> str:
+        return f"Modes({self.modes.shape[0]} DOFs, {self.omega2.size} modes, {self.digest[:12]})"
+
+    @property
+    def size(self) -> int:
+        """Number of DOFs the modes have."""
+        return int(self.modes.shape[0])
+
+    @classmethod
+    def read(cls, data: object) -> Modes:
+        """Read a table with `omega2` or `frequencies_hz`, `modes` (rows: DOFs) and maybe `damping_ratio`."""
+        if isinstance(data, Modes):
+            return data
+        if isinstance(data, str):
+            raise ValueError(f"`modes` {_INLINE}, got the path {data[:80]!r}")
+        if not isinstance(data, dict):
+            raise ValueError(f"`modes` must be a table, got {type(data).__name__}")
+        unknown = [str(key) for key in data if key not in _MODES_KEYS]
+        if unknown:
+            raise ValueError(
+                f"`{unknown[0][:80]}` is not a key of modes; known keys: {', '.join(_MODES_KEYS)}"
+            )
+        if ("omega2" in data) == ("frequencies_hz" in data) or "modes" not in data:
+            raise ValueError(
+                "`modes` must have the keys `modes` and one of `omega2` [rad²/s²] and `frequencies_hz`, got "
+                + (", ".join(sorted(data)) or "none")
+            )
+        arrays = {key: _numbers(data[key], f"`{key}`") for key in data if key != "modes"}
+        return cls.of({**arrays, "modes": _rows(data["modes"], "`modes`", MOST_DOFS)})
+
+    @classmethod
+    def of(cls, arrays: dict[str, FloatArray]) -> Modes:
+        """Modes from the arrays of a file or a table, under the keys of the table."""
+        omega2 = arrays["omega2"] if "omega2" in arrays else (2.0 * np.pi * arrays["frequencies_hz"]) ** 2
+        if "frequencies_hz" in arrays and np.any(arrays["frequencies_hz"] < 0.0):
+            raise ValueError(f"`frequencies_hz` must be >= 0, got {arrays['frequencies_hz'].min():g}")
+        return cls(omega2=omega2, modes=arrays["modes"], damping_ratio=arrays.get("damping_ratio"))
+
+    def write(self) -> dict[str, object]:
+        """The table that `read` reads."""
+        table: dict[str, object] = {"omega2": self.omega2.tolist(), "modes": self.modes.tolist()}
+        if self.damping_ratio is not None:
+            table["damping_ratio"] = self.damping_ratio.tolist()
+        return table
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return _schema(cls.read, cls.write, None)
+
+
+def _numbers(data: object, what: str) -> FloatArray:
+    """A number or a list of numbers; texts, truth values and nested lists are refused."""
+    listed = data if isinstance(data, list | tuple) else [data]
+    for i, value in enumerate(listed):
+        if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+            raise ValueError(f"{what} must hold numbers, got {str(value)[:80]!r} as entry {i}")
+    try:
+        return np.array(listed, dtype=np.float64)
+    except OverflowError:
+        raise ValueError(f"{what} must be finite, got a whole number too large for it") from None
+
+
+def _rows(data: object, what: str, most: int) -> FloatArray:
+    if (
+        not isinstance(data, list | tuple)
+        or not all(isinstance(row, list | tuple) for row in data)
+        or not data
+    ):
+        raise ValueError(f"{what} must be a list of rows, each a list of numbers")
+    if len(data) > most:
+        raise ValueError(f"{what} may have {most} rows, got {len(data)}")
+    width = len(data[0])
+    for i, row in enumerate(data):
+        if len(row) != width:
+            raise ValueError(f"{what}: row {i} has {len(row)} numbers where row 0 has {width}")
+    return np.array([_numbers(row, f"{what}, row {i},") for i, row in enumerate(data)]).reshape(-1, width)
+
+
+def _entries(data: dict[str, object]) -> FloatArray:
+    if set(data) != set(_ENTRY_KEYS):
+        got = ", ".join(sorted(map(str, data)))[:200]
+        raise ValueError(f"a matrix given by its entries has the keys {', '.join(_ENTRY_KEYS)}, got {got}")
+    size = data["size"]
+    if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= MOST_DOFS:
+        raise ValueError(
+            f"`size` of a matrix must be a whole number from 1 to {MOST_DOFS}, got {str(size)[:80]}"
+        )
+    rows, columns, values = (_numbers(data[key] or [], f"`{key}`") for key in _ENTRY_KEYS[1:])
+    if not rows.size == columns.size == values.size:
+        raise ValueError(
+            "`rows`, `columns` and `values` must be of one length, "
+            f"got {rows.size}, {columns.size}, {values.size}"
+        )
+    for key, places in (("rows", rows), ("columns", columns)):
+        bad = places[~((places >= 0) & (places < size) & (places == np.floor(places)))]
+        if bad.size:
+            raise ValueError(f"`{key}` must be whole numbers from 0 to {size - 1}, got {bad[0]:g}")
+    array = np.zeros((size, size))
+    np.add.at(array, (rows.astype(np.int64), columns.astype(np.int64)), values)
+    return array
