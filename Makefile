@@ -5,6 +5,8 @@ BIN := .venv/bin
 STAMP := .venv/.up-to-date
 # What pytest gets in addition, for example: make test PYTEST="-k march -x"
 PYTEST ?=
+# Which benchmarks: all when empty; `python -m benchmarks --help` lists them.
+BENCH ?=
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-long lint bench serve clean
@@ -15,7 +17,7 @@ help:
 	@echo "make test       check the code and run every test but the long ones"
 	@echo "make test-long  run the long studies"
 	@echo "make lint       check the code: ruff, mypy, import-linter"
-	@echo "make bench      measure the solver and print a table"
+	@echo "make bench      measure the solver and print tables; some of them: make bench BENCH='case-a chains'"
 	@echo "make serve      start the service on http://127.0.0.1:8000"
 	@echo "make clean      remove .venv, caches and demo-output/"
 
@@ -49,7 +51,7 @@ lint: setup
 	$(BIN)/lint-imports
 
 bench: setup
-	$(BIN)/python -m benchmarks
+	$(BIN)/python -m benchmarks $(BENCH)
 
 serve: setup
 	$(BIN)/stickslip serve

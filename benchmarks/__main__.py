@@ -1,11 +1,56 @@
-"""Run every benchmark and print the tables."""
+"""Run benchmarks and print their tables: all of them, or those named on the command line."""
 
 from __future__ import annotations
 
-from benchmarks.responses import cold_start, designs, responses, solves
+import argparse
+import sys
+from collections.abc import Callable
+
+from benchmarks.harness import WrongResultError
+
+GROUPS = {"chains": ("chain-8", "chain-32", "one-slider")}
+
+
+def _cases() -> dict[str, Callable[[], None]]:
+    from benchmarks import against_peers, disk, large, responses, robustness
+
+    return {
+        "responses": responses.responses,
+        "solves": responses.solves,
+        "designs": responses.designs,
+        "cold-start": responses.cold_start,
+        "case-a": against_peers.case_a_response,
+        "chain-8": against_peers.chain_of_8,
+        "chain-32": against_peers.chain_of_32,
+        "one-slider": against_peers.one_slider,
+        "optimum": against_peers.optimum,
+        "disk": disk.disk_response,
+        "two-hundred": large.two_hundred_contacts,
+        "robustness": robustness.robustness,
+    }
+
+
+def main() -> int:
+    """Run what is asked for; 1 if a result was wrong."""
+    cases = _cases()
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    listed = "; ".join(f"{name}: {(case.__doc__ or '').splitlines()[0]}" for name, case in cases.items())
+    parser.add_argument("case", nargs="*", metavar="CASE", help=listed)
+    asked = parser.parse_args().case or list(cases)
+    names = [case for name in asked for case in GROUPS.get(name, (name,))]
+    unknown = [name for name in names if name not in cases]
+    if unknown:
+        parser.error(f"no such case: {', '.join(unknown)}; there are {', '.join(cases)}")
+    wrong = 0
+    for name in names:
+        try:
+            cases[name]()
+        except WrongResultError as error:
+            wrong += 1
+            print(f"\n{name}: WRONG, no figure: {error}")
+        sys.stdout.flush()
+    return 1 if wrong else 0
+
 
 if __name__ == "__main__":
-    responses()
-    solves()
-    designs()
-    cold_start()
+    sys.exit(main())

@@ -1,4 +1,8 @@
-"""How things are timed here: warm, one thread, the median of several runs, and the spread beside it."""
+"""How things are timed here: warm, one thread, the least of several runs, on the clock of the process.
+
+The time of the process (CPU time) is the figure: it does not count what other programs on the machine do.
+The time on the wall stands beside it where both are known.
+"""
 
 from __future__ import annotations
 
@@ -15,24 +19,51 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUM
 _T = TypeVar("_T")
 
 
+class WrongResultError(Exception):
+    """A benchmark computed something that is not so: there is no figure then."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Timing:
-    """Seconds of one call: the least, the median and the number of runs."""
+    """Seconds of one call: least and median time on the wall, least of the process, number of runs."""
 
     least: float
     median: float
+    cpu: float
     runs: int
 
 
-def timed(call: Callable[[], _T], *, runs: int = 9) -> tuple[_T, Timing]:
-    """Return the result of a call and its time, after one call that is not counted."""
-    result = call()
-    seconds = []
+def timed(call: Callable[[], _T], *, runs: int = 9, warm_up: int = 1) -> tuple[_T, Timing]:
+    """Return the result of a call and its time, after `warm_up` calls that are not counted."""
+    for _ in range(warm_up):
+        call()
+    seconds, process = [], []
     for _ in range(runs):
-        begun = time.perf_counter()
+        begun, begun_cpu = time.perf_counter(), time.process_time()
         result = call()
+        process.append(time.process_time() - begun_cpu)
         seconds.append(time.perf_counter() - begun)
-    return result, Timing(least=min(seconds), median=statistics.median(seconds), runs=runs)
+    return result, Timing(least=min(seconds), median=statistics.median(seconds), cpu=min(process), runs=runs)
+
+
+def check(what: str, found: float, known: float, rel: float) -> str:
+    """Return `found` and its relative distance to the known value, for a table.
+
+    Raises
+    ------
+    WrongResultError
+        It is further away than `rel`.
+    """
+    error = abs(found - known) / abs(known)
+    if not error <= rel:
+        raise WrongResultError(f"{what}: {found:.9g} instead of {known:.9g}, off by {error:.1e} > {rel:.0e}")
+    return f"{found:.7g} (off {error:.0e})"
+
+
+def expect(what: str, holds: bool) -> None:
+    """Raise WrongResultError unless something holds."""
+    if not holds:
+        raise WrongResultError(what)
 
 
 def table(title: str, header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
