@@ -1,4 +1,4 @@
-"""What is wrong with mistuning and wave patterns, on the plain tables and lists of a scene."""
+"""What is wrong with mistuning, wave patterns and groups, on the plain tables and lists of a scene."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from solver.scene_parts import Mistuning
 
 
 def cyclic_issues(raw: dict[str, Any]) -> list[Issue]:
-    """Patterns that do not fit, mistuned parts that do not exist, factors that are too few or not > 0."""
+    """Patterns and groups that do not fit, mistuned parts that do not exist, factors too few or not > 0."""
     structure = raw.get("structure")
     structure = structure if isinstance(structure, dict) else {}
     found = [*_pattern_issues(raw.get("excitation"), structure.get("kind"))]
+    found += _group_issues(structure)
     mistuning = structure.get("mistuning")
     if structure.get("kind") == "cyclic" and isinstance(mistuning, dict):
         found += [*_name_issues(structure, mistuning), *_factor_issues(mistuning, structure.get("sectors"))]
@@ -42,16 +43,45 @@ def _pattern_issues(excitation: object, kind: object) -> Iterator[Issue]:
         first = pattern if first is None else first
 
 
+def _parts(structure: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Masses, springs and dashpots that are tables, with their pointers."""
+    masses = structure.get("masses")
+    for dof, row in masses.items() if isinstance(masses, dict) else ():
+        if isinstance(row, dict):
+            yield "/structure/masses/" + str(dof).replace("~", "~0").replace("/", "~1"), row
+    for key in ("springs", "dampers"):
+        table = structure.get(key)
+        for i, row in enumerate(table if isinstance(table, list) else []):
+            if isinstance(row, dict):
+                yield f"/structure/{key}/{i}", row
+
+
+def _names(structure: dict[str, Any]) -> list[str]:
+    return [row["name"] for _, row in _parts(structure) if isinstance(row.get("name"), str)]
+
+
+def _group_issues(structure: dict[str, Any]) -> Iterator[Issue]:
+    """Groups named like a part, in a cyclic structure, or of parts of another kind."""
+    names, quantities = set(_names(structure)), dict[str, str]()
+    for pointer, row in _parts(structure):
+        group, quantity = row.get("group"), pointer.split("/")[2]
+        if not isinstance(group, str):
+            continue
+        where = f"{pointer}/group"
+        if structure.get("kind") == "cyclic":
+            message = f"`group` = {quoted(group)}: a named part of a cyclic structure is a group already"
+            yield Issue(pointer=where, message=message)
+        elif group in names:
+            yield Issue(pointer=where, message=f"`group` = {quoted(group)} is also the name of a part")
+        elif quantities.setdefault(group, quantity) != quantity:
+            message = f"`group` = {quoted(group)} has {quantities[group]} in it already, and no {quantity}"
+            yield Issue(pointer=where, message=message)
+
+
 def _name_issues(structure: dict[str, Any], mistuning: dict[str, Any]) -> Iterator[Issue]:
     """Names in `of` that are neither a DOF nor the name of a spring, dashpot or mass, or stand twice."""
     masses = structure.get("masses")
-    masses = masses if isinstance(masses, dict) else {}
-    rows = [*masses.values()]
-    for key in ("springs", "dampers"):
-        table = structure.get(key)
-        rows += table if isinstance(table, list) else []
-    names = [row["name"] for row in rows if isinstance(row, dict) and isinstance(row.get("name"), str)]
-    known = [*names, *map(str, masses)]
+    known = [*_names(structure), *map(str, masses if isinstance(masses, dict) else ())]
     of = mistuning.get("of")
     named = of if isinstance(of, list) else []
     for i, name in enumerate(named):

@@ -30,7 +30,7 @@ from solver.scene import (
     parse_end,
 )
 from solver.scene_checks import listing, nearest
-from solver.scene_paths import PROPORTIONAL, structure_names
+from solver.scene_paths import PROPORTIONAL, share, structure_names
 from solver.sectors import written_out
 
 FloatArray = NDArray[np.float64]
@@ -217,6 +217,8 @@ def _identity(n: int) -> FloatArray:
 def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
     """Derivatives of the matrices by the structural parameter `name` (without ``structure.``).
 
+    By the value of a group they are the sum of those by its members, times their factors.
+
     Raises
     ------
     SettingError
@@ -226,10 +228,18 @@ def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
     if isinstance(structure, MatricesStructure):
         return _proportional(structure, name)
     parts: tuple[Mass | Spring | Damper, ...] = (*structure.masses, *structure.springs, *structure.dampers)
-    owners = [part.name for part in parts]
-    if not name or name not in owners:
+    shares = [(i, weight) for i, part in enumerate(parts) if name and (weight := share(part, name))]
+    if not shares:
         raise _unknown(name, structure_names(structure))
-    return _derivative(_topology(structure), _numbers(structure), owners.index(name))
+    topology, numbers = _topology(structure), _numbers(structure)
+    members = [(_derivative(topology, numbers, i), weight) for i, weight in shares]
+    matrices = {
+        key: _frozen(
+            sum((weight * getattr(d, key) for d, weight in members), np.zeros(members[0][0].dM.shape))
+        )
+        for key in ("dM", "dC0", "dCp", "dK0", "dKp")
+    }
+    return LinearModelDerivative(**matrices, affine=all(d.affine for d, _ in members))
 
 
 def _proportional(structure: MatricesStructure, name: str) -> LinearModelDerivative:

@@ -40,7 +40,7 @@ _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     ("structure", "cyclic"): ("a cyclic structure", tuple(CyclicStructure.model_fields)),
     ("structure", "matrices"): ("a matrices structure", tuple(MatricesStructure.model_fields)),
     ("structure", "matrices", "reduction"): ("reduction", tuple(Reduction.model_fields)),
-    ("structure", "masses"): ("a mass", ("m", "name")),
+    ("structure", "masses"): ("a mass", ("m", "name", "group", "factor")),
     ("structure", "springs"): ("a spring", tuple(Spring.model_fields)),
     ("structure", "dampers"): ("a damper", tuple(Damper.model_fields)),
     ("structure", "mistuning"): ("mistuning", tuple(Mistuning.model_fields)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, NamedTuple, cast
+from typing import Annotated, Literal, NamedTuple, Self, cast
 
 import numpy as np
 from pydantic import (
@@ -63,7 +63,33 @@ class _Element(Part):
         return parse_end(self.between[0]), parse_end(self.between[1])
 
 
-class Mass(Part):
+class _Grouped(Part):
+    """A part whose value may be set together with others'.
+
+    Attributes
+    ----------
+    name : str or None
+        Makes it a parameter ``structure.<name>``.
+    group : str or None
+        Makes the value of the whole group a parameter ``structure.<group>``.
+    factor : float or None
+        The part's value as a multiple of its group's; 1 if left out.
+    """
+
+    name: MemberName | None = None
+    group: Name | None = None
+    factor: Positive | None = None
+
+    @model_validator(mode="after")
+    def _factor_of_a_group(self) -> Self:
+        if self.factor is not None and self.group is None:
+            raise ValueError(
+                f"`factor` = {self.factor!r} needs a `group`: it is relative to the group's value"
+            )
+        return self
+
+
+class Mass(_Grouped):
     """A point mass: one degree of freedom.
 
     Attributes
@@ -72,35 +98,29 @@ class Mass(Part):
         The degree of freedom it makes.
     m : float
         Mass [kg].
-    name : str or None
-        Makes it a parameter ``structure.<name>``.
     """
 
     dof: str
     m: Positive
-    name: MemberName | None = None
 
 
-class Spring(_Element):
+class Spring(_Element, _Grouped):
     """A spring, with an optional dashpot beside it: `k` [N/m], `c` [N s/m]."""
 
     k: NonNegative
     c: NonNegative = 0.0
-    name: MemberName | None = None
 
 
-class Damper(_Element):
+class Damper(_Element, _Grouped):
     """A dashpot: `c` [N s/m]."""
 
     c: NonNegative
-    name: MemberName | None = None
 
 
-class _MassEntry(Part):
-    """A mass as a scene file gives it: a number, or a table with `m` and an optional `name`."""
+class _MassEntry(_Grouped):
+    """A mass as a scene file gives it: a number, or a table with `m`, `name`, `group` and `factor`."""
 
     m: Positive
-    name: MemberName | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -125,15 +145,12 @@ class _MassTable:
 
     @staticmethod
     def _read(table: dict[str, _MassEntry]) -> tuple[Mass, ...]:
-        return tuple(
-            Mass.model_construct(dof=dof, m=entry.m, name=entry.name) for dof, entry in table.items()
-        )
+        return tuple(Mass.model_construct(dof=dof, **entry.__dict__) for dof, entry in table.items())
 
     @staticmethod
     def _write(masses: tuple[Mass, ...]) -> dict[str, object]:
-        return {
-            mass.dof: mass.m if mass.name is None else {"m": mass.m, "name": mass.name} for mass in masses
-        }
+        tables = {mass.dof: mass.model_dump(exclude={"dof"}, exclude_none=True) for mass in masses}
+        return {dof: table["m"] if len(table) == 1 else table for dof, table in tables.items()}
 
 
 class _Structure(Part):

@@ -56,14 +56,24 @@ def parameter_paths(scene: Scene) -> tuple[str, ...]:
 
 
 def structure_names(structure: Structure) -> tuple[str, ...]:
-    """Names of the springs, dashpots and masses that are parameters, in the order of the tables.
+    """Names that are parameters: of groups, then of masses, springs and dashpots, as in the tables.
 
     Of a structure given by its matrices, the proportional damping is what can be changed.
     """
     if isinstance(structure, MatricesStructure):
         return PROPORTIONAL
     parts: tuple[_Named, ...] = (*structure.masses, *structure.springs, *structure.dampers)
-    return tuple(part.name for part in parts if part.name is not None)
+    groups = dict.fromkeys(part.group for part in parts if part.group is not None)
+    return (*groups, *(part.name for part in parts if part.name is not None))
+
+
+def share(part: _Named, name: str) -> float:
+    """Value of a part as a multiple of that of the parameter `name`, its own or its group's; 0 if neither."""
+    if part.name == name:
+        return 1.0
+    if part.group != name:
+        return 0.0
+    return 1.0 if part.factor is None else part.factor
 
 
 def check_path(scene: Scene, path: str) -> None:
@@ -82,10 +92,10 @@ def value(scene: Scene, path: str) -> float:
     if owner == "structure" and isinstance(scene.structure, MatricesStructure) and key in PROPORTIONAL:
         return cast(float, getattr(scene.structure, key))
     if owner == "structure":
-        part = _structure_part(scene, key)
+        part = next(iter(_structure_parts(scene.structure, key)), None)
         if part is None:
             raise _unknown(scene, path)
-        return cast(float, getattr(part, _quantity(part)))
+        return cast(float, getattr(part, _quantity(part))) / share(part, key)
     contact = next((c for c in scene.contacts if owner in (c.name, c.group)), None)
     if contact is None or key not in CONTACT_KEYS:
         raise _unknown(scene, path)
@@ -126,13 +136,16 @@ def _with_structure(scene: Scene, path: str, name: str, new: float) -> Structure
             unit = "s" if name == PROPORTIONAL[0] else "1/s"
             raise SettingError(path, new, f"must be a number >= 0 and <= 1e15 [{unit}]")
         return scene.structure.model_copy(update={name: new})
-    part = _structure_part(scene, name)
-    if part is None:
+    members = _structure_parts(scene.structure, name)
+    if not members:
         raise _unknown(scene, path)
-    changed = _changed(part, {_quantity(part): new}, path, new)
-    table = {Mass: "masses", Spring: "springs", Damper: "dampers"}[type(part)]
-    parts = tuple(changed if old is part else old for old in getattr(scene.structure, table))
-    return scene.structure.model_copy(update={table: parts})
+    changed = {
+        id(part): _changed(part, {_quantity(part): new * share(part, name)}, path, new) for part in members
+    }
+    tables = {table: getattr(scene.structure, table) for table in ("masses", "springs", "dampers")}
+    return scene.structure.model_copy(
+        update={table: tuple(changed.get(id(old), old) for old in parts) for table, parts in tables.items()}
+    )
 
 
 def _with_amplitude(forces: tuple[Excitation, ...], new: float) -> tuple[Excitation, ...]:
@@ -178,12 +191,11 @@ def _contact_value(contact: Contact, key: str) -> float:
     return contact.N1_value / contact.N0 if contact.N0 else 0.0
 
 
-def _structure_part(scene: Scene, name: str) -> _Named | None:
-    structure = scene.structure
+def _structure_parts(structure: Structure, name: str) -> tuple[_Named, ...]:
     if isinstance(structure, MatricesStructure):
-        return None
+        return ()
     parts: tuple[_Named, ...] = (*structure.springs, *structure.dampers, *structure.masses)
-    return next((part for part in parts if part.name == name), None)
+    return tuple(part for part in parts if name and name in (part.name, part.group))
 
 
 def _quantity(part: _Named) -> str:

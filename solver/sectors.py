@@ -85,12 +85,12 @@ def written_out(scene: Scene) -> Scene:
 def check_in_annulus(scene: Scene, path: str) -> None:
     """Raise SettingError if `path` of a cyclic scene is not one value in its annulus.
 
-    A contact's load then has a phase (in a standing wave, an amplitude) of its own in every sector, and a
-    part of the structure has its own factor: set them in the scene, there they stand for all sectors.
+    A contact's load has a phase (in a standing wave, an amplitude) of its own in every sector: set it in
+    the scene, there it stands for all sectors.
     """
     owner, _, key = path.rpartition(".")
     differs = ("N1", "N1_ratio") if _standing(scene) else ("N1_phase",)
-    if owner == "structure" or key in differs:
+    if owner != "structure" and key in differs:
         reason = sectors_needed(scene).reason
         raise SettingError(
             "path",
@@ -103,8 +103,8 @@ def annulus(scene: Scene) -> Scene:
     """Write a cyclic scene out as a lumped one, sector by sector.
 
     DOF ``tip`` of sector j is ``tip@j``, contact ``shroud`` becomes ``shroud@j`` in the group ``shroud``
-    (or in the group it had), a named spring ``k`` becomes ``k@j``, times the sector's factor of the
-    mistuning. In a travelling wave sector j has
+    (or in the group it had), a named spring ``k`` becomes ``k@j`` in the group ``k``, times
+    the sector's factor of the mistuning. In a travelling wave sector j has
     harmonic * engine_order * j * 2 pi / sectors added to the phase of its forces and
     engine_order * j * 2 pi / sectors to that of its loads; in a standing wave the amplitudes are multiplied
     by the cosines of these angles instead. What joins a sector to itself (one sector only)
@@ -166,17 +166,22 @@ def _mistuned(structure: CyclicStructure, factor: float) -> CyclicStructure:
     return structure.model_copy(
         update={
             "masses": tuple(
-                m.model_copy(update={"m": factor * m.m}) if m.name in of or m.dof in dofs else m
+                _scaled(m, {"m": factor * m.m}, factor) if m.name in of or m.dof in dofs else m
                 for m in structure.masses
             ),
             "springs": tuple(
-                s.model_copy(update={"k": factor * s.k}) if s.name in of else s for s in structure.springs
+                _scaled(s, {"k": factor * s.k}, factor) if s.name in of else s for s in structure.springs
             ),
             "dampers": tuple(
-                d.model_copy(update={"c": factor * d.c}) if d.name in of else d for d in structure.dampers
+                _scaled(d, {"c": factor * d.c}, factor) if d.name in of else d for d in structure.dampers
             ),
         }
     )
+
+
+def _scaled(part: _NamedT, value: dict[str, float], factor: float) -> _NamedT:
+    named = {} if part.name is None or factor == 1.0 else {"factor": factor}
+    return part.model_copy(update={**value, **named})
 
 
 def _in_sector(name: str, j: int) -> str:
@@ -195,7 +200,9 @@ def _joining(parts: tuple[_JoinT, ...], j: int, n: int) -> tuple[_JoinT, ...]:
 
 
 def _renamed(part: _NamedT, j: int) -> _NamedT:
-    return part if part.name is None else part.model_copy(update={"name": _in_sector(part.name, j)})
+    if part.name is None:
+        return part
+    return part.model_copy(update={"name": _in_sector(part.name, j), "group": part.name})
 
 
 def _mass(mass: Mass, j: int) -> Mass:
