@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver import fourier
-from solver.histories import matrices, response
+from solver.histories import coordinates, matrices
 from solver.parametric import linear_model
 from solver.response import Solution
 from solver.structure import force_amplitudes
@@ -59,7 +59,7 @@ def power_balance(solution: Solution) -> PowerBalance:
     put_in = taken = 0.0
     for k in range(solution.n_harmonics + 1):
         speed = 2.0 * math.pi * solution.frequency_hz * k
-        velocity = 1j * speed * response(solution, k)
+        velocity = 1j * speed * coordinates(solution, k)
         force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]
         _, C, _ = matrices(model, k)
         put_in += 0.5 * float(np.vdot(force, velocity).real)

@@ -86,10 +86,16 @@ def hysteresis_loop(solution: Solution, contact: str, *, samples: int = 512) -> 
 
 
 def response(solution: Solution, k: int) -> Complex:
-    """Return the complex amplitudes x̂_k [m] of all DOFs, (n_dofs,), behind a converged solution.
+    """Return the complex amplitudes x̂_k [m] of all DOFs, (n_dofs,), behind a converged solution."""
+    return np.asarray(linear_model(solution.scene).shapes @ coordinates(solution, k), dtype=np.complex128)
 
-    The mean is found with contact stiffnesses on both sides, (K + Lᵀ kt L) x̂_0 = f̂_0 − Lᵀ (F̂_0 − kt û_0),
-    because a part may be held in place by its contacts alone.
+
+def coordinates(solution: Solution, k: int) -> Complex:
+    """Return the complex amplitudes of all coordinates of the matrices, (n,), behind a converged solution.
+
+    They are the DOFs, or those of the matrices or modes a structure is given by. The mean is found with
+    contact stiffnesses on both sides, (K + Lᵀ kt L) x̂_0 = f̂_0 − Lᵀ (F̂_0 − kt û_0), because a part may
+    be held in place by its contacts alone.
     """
     _check_converged(solution)
     model = linear_model(solution.scene)
@@ -102,8 +108,7 @@ def response(solution: Solution, k: int) -> Complex:
         K = K + L.conj().T @ (kt[:, None] * L)
     speed = 2.0 * math.pi * solution.frequency_hz * k
     dynamic = K - speed**2 * model.M + 1j * speed * C
-    q = np.linalg.solve(dynamic, force - L.conj().T @ friction)
-    return np.asarray(model.shapes @ q, dtype=np.complex128)
+    return np.asarray(np.linalg.solve(dynamic, force - L.conj().T @ friction), dtype=np.complex128)
 
 
 def matrices(model: LinearModel, k: int) -> tuple[Complex, Complex, Complex]:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli import service_commands, solver_commands, submit_commands
+from service.cli import import_command, service_commands, solver_commands, submit_commands
 from service.cli.failures import REPORTED, report
 from service.cli.inputs import join_variables
 
@@ -37,6 +37,7 @@ for _command in _ALONE:
 for _command in _SUBMITTED:
     _submit.command()(_command)
 _database.command()(service_commands.upgrade)
+app.command("import")(import_command.import_scene)
 app.add_typer(_submit, name="submit")
 app.add_typer(_database, name="db")
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +67,27 @@ def read_matrix(path: Path, key: str) -> coo_array:
         where = f"row {matrix.row[at]}, column {matrix.col[at]} (zero-based)"
         raise MatrixFileError(f"{str(path)!r} must hold finite numbers, got {matrix.data[at]} in {where}")
     return matrix
+
+
+def array_names(path: Path) -> list[str]:
+    """Names of the arrays in a .npz or .mat file; none for a file of one matrix.
+
+    Raises
+    ------
+    MatrixFileError
+        No such file, an unknown suffix, or a damaged file.
+    """
+    names: list[str] = _read(path, lambda suffix: _names(path, suffix))
+    return names
+
+
+def _names(path: Path, suffix: str) -> list[str]:
+    if suffix == ".mat":
+        return list(_matlab(path))
+    if suffix != ".npz":
+        return []
+    with _archive(path) as arrays:
+        return list(arrays.files)
 
 
 def read_modes(path: Path) -> Modes:
@@ -134,15 +156,18 @@ def _matrix_market(path: Path) -> Any:
     return mmread(path, spmatrix=False)
 
 
-def _archive(path: Path) -> Any:
+@contextmanager
+def _archive(path: Path) -> Iterator[Any]:
     """Open a .npz file; what is not one is named by its first bytes."""
     with path.open("rb") as file:
         start = file.read(4)
-    if start[:2] != b"PK":
-        raise MatrixFileError(
-            f"{str(path)!r} is not a .npz file: it begins with {start!r} at byte 0, not b'PK'"
-        )
-    return np.load(path, allow_pickle=False)
+        if start[:2] != b"PK":
+            raise MatrixFileError(
+                f"{str(path)!r} is not a .npz file: it begins with {start!r} at byte 0, not PK"
+            )
+        file.seek(0)
+        with np.load(file, allow_pickle=False) as arrays:
+            yield arrays
 
 
 def _sparse(arrays: Any) -> coo_array:
