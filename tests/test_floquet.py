@@ -18,6 +18,7 @@ from solver import (
     SettingError,
     annulus,
     branch_stability,
+    march,
     marching,
     mistuned,
     solve,
@@ -80,7 +81,7 @@ class Return:
 
     def __init__(self, scene: Scene, frequency_hz: float, steps: int = 1024) -> None:
         whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
-        self.system = marching._system(whole, 2.0 * math.pi * frequency_hz)
+        self.system, _ = marching._system(whole, 2.0 * math.pi * frequency_hz)
         self.steps = steps
         self.orbit = marching._at_rest(self.system)
         code, _ = self.march(self.orbit, 5000, 1e-13)
@@ -216,7 +217,7 @@ def test_a_multiplier_goes_through_one_at_each_fold(damping: float):
 def trajectory(point: Point, damping: float, move: np.ndarray, periods: int) -> np.ndarray:
     """(x, v) at the ends of periods, from a point's motion moved by (x, v, place of the slider if held)."""
     omega, (contact,) = PERIOD * point.frequency_hz, UNSTABLE.contacts
-    system = marching._system(UNSTABLE, omega)
+    system, _ = marching._system(UNSTABLE, omega)
     system = system._replace(B_value=np.full_like(system.B_value, damping / omega))
     orders = np.arange(1, point.slip.size // 2 + 1)
     x, v = point.slip[0] + point.slip[1::2].sum(), float(orders @ point.slip[2::2])
@@ -262,6 +263,34 @@ def test_perturbations_grow_and_decay_in_time_as_the_matrix_says(damping: float)
         later = trajectory(point, damping, 1e3 * move, 500)
         distance = np.abs(later - later[0]).max(axis=1)[-50:] / size
         assert (distance.min() > 0.1) if grows else (distance.max() < 0.02)
+
+
+def driven_from_behind() -> Scene:
+    """The oscillator with negative damping as a scene: a structure given by its matrices."""
+    raw = UNSTABLE.to_dict()
+    raw["structure"] = {"kind": "matrices", "M": [[1.0]], "K": [[1.0]], "C": [[-0.05]], "dofs": ["x"]}
+    return Scene.from_dict(raw)
+
+
+@pytest.mark.parametrize(
+    ("frequency_hz", "growth", "neutral"),
+    [(0.05, Growth.TORUS, 1), (0.17, Growth.TORUS, 1), (0.175, Growth.NONE, 0), (0.2, Growth.NONE, 0)],
+)
+def test_negative_damping_is_held_by_slip_alone(frequency_hz: float, growth: Growth, neutral: int):
+    """Stuck, nothing takes out the power that negative damping puts in: another motion is reached."""
+    scene = driven_from_behind()
+    solution = solve(scene, frequency_hz=frequency_hz)
+    found = stability(solution)
+    marched = march(scene, frequency_hz=frequency_hz, max_periods=2000)
+    assert found.growth is growth
+    assert found.neutral == neutral
+    if found.stable:
+        assert marched.converged
+        assert marched.half_peak_to_peak == pytest.approx(solution.half_peak_to_peak, rel=1e-5)
+    else:
+        expected = np.exp(poles(np.eye(1), np.array([[-0.05]]), np.array([[1.5]])) / frequency_hz)
+        np.testing.assert_allclose(np.sort_complex(found.multipliers), np.sort_complex(expected), rtol=1e-10)
+        assert marched.half_peak_to_peak > 2.0 * solution.half_peak_to_peak
 
 
 def test_friction_with_a_given_load_is_always_stable():
