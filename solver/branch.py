@@ -23,6 +23,10 @@ class BranchStatus(Enum):
         "The steps became too small to go on: use more harmonics, or start from the other end of the range."
     )
     TURNED_BACK = "The branch turned and left the range where it began; the end of the range was not reached."
+    ACCURACY_NOT_REACHED = (
+        "The branch reached the end of the range, but the accuracy asked for was not reached with the most "
+        "harmonics allowed: ask for less, or set the harmonics yourself."
+    )
     STOPPED = "The continuation was stopped by the caller."
     TOO_MANY_POINTS = "The largest number of points was used up: allow more points or a larger step."
 

@@ -14,6 +14,7 @@ from enum import IntEnum
 import numpy as np
 
 from solver.accuracy import peak_error
+from solver.adaptive import sweep_to
 from solver.balance import Balance, build
 from solver.branch import ENDINGS, Branch, BranchStatus
 from solver.errors import SettingError
@@ -91,6 +92,7 @@ def sweep(
     stop: float | None = None,
     *,
     harmonics: int = 11,
+    accuracy: float | None = None,
     frequency_hz: float | None = None,
     limit: float | None = None,
     settings: ContinuationSettings | None = None,
@@ -105,7 +107,9 @@ def sweep(
     scene : what vibrates, with the values that stay fixed.
     parameter : path of the parameter, for example ``frequency`` or ``shroud.N0``.
     start, stop : the range in user units (Hz for a frequency, the scene's band if left out).
-    harmonics : highest harmonic kept.
+    harmonics : highest harmonic kept, unless `accuracy` is given.
+    accuracy : estimated error, relative to the amplitude, that the harmonics are chosen for; see
+        `solver.adaptive.harmonics_for` for where and how it is judged.
     frequency_hz : excitation frequency [Hz], needed unless it is the parameter.
     limit : amplitude [m] above which the resonance band is measured; peak/√2 if left out.
     settings : of the continuation.
@@ -120,8 +124,19 @@ def sweep(
     Raises
     ------
     SettingError
-        A bad path, range, frequency, limit or number of harmonics.
+        A bad path, range, frequency, limit, number of harmonics or accuracy.
     """
+    if accuracy is not None:
+        if guess is not None:
+            raise SettingError("accuracy", accuracy, "cannot go with a guess, whose harmonics are fixed")
+
+        def sweep_with(count: int) -> Branch:
+            return sweep(
+                scene, parameter, start, stop, harmonics=count, frequency_hz=frequency_hz, limit=limit,
+                settings=settings, on_progress=on_progress, should_stop=should_stop,
+            )  # fmt: skip
+
+        return sweep_to(sweep_with, accuracy)
     begun = time.perf_counter()
     settings = settings or ContinuationSettings()
     if parameter == "frequency":

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 
 from solver import fourier
 from solver.accuracy import truncation_error
+from solver.adaptive import solve_to
 from solver.balance import Balance, build, check_frequency
 from solver.fourier import Real
 from solver.kernels.events import LIFTING, SEPARATED, STUCK
@@ -43,6 +44,10 @@ class SolutionStatus(Enum):
     """How a solve ended; the value is a sentence a user can act on."""
 
     CONVERGED = "The balance is satisfied."
+    ACCURACY_NOT_REACHED = (
+        "The balance is satisfied, but the accuracy asked for was not reached with the most harmonics "
+        "allowed: ask for less, or set the harmonics yourself."
+    )
     NOT_CONVERGED = (
         "No solution was found at this frequency: try more harmonics, or a sweep that passes through it."
     )
@@ -83,7 +88,7 @@ class Solution:
     Attributes
     ----------
     status : SolutionStatus
-        Whether and why; every number below is NaN unless it is CONVERGED.
+        Whether and why; every number below is NaN if it is NOT_CONVERGED.
     max_abs, half_peak_to_peak, mean : float
         Of the observed DOF over the period [m]. Not unique when `flags` has ``mean_undetermined``: the first
         and the last then depend on the history.
@@ -121,6 +126,11 @@ class Solution:
     @property
     def converged(self) -> bool:
         """Whether the numbers are a solution."""
+        return self.status is not SolutionStatus.NOT_CONVERGED
+
+    @property
+    def reached(self) -> bool:
+        """Whether they are, with the accuracy asked for."""
         return self.status is SolutionStatus.CONVERGED
 
     def to_json(self) -> dict[str, object]:
@@ -144,29 +154,36 @@ class Solution:
         }
 
 
-def solve(scene: Scene, *, frequency_hz: float, harmonics: int = 11) -> Solution:
+def solve(
+    scene: Scene, *, frequency_hz: float, harmonics: int = 11, accuracy: float | None = None
+) -> Solution:
     """Find the periodic response of a scene at one frequency.
 
     Parameters
     ----------
     scene : what vibrates.
     frequency_hz : excitation frequency [Hz].
-    harmonics : highest harmonic kept.
+    harmonics : highest harmonic kept, unless `accuracy` is given.
+    accuracy : estimated error of the amplitude, relative to it, that the fewest harmonics are chosen for.
 
     Raises
     ------
     SettingError
-        A bad frequency or number of harmonics.
+        A bad frequency, number of harmonics or accuracy.
     """
     begun = time.perf_counter()
     check_frequency("frequency_hz", frequency_hz)
-    balance = build(scene, harmonics=harmonics)
-    workspace = Workspace.of(balance)
     omega = 2.0 * math.pi * frequency_hz
-    found = workspace.solve(omega)
+    good_enough = True
+    if accuracy is None:
+        workspace = Workspace.of(build(scene, harmonics=harmonics))
+        found = workspace.solve(omega)
+    else:
+        workspace, found, good_enough = solve_to(lambda h: build(scene, harmonics=h), omega, accuracy)
     if not found.converged:
-        return _failure(balance, frequency_hz, found, time.perf_counter() - begun)
-    return describe(workspace, found, frequency_hz, begun)
+        return _failure(workspace.balance, frequency_hz, found, time.perf_counter() - begun)
+    solution = describe(workspace, found, frequency_hz, begun)
+    return solution if good_enough else replace(solution, status=SolutionStatus.ACCURACY_NOT_REACHED)
 
 
 def describe(workspace: Workspace, found: PointSolution, frequency_hz: float, begun: float) -> Solution:

@@ -20,6 +20,7 @@ _OPTIONS = {
     "stop": "--to",
     "to": "--to",
     "harmonics": "--harmonics",
+    "accuracy": "--accuracy",
     "limit": "--limit",
     "max_band_hz": "--max-band",
     "variables": "--variable",

@@ -30,6 +30,13 @@ FixedFrequency = Annotated[
 Harmonics = Annotated[
     int, typer.Option("--harmonics", metavar="H", parser=whole_number, help="Highest harmonic kept.")
 ]
+Accuracy = Annotated[
+    float | None,
+    typer.Option(
+        "--accuracy", metavar="E", parser=number,
+        help="Estimated error relative to the amplitude; chooses the harmonics, in place of --harmonics.",
+    ),
+]  # fmt: skip
 Parameter = Annotated[
     str, typer.Option("--parameter", metavar="PATH", help="What is swept: frequency, shroud.N0, …")
 ]

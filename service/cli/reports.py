@@ -64,9 +64,8 @@ def solution(found: Json) -> None:
         return
     pairs = _amplitudes(found)
     if found["error_estimate"] is not None:
-        pairs.append(
-            ("estimated error", f"{units.length(found['error_estimate'])} of max|x|, by harmonics left out")
-        )
+        of = "half peak to peak" if "mean_undetermined" in found["flags"] else "max|x|"
+        pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of {of}"))
     pairs.append(("harmonics 1 to 5", ", ".join(units.length(a) for a in found["harmonics"][1:6])))
     pairs += [(f"contact {name}", state) for name, state in found["contacts"].items()]
     pairs += [("note", _FLAGS.get(flag, flag)) for flag in found["flags"]]
@@ -78,6 +77,8 @@ def branch(found: Json) -> None:
     """A branch: its peaks and its band."""
     path, values = found["parameter_path"], found["parameter"]
     pairs = _peaks(found, path)
+    if found["error_estimate"] is not None:
+        pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of the highest"))
     if found["band_hz"] is not None:
         pairs.append(("band", _band(found)))
     effort = f"{found['newton_iterations']} Newton iterations, {found['rejected_steps']} steps rejected"

@@ -47,6 +47,7 @@ def solve(
     frequency: options.Frequency,
     values: options.Values = None,
     harmonics: options.Harmonics = 11,
+    accuracy: options.Accuracy = None,
     plot: options.Plot = None,
     as_json: options.Json = False,
 ) -> None:
@@ -56,7 +57,7 @@ def solve(
     picture = inputs.output_path("--plot", plot, SUFFIXES)
     scene = inputs.scene(name, values)
     with patience():
-        solution = solver.solve(scene, frequency_hz=frequency, harmonics=harmonics)
+        solution = solver.solve(scene, frequency_hz=frequency, harmonics=harmonics, accuracy=accuracy)
     if solution.converged and picture is not None:
         from service.plots.motion import Motion, motion_figure
         from service.plots.style import save
@@ -66,7 +67,7 @@ def solve(
         print_json(solution.to_json())
     else:
         reports.solution(solution.to_json())
-    _end(solution.converged, solution.status.value)
+    _end(solution.reached, solution.status.value)
 
 
 def sweep(
@@ -78,6 +79,7 @@ def sweep(
     values: options.Values = None,
     limit: options.Limit = None,
     harmonics: options.Harmonics = 11,
+    accuracy: options.Accuracy = None,
     plot: options.Plot = None,
     as_json: options.Json = False,
 ) -> None:
@@ -91,8 +93,8 @@ def sweep(
     scene = inputs.scene(name, values)
     with inputs.path_of("--parameter"), bar("sweep") as on_progress:
         branch = solver.sweep(
-            scene, parameter, start, stop, harmonics=harmonics, frequency_hz=frequency, limit=limit,
-            on_progress=on_progress,
+            scene, parameter, start, stop, harmonics=harmonics, accuracy=accuracy, frequency_hz=frequency,
+            limit=limit, on_progress=on_progress,
         )  # fmt: skip
     if picture is not None and len(branch.values):
         from service.plots.curves import Response
