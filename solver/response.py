@@ -133,8 +133,12 @@ class Solution:
         """Whether they are, with the accuracy asked for."""
         return self.status is SolutionStatus.CONVERGED
 
-    def to_json(self) -> dict[str, object]:
-        """Return the answer as one JSON object."""
+    def to_json(self, *, with_stability: bool = False) -> dict[str, object]:
+        """Return the answer as one JSON object; on request with what `solver.stability` says, which costs."""
+        if with_stability:
+            from solver.floquet import stability
+
+            return {**self.to_json(), "stability": stability(self).to_json() if self.converged else None}
         return {
             "scene": self.scene.name,
             "frequency_hz": self.frequency_hz,

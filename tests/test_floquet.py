@@ -416,6 +416,19 @@ def test_json():
     assert set(obj) == {"stable", "growth", "radius", "neutral", "multipliers", "frequency_hz", "seconds"}
 
 
+def test_stability_in_the_json_of_a_solution_on_request_only():
+    solution = solve(two_dof(), frequency_hz=1.2, harmonics=3)
+    asked = solution.to_json(with_stability=True)
+    assert "stability" not in solution.to_json()
+    stable: object = stability(solution).to_json() | {"seconds": 0.0}
+    assert asked["stability"] | {"seconds": 0.0} == stable  # type: ignore[operator]
+    assert {key: value for key, value in asked.items() if key != "stability"} == solution.to_json()
+    nothing = solve(
+        oscillator({"kt": 0.3, "mu": 0.3, "N0": 0.5}, k=1.0), frequency_hz=0.5 / math.pi, harmonics=3
+    )
+    assert nothing.to_json(with_stability=True)["stability"] is None
+
+
 def test_only_of_a_solution():
     scene = oscillator({"kt": 0.3, "mu": 0.3, "N0": 0.5}, k=1.0)
     with pytest.raises(SettingError, match="`solution` must have converged"):
