@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from solver.floquet import Growth, Stability, branch_stability, stability
     from solver.histories import hysteresis_loop, motion, time_history
     from solver.marching import march
-    from solver.mistuning import BladeAmplitudes, blade_amplitudes, mistuned
+    from solver.mistuning import BladeAmplitudes, BladePeaks, blade_amplitudes, blade_peaks, mistuned
     from solver.response import Solution, SolutionStatus, solve
     from solver.scene import Scene, load_scene, shipped_scenes
     from solver.sectors import Extent, annulus, sectors_needed
@@ -31,6 +31,7 @@ _HOME = {
     "Plan": "effects", "plan": "effects", "Scene": "scene", "load_scene": "scene", "shipped_scenes": "scene",
     "Solution": "response", "SolutionStatus": "response", "solve": "response",
     "Growth": "floquet", "Stability": "floquet", "branch_stability": "floquet", "stability": "floquet",
+    "BladePeaks": "mistuning", "blade_peaks": "mistuning",
     "BladeAmplitudes": "mistuning", "blade_amplitudes": "mistuning", "mistuned": "mistuning",
     "Extent": "sectors", "sectors_needed": "sectors", "annulus": "sectors",
     "march": "marching", "PowerBalance": "energy", "power_balance": "energy",
@@ -40,6 +41,7 @@ _HOME = {
 __all__ = [
     "Band",
     "BladeAmplitudes",
+    "BladePeaks",
     "Branch",
     "BranchStatus",
     "ContinuationSettings",
@@ -60,6 +62,7 @@ __all__ = [
     "Stability",
     "annulus",
     "blade_amplitudes",
+    "blade_peaks",
     "branch_errors",
     "branch_stability",
     "hysteresis_loop",

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from solver import fourier
+from solver.branch import BranchStatus
+from solver.continuation import ContinuationSettings, sweep
 from solver.errors import SettingError
 from solver.fourier import Real
 from solver.histories import motion
 from solver.kernels.events import largest
 from solver.kernels.trigpoly import grid_size, grid_tables, on_grid
 from solver.response import Solution
-from solver.scene import CyclicStructure, Scene
+from solver.scene import CyclicStructure, Observe, Scene
 from solver.scene_checks import listing, nearest
-from solver.sectors import annulus
+from solver.sectors import annulus, sectors_needed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +51,90 @@ class BladeAmplitudes:
     def magnification(self, tuned: Solution | BladeAmplitudes) -> float:
         """Largest amplitude relative to that of another disk, usually the tuned one."""
         return self.largest / (tuned.largest if isinstance(tuned, BladeAmplitudes) else tuned.max_abs)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BladePeaks:
+    """The highest peak of one DOF in every sector over a range of the frequency.
+
+    Attributes
+    ----------
+    dof : str
+        Its name in one sector.
+    value : (sectors,) array
+        Largest max|x| [m]; NaN where the branch did not reach the end of the range.
+    at_hz : (sectors,) array
+        Where [Hz].
+    status : tuple of BranchStatus
+        How each sector's branch ended.
+    """
+
+    dof: str
+    value: Real
+    at_hz: Real
+    status: tuple[BranchStatus, ...]
+
+    @property
+    def largest(self) -> float:
+        """Highest peak of all blades [m]; NaN if one is not known."""
+        return float(self.value.max())
+
+    @property
+    def worst(self) -> int:
+        """The sector that has it."""
+        return int(self.value.argmax())
+
+    def magnification(self, tuned: BladePeaks) -> float:
+        """The amplitude magnification factor: the highest peak relative to that of the tuned disk."""
+        return self.largest / tuned.largest
+
+
+def blade_peaks(
+    scene: Scene,
+    start: float | None = None,
+    stop: float | None = None,
+    *,
+    dof: str | None = None,
+    harmonics: int = 11,
+    settings: ContinuationSettings | None = None,
+) -> BladePeaks:
+    """Return the highest peak of every blade: a sweep of the frequency for each, or one where all are alike.
+
+    Parameters
+    ----------
+    scene : an annulus, or a cyclic scene.
+    start, stop : the range [Hz], the scene's band if left out.
+    dof : name of the DOF in one sector; the observed one if left out.
+    harmonics : highest harmonic kept.
+    settings : of the continuation.
+
+    Raises
+    ------
+    SettingError
+        No sector has such a DOF, or a bad range or number of harmonics.
+    """
+    name = scene.observe.dof.partition("@")[0] if dof is None else dof
+    structure = scene.structure
+    names, repeats = [scene.structure.dofs[i] for i in _rows(scene, name)], 1
+    if isinstance(structure, CyclicStructure):
+        names, repeats = [name], structure.sectors
+        if sectors_needed(_observing(scene, name)).sectors > 1:
+            names, repeats = [f"{name}@{j}" for j in range(structure.sectors)], 1
+    branches = [
+        sweep(_observing(scene, each), start=start, stop=stop, harmonics=harmonics, settings=settings)
+        for each in names
+    ] * repeats
+    known = [branch.peak if branch.completed else None for branch in branches]
+    return BladePeaks(
+        dof=name,
+        value=np.array([math.nan if peak is None else peak.value for peak in known]),
+        at_hz=np.array([math.nan if peak is None else peak.at for peak in known]),
+        status=tuple(branch.status for branch in branches),
+    )
+
+
+def _observing(scene: Scene, dof: str) -> Scene:
+    return scene.model_copy(update={"observe": Observe(dof=dof, band=scene.observe.band)})
 
 
 def mistuned(
@@ -101,7 +188,19 @@ def blade_amplitudes(solution: Solution, dof: str | None = None) -> BladeAmplitu
         The solution did not converge, or no sector has such a DOF.
     """
     name = solution.scene.observe.dof.partition("@")[0] if dof is None else dof
-    dofs, structure = solution.scene.structure.dofs, solution.scene.structure
+    rows = _rows(solution.scene, name)
+    moves = motion(solution)
+    ranges = np.array([_extremes(moves[row]) for row in rows])
+    return BladeAmplitudes(
+        dof=name,
+        max_abs=np.abs(ranges).max(axis=1),
+        half_peak_to_peak=0.5 * (ranges[:, 0] - ranges[:, 1]),
+    )
+
+
+def _rows(scene: Scene, name: str) -> list[int]:
+    """Index of a DOF in each sector; in a cyclic scene the same one again and again."""
+    dofs, structure = scene.structure.dofs, scene.structure
     if isinstance(structure, CyclicStructure):
         rows = [dofs.index(name)] * structure.sectors if name in dofs else []
     else:
@@ -110,13 +209,7 @@ def blade_amplitudes(solution: Solution, dof: str | None = None) -> BladeAmplitu
         known = tuple(dict.fromkeys(each.partition("@")[0] for each in dofs))
         needs = f"must be a DOF of every sector, one of {listing(known)}"
         raise SettingError("dof", name, needs, nearest(str(name), known))
-    moves = motion(solution)
-    ranges = np.array([_extremes(moves[row]) for row in rows])
-    return BladeAmplitudes(
-        dof=name,
-        max_abs=np.abs(ranges).max(axis=1),
-        half_peak_to_peak=0.5 * (ranges[:, 0] - ranges[:, 1]),
-    )
+    return rows
 
 
 def _extremes(x: Real) -> tuple[float, float]:

@@ -12,11 +12,14 @@ import pytest
 from scene_cases import bladed_disk, two_dof
 
 from solver import (
+    BranchStatus,
+    ContinuationSettings,
     Scene,
     SceneError,
     SettingError,
     annulus,
     blade_amplitudes,
+    blade_peaks,
     load_scene,
     march,
     mistuned,
@@ -289,6 +292,33 @@ def test_the_hub_moves_too():
     found = blade_amplitudes(solution, "hub")
     np.testing.assert_allclose(np.abs(histories).max(axis=1), found.max_abs, rtol=1e-5)
     np.testing.assert_allclose(0.5 * np.ptp(histories, axis=1), found.half_peak_to_peak, rtol=1e-5)
+
+
+@pytest.mark.parametrize("written", [False, True], ids=["cyclic", "annulus"])
+def test_peaks_of_every_blade(written: bool):
+    light = disk(2).with_values(LIGHT)
+    scene = with_mistuning(light, of=["root"], values=VALUES)
+    found = blade_peaks(annulus(scene) if written else scene, 2.8, 3.8, harmonics=3)
+    tuned = blade_peaks(light, 2.8, 3.8, harmonics=3)
+    assert found.value.shape == tuned.value.shape == (6,)
+    assert np.ptp(tuned.value) == 0.0
+    assert np.ptp(found.value) > 0.01 * found.largest
+    assert found.magnification(tuned) == found.value.max() / tuned.value[0]
+    assert all(status is BranchStatus.COMPLETED for status in found.status)
+    at_worst = blade_amplitudes(solve(scene, frequency_hz=found.at_hz[found.worst], harmonics=3))
+    assert at_worst.max_abs[found.worst] == pytest.approx(found.largest, rel=1e-6)
+    for frequency_hz in np.linspace(2.8, 3.8, 12):
+        every = blade_amplitudes(solve(scene, frequency_hz=float(frequency_hz), harmonics=3))
+        assert np.all(every.max_abs <= found.value * (1.0 + 1e-6))
+
+
+def test_peaks_that_were_not_reached():
+    cut = ContinuationSettings(most_points=5)
+    found = blade_peaks(disk(), harmonics=1, settings=cut)
+    assert math.isnan(found.largest)
+    assert set(found.status) == {BranchStatus.TOO_MANY_POINTS}
+    with pytest.raises(SettingError, match="did you mean `blade`"):
+        blade_peaks(disk(), dof="blad")
 
 
 def test_sweeps_and_groups():
