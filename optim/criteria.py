@@ -14,11 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from optim.scaling import Real
-from solver.balance import build, for_parameter
+from solver.balance import Balance, for_parameter
 from solver.branch import Branch, Edge, Peak
 from solver.continuation import sweep
 from solver.kernels.observe import SLOPE
 from solver.peaks import HALF_POWER
+from solver.savings import Effects, even_harmonics_reason
 from solver.scene import Scene
 from solver.workspace import Workspace
 
@@ -112,12 +113,14 @@ def evaluate(
     should_stop : asked while the response is computed.
     """
     here = scene.with_values(dict(values))
-    branch = sweep(here, harmonics=harmonics, limit=limit, should_stop=should_stop)
+    # A slope by the variation of a load needs the harmonics that variation brings in.
+    effects = Effects(even_harmonics=even_harmonics_reason(here, values) is not None)
+    branch = sweep(here, harmonics=harmonics, limit=limit, effects=effects, should_stop=should_stop)
     if not branch.completed:
         return Criteria(values=dict(values), branch=branch, peaks=(), band=None)
     competing = [peak for peak in branch.peaks if peak.value >= COMPETES * branch.peaks[0].value]
     paths = tuple(values)
-    sensitivity = Sensitivity(here, paths, harmonics) if gradients else None
+    sensitivity = Sensitivity(branch.balance, paths) if gradients else None
     nothing = np.full(len(paths), np.nan)
     peaks = tuple(
         PeakCriterion(
@@ -138,10 +141,9 @@ def evaluate(
 class Sensitivity:
     """Derivatives of the amplitude at points of a response by parameter paths, through the whole solve."""
 
-    def __init__(self, scene: Scene, paths: Sequence[str], harmonics: int) -> None:
-        self._scene = scene
+    def __init__(self, balance: Balance, paths: Sequence[str]) -> None:
         self._paths = tuple(paths)
-        self._balance = build(scene, harmonics=harmonics)
+        self._balance = balance
         self._by_frequency = Workspace.of(self._balance)
 
     def _by_parameters(self, at_hz: float, solution: Real) -> Real:
@@ -149,7 +151,7 @@ class Sensitivity:
         slopes = np.full(len(self._paths), np.nan)
         for i, path in enumerate(self._paths):
             balance = for_parameter(self._balance, path, at_hz)
-            value = balance.parameter.inside(self._scene.value(path))
+            value = balance.parameter.inside(self._balance.scene.value(path))
             measures = Workspace.of(balance).measure(solution, value)
             if measures is not None:
                 slopes[i] = measures.values[SLOPE]

@@ -129,7 +129,8 @@ class ErrorEstimator:
             return None
         size = max(float(np.abs(u).max(initial=0.0)), 1e-300)
         row: Real = np.append(
-            pad(-slope, self._workspace.balance, self._larger.balance) / size**2, 1.0 / p**2
+            pad(-slope, self._workspace.balance, self._larger.balance) / size**2,
+            1.0 / (p * p if p != 0.0 else 1.0),
         )
         row /= np.abs(row).max()
         return row

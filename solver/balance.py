@@ -9,10 +9,11 @@ import numpy as np
 
 from solver.errors import SettingError
 from solver.fourier import Integer, Real, all_harmonics
-from solver.kernels.system import System
+from solver.kernels.system import COULOMB, System
 from solver.kernels.trigpoly import grid_size, grid_tables
 from solver.parameter import Kind, Parameter, resolve
 from solver.parametric import linear_model, structure_derivative
+from solver.savings import Effects, even_harmonics_reason
 from solver.scene import Scene
 from solver.sectors import check_in_annulus, written_out
 from solver.structure import reduce_model
@@ -32,16 +33,22 @@ class Balance:
         What λ is; its unit inside is that of `Parameter.inside`.
     system : System
         The arrays the compiled loops work on.
+    n_harmonics : int
+        Highest harmonic asked for; of those up to it the system keeps `system.ks`.
+    effects : Effects
+        What is paid for though the scene does not call for it.
     """
 
     scene: Scene
     parameter: Parameter
     system: System
+    n_harmonics: int
+    effects: Effects
 
     @property
-    def n_harmonics(self) -> int:
-        """Highest harmonic kept."""
-        return int(self.system.ks[-1])
+    def n_ports(self) -> int:
+        """Relative motions of all contacts."""
+        return int(self.system.owner.size)
 
     @property
     def n_coefficients(self) -> int:
@@ -51,7 +58,7 @@ class Balance:
     @property
     def n_unknowns(self) -> int:
         """Unknowns of the condensed balance."""
-        return int(self.system.contacts.shape[0]) * self.n_coefficients
+        return self.n_ports * self.n_coefficients
 
 
 def check_harmonics(harmonics: int) -> int:
@@ -84,16 +91,18 @@ def check_frequency(name: str, frequency_hz: float) -> float:
 
 
 def build(
-    scene: Scene, path: str = "frequency", *, harmonics: int = 11, frequency_hz: float | None = None
-) -> Balance:
+    scene: Scene, path: str = "frequency", *, harmonics: int = 11, frequency_hz: float | None = None,
+    effects: Effects | None = None,
+) -> Balance:  # fmt: skip
     """Set up the balance of a scene for continuation in `path`.
 
     Parameters
     ----------
     scene : the scene, with the values that stay fixed.
     path : the parameter that λ is.
-    harmonics : highest harmonic kept; 0 … H are.
+    harmonics : highest harmonic kept; all from 0 on are, or the odd ones where the others are zero.
     frequency_hz : the excitation frequency [Hz], needed unless λ is the frequency.
+    effects : what is paid for though the scene does not call for it.
 
     Raises
     ------
@@ -105,7 +114,8 @@ def build(
         check_in_annulus(scene, path)
     scene = whole
     parameter = resolve(scene, path)
-    ks = all_harmonics(check_harmonics(harmonics))
+    effects = effects or Effects()
+    ks = _harmonics(scene, path, check_harmonics(harmonics), effects)
     omega = 0.0
     if parameter.kind is not Kind.FREQUENCY:
         if frequency_hz is None:
@@ -113,15 +123,33 @@ def build(
         omega = 2.0 * math.pi * check_frequency("frequency_hz", frequency_hz)
     if parameter.kind is Kind.LEVEL and scene.value("excitation.amplitude") == 0.0:
         scene = scene.with_values({"excitation.amplitude": 1.0})
-    return Balance(scene=scene, parameter=parameter, system=_system(scene, parameter, ks, omega))
+    system = _system(scene, parameter, ks, omega, effects)
+    return Balance(scene=scene, parameter=parameter, system=system, n_harmonics=harmonics, effects=effects)
+
+
+def _harmonics(scene: Scene, path: str, highest: int, effects: Effects) -> Integer:
+    """Return the harmonics kept: all of them, or the odd ones where a symmetry makes the others zero."""
+    ks = all_harmonics(highest)
+    if highest == 0 or effects.even_harmonics or even_harmonics_reason(scene, (path,)) is not None:
+        return ks
+    return np.ascontiguousarray(ks[1::2])
 
 
 def for_parameter(balance: Balance, path: str, frequency_hz: float) -> Balance:
-    """Return the same balance with another λ, at a fixed frequency."""
+    """Return the same balance with another λ, at a fixed frequency.
+
+    Raises
+    ------
+    SettingError
+        Even harmonics were left out, but λ calls for them: build the first balance with them.
+    """
     parameter = resolve(balance.scene, path)
     omega = 2.0 * math.pi * frequency_hz
+    reason = even_harmonics_reason(balance.scene, (path,))
+    if reason is not None and balance.system.ks[0] != 0:
+        raise SettingError("parameter", path, f"needs a balance with even harmonics: {reason}")
     if parameter.kind is Kind.STRUCTURE or balance.parameter.kind is Kind.STRUCTURE:
-        system = _system(balance.scene, parameter, balance.system.ks, omega)
+        system = _system(balance.scene, parameter, balance.system.ks, omega, balance.effects)
     else:
         system = balance.system._replace(
             kind=int(parameter.kind), active=parameter.active, omega=omega,
@@ -140,7 +168,7 @@ def fewer_harmonics(balance: Balance, count: int) -> Balance:
         ks=ks, which=system.which[:count], cos_table=cos_table, sin_table=sin_table,
         modal_forces=system.modal_forces[:count], forces=system.forces[:count],
     )  # fmt: skip
-    return replace(balance, system=smaller)
+    return replace(balance, system=smaller, n_harmonics=int(ks[-1]))
 
 
 def _level(scene: Scene) -> float:
@@ -157,17 +185,24 @@ def contact_table(scene: Scene) -> Real:
     return np.array(rows, dtype=np.float64).reshape(len(rows), 6)
 
 
-def _system(scene: Scene, parameter: Parameter, ks: Integer, omega: float) -> System:
+def _system(
+    scene: Scene, parameter: Parameter, ks: Integer, omega: float, effects: Effects
+) -> System:  # fmt: skip
     """Put the arrays of the compiled loops together."""
     model = linear_model(scene)
     derivative = structure_derivative(scene, parameter.name) if parameter.kind is Kind.STRUCTURE else None
     contacts = contact_table(scene)
-    reduced = reduce_model(model, ks, contacts[:, 0].copy(), derivative)
+    reduced = reduce_model(
+        model, ks, contacts[:, 0].copy(), derivative, whole_matrices=effects.whole_matrices
+    )  # fmt: skip
     highest = max(int(ks[-1]), 1)
     cos_table, sin_table = grid_tables(grid_size(highest), highest)
+    ports = np.ones(len(scene.contacts), dtype=np.int64)
     return System(
         ks=ks, load_ks=np.arange(2, dtype=np.int64), which=reduced.which, cos_table=cos_table,
-        sin_table=sin_table, contacts=contacts,
+        sin_table=sin_table, laws=np.full(ports.size, COULOMB), first_port=np.append(0, np.cumsum(ports)),
+        first_block=np.append(0, np.cumsum(ports**2)), owner=np.repeat(np.arange(ports.size), ports),
+        contacts=contacts, condense=0 if effects.every_contact else 1, least_size=reduced.least_size,
         active=parameter.active, shift=reduced.shift, kind=int(parameter.kind), omega=omega,
         level_reference=_level(scene), phase_reference=scene.value("excitation.phase"),
         parameter_reference=scene.value(parameter.path) if derivative is not None else 0.0,

@@ -18,11 +18,12 @@ from solver.adaptive import sweep_to
 from solver.balance import Balance, build
 from solver.branch import ENDINGS, Branch, BranchStatus
 from solver.errors import SettingError
-from solver.fourier import Integer, Real
+from solver.fourier import Integer, Real, to_full
 from solver.kernels import path
 from solver.kernels.observe import MEASURES
 from solver.kernels.path import Control, begin_walk, walk_by_value, walk_on
 from solver.peaks import Points, Survey, band_limit
+from solver.savings import Effects
 from solver.scene import Scene
 from solver.workspace import Workspace
 
@@ -96,6 +97,7 @@ def sweep(
     frequency_hz: float | None = None,
     limit: float | None = None,
     settings: ContinuationSettings | None = None,
+    effects: Effects | None = None,
     guess: Real | None = None,
     on_progress: Callable[[float, int], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
@@ -113,6 +115,7 @@ def sweep(
     frequency_hz : excitation frequency [Hz], needed unless it is the parameter.
     limit : amplitude [m] above which the resonance band is measured; peak/√2 if left out.
     settings : of the continuation.
+    effects : what is paid for though the scene does not call for it; see `solver.savings.Effects`.
     guess : (n_unknowns,) slip motions [m] to start from, instead of the start-up ladder.
     on_progress : called with (share of the range reached, points so far).
     should_stop : asked between stretches of points; True ends the branch with the status STOPPED.
@@ -133,7 +136,7 @@ def sweep(
         def sweep_with(count: int) -> Branch:
             return sweep(
                 scene, parameter, start, stop, harmonics=count, frequency_hz=frequency_hz, limit=limit,
-                settings=settings, on_progress=on_progress, should_stop=should_stop,
+                settings=settings, effects=effects, on_progress=on_progress, should_stop=should_stop,
             )  # fmt: skip
 
         return sweep_to(sweep_with, accuracy)
@@ -142,7 +145,9 @@ def sweep(
     if parameter == "frequency":
         start = scene.observe.band[0] if start is None else start
         stop = scene.observe.band[1] if stop is None else stop
-    balance = build(scene, parameter, harmonics=harmonics, frequency_hz=frequency_hz)
+    balance = build(
+        scene, parameter, harmonics=harmonics, frequency_hz=frequency_hz, effects=effects
+    )  # fmt: skip
     first, last = check_range(balance, start, stop)
     if limit is not None and not (isinstance(limit, (int, float)) and np.isfinite(limit) and limit > 0.0):
         raise SettingError("limit", limit, "must be an amplitude > 0 m")
@@ -260,6 +265,7 @@ def _finish(
     solutions = np.concatenate([stretch.solutions for stretch in stretches])
     tangents = np.concatenate([stretch.tangents for stretch in stretches])
     measures = np.concatenate([stretch.measures for stretch in stretches])
+    observed = np.concatenate([stretch.observed for stretch in stretches])
     points = Points(solutions=solutions, tangents=tangents, measures=measures)
     survey = Survey(workspace, points)
     at = band_limit(limit, survey.peaks, balance.parameter.kind)
@@ -267,7 +273,7 @@ def _finish(
     return Branch(
         balance=balance, status=status, start=start, stop=stop,
         values=balance.parameter.all_outside(solutions[:, -1].copy()), solutions=solutions,
-        tangents=tangents, observed=np.concatenate([stretch.observed for stretch in stretches]),
+        tangents=tangents, observed=to_full(observed, balance.system.ks, balance.n_harmonics),
         measures=measures, states=np.concatenate([stretch.states for stretch in stretches]),
         peaks=survey.peaks,
         band=band, error_estimate=peak_error(workspace, survey.peaks),

@@ -6,10 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.balance import build
+from solver.balance import Balance, build
+from solver.fourier import Real
 from solver.kernels.system import DENSE, MODES, POLES
+from solver.savings import Effects, even_harmonics_reason
 from solver.scene import Scene
 from solver.scene_parts import CyclicStructure
+from solver.sectors import sectors_needed
+from solver.workspace import Workspace
 
 # Fitted to responses of the shipped scenes at 11 harmonics on one core of a server: seconds of a Newton
 # iteration, of one contact with n coefficients (times n²), and of a solve with n unknowns (times n³).
@@ -17,6 +21,7 @@ _SECONDS_AN_ITERATION = 5e-6
 _SECONDS_A_CONTACT = 2e-8
 _SECONDS_A_SOLVE = 1.5e-10
 _ITERATIONS_A_POINT = 4.0
+_FREQUENCIES = 101  # of the band at which the stuck response is looked at
 
 _FORMS = {
     MODES: "undamped modes: the damping is diagonal in them, so a frequency costs modes x contacts^2",
@@ -83,66 +88,128 @@ class Plan:
         }
 
 
-def plan(scene: Scene, *, harmonics: int = 11) -> Plan:
+def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -> Plan:
     """Return what solving a scene takes: the effects in use and left out, sizes and estimated cost.
+
+    Parameters
+    ----------
+    scene : what will vibrate.
+    harmonics : highest harmonic kept.
+    effects : what is to be paid for though the scene does not call for it.
 
     Raises
     ------
     SettingError
         A bad number of harmonics.
     """
-    balance = build(scene, harmonics=harmonics)
-    n, contacts = balance.n_unknowns, len(scene.contacts)
+    asked = effects or Effects()
+    balance = build(scene, harmonics=harmonics, effects=asked)
+    n, contacts = balance.n_unknowns, balance.n_ports
+    slips = tuple(_slip(balance, i) for i in range(len(balance.scene.contacts)))
+    kept = sum(effect.used for effect in slips) * balance.n_coefficients
     iteration = (
         _SECONDS_AN_ITERATION
         + _SECONDS_A_CONTACT * contacts * balance.n_coefficients**2
-        + _SECONDS_A_SOLVE * n**3
+        + _SECONDS_A_SOLVE * kept**3
     )
     return Plan(
         scene=scene.name,
         effects=(
-            _condensation(scene, n, balance.n_coefficients),
-            _one_sector(scene),
-            *(_separation(scene, i) for i in range(contacts)),
-            Effect(
-                name="even harmonics and mean",
-                used=True,
-                reason=f"harmonics 0 to {harmonics}: {balance.n_coefficients} coefficients a contact",
-            ),
-            Effect(name="linear part", used=True, reason=_FORMS[balance.system.form]),
+            _condensation(balance),
+            _one_sector(scene, asked),
+            *(_separation(balance.scene, i) for i in range(len(balance.scene.contacts))),
+            *slips,
+            _even_harmonics(balance),
+            Effect(name="linear part", used=True, reason=_linear_part(balance)),
             _stiffness_shift(balance.system.shift),
         ),
         unknowns=n,
         linear_dofs=len(scene.structure.dofs),
-        contacts=contacts,
+        contacts=len(balance.scene.contacts),
         harmonics=harmonics,
         seconds_a_point=_ITERATIONS_A_POINT * iteration,
     )
 
 
-def _condensation(scene: Scene, unknowns: int, coefficients: int) -> Effect:
-    dofs = len(scene.structure.dofs)
+def _condensation(balance: Balance) -> Effect:
+    dofs, coefficients = len(balance.scene.structure.dofs), balance.n_coefficients
     return Effect(
         name="condensation",
         used=True,
         reason=(
-            f"the {dofs} linear DOFs are eliminated exactly: {unknowns} unknowns (contacts x coefficients) "
-            f"instead of {dofs * coefficients}"
+            f"the {dofs} linear DOFs are eliminated exactly: {balance.n_unknowns} unknowns "
+            f"(contacts x coefficients) instead of {dofs * coefficients}"
         ),
     )
 
 
-def _one_sector(scene: Scene) -> Effect:
-    structure = scene.structure
-    if isinstance(structure, CyclicStructure):
-        reason = (
-            f"the disk is tuned and the excitation a travelling wave of engine order {scene.engine_order}: "
-            f"one sector stands for all {structure.sectors}"
-        )
-        return Effect(name="one sector for the annulus", used=True, reason=reason)
+def _one_sector(scene: Scene, asked: Effects) -> Effect:
+    extent = sectors_needed(scene)
+    cyclic = isinstance(scene.structure, CyclicStructure)
+    forced = cyclic and extent.sectors == 1 and asked.every_sector
     return Effect(
-        name="one sector for the annulus", used=False, reason="the structure is lumped, it has no sectors"
+        name="one sector for the annulus",
+        used=cyclic and extent.sectors == 1 and not forced,
+        reason=f"every sector was asked for, though {extent.reason}" if forced else extent.reason,
     )
+
+
+def _slip(balance: Balance, i: int) -> Effect:
+    """Say whether a contact is expected to slip: from the response of the structure with all contacts stuck.
+
+    Only the expectation comes from here. Whether a contact is its spring is decided at every Newton step.
+    """
+    contact = balance.scene.contacts[i]
+    name = f"slip of {contact.name}"
+    if balance.effects.every_contact:
+        return Effect(name=name, used=True, reason=f"{contact.name} was asked to stay in every Newton step")
+    limit = contact.mu * max(contact.N0 - abs(contact.N1_value), 0.0)
+    carried = _stuck_force(balance)[i]
+    words = f"stuck, {contact.name} would carry up to {carried:.4g} N in the band; its limit is {limit:.4g} N"
+    if carried <= limit:
+        return Effect(
+            name=name,
+            used=False,
+            reason=f"{words}: while it sticks it is its spring of {contact.kt:g} N/m (exact, checked every time)",
+        )
+    return Effect(name=name, used=True, reason=words)
+
+
+def _stuck_force(balance: Balance) -> Real:
+    """Return the largest force each contact carries over the band if all stick [N], without the mean."""
+    workspace, low_high = Workspace.of(balance), balance.scene.observe.band
+    kt = np.array([contact.kt for contact in balance.scene.contacts])
+    largest = np.zeros(kt.size)
+    stiffness = kt - balance.system.shift
+    for frequency in np.linspace(*low_high, _FREQUENCIES):
+        linear = workspace.receptance(2.0 * np.pi * float(frequency))
+        total = np.zeros(kt.size)
+        for k, A, free in zip(balance.system.ks, linear.A[0], linear.u_linear[0], strict=True):
+            if k > 0 and np.any(free):
+                total += np.abs(np.linalg.solve(np.eye(kt.size) + A * stiffness, free))
+        largest = np.maximum(largest, kt * total)
+    return largest
+
+
+def _even_harmonics(balance: Balance) -> Effect:
+    count = f"{balance.n_coefficients} coefficients a contact"
+    reason = even_harmonics_reason(balance.scene)
+    if reason is None and balance.system.ks[0] != 0:
+        odd = ", ".join(str(k) for k in balance.system.ks[:3])
+        reason = f"loads are constant and forces odd, so the response is half-wave symmetric: {odd} … only"
+        return Effect(name="even harmonics and mean", used=False, reason=f"{reason}, {count}")
+    reason = reason or "they were asked for"
+    return Effect(
+        name="even harmonics and mean",
+        used=True,
+        reason=f"{reason}: harmonics 0 to {balance.n_harmonics}, {count}",
+    )
+
+
+def _linear_part(balance: Balance) -> str:
+    if balance.effects.whole_matrices:
+        return "the matrices themselves at every frequency, as asked for"
+    return _FORMS[balance.system.form]
 
 
 def _separation(scene: Scene, i: int) -> Effect:

@@ -18,6 +18,7 @@ from solver.kernels.compiled import compiled
 Real: TypeAlias = NDArray[np.float64]
 Complex: TypeAlias = NDArray[np.complex128]
 Integer: TypeAlias = NDArray[np.int64]
+Index: TypeAlias = NDArray[np.int32]  # LAPACK's pivots
 
 
 @compiled
@@ -59,6 +60,18 @@ def to_full(coefficients: Real, ks: Integer, n_harmonics: int) -> Real:
         else:
             full[..., 2 * k - 1 : 2 * k + 1] = coefficients[..., here : here + 2]
     return full
+
+
+def from_full(coefficients: Real, ks: Integer) -> Real:
+    """Return the coefficients (..., n) for the harmonics `ks` of full coefficients (..., 2H + 1)."""
+    kept = np.zeros((*coefficients.shape[:-1], int(coefficient_count(ks))))
+    for i, k in enumerate(ks):
+        here = cosine_position(ks, i)
+        if k == 0:
+            kept[..., 0] = coefficients[..., 0]
+        elif 2 * k < coefficients.shape[-1]:
+            kept[..., here : here + 2] = coefficients[..., 2 * k - 1 : 2 * k + 1]
+    return kept
 
 
 def basis(tau: Real, n_harmonics: int) -> Real:

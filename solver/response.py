@@ -15,8 +15,10 @@ from solver.adaptive import solve_to
 from solver.balance import Balance, build, check_frequency
 from solver.fourier import Real
 from solver.kernels.events import LIFTING, SEPARATED, STUCK
+from solver.kernels.jacobian import fill_jacobian
 from solver.kernels.observe import HALF_RANGE, MAX_ABS, MEAN
 from solver.kernels.system import evaluation_by_value
+from solver.savings import Effects
 from solver.scene import Scene
 from solver.workspace import PointSolution, Workspace
 
@@ -159,7 +161,12 @@ class Solution:
 
 
 def solve(
-    scene: Scene, *, frequency_hz: float, harmonics: int = 11, accuracy: float | None = None
+    scene: Scene,
+    *,
+    frequency_hz: float,
+    harmonics: int = 11,
+    accuracy: float | None = None,
+    effects: Effects | None = None,
 ) -> Solution:
     """Find the periodic response of a scene at one frequency.
 
@@ -169,6 +176,7 @@ def solve(
     frequency_hz : excitation frequency [Hz].
     harmonics : highest harmonic kept, unless `accuracy` is given.
     accuracy : estimated error of the amplitude, relative to it, that the fewest harmonics are chosen for.
+    effects : what is paid for though the scene does not call for it; see `solver.savings.Effects`.
 
     Raises
     ------
@@ -180,10 +188,12 @@ def solve(
     omega = 2.0 * math.pi * frequency_hz
     good_enough = True
     if accuracy is None:
-        workspace = Workspace.of(build(scene, harmonics=harmonics))
+        workspace = Workspace.of(build(scene, harmonics=harmonics, effects=effects))
         found = workspace.solve(omega)
     else:
-        workspace, found, good_enough = solve_to(lambda h: build(scene, harmonics=h), omega, accuracy)
+        workspace, found, good_enough = solve_to(
+            lambda h: build(scene, harmonics=h, effects=effects), omega, accuracy
+        )
     if not found.converged:
         return _failure(workspace.balance, frequency_hz, found, time.perf_counter() - begun)
     solution = describe(workspace, found, frequency_hz, begun)
@@ -225,7 +235,7 @@ def contact_responses(workspace: Workspace, u: Real, p: float) -> tuple[ContactR
     balance = workspace.balance
     _, point = workspace.evaluate(u, p)
     ks, top = balance.system.ks, balance.n_harmonics
-    slips = fourier.to_full(u.reshape(len(balance.scene.contacts), balance.n_coefficients), ks, top)
+    slips = fourier.to_full(u.reshape(balance.n_ports, balance.n_coefficients), ks, top)
     forces = fourier.to_full(point.F, ks, top)
     responses = []
     for contact, state, slip, force in zip(balance.scene.contacts, point.states, slips, forces, strict=True):
@@ -260,6 +270,7 @@ def _nothing_holds_a_part(workspace: Workspace) -> bool:
     system = workspace.balance.system
     if not np.any(system.shift > 0.0):
         return False
+    fill_jacobian(workspace.system, workspace.linear, workspace.point)
     values = np.linalg.svd(evaluation_by_value(workspace.point).jacobian, compute_uv=False)
     return bool(values[-1] < FREE * values[0])
 

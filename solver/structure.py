@@ -102,6 +102,11 @@ def _least_size(contact_modes: Complex, modal_forces: Complex, eigenvalues: Comp
     return CANCELLED * largest
 
 
+def has_loose_parts(model: LinearModel) -> bool:
+    """Return whether the structure without its contacts leaves a part free to move away."""
+    return not held_alone(matrices_of(model, np.zeros(1)))
+
+
 def force_amplitudes(model: LinearModel, ks: Integer) -> Complex:
     """Return the complex force amplitudes f̂_k, (nk, n), of cos(hωt + phase) terms: amplitude·e^{i phase}."""
     amplitudes = np.zeros((ks.size, model.observe.size), dtype=np.complex128)

@@ -26,7 +26,8 @@ def more_harmonics(balance: Balance, top: int) -> Balance:
     if system is None:
         return _rebuilt(balance, top)
     cos_table, sin_table = _tables(max(int(ks[-1]), 1))
-    return replace(balance, system=system._replace(cos_table=cos_table, sin_table=sin_table))
+    system = system._replace(cos_table=cos_table, sin_table=sin_table)
+    return replace(balance, system=system, n_harmonics=top)
 
 
 def linear_part(balance: Balance, top: int) -> System:
@@ -52,7 +53,13 @@ def pad(coefficients: Real, balance: Balance, wider: Balance) -> Real:
 def _rebuilt(balance: Balance, top: int) -> Balance:
     """Return the balance of the same scene with the harmonics up to `top`, everything made anew."""
     frequency_hz = balance.system.omega / (2.0 * math.pi) or None
-    return build(balance.scene, balance.parameter.path, harmonics=top, frequency_hz=frequency_hz)
+    return build(
+        balance.scene,
+        balance.parameter.path,
+        harmonics=top,
+        frequency_hz=frequency_hz,
+        effects=balance.effects,
+    )
 
 
 def _extended(balance: Balance, ks: Integer) -> System | None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from solver.balance import Balance, fewer_harmonics
 from solver.fourier import Real
+from solver.kernels.jacobian import fill_jacobian
 from solver.kernels.newton import from_stuck, ladder, newton
 from solver.kernels.observe import MEASURES
 from solver.kernels.receptance import receptance
@@ -134,9 +135,8 @@ class Workspace:
 
     def _padded(self, u: Real) -> Real:
         """Return a solution with fewer harmonics, filled up with zeros."""
-        contacts = len(self.balance.scene.contacts)
-        kept = u.reshape(contacts, -1)
-        full = np.zeros((contacts, self.balance.n_coefficients))
+        kept = u.reshape(self.balance.n_ports, -1)
+        full = np.zeros((self.balance.n_ports, self.balance.n_coefficients))
         full[:, : kept.shape[1]] = kept
         return full.reshape(-1)
 
@@ -144,6 +144,7 @@ class Workspace:
         """Return the relative residual at (u, p) and everything evaluated there (views of scratch arrays)."""
         receptance(self.system, p, self.linear)
         norm = evaluate(self.system, self.linear, u, p, 0.0, self.point)
+        fill_jacobian(self.system, self.linear, self.point)
         return float(norm), evaluation_by_value(self.point)
 
     def receptance(self, p: float) -> Receptance:
@@ -153,7 +154,8 @@ class Workspace:
 
     def measure(self, u: Real, p: float) -> PointMeasures | None:
         """Return what is observed at the solution (u, p) with slopes by λ; None where dr/du is singular."""
-        self.evaluate(u, p)
+        receptance(self.system, p, self.linear)
+        evaluate(self.system, self.linear, u, p, 0.0, self.point)
         observed, values = np.zeros(self.balance.n_coefficients), np.zeros(MEASURES)
         good = slope_by_parameter(self.system, self.linear, u, self.point, observed, values)
         return PointMeasures(observed=observed, values=values) if good else None

@@ -3,7 +3,7 @@
 Written as plain loops: an array expression costs Numba a tenth of a second of compilation each time.
 
 Small systems use a loop of our own (a call to LAPACK costs more than the factorisation), larger ones LAPACK's
-``dgesv`` through the entry Numba itself links, which stays cacheable on disk.
+``dgetrf`` through the entry Numba itself links, which stays cacheable on disk.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from collections.abc import Callable
 import numba
 import numpy as np
 
-from solver.fourier import Complex, Real
+from solver.fourier import Complex, Index, Real
 from solver.kernels.compiled import compiled, out_of_line
 
 OWN_UP_TO = 36  # measured crossing of our loop and LAPACK
 
 _int, _index, _doubles = numba.types.intc, numba.types.intp, numba.types.CPointer(numba.types.float64)
 _pivots = numba.types.CPointer(numba.types.int32)
-_gesv: Callable[..., int] = numba.core.types.ExternalFunction(
-    "numba_xgesv", _int(numba.types.char, _index, _index, _doubles, _index, _pivots, _doubles, _index)
+_getrf: Callable[..., int] = numba.core.types.ExternalFunction(
+    "numba_xxgetrf", _int(numba.types.char, _index, _index, _doubles, _index, _pivots)
 )
 _DOUBLE = np.int8(ord("d"))
 
@@ -111,42 +111,82 @@ def invert(matrix: Complex, inverse: Complex) -> bool:
 
 
 @compiled
-def _solve_small(matrix: Real, rhs: Real) -> float:
-    """Gauss with partial pivoting on a row-major matrix; the right-hand sides are the rows of `rhs`."""
+def _own_factors(a: Real, n: int, pivots: Index) -> None:
+    """Factorise the leading block, columns exchanged for the largest pivot of a row; numbers as LAPACK's."""
     out_of_line()
-    n = matrix.shape[0]
-    sign = 1.0
     for k in range(n):
-        pivot, size = k, abs(matrix[k, k])
-        for i in range(k + 1, n):
-            here = abs(matrix[i, k])
+        pivot, size = k, abs(a[k, k])
+        for j in range(k + 1, n):
+            here = abs(a[k, j])
             if here > size:
-                pivot, size = i, here
-        if not size > 0.0:
-            return 0.0
+                pivot, size = j, here
+        pivots[k] = pivot + 1
         if pivot != k:
-            sign = -sign
-            for j in range(k, n):
-                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
-            for b in range(rhs.shape[0]):
-                rhs[b, k], rhs[b, pivot] = rhs[b, pivot], rhs[b, k]
-        if matrix[k, k] < 0.0:
-            sign = -sign
-        inverse = 1.0 / matrix[k, k]
+            for i in range(n):
+                a[i, k], a[i, pivot] = a[i, pivot], a[i, k]
+        if not size > 0.0:
+            continue
+        inverse = 1.0 / a[k, k]
+        for j in range(k + 1, n):
+            a[k, j] *= inverse
         for i in range(k + 1, n):
-            factor = matrix[i, k] * inverse
+            factor = a[i, k]
             if factor != 0.0:
                 for j in range(k + 1, n):
-                    matrix[i, j] -= factor * matrix[k, j]
-                for b in range(rhs.shape[0]):
-                    rhs[b, i] -= factor * rhs[b, k]
-    for b in range(rhs.shape[0]):
-        for i in range(n - 1, -1, -1):
-            total = rhs[b, i]
-            for j in range(i + 1, n):
-                total -= matrix[i, j] * rhs[b, j]
-            rhs[b, i] = total / matrix[i, i]
+                    a[i, j] -= factor * a[k, j]
+
+
+@compiled
+def factorise(a: Real, n: int, pivots: Index) -> float:
+    """Factorise the leading n × n block of a row-major matrix in place, as `back_substitute` needs it.
+
+    The rows of `a` are the columns of its transpose, which is what is factorised: LAPACK works on columns.
+
+    Returns
+    -------
+    The sign of the determinant, 0.0 if the matrix is singular or not finite.
+    """
+    out_of_line()
+    for i in range(n):
+        for j in range(n):
+            if not math.isfinite(a[i, j]):
+                return 0.0
+    if n <= OWN_UP_TO:
+        _own_factors(a, n, pivots)
+    else:
+        _getrf(_DOUBLE, n, n, a.ctypes, a.shape[1], pivots.ctypes)
+    sign = 1.0
+    for k in range(n):
+        if a[k, k] == 0.0:
+            return 0.0
+        if pivots[k] != k + 1:
+            sign = -sign
+        if a[k, k] < 0.0:
+            sign = -sign
     return sign
+
+
+@compiled
+def back_substitute(a: Real, n: int, pivots: Index, x: Real) -> None:
+    """Solve matrix @ x = rhs with the factors of `factorise`; `x` (≥ n,) is the right-hand side, overwritten.
+
+    With Mᵀ = Pᵀ L U the solution is x = Pᵀ L⁻ᵀ U⁻ᵀ rhs: dot products along rows of `a`.
+    """
+    out_of_line()
+    for i in range(n):
+        total = x[i]
+        for k in range(i):
+            total -= a[i, k] * x[k]
+        x[i] = total / a[i, i]
+    for i in range(n - 1, -1, -1):
+        total = x[i]
+        for k in range(i + 1, n):
+            total -= a[i, k] * x[k]
+        x[i] = total
+    for k in range(n - 1, -1, -1):
+        other = pivots[k] - 1
+        if other != k:
+            x[k], x[other] = x[other], x[k]
 
 
 @compiled
@@ -164,22 +204,9 @@ def solve(matrix: Real, rhs: Real) -> float:
     """
     out_of_line()
     n = matrix.shape[0]
-    if n <= OWN_UP_TO:
-        return _solve_small(matrix, rhs)
-    columns = np.empty((n, n))
-    for i in range(n):
-        for j in range(n):
-            columns[j, i] = matrix[i, j]
-            if not math.isfinite(matrix[i, j]):
-                return 0.0
     pivots = np.empty(n, np.int32)
-    info = _gesv(_DOUBLE, n, rhs.shape[0], columns.ctypes, n, pivots.ctypes, rhs.ctypes, n)
-    if info != 0:
-        return 0.0
-    sign = 1.0
-    for k in range(n):
-        if pivots[k] != k + 1:
-            sign = -sign
-        if columns[k, k] < 0.0:
-            sign = -sign
+    sign = factorise(matrix, n, pivots)
+    if sign != 0.0:
+        for b in range(rhs.shape[0]):
+            back_substitute(matrix, n, pivots, rhs[b])
     return sign

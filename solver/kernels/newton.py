@@ -14,7 +14,8 @@ import numpy as np
 
 from solver.fourier import Real, coefficient_count, cosine_position
 from solver.kernels.compiled import compiled, out_of_line
-from solver.kernels.linear import copy_block, copy_to, invert, set_to, solve
+from solver.kernels.jacobian import factorise, step_back
+from solver.kernels.linear import copy_to, invert, set_to
 from solver.kernels.receptance import receptance
 from solver.kernels.residual import contact_values, evaluate
 from solver.kernels.system import KT, MU, N0, N1, Evaluation, Receptance, System
@@ -38,7 +39,7 @@ def newton(
     """
     out_of_line()
     n = u.size
-    trial, kept, matrix, step = np.empty(n), np.empty(n), np.empty((n, n)), np.empty((1, n))
+    trial, kept, step = np.empty(n), np.empty(n), np.empty(n)
     copy_to(trial, u)
     norm, best, length, least, least_length = np.inf, np.inf, 0.0, np.inf, 1.0
     iteration, halvings, uphill, must_take = 0, 0, 0, True
@@ -56,7 +57,7 @@ def newton(
                 if uphill > _UPHILL_STEPS:
                     break
                 length, must_take = least_length, True
-            set_to(trial, u, -length, step[0])
+            set_to(trial, u, -length, step)
             continue
         if not math.isfinite(fresh):
             break
@@ -69,14 +70,14 @@ def newton(
             return True, iteration, norm
         if iteration >= _MOST:
             break
-        copy_block(matrix, point.jacobian)
-        copy_to(step[0], point.residual)
-        if solve(matrix, step) == 0.0:
+        if factorise(system, linear, point, step, 0.0, 0.0) == 0.0:
             break
+        copy_to(step, point.residual)
+        step_back(system, point, step)
         iteration += 1
         length, halvings, must_take = 1.0, 0, False
         least, least_length = np.inf, 1.0
-        set_to(trial, u, -length, step[0])
+        set_to(trial, u, -length, step)
     if not math.isfinite(best):
         return False, iteration, best
     copy_to(u, kept)
@@ -101,7 +102,7 @@ def arc_newton(
     """
     out_of_line()
     n = u.size
-    matrix, rhs = np.empty((n + 1, n + 1)), np.empty((1, n + 1))
+    rhs = np.empty(n + 1)
     before, norm = np.inf, np.inf
     for iteration in range(most + 1):
         receptance(system, p, linear)
@@ -113,28 +114,17 @@ def arc_newton(
         if iteration == most or norm > 1e3 * max(before, 1e-3):
             return False, iteration, p, norm
         before = norm
-        border(point, tangent, weight_u, weight_p, matrix)
+        if factorise(system, linear, point, tangent, weight_u, weight_p) == 0.0:
+            return False, iteration, p, norm
         plane = weight_p * tangent[n] * (p - guess_p)
         for i in range(n):
-            rhs[0, i] = point.residual[i]
+            rhs[i] = point.residual[i]
             plane += weight_u * tangent[i] * (u[i] - guess_u[i])
-        rhs[0, n] = plane
-        if solve(matrix, rhs) == 0.0:
-            return False, iteration, p, norm
-        set_to(u, u, -1.0, rhs[0])
-        p -= rhs[0, n]
+        rhs[n] = plane
+        step_back(system, point, rhs)
+        set_to(u, u, -1.0, rhs)
+        p -= rhs[n]
     return False, most, p, norm
-
-
-@compiled
-def border(point: Evaluation, tangent: Real, weight_u: float, weight_p: float, matrix: Real) -> None:
-    """Fill `matrix` with [dr/du, dr/dλ; weighted tangentᵀ]."""
-    n = point.residual.size
-    copy_block(matrix, point.jacobian)
-    for i in range(n):
-        matrix[i, n] = point.dr_dp[i]
-        matrix[n, i] = weight_u * tangent[i]
-    matrix[n, n] = weight_p * tangent[n]
 
 
 @compiled
@@ -144,13 +134,13 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
     (I + A kt) u = ū harmonic by harmonic; a contact stays stuck while max|kt u| ≤ μ (N0 − |N1| + added).
     """
     out_of_line()
-    nc, n = system.contacts.shape[0], coefficient_count(system.ks)
+    nc, n = system.owner.size, coefficient_count(system.ks)
     table, _, _, _ = contact_values(system, p, 0.0)
     matrix, inverse = np.empty((nc, nc), np.complex128), np.empty((nc, nc), np.complex128)
     for i in range(system.ks.size):
         for c in range(nc):
             for d in range(nc):
-                matrix[c, d] = linear.A[0, i, c, d] * (table[d, KT] - system.shift[d])
+                matrix[c, d] = linear.A[0, i, c, d] * (table[system.owner[d], KT] - system.shift[d])
             matrix[c, c] += 1.0
         good = invert(matrix, inverse)
         here = cosine_position(system.ks, i)
@@ -163,13 +153,14 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
                 u[c * n + here + 1] = -motion.imag if good else 0.0
     added = 0.0
     for c in range(nc):
-        if table[c, MU] <= 0.0:
+        row = table[system.owner[c]]
+        if row[MU] <= 0.0:
             continue
         reach = 0.0
         for i in range(system.ks.size):
             here = c * n + cosine_position(system.ks, i)
             reach += abs(u[here]) if system.ks[i] == 0 else math.hypot(u[here], u[here + 1])
-        needed = 1.05 * table[c, KT] * reach / table[c, MU] - (table[c, N0] - abs(table[c, N1]))
+        needed = 1.05 * row[KT] * reach / row[MU] - (row[N0] - abs(row[N1]))
         added = max(added, needed)
     return added
 

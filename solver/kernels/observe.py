@@ -16,13 +16,14 @@ from solver.kernels.trigpoly import on_grid, unpack
 # max|x|, the larger of the two, has a kink where they cross.
 MAX_ABS, HALF_RANGE, MEAN, SLOPE, RANGE_SLOPE, RESIDUAL, HIGH, LOW, HIGH_SLOPE, LOW_SLOPE = range(10)
 MEASURES = 10
+SAME_HEIGHT = 1e-12  # relative distance within which max x and −min x are the same but for rounding
 
 
 @compiled
 def observed_motion(system: System, linear: Receptance, u: Real, point: Evaluation, x: Real) -> None:
     """Fill `x` (n,) with the coefficients of the observed DOF [m]: x̂ = x̂_linear − B (F̂ − shift û)."""
     out_of_line()
-    nc, n = system.contacts.shape[0], coefficient_count(system.ks)
+    nc, n = system.owner.size, coefficient_count(system.ks)
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
         value = linear.x_linear[0, i]
@@ -42,13 +43,17 @@ def observed_slope(
 ) -> None:
     """Fill `dx` with the change of the observed coefficients for a change (du, dλ) of the solution."""
     out_of_line()
-    nc, n = system.contacts.shape[0], coefficient_count(system.ks)
+    nc, n = system.owner.size, coefficient_count(system.ks)
     dF = np.empty((nc, n))
     for c in range(nc):
+        e = system.owner[c]
+        first, m = system.first_port[e], system.first_port[e + 1] - system.first_port[e]
         for i in range(n):
             total = dp * point.dF_dp[c, i] - system.shift[c] * du[c * n + i]
-            for j in range(n):
-                total += point.dF_dU[c, i, j] * du[c * n + j]
+            for q in range(m):
+                block = system.first_block[e] + (c - first) * m + q
+                for j in range(n):
+                    total += point.dF_dU[block, i, j] * du[(first + q) * n + j]
             dF[c, i] = total
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
@@ -115,7 +120,9 @@ def measure(
     out[HALF_RANGE], out[RANGE_SLOPE] = 0.5 * (high - low), 0.5 * (rise - sink)
     out[HIGH], out[LOW], out[HIGH_SLOPE], out[LOW_SLOPE] = high, -low, rise, -sink
     out[MEAN] = x[0] if system.ks[0] == 0 else 0.0
-    if high >= -low:
-        out[MAX_ABS], out[SLOPE] = high, rise
+    out[MAX_ABS] = max(high, -low)
+    if abs(high + low) <= SAME_HEIGHT * out[MAX_ABS]:
+        # A symmetric motion: onward along (du, dλ) the larger slope leads.
+        out[SLOPE] = max(rise, -sink)
     else:
-        out[MAX_ABS], out[SLOPE] = -low, -sink
+        out[SLOPE] = rise if high > -low else -sink

@@ -19,13 +19,16 @@ from numba.experimental import structref
 
 from solver.fourier import Integer, Real
 from solver.kernels.compiled import compiled, out_of_line
-from solver.kernels.linear import copy_to, largest_entry, set_to, solve
-from solver.kernels.newton import arc_newton, border, newton
+from solver.kernels.frozen import frozen_arc
+from solver.kernels.jacobian import AT_BRANCH_POINT, factorise, step_back
+from solver.kernels.linear import copy_to, largest_entry, set_to
+from solver.kernels.newton import arc_newton, newton
 from solver.kernels.observe import RESIDUAL, measure
 from solver.kernels.receptance import receptance
-from solver.kernels.residual import evaluate
+from solver.kernels.residual import evaluate, least_size
 from solver.kernels.system import Evaluation, Receptance, System
 
+_TINY = 64.0  # smallest steps: a step as short as this may turn as it likes
 STRAIGHT_ON = 0.98  # cosine of the turn at a branch point; more than that is a step across a sharp peak
 # How a stretch of continuation ended.
 RUNNING, FINISHED, NO_START, STALLED, LEFT_RANGE = 0, 1, 2, 3, 4
@@ -57,7 +60,7 @@ class Walk(NamedTuple):
     before: Real  # (nt + 1,) the point before, λ last
     tangent: Real  # (nt + 1,)
     before_tangent: Real  # (nt + 1,) at the point before
-    numbers: Real  # (11,)
+    numbers: Real  # (12,)
 
 
 @structref.register
@@ -80,7 +83,8 @@ def walk_by_value(walk: Walk) -> Walk:
     return Walk(walk.u, walk.before, walk.tangent, walk.before_tangent, walk.numbers)
 
 
-P, STEP, ORIENTATION, ITERATIONS, REJECTED, STEPPED_OVER, COUNT, NORM, FRESH, ROUGH, PIECE = range(11)
+P, STEP, ORIENTATION, ITERATIONS, REJECTED, STEPPED_OVER, COUNT, NORM, FRESH, ROUGH, PIECE, FROZEN = range(12)
+FROZEN_FROM = 64  # unknowns from which old factors beat new ones (measured)
 
 
 @compiled
@@ -90,14 +94,14 @@ def begin_walk(
     """Begin a branch at a solution `u` for the start of the range: its first point and tangent."""
     out_of_line()
     nt, p = u.size, control.start
-    walk = _new_walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(11))
+    walk = _new_walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(12))
     copy_to(walk.u, u)
     walk.numbers[P] = p
     walk.numbers[STEP] = control.first_step
     walk.tangent[nt] = 1.0 if control.stop >= control.start else -1.0
     receptance(system, p, linear)
     walk.numbers[NORM], walk.numbers[FRESH] = evaluate(system, linear, walk.u, p, 0.0, point), 1.0
-    if not _turn(walk, point, control):
+    if not _turn(system, linear, point, control, walk):
         return NO_START, walk
     set_to(walk.before[:nt], walk.u, -control.first_step, walk.tangent)
     walk.before[nt] = p - control.first_step * walk.tangent[nt]
@@ -105,9 +109,9 @@ def begin_walk(
 
 
 @compiled
-def _weights(u: Real, control: Control) -> tuple[float, float]:
+def _weights(system: System, walk: Walk, control: Control) -> tuple[float, float]:
     """Return the weights of the scalar product: u relative to its size, λ relative to its range."""
-    size = largest_entry(u)
+    size = max(largest_entry(walk.u), least_size(system, walk.numbers[P]))
     span = abs(control.stop - control.start) / control.range_weight
     weight_u = 1.0 / (size * size) if size > 0.0 else 1.0
     return weight_u, 1.0 / (span * span) if span > 0.0 else 1.0
@@ -123,22 +127,25 @@ def _piece(point: Evaluation) -> float:
 
 
 @compiled
-def _turn(walk: Walk, point: Evaluation, control: Control) -> bool:
+def _turn(system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk) -> bool:
     """Replace the tangent by the one at the new point (`point` is evaluated there), oriented onward."""
     out_of_line()
     n = walk.u.size
-    weight_u, weight_p = _weights(walk.u, control)
-    matrix, rhs = np.empty((n + 1, n + 1)), np.zeros((1, n + 1))
-    border(point, walk.tangent, weight_u, weight_p, matrix)
-    rhs[0, n] = 1.0
-    sign = solve(matrix, rhs)
-    if sign == 0.0 or not math.isfinite(rhs[0, n]):
+    weight_u, weight_p = _weights(system, walk, control)
+    rhs = np.zeros(n + 1)
+    rhs[n] = 1.0
+    sign = factorise(system, linear, point, walk.tangent, weight_u, weight_p)
+    if sign == 0.0:
         return False
+    step_back(system, point, rhs)
+    if not math.isfinite(rhs[n]):
+        return False
+    point.counts[AT_BRANCH_POINT] = 1
     old = weight_p * walk.tangent[n] ** 2
-    new = weight_p * rhs[0, n] ** 2
+    new = weight_p * rhs[n] ** 2
     for i in range(n):
         old += weight_u * walk.tangent[i] ** 2
-        new += weight_u * rhs[0, i] ** 2
+        new += weight_u * rhs[i] ** 2
     length = math.sqrt(new)
     if walk.numbers[ORIENTATION] == 0.0:
         walk.numbers[ORIENTATION] = sign
@@ -149,17 +156,17 @@ def _turn(walk: Walk, point: Evaluation, control: Control) -> bool:
             length = -length
     walk.numbers[PIECE] = _piece(point)
     for i in range(n + 1):
-        walk.tangent[i] = rhs[0, i] / length
+        walk.tangent[i] = rhs[i] / length
     return True
 
 
 @compiled
-def _predict(walk: Walk, control: Control, step: float, guess: Real) -> float:
+def _predict(system: System, walk: Walk, control: Control, step: float, guess: Real) -> float:
     """Fill `guess` with the predicted u at arc length `step`; return the predicted λ."""
     n = walk.u.size
     p = walk.numbers[P]
     if control.predictor == SECANT and walk.numbers[COUNT] > 0:
-        weight_u, weight_p = _weights(walk.u, control)
+        weight_u, weight_p = _weights(system, walk, control)
         length = weight_p * (p - walk.before[n]) ** 2
         for i in range(n):
             length += weight_u * (walk.u[i] - walk.before[i]) ** 2
@@ -169,17 +176,17 @@ def _predict(walk: Walk, control: Control, step: float, guess: Real) -> float:
                 guess[i] = walk.u[i] + scale * (walk.u[i] - walk.before[i])
             return p + scale * (p - walk.before[n])
     if control.predictor == CUBIC and walk.numbers[COUNT] > 0 and walk.numbers[ROUGH] == 0.0:
-        return _extrapolate(walk, control, step, guess)
+        return _extrapolate(system, walk, control, step, guess)
     set_to(guess, walk.u, step, walk.tangent)
     return p + step * walk.tangent[n]
 
 
 @compiled
-def _extrapolate(walk: Walk, control: Control, step: float, guess: Real) -> float:
+def _extrapolate(system: System, walk: Walk, control: Control, step: float, guess: Real) -> float:
     """Predict by the cubic through the last two points and their tangents; return the predicted λ."""
     n = walk.u.size
     p = walk.numbers[P]
-    weight_u, weight_p = _weights(walk.u, control)
+    weight_u, weight_p = _weights(system, walk, control)
     chord = weight_p * (p - walk.before[n]) ** 2
     here, there = weight_p * walk.tangent[n] ** 2, weight_p * walk.before_tangent[n] ** 2
     for i in range(n):
@@ -226,25 +233,51 @@ def _accept(walk: Walk, trial: Real, p: float, norm: float) -> None:
 
 
 @compiled
+def _correct(
+    system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk, guess: Real,
+    p_guess: float, trial: Real, weight_u: float, weight_p: float,
+) -> tuple[bool, int, float, float]:  # fmt: skip
+    """Correct the guess into `trial`: with the factors of the last point if that pays, else Newton's method.
+
+    Returns
+    -------
+    (converged, iterations as far as the step control is concerned, λ, relative residual).
+    """
+    out_of_line()
+    if trial.size >= FROZEN_FROM and point.counts[AT_BRANCH_POINT] == 1:
+        copy_to(trial, guess)
+        good, solves, p, norm = frozen_arc(
+            system, linear, trial, p_guess, walk.tangent, weight_u, weight_p, point
+        )
+        walk.numbers[FROZEN] += solves
+        if good:
+            return True, (solves + 1) // 2, p, norm
+    copy_to(trial, guess)
+    good, iterations, p, norm = arc_newton(
+        system, linear, trial, p_guess, guess, p_guess, walk.tangent, weight_u, weight_p, point,
+        control.most_iterations,
+    )  # fmt: skip
+    walk.numbers[ITERATIONS] += iterations
+    return good, iterations, p, norm
+
+
+@compiled
 def _step(system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk) -> int:
     """Make one step; return RUNNING, FINISHED, STALLED or LEFT_RANGE."""
     out_of_line()
     n = walk.u.size
     guess, trial = np.empty(n), np.empty(n)
     forward = 1.0 if control.stop >= control.start else -1.0
-    weight_u, weight_p = _weights(walk.u, control)
+    weight_u, weight_p = _weights(system, walk, control)
     while walk.numbers[STEP] >= control.smallest_step:
         step = walk.numbers[STEP]
-        p_guess = _predict(walk, control, step, guess)
+        p_guess = _predict(system, walk, control, step, guess)
         last = (p_guess - control.stop) * forward >= 0.0
         good, iterations, p, norm = False, 0, p_guess, np.inf
         if not last:
-            copy_to(trial, guess)
-            good, iterations, p, norm = arc_newton(
-                system, linear, trial, p_guess, guess, p_guess, walk.tangent, weight_u, weight_p, point,
-                control.most_iterations,
-            )  # fmt: skip
-            walk.numbers[ITERATIONS] += iterations
+            good, iterations, p, norm = _correct(
+                system, linear, point, control, walk, guess, p_guess, trial, weight_u, weight_p
+            )
             if good and (p - control.stop) * forward > 0.0:
                 last, p_guess = True, p
                 copy_to(guess, trial)
@@ -262,7 +295,7 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
         if good:
             off = _distance(trial, p, guess, p_guess, weight_u, weight_p)
             turned = off / (step + 1e-300)
-            if turned > control.largest_turn and step > 64.0 * control.smallest_step:
+            if turned > control.largest_turn and step > _TINY * control.smallest_step:
                 good = False
         if not good:
             walk.numbers[REJECTED] += 1
@@ -280,10 +313,40 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
             return LEFT_RANGE
         _accept(walk, trial, p, norm)
         if last:
-            _turn(walk, point, control)
+            _turn(system, linear, point, control, walk)
             return FINISHED
-        return RUNNING if _turn(walk, point, control) else STALLED
+        orientation, piece = walk.numbers[ORIENTATION], walk.numbers[PIECE]
+        if not _turn(system, linear, point, control, walk):
+            return STALLED
+        if step <= _TINY * control.smallest_step and _turned_back(system, control, walk):
+            _undo(walk, orientation, piece)
+            return STALLED
+        return RUNNING
     return STALLED
+
+
+@compiled
+def _turned_back(system: System, control: Control, walk: Walk) -> bool:
+    """Return whether the last step led back on another piece: near a cusp both meet the corrector's plane."""
+    n = walk.u.size
+    weight_u, weight_p = _weights(system, walk, control)
+    along = weight_p * walk.tangent[n] * (walk.numbers[P] - walk.before[n])
+    for i in range(n):
+        along += weight_u * walk.tangent[i] * (walk.u[i] - walk.before[i])
+    return along < 0.0
+
+
+@compiled
+def _undo(walk: Walk, orientation: float, piece: float) -> None:
+    """Take the last step back."""
+    n = walk.u.size
+    copy_to(walk.u, walk.before[:n])
+    copy_to(walk.tangent, walk.before_tangent)
+    walk.numbers[P] = walk.before[n]
+    walk.numbers[ORIENTATION], walk.numbers[PIECE] = orientation, piece
+    walk.numbers[ROUGH], walk.numbers[FRESH] = 1.0, 0.0
+    walk.numbers[COUNT] -= 1
+    walk.numbers[REJECTED] += 1
 
 
 @compiled
@@ -309,7 +372,7 @@ def _step_over(system: System, linear: Receptance, point: Evaluation, control: C
         walk.numbers[ITERATIONS] += iterations
         if not good:
             continue
-        weight_u, weight_p = _weights(walk.u, control)
+        weight_u, weight_p = _weights(system, walk, control)
         if _distance(trial, p, walk.u, walk.numbers[P], weight_u, weight_p) > 4.0 * control.largest_step:
             continue
         walk.numbers[STEPPED_OVER] += 1
@@ -319,7 +382,7 @@ def _step_over(system: System, linear: Receptance, point: Evaluation, control: C
         walk.tangent[n] = p - walk.before[n]
         walk.numbers[ORIENTATION], walk.numbers[ROUGH] = 0.0, 1.0
         walk.numbers[STEP] = max(control.first_step * 0.1, 256.0 * control.smallest_step)
-        turned = _turn(walk, point, control)
+        turned = _turn(system, linear, point, control, walk)
         if last:
             return FINISHED
         return RUNNING if turned else STALLED

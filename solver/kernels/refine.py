@@ -8,8 +8,9 @@ import numpy as np
 
 from solver.fourier import Real
 from solver.kernels.compiled import compiled, out_of_line
-from solver.kernels.linear import copy_block, copy_to, largest_entry, set_to, solve
-from solver.kernels.newton import arc_newton, border
+from solver.kernels.jacobian import factorise, step_back
+from solver.kernels.linear import copy_to, largest_entry, set_to
+from solver.kernels.newton import arc_newton
 from solver.kernels.observe import HIGH_SLOPE, LOW_SLOPE, MAX_ABS, RESIDUAL, measure
 from solver.kernels.system import Evaluation, Receptance, System
 
@@ -23,13 +24,13 @@ def slope_by_parameter(
     """Measure a solution with its slopes by λ, du/dλ = −(dr/du)⁻¹ dr/dλ; False where dr/du is singular."""
     out_of_line()
     n = u.size
-    matrix, rhs = np.empty((n, n)), np.empty((1, n))
-    copy_block(matrix, point.jacobian)
-    for i in range(n):
-        rhs[0, i] = -point.dr_dp[i]
-    if n > 0 and solve(matrix, rhs) == 0.0:
+    slope = np.empty(n)
+    if factorise(system, linear, point, slope, 0.0, 0.0) == 0.0:
         return False
-    measure(system, linear, u, point, rhs[0], 1.0, x, out)
+    for i in range(n):
+        slope[i] = -point.dr_dp[i]
+    step_back(system, point, slope)
+    measure(system, linear, u, point, slope, 1.0, x, out)
     return True
 
 
@@ -73,17 +74,16 @@ def between(
     )  # fmt: skip
     if not good:
         return False, iterations
-    matrix, rhs = np.empty((n + 1, n + 1)), np.zeros((1, n + 1))
-    border(point, chord, weight_u, weight_p, matrix)
-    total = weight_p * chord[n] * chord[n]
-    for i in range(n):
-        total += weight_u * chord[i] * chord[i]
-    rhs[0, n] = total
-    if solve(matrix, rhs) == 0.0:
+    if factorise(system, linear, point, chord, weight_u, weight_p) == 0.0:
         return False, iterations
+    for i in range(n):
+        tangent[i] = 0.0
+    tangent[n] = weight_p * chord[n] * chord[n]
+    for i in range(n):
+        tangent[n] += weight_u * chord[i] * chord[i]
+    step_back(system, point, tangent)
     copy_to(found[:n], u)
     found[n] = p
-    copy_to(tangent, rhs[0])
     measure(system, linear, u, point, tangent[:n], tangent[n], x, out)
     out[RESIDUAL] = norm
     return True, iterations

@@ -6,8 +6,11 @@ in one of three forms: undamped modes (classical damping), poles and residues (a
 span the state space), both at the cost of modes × contacts² a frequency, and dense (the rest, and whenever λ
 is a parameter of the structure itself).
 
-A stiffness `shift` of each contact may be moved into the structure and taken out of the force again,
+A stiffness `shift` of each port may be moved into the structure and taken out of the force again,
 r = u − ū + A (F − shift u): the same equation, but Z_0 stays regular when only contacts hold a part in place.
+
+An element (a contact, of whatever law) has one or more ports: relative motions with n coefficients each, the
+force of each depending on all of them. The unknowns are the motions of all ports, port after port.
 """
 
 from __future__ import annotations
@@ -19,7 +22,7 @@ import numba
 import numpy as np
 from numba.experimental import structref
 
-from solver.fourier import Complex, Integer, Real, coefficient_count
+from solver.fourier import Complex, Index, Integer, Real, coefficient_count
 from solver.kernels.compiled import compiled
 from solver.kernels.events import SEGMENT_COLUMNS, segment_capacity
 
@@ -31,12 +34,15 @@ MODES, POLES, DENSE = 0, 1, 2
 # Columns of the contact table.
 KT, MU, N0, N1, RATIO, PHASE = 0, 1, 2, 3, 4, 5
 LOAD_COEFFICIENTS = 3
+# Laws of an element.
+COULOMB = 0
 
 
 class System(NamedTuple):
     """Everything the compiled loops need; arrays only.
 
-    nk harmonics, nc contacts, ns distinct structures (nodal diameters), nm modes or n DOFs of each.
+    nk harmonics, ne elements with nc ports in all, ns distinct structures (nodal diameters), nm modes or n
+    DOFs of each.
     """
 
     ks: Integer  # (nk,) harmonics kept, ascending
@@ -44,14 +50,20 @@ class System(NamedTuple):
     which: Integer  # (nk,) structure of each harmonic
     cos_table: Real
     sin_table: Real
-    contacts: Real  # (nc, 6) kt, mu, N0, N1, N1_ratio (NaN: not tied), N1_phase
-    active: Real  # (nc,) 1.0 where λ acts
+    laws: Integer  # (ne,) COULOMB, …
+    first_port: Integer  # (ne + 1,) where the ports of each element begin
+    first_block: Integer  # (ne + 1,) where its blocks of dF_dU begin: ports² of them, row after row
+    owner: Integer  # (nc,) element of each port
+    contacts: Real  # (ne, 6) kt, mu, N0, N1, N1_ratio (NaN: not tied), N1_phase
+    active: Real  # (ne,) 1.0 where λ acts
     shift: Real  # (nc,) stiffness moved into the structure [N/m]
+    condense: int  # 1: contacts that are linear where they are leave the Newton step, 0: none does
     kind: int  # what λ is
     omega: float  # rad/s, when λ is not the frequency
     level_reference: float  # N, the excitation amplitude at level 1
     phase_reference: float  # rad
     parameter_reference: float  # the value of a structural parameter at which K, M, C stand
+    least_size: float  # m, motions of the contacts far below it are rounding of what cancels in ū
     form: int
     eigenvalues: Complex  # (ns, nm) undamped ω² [rad²/s²], or poles [rad/s]
     dampings: Real  # (ns, nm) modal damping [1/s] of undamped modes
@@ -80,20 +92,37 @@ class Receptance(NamedTuple):
 
 
 class Evaluation(NamedTuple):
-    """The balance at one (u, λ): residual, Jacobian, derivative by λ, and the contact forces behind them."""
+    """The balance at one (u, λ): residual, derivative by λ, and the contact forces behind them.
+
+    From `jacobian` on, filled by `solver.kernels.jacobian`: what belongs to the last Jacobian looked at.
+    """
 
     residual: Real  # (nt,)
-    jacobian: Real  # (nt, nt) dr/du
     dr_dp: Real  # (nt,) dr/dλ
     F: Real  # (nc, n)
-    dF_dU: Real  # (nc, n, n)
-    dF_dkt: Real  # (nc, n)
-    dF_dmu: Real  # (nc, n)
-    dF_dN: Real  # (nc, n, 3)
+    dF_dU: Real  # (blocks, n, n)
     dF_dp: Real  # (nc, n) partial derivative of the force by λ
-    states: Integer  # (nc,)
-    pieces: Integer  # (nc,) which smooth piece of its law a contact is on, see `events.piece_of`
+    dF_dkt: Real  # (n,) scratch, as the two below
+    dF_dmu: Real  # (n,)
+    dF_dN: Real  # (n, 3)
+    states: Integer  # (ne,)
+    pieces: Integer  # (ne,) which smooth piece of its law a contact is on, see `events.piece_of`
+    slopes: Real  # (ne,) F = slope · u where the law is linear there (stuck or separated), else NaN
     segments: Real  # scratch
+    jacobian: Real  # (nt, nt) dr/du
+    lu: Real  # (nt + 1, nt + 1) factors of the condensed, perhaps bordered, Jacobian in their leading block
+    pivots: Index  # (nt + 1,)
+    free: Integer  # (nc,) ports kept in it
+    held: Integer  # (nc,) ports eliminated
+    counts: Integer  # (4,) numbers of both, size of the factors, and whether they belong to a branch point
+    G: Real  # (blocks, n, n) dF_dU less the shift, at the factors' point
+    inverse: Complex  # (nk, nc, nc) D⁻¹, likewise below; see `solver.kernels.jacobian`
+    V: Complex  # (nk, nc, nc)
+    W: Complex  # (nk, nc, nc)
+    reduced: Complex  # (nk, nc, nc) A' of the ports kept
+    border: Real  # (nt,) the weighted tangent
+    held_slope: Real  # (nt,) D⁻¹ dr/dλ of the ports eliminated
+    work: Real  # (4, nt + 1) scratch
 
 
 # Inside the compiled loops each record is one pointer: forty arrays passed by value at every call cost more
@@ -146,8 +175,10 @@ def by_reference(system: System) -> System:
 def evaluation_by_value(point: Evaluation) -> Evaluation:
     """Return the arrays of an evaluation as a tuple that Python can read (views, not copies)."""
     return Evaluation(
-        point.residual, point.jacobian, point.dr_dp, point.F, point.dF_dU, point.dF_dkt, point.dF_dmu,
-        point.dF_dN, point.dF_dp, point.states, point.pieces, point.segments,
+        point.residual, point.dr_dp, point.F, point.dF_dU, point.dF_dp, point.dF_dkt, point.dF_dmu,
+        point.dF_dN, point.states, point.pieces, point.slopes, point.segments, point.jacobian, point.lu,
+        point.pivots, point.free, point.held, point.counts, point.G, point.inverse, point.V, point.W,
+        point.reduced, point.border, point.held_slope, point.work,
     )  # fmt: skip
 
 
@@ -160,7 +191,7 @@ def receptance_by_value(linear: Receptance) -> Receptance:
 @compiled
 def new_receptance(system: System) -> Receptance:
     """Return an empty receptance for `system`."""
-    nk, nc = system.ks.size, system.contacts.shape[0]
+    nk, nc = system.ks.size, system.owner.size
     return _receptance_of(
         np.zeros((2, nk, nc, nc), np.complex128),
         np.zeros((2, nk, nc), np.complex128),
@@ -172,10 +203,16 @@ def new_receptance(system: System) -> Receptance:
 @compiled
 def new_evaluation(system: System) -> Evaluation:
     """Return empty arrays for `evaluate`."""
-    nc, n = system.contacts.shape[0], coefficient_count(system.ks)
+    ne, nc, n, nk = system.laws.size, system.owner.size, coefficient_count(system.ks), system.ks.size
+    blocks, nt = system.first_block[ne], nc * n
     return _evaluation_of(
-        np.zeros(nc * n), np.zeros((nc * n, nc * n)), np.zeros(nc * n),
-        np.zeros((nc, n)), np.zeros((nc, n, n)), np.zeros((nc, n)), np.zeros((nc, n)),
-        np.zeros((nc, n, LOAD_COEFFICIENTS)), np.zeros((nc, n)), np.zeros(nc, np.int64),
-        np.zeros(nc, np.int64), np.zeros((segment_capacity(max(system.ks[-1], 1)), SEGMENT_COLUMNS)),
+        np.zeros(nt), np.zeros(nt), np.zeros((nc, n)), np.zeros((blocks, n, n)), np.zeros((nc, n)),
+        np.zeros(n), np.zeros(n), np.zeros((n, LOAD_COEFFICIENTS)), np.zeros(ne, np.int64),
+        np.zeros(ne, np.int64), np.zeros(ne),
+        np.zeros((segment_capacity(max(system.ks[-1], 1)), SEGMENT_COLUMNS)), np.zeros((nt, nt)),
+        np.zeros((nt + 1, nt + 1)), np.zeros(nt + 1, np.int32), np.zeros(nc, np.int64),
+        np.zeros(nc, np.int64), np.zeros(4, np.int64), np.zeros((blocks, n, n)),
+        np.zeros((nk, nc, nc), np.complex128), np.zeros((nk, nc, nc), np.complex128),
+        np.zeros((nk, nc, nc), np.complex128), np.zeros((nk, nc, nc), np.complex128), np.zeros(nt),
+        np.zeros(nt), np.zeros((4, nt + 1)),
     )  # fmt: skip
