@@ -109,12 +109,12 @@ def build(
     SettingError
         Unknown path, a missing or bad frequency, or a bad number of harmonics.
     """
-    whole = written_out(scene)
+    effects = effects or Effects()
+    whole = written_out(scene, every_sector=effects.every_sector)
     if whole is not scene:
         check_in_annulus(scene, path)
     scene = whole
     parameter = resolve(scene, path)
-    effects = effects or Effects()
     ks = _harmonics(scene, path, check_harmonics(harmonics), effects)
     omega = 0.0
     if parameter.kind is not Kind.FREQUENCY:

@@ -170,7 +170,7 @@ def _slip(balance: Balance, i: int) -> Effect:
         return Effect(
             name=name,
             used=False,
-            reason=f"{words}: while it sticks it is its spring of {contact.kt:g} N/m (exact, checked every time)",
+            reason=f"{words}: while it sticks it is its spring of {contact.kt:g} N/m, checked at every step",
         )
     return Effect(name=name, used=True, reason=words)
 

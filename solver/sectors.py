@@ -75,9 +75,14 @@ def sectors_needed(scene: Scene) -> Extent:
     return Extent(sectors=1, reason=reason)
 
 
-def written_out(scene: Scene) -> Scene:
-    """Return the annulus of a scene that one sector does not stand for, under its own name; else itself."""
-    if not isinstance(scene.structure, CyclicStructure) or sectors_needed(scene).sectors == 1:
+def written_out(scene: Scene, *, every_sector: bool = False) -> Scene:
+    """Return the annulus of a scene that one sector does not stand for, under its own name; else itself.
+
+    With `every_sector` a disk is written out whether it needs to be or not.
+    """
+    if not isinstance(scene.structure, CyclicStructure):
+        return scene
+    if sectors_needed(scene).sectors == 1 and not every_sector:
         return scene
     return annulus(scene).model_copy(update={"name": scene.name})
 
