@@ -21,6 +21,7 @@ from solver.parametric import LinearModel
 from solver.undamped import UndampedModes, least_stiffness, undamped_modes
 
 CLASSICAL = 1e-11  # largest off-diagonal modal damping, relative to the diagonal, that counts as none
+ROUNDING = 4.0  # the same in units of what the modes lack in orthogonality
 SPAN_ERROR = 1e-11  # largest relative error of the pole form against the direct inverse
 SINGULAR = 1e-13  # smallest squared pivot of the scaled K that counts as held in place
 LEAST_POLE = 1e-25  # smallest |1/s| relative to the largest: below is rounding
@@ -119,7 +120,8 @@ def decompose(held: Held) -> Decomposition | None:
     """Return modes if the damping is classical, else poles; None if neither gives Z⁻¹ to rounding."""
     undamped = [undamped_modes(K, M) for K, M in zip(held.K, held.M, strict=True)]
     damping = [u.psi.conj().T @ C @ u.psi for u, C in zip(undamped, held.C, strict=True)]
-    if all(_classical(D) for D in damping):
+    rounding = [_rounding(u, K, M) for u, K, M in zip(undamped, held.K, held.M, strict=True)]
+    if all(_classical(D, each) for D, each in zip(damping, rounding, strict=True)):
         phi = np.array([u.phi for u in undamped])
         return Decomposition(
             form=MODES,
@@ -145,10 +147,20 @@ def decompose(held: Held) -> Decomposition | None:
     )
 
 
-def _classical(damping: NDArray[Any]) -> bool:
-    diagonal = np.diag(damping)
-    largest = np.abs(diagonal).max(initial=0.0)
-    return bool(np.abs(damping - np.diag(diagonal)).max(initial=0.0) <= CLASSICAL * largest)
+def _rounding(undamped: UndampedModes, K: NDArray[Any], M: NDArray[Any]) -> float:
+    """Return how far from orthogonal by K the modes are: of a fine mesh, more than the last digits."""
+    gram = undamped.psi.conj().T @ (K + undamped.sigma * M if undamped.sigma else K) @ undamped.psi
+    return _off_diagonal(gram)
+
+
+def _classical(damping: NDArray[Any], rounding: float) -> bool:
+    """Return whether modal damping is diagonal, as far as the modes themselves are orthogonal."""
+    largest = np.abs(np.diag(damping)).max(initial=0.0)
+    return bool(_off_diagonal(damping) <= max(CLASSICAL, ROUNDING * rounding) * largest)
+
+
+def _off_diagonal(matrix: NDArray[Any]) -> float:
+    return float(np.abs(matrix - np.diag(np.diag(matrix))).max(initial=0.0))
 
 
 def _poles(undamped: UndampedModes, D: NDArray[Any]) -> tuple[Complex, Complex, Complex] | None:
