@@ -11,7 +11,7 @@ from solver.fourier import Real
 from solver.kernels.system import DENSE, MODES, POLES
 from solver.savings import Effects, even_harmonics_reason
 from solver.scene import Scene
-from solver.scene_parts import CyclicStructure
+from solver.scene_parts import CyclicStructure, MatricesStructure
 from solver.sectors import sectors_needed
 from solver.workspace import Workspace
 
@@ -120,11 +120,12 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
             *(_separation(balance.scene, i) for i in range(len(balance.scene.contacts))),
             *slips,
             _even_harmonics(balance),
+            *_reduction(scene),
             Effect(name="linear part", used=True, reason=_linear_part(balance)),
             _stiffness_shift(balance.system.shift),
         ),
         unknowns=n,
-        linear_dofs=len(scene.structure.dofs),
+        linear_dofs=_linear_dofs(scene),
         contacts=len(balance.scene.contacts),
         harmonics=harmonics,
         seconds_a_point=_ITERATIONS_A_POINT * iteration,
@@ -132,7 +133,7 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
 
 
 def _condensation(balance: Balance) -> Effect:
-    dofs, coefficients = len(balance.scene.structure.dofs), balance.n_coefficients
+    dofs, coefficients = _linear_dofs(balance.scene), balance.n_coefficients
     return Effect(
         name="condensation",
         used=True,
@@ -141,6 +142,25 @@ def _condensation(balance: Balance) -> Effect:
             f"(contacts x coefficients) instead of {dofs * coefficients}"
         ),
     )
+
+
+def _linear_dofs(scene: Scene) -> int:
+    """DOFs of the structure, of which a structure given by matrices names only those in use."""
+    structure = scene.structure
+    return structure.n_coordinates if isinstance(structure, MatricesStructure) else len(structure.dofs)
+
+
+def _reduction(scene: Scene) -> tuple[Effect, ...]:
+    """What was left out of a large model when it was loaded, if it was reduced."""
+    structure = scene.structure
+    found = structure.reduction if isinstance(structure, MatricesStructure) else None
+    if found is None:
+        return ()
+    reason = (
+        f"{found.dofs} DOFs were reduced to the {len(structure.dofs)} in use and {found.modes} modes of the "
+        f"rest, the highest at {found.highest_hz:.5g} Hz: raise `keep_modes` until the answer stays"
+    )
+    return (Effect(name="reduction of the model", used=True, reason=reason),)
 
 
 def _one_sector(scene: Scene, asked: Effects) -> Effect:

@@ -52,7 +52,8 @@ def sectors_needed(scene: Scene) -> Extent:
     """
     structure, order = scene.structure, scene.engine_order
     if not isinstance(structure, CyclicStructure):
-        return Extent(sectors=1, reason="the structure is lumped, it has no sectors")
+        given = "lumped" if isinstance(structure, LumpedStructure) else "given by its matrices"
+        return Extent(sectors=1, reason=f"the structure is {given}, it has no sectors")
     n = structure.sectors
     factors = structure.mistuning.factors(n) if structure.mistuning is not None else (1.0,)
     least, most = min(factors), max(factors)

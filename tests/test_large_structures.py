@@ -179,6 +179,10 @@ def test_a_reduced_model_keeps_the_low_frequencies(tmp_path: Path) -> None:
     assert Scene.from_dict(scene.to_dict()) == scene
     low = undamped_modes(scene.structure.K.array, scene.structure.M.array).omega2
     assert low[:4] == pytest.approx(undamped_modes(K, M).omega2[:4], rel=5e-4)
+    told = {effect.name: effect.reason for effect in solver.plan(scene).effects}
+    assert "120 DOFs were reduced to the 2 in use and 10 modes" in told["reduction of the model"]
+    assert "the 12 linear DOFs are eliminated" in told["condensation"]
+    assert "given by its matrices" in told["one sector for the annulus"]
     full = load_scene(reduced_scene(tmp_path, 60))
     found, expected = (solver.solve(s, frequency_hz=1.0) for s in (scene, full))
     assert found.max_abs == pytest.approx(expected.max_abs, rel=1e-5)

@@ -61,6 +61,13 @@ class MatricesStructure(Part):
     mass_proportional_damping: NonNegative = 0.0
     reduction: Reduction | None = None
 
+    @property
+    def n_coordinates(self) -> int:
+        """Number of coordinates the matrices, or the modes, have."""
+        if self.modes is not None:
+            return int(self.modes.omega2.size)
+        return 0 if self.M is None else self.M.size
+
     @field_validator("M", "K", "C")
     @classmethod
     def _symmetric(cls, matrix: Matrix | None, info: ValidationInfo) -> Matrix | None:
