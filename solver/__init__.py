@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from solver.accuracy import ErrorEstimate, branch_errors
+    from solver.accuracy_cost import AccuracyRow, AccuracyStudy, accuracy_study
     from solver.branch import Band, Branch, BranchStatus, Peak
     from solver.continuation import ContinuationSettings, Predictor, sweep
     from solver.effects import Plan, plan
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from solver.sectors import Extent, annulus, sectors_needed
 
 _HOME = {
+    "AccuracyRow": "accuracy_cost", "AccuracyStudy": "accuracy_cost", "accuracy_study": "accuracy_cost",
     "ErrorEstimate": "accuracy", "branch_errors": "accuracy",
     "Band": "branch", "Branch": "branch", "BranchStatus": "branch", "Peak": "branch",
     "ContinuationSettings": "continuation", "Predictor": "continuation", "sweep": "continuation",
@@ -39,6 +41,8 @@ _HOME = {
 }  # fmt: skip
 
 __all__ = [
+    "AccuracyRow",
+    "AccuracyStudy",
     "Band",
     "BladeAmplitudes",
     "BladePeaks",
@@ -60,6 +64,7 @@ __all__ = [
     "SolutionStatus",
     "SolverError",
     "Stability",
+    "accuracy_study",
     "annulus",
     "blade_amplitudes",
     "blade_peaks",

@@ -25,6 +25,7 @@ _submit = typer.Typer(help="Hand a job to a running service.", no_args_is_help=T
 
 _ALONE: tuple[Callable[..., None], ...] = (
     solver_commands.scenes, solver_commands.plan, solver_commands.solve, solver_commands.sweep,
+    solver_commands.accuracy,
     solver_commands.design, solver_commands.march, service_commands.demo, service_commands.serve,
     service_commands.worker, submit_commands.watch, submit_commands.results,
 )  # fmt: skip

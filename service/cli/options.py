@@ -27,6 +27,13 @@ FixedFrequency = Annotated[
         help="Excitation frequency [Hz], needed when another parameter is swept.",
     ),
 ]  # fmt: skip
+StudyFrequency = Annotated[
+    float | None,
+    typer.Option(
+        "--frequency", metavar="HZ", parser=number,
+        help="Excitation frequency [Hz]; the highest peak of the scene's band if left out.",
+    ),
+]  # fmt: skip
 Harmonics = Annotated[
     int, typer.Option("--harmonics", metavar="H", parser=whole_number, help="Highest harmonic kept.")
 ]

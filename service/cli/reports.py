@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from service import units
-from service.cli.output import print_pairs, print_table
+from service.cli.output import print_pairs, print_table, say
 
 if TYPE_CHECKING:
     from solver.scene import Scene
@@ -19,6 +19,7 @@ _FLAGS = {
     "all_stuck": "every contact sticks all the time",
     "separation": "a contact opens during the period",
 }
+_ACCURACY_COLUMNS = ("", "harmonics", "contact forces", "max|x|", "error", "ms", "iterations")
 _EFFECT_COLUMNS = ("used", "effect", "reason")
 _SCENE_COLUMNS = ("name", "kind", "DOFs", "contacts", "observed", "band")
 
@@ -101,6 +102,30 @@ def design(found: Json) -> None:
         pairs.append(("held by", "; ".join(found["active"])))
     effort = f"{found['evaluations']} frequency responses in {units.duration(found['seconds'])}"
     print_pairs(f"Best damper of {found['scene']}", [*pairs, ("effort", effort)])
+
+
+def accuracy(found: Json) -> None:
+    """Error against time, the rows nothing beats marked."""
+    size = found["reference"]
+    rows = [
+        (
+            "*" if row["pareto"] else "",
+            str(row["harmonics"]),
+            row["evaluator"] if row["samples"] == 0 else f"{row['samples']} samples",
+            units.length(row["max_abs"]),
+            f"{row['error'] / size:.1e}" if size > 0.0 else "",
+            f"{row['milliseconds']:.3g}",
+            str(row["iterations"]),
+        )
+        for row in found["rows"]
+    ]
+    title = f"{found['scene']} at {found['frequency_hz']:.6g} Hz: {units.length(size)}"
+    if found["reference_error"] is not None:
+        title += (
+            f" with {found['reference_harmonics']} harmonics, to {units.length(found['reference_error'])}"
+        )
+    print_table(title, _ACCURACY_COLUMNS, rows, right="13456")
+    say("* nothing else here is both as accurate and as fast")
 
 
 def march(found: Json) -> None:

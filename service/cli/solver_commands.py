@@ -109,6 +109,34 @@ def sweep(
     _end(branch.completed, branch.status.value)
 
 
+def accuracy(
+    name: options.Scene,
+    frequency: options.StudyFrequency = None,
+    values: options.Values = None,
+    plot: options.Plot = None,
+    as_json: options.Json = False,
+) -> None:
+    """Measure what accuracy costs.
+
+    Error against time of one point, for numbers of harmonics, contact forces in closed form and by samples.
+    """
+    import solver
+
+    picture = inputs.output_path("--plot", plot, SUFFIXES)
+    scene = inputs.scene(name, values)
+    with bar("accuracy", "rows") as on_progress:
+        study = solver.accuracy_study(scene, frequency, on_progress=on_progress).to_json()
+    if picture is not None:
+        from service.plots.accuracy import accuracy_figure
+        from service.plots.style import save
+
+        save(accuracy_figure(study), picture)
+    if as_json:
+        print_json(study)
+    else:
+        reports.accuracy(study)
+
+
 def design(
     name: options.Scene,
     variables: options.Variables = None,

@@ -62,7 +62,7 @@ def add_moments(begin: float, end: float, weight: float, cosines: Real, sines: R
 
 
 @compiled
-def _basis_at(tau: float, ks: Integer, out: Real) -> None:
+def basis_at(tau: float, ks: Integer, out: Real) -> None:
     """Fill `out` with the basis for the harmonics `ks` at `tau`."""
     cos1, sin1 = math.cos(tau), math.sin(tau)
     cosine, sine, k, here = 1.0, 0.0, 0, 0
@@ -78,7 +78,7 @@ def _basis_at(tau: float, ks: Integer, out: Real) -> None:
 
 
 @compiled
-def _moment_rows(cosines: Real, sines: Real, ks: Integer, out: Real) -> None:
+def moment_rows(cosines: Real, sines: Real, ks: Integer, out: Real) -> None:
     """Fill `out` with ∫e divided by π (2π for the mean row) from the moments q = 0 … ."""
     here = 0
     for i in range(ks.size):
@@ -93,7 +93,7 @@ def _moment_rows(cosines: Real, sines: Real, ks: Integer, out: Real) -> None:
 
 
 @compiled
-def _products(
+def products(
     cosines: Real, sines: Real, row_ks: Integer, column_ks: Integer, scale: float, out: Real
 ) -> None:
     """Fill `out` with scale·∫e_row e_column/π (2π for the mean row): Toeplitz plus Hankel of the moments."""
@@ -168,8 +168,8 @@ def contact_force(
             add_moments(row[BEGIN], row[END], 1.0, stick_cos, stick_sin)
         else:
             add_moments(row[BEGIN], row[END], row[DIRECTION], slip_cos, slip_sin)
-    _products(slip_cos, slip_sin, ks, load_ks, 1.0, dF_dN)
-    _products(stick_cos, stick_sin, ks, ks, 1.0, dF_dU)
+    products(slip_cos, slip_sin, ks, load_ks, 1.0, dF_dN)
+    products(stick_cos, stick_sin, ks, ks, 1.0, dF_dU)
     for i in range(n):
         total = 0.0
         for j in range(N.size):
@@ -190,7 +190,7 @@ def contact_force(
 
 
 @compiled
-def _dot(a: Real, b: Real) -> float:
+def dot(a: Real, b: Real) -> float:
     """Return a · b."""
     total = 0.0
     for i in range(a.size):
@@ -215,11 +215,11 @@ def _add_onsets(
         fill(cosines, 0.0)
         fill(sines, 0.0)
         add_moments(row[BEGIN], row[END], 1.0, cosines, sines)
-        _moment_rows(cosines, sines, ks, moment)
+        moment_rows(cosines, sines, ks, moment)
         tau = row[ONSET]
-        _basis_at(tau, ks, e_u)
-        _basis_at(tau, load_ks, e_n)
-        u_onset, load_onset = _dot(e_u, U), _dot(e_n, N)
+        basis_at(tau, ks, e_u)
+        basis_at(tau, load_ks, e_n)
+        u_onset, load_onset = dot(e_u, U), dot(e_n, N)
         slipped = row[BEGAN] == AFTER_SLIP
         rate = 0.0
         if not slipped:

@@ -11,6 +11,7 @@ from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED, piece_of
 from solver.kernels.force import contact_force
 from solver.kernels.linear import copy_block
+from solver.kernels.sampled import sampled_force
 from solver.kernels.system import (
     FRICTION,
     KT,
@@ -100,10 +101,16 @@ def _coulomb(
     out_of_line()
     n = coefficient_count(system.ks)
     c, block = system.first_port[e], system.first_block[e]
-    state, count = contact_force(
-        u[c * n : (c + 1) * n], system.ks, load, system.load_ks, table[KT], table[MU], system.cos_table,
-        system.sin_table, out.segments, out.dF_dU[block], out.dF_dkt, out.dF_dmu, out.dF_dN, out.F[c],
-    )  # fmt: skip
+    if system.samples > 0:
+        state, count = sampled_force(
+            u[c * n : (c + 1) * n], system.ks, load, system.load_ks, table[KT], table[MU], system.samples,
+            out.segments, out.dF_dU[block], out.dF_dkt, out.dF_dmu, out.dF_dN, out.F[c],
+        )  # fmt: skip
+    else:
+        state, count = contact_force(
+            u[c * n : (c + 1) * n], system.ks, load, system.load_ks, table[KT], table[MU], system.cos_table,
+            system.sin_table, out.segments, out.dF_dU[block], out.dF_dkt, out.dF_dmu, out.dF_dN, out.F[c],
+        )  # fmt: skip
     out.states[e], out.pieces[e] = state, piece_of(out.segments, count)
     out.slopes[e] = np.nan
     if state == FAILED:

@@ -57,6 +57,7 @@ class System(NamedTuple):
     contacts: Real  # (ne, 6) kt, mu, N0, N1, N1_ratio (NaN: not tied), N1_phase
     active: Real  # (ne,) 1.0 where λ acts
     shift: Real  # (nc,) stiffness moved into the structure [N/m]
+    samples: int  # in a period, for contact forces by samples in time; 0: in closed form
     condense: int  # 1: contacts that are linear where they are leave the Newton step, 0: none does
     kind: int  # what λ is
     omega: float  # rad/s, when λ is not the frequency
