@@ -10,7 +10,7 @@ import numpy as np
 
 import solver
 from benchmarks.harness import WrongResultError, table
-from benchmarks.random_scenes import random_scene
+from benchmarks.random_scenes import Seeded, random_scene
 
 SCENES = 300
 TIGHT = 1e-9  # residual of every point
@@ -36,7 +36,7 @@ def robustness() -> None:
     points, iterations, rejected, folds, solves = 0, 0, 0, 0, []
     begun = time.process_time()
     for seed in range(SCENES):
-        scene, harmonics = random_scene(seed)
+        scene, harmonics = random_scene(Seeded(seed))
         low, high = scene.observe.band
         branch = solver.sweep(scene, harmonics=harmonics)
         middle = math.sqrt(low * high)

@@ -127,7 +127,7 @@ class ErrorEstimator:
         slope = _Factorised(point.jacobian).solve(point.dr_dp)
         if slope is None:
             return None
-        size = max(float(np.abs(u).max(initial=0.0)), 1e-300)
+        size = max(float(np.abs(u).max(initial=0.0)), 1e-150)
         row: Real = np.append(
             pad(-slope, self._workspace.balance, self._larger.balance) / size**2,
             1.0 / (p * p if p != 0.0 else 1.0),
