@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from optim.errors import DesignError
 from solver.parameter import Kind, resolve
-from solver.scene import Scene
+from solver.scene import FrictionContact, Scene
 
 Real = NDArray[np.float64]
 LOGARITHMIC_FROM = 5.0  # ratio of the bounds from which a variable is scaled logarithmically
@@ -103,10 +103,11 @@ def _bounds(path: str, bounds: object) -> tuple[float, float]:
 
 def _default(scene: Scene) -> dict[str, tuple[float, float]]:
     """Return N0 of the first contact with a tied load (else of the first), a tenth to 15 times its value."""
-    if not scene.contacts:
-        raise DesignError("variables", None, "must be given: the scene has no contact to design")
-    tied = [contact for contact in scene.contacts if contact.N1_ratio is not None]
-    contact = (tied or list(scene.contacts))[0]
+    rubbing = [contact for contact in scene.contacts if isinstance(contact, FrictionContact)]
+    if not rubbing:
+        raise DesignError("variables", None, "must be given: the scene has no friction contact to design")
+    tied = [contact for contact in rubbing if contact.N1_ratio is not None]
+    contact = (tied or rubbing)[0]
     if contact.N0 <= 0.0:
         raise DesignError("variables", None, f"must be given: {contact.name}.N0 is 0, it suggests no range")
     return {f"{contact.group or contact.name}.N0": (contact.N0 / 10.0, contact.N0 * 15.0)}

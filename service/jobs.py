@@ -66,7 +66,7 @@ class Resolved:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContactValues:
-    """The values of a contact during a sweep; None where the value is swept."""
+    """The values of a contact during a sweep; None where the value is swept or its law has none."""
 
     name: str
     kt: float | None

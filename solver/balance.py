@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from solver.contact_rows import contact_table, law_numbers, port_counts, port_stiffnesses
 from solver.errors import SettingError
-from solver.fourier import Integer, Real, all_harmonics
-from solver.kernels.system import COULOMB, System
+from solver.fourier import Integer, all_harmonics
+from solver.kernels.system import System
 from solver.kernels.trigpoly import grid_size, grid_tables
 from solver.parameter import Kind, Parameter, resolve
 from solver.parametric import linear_model, structure_derivative
@@ -176,15 +177,6 @@ def _level(scene: Scene) -> float:
     return scene.value("excitation.amplitude") or 1.0
 
 
-def contact_table(scene: Scene) -> Real:
-    """Return the contacts as the loops read them: kt, mu, N0, N1, N1_ratio (NaN: untied), N1_phase."""
-    rows = [
-        (c.kt, c.mu, c.N0, c.N1_value, math.nan if c.N1_ratio is None else c.N1_ratio, c.N1_phase)
-        for c in scene.contacts
-    ]
-    return np.array(rows, dtype=np.float64).reshape(len(rows), 6)
-
-
 def _system(
     scene: Scene, parameter: Parameter, ks: Integer, omega: float, effects: Effects
 ) -> System:  # fmt: skip
@@ -193,14 +185,14 @@ def _system(
     derivative = structure_derivative(scene, parameter.name) if parameter.kind is Kind.STRUCTURE else None
     contacts = contact_table(scene)
     reduced = reduce_model(
-        model, ks, contacts[:, 0].copy(), derivative, whole_matrices=effects.whole_matrices
+        model, ks, port_stiffnesses(scene, model), derivative, whole_matrices=effects.whole_matrices
     )  # fmt: skip
     highest = max(int(ks[-1]), 1)
     cos_table, sin_table = grid_tables(grid_size(highest), highest)
-    ports = np.ones(len(scene.contacts), dtype=np.int64)
+    ports = port_counts(scene)
     return System(
         ks=ks, load_ks=np.arange(2, dtype=np.int64), which=reduced.which, cos_table=cos_table,
-        sin_table=sin_table, laws=np.full(ports.size, COULOMB), first_port=np.append(0, np.cumsum(ports)),
+        sin_table=sin_table, laws=law_numbers(scene), first_port=np.append(0, np.cumsum(ports)),
         first_block=np.append(0, np.cumsum(ports**2)), owner=np.repeat(np.arange(ports.size), ports),
         contacts=contacts, samples=0, condense=0 if effects.every_contact else 1,
         least_size=reduced.least_size,

@@ -7,10 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.balance import Balance, build
+from solver.contact_rows import DEFAULT_SAMPLES
 from solver.fourier import Real
 from solver.kernels.system import DENSE, MODES, POLES
 from solver.savings import Effects, even_harmonics_reason
-from solver.scene import Scene
+from solver.scene import (
+    AnyContact,
+    Contact,
+    ElasticNormalContact,
+    FrictionContact,
+    PlanarContact,
+    PolynomialSpring,
+    Scene,
+)
 from solver.scene_parts import CyclicStructure, MatricesStructure
 from solver.sectors import sectors_needed
 from solver.workspace import Workspace
@@ -117,7 +126,7 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
         effects=(
             _condensation(balance),
             _one_sector(scene, asked),
-            *(_separation(balance.scene, i) for i in range(len(balance.scene.contacts))),
+            *(_separation(contact) for contact in balance.scene.contacts),
             *slips,
             _even_harmonics(balance),
             *_reduction(scene),
@@ -183,8 +192,10 @@ def _slip(balance: Balance, i: int) -> Effect:
     name = f"slip of {contact.name}"
     if balance.effects.every_contact:
         return Effect(name=name, used=True, reason=f"{contact.name} was asked to stay in every Newton step")
+    if not isinstance(contact, Contact):
+        return Effect(name=f"law of {contact.name}", used=True, reason=_law(contact))
     limit = contact.mu * max(contact.N0 - abs(contact.N1_value), 0.0)
-    carried = _stuck_force(balance)[i]
+    carried = _stuck_force(balance)[balance.system.first_port[i]]
     words = f"stuck, {contact.name} would carry up to {carried:.4g} N in the band; its limit is {limit:.4g} N"
     if carried <= limit:
         return Effect(
@@ -196,9 +207,9 @@ def _slip(balance: Balance, i: int) -> Effect:
 
 
 def _stuck_force(balance: Balance) -> Real:
-    """Return the largest force each contact carries over the band if all stick [N], without the mean."""
+    """Return the largest force each port carries over the band if all stick [N], without the mean."""
     workspace, low_high = Workspace.of(balance), balance.scene.observe.band
-    kt = np.array([contact.kt for contact in balance.scene.contacts])
+    kt = np.array([k for contact in balance.scene.contacts for k in contact.stiffnesses])
     largest = np.zeros(kt.size)
     stiffness = kt - balance.system.shift
     for frequency in np.linspace(*low_high, _FREQUENCIES):
@@ -232,8 +243,25 @@ def _linear_part(balance: Balance) -> str:
     return _FORMS[balance.system.form]
 
 
-def _separation(scene: Scene, i: int) -> Effect:
-    contact = scene.contacts[i]
+def _law(contact: AnyContact) -> str:
+    """Say how the force of a contact that is not plain Coulomb is found."""
+    if isinstance(contact, PlanarContact) and contact.limit != "box":
+        samples = contact.samples or DEFAULT_SAMPLES
+        return f"circular limit, marched over {samples} samples a period, of second order"
+    if isinstance(contact, PlanarContact):
+        return "a limit for each direction by itself: two contacts in closed form"
+    if isinstance(contact, ElasticNormalContact):
+        return f"the normal load moves with the parts by {contact.kn:g} N/m: friction and load in closed form"
+    if isinstance(contact, PolynomialSpring):
+        return "a polynomial: exact with enough samples"
+    return "a spring on one side: closed form"
+
+
+def _separation(contact: AnyContact) -> Effect:
+    if not isinstance(contact, FrictionContact) or isinstance(contact, ElasticNormalContact):
+        may = not isinstance(contact, PolynomialSpring)
+        reason = f"{contact.name} opens and closes as it moves" if may else f"{contact.name} has no gap"
+        return Effect(name=f"separation of {contact.name}", used=may, reason=reason)
     least = contact.N0 - abs(contact.N1_value)
     loses = least < 0.0
     reason = f"the normal load of {contact.name} falls to {least:g} N" if loses else (

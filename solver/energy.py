@@ -67,8 +67,10 @@ def power_balance(solution: Solution) -> PowerBalance:
     omega = 2.0 * math.pi * solution.frequency_hz
     friction = {}
     for contact in solution.contacts:
-        speeds = omega * fourier.derivative(contact.slip)
-        friction[contact.name] = 0.5 * float(contact.force[1:] @ speeds[1:])
+        friction[contact.name] = 0.5 * sum(
+            float(force[1:] @ (omega * fourier.derivative(motion))[1:])
+            for motion, force in zip(contact.motions, contact.forces, strict=True)
+        )
     return PowerBalance(
         input_w=put_in, viscous_w=taken, friction_w=sum(friction.values()), contacts_w=friction
     )

@@ -172,7 +172,12 @@ def scene_monodromy(scene: Scene, frequency_hz: float, slips: Real) -> Monodromy
 
 def _pieces(scene: Scene, slips: Real) -> dict[str, tuple[Piece, ...]]:
     """The states of every contact; those of the next sector are the same a part of a period earlier."""
-    own = {c.name: coulomb_pieces(c, slip) for c, slip in zip(scene.contacts, slips, strict=True)}
+    for contact in scene.contacts:
+        if not isinstance(contact, Contact):
+            wanted = "must have contacts of the law coulomb only: the stability of others is not computed"
+            raise SettingError("solution", contact.name, wanted)
+    coulomb = [contact for contact in scene.contacts if isinstance(contact, Contact)]
+    own = {c.name: coulomb_pieces(c, slip) for c, slip in zip(coulomb, slips, strict=True)}
     structure = scene.structure
     if not isinstance(structure, CyclicStructure):
         return own

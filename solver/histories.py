@@ -11,25 +11,12 @@ import math
 import numpy as np
 
 from solver import fourier
+from solver.contact_force import force_at
+from solver.contact_rows import port_stiffnesses
 from solver.errors import SettingError
-from solver.fourier import Complex, Integer, Real
-from solver.kernels.events import (
-    AFTER_SLIP,
-    BEGAN,
-    BEGIN,
-    DIRECTION,
-    END,
-    MOTION,
-    ONSET,
-    SEGMENT_COLUMNS,
-    SLIP,
-    UNLOADED,
-    segment_capacity,
-)
-from solver.kernels.segments import find_segments
-from solver.kernels.trigpoly import grid_size, grid_tables
+from solver.fourier import Complex, Real
 from solver.parametric import LinearModel, linear_model
-from solver.response import ContactResponse, Solution
+from solver.response import Solution
 from solver.scene_checks import listing
 from solver.structure import force_amplitudes
 
@@ -65,10 +52,10 @@ def time_history(solution: Solution, dof: str, *, samples: int = 512) -> tuple[R
 
 
 def hysteresis_loop(solution: Solution, contact: str, *, samples: int = 512) -> tuple[Real, Real]:
-    """Return slip [m] and friction force [N] of a contact over one period, (samples,) each.
+    """Return motion [m] and force [N] of a contact over one period, (samples,) each.
 
-    The force is the one the law gives for the slip motion of the solution, with its corners, not the sum of
-    the harmonics kept.
+    Of a contact with two relative motions they are the first. The force is the one the law gives for the
+    motion of the solution, with its corners, not the sum of the harmonics kept.
 
     Raises
     ------
@@ -82,7 +69,8 @@ def hysteresis_loop(solution: Solution, contact: str, *, samples: int = 512) -> 
         raise SettingError("contact", contact, f"must be one of {listing(names)}")
     at = names.index(contact)
     given, found = solution.scene.contacts[at], solution.contacts[at]
-    return fourier.basis(tau, solution.n_harmonics) @ found.slip, _force_at(found, given.kt, given.mu, tau)
+    basis = fourier.basis(tau, solution.n_harmonics)
+    return basis @ found.slip, force_at(given, found, tau)
 
 
 def response(solution: Solution, k: int) -> Complex:
@@ -101,10 +89,11 @@ def coordinates(solution: Solution, k: int) -> Complex:
     model = linear_model(solution.scene)
     K, C, L = matrices(model, k)
     force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]
-    friction = np.array([fourier.to_complex(c.force)[k] for c in solution.contacts], dtype=np.complex128)
+    forces = [fourier.to_complex(force)[k] for c in solution.contacts for force in c.forces]
+    friction = np.array(forces, dtype=np.complex128)
     if k == 0 and solution.contacts:
-        kt = np.array([contact.kt for contact in solution.scene.contacts])
-        friction = friction - kt * np.array([c.slip[0] for c in solution.contacts])
+        kt = port_stiffnesses(solution.scene, model)
+        friction = friction - kt * np.array([motion[0] for c in solution.contacts for motion in c.motions])
         K = K + L.conj().T @ (kt[:, None] * L)
     speed = 2.0 * math.pi * solution.frequency_hz * k
     dynamic = K - speed**2 * model.M + 1j * speed * C
@@ -131,32 +120,3 @@ def _angles(samples: int) -> Real:
     if not good or not 2 <= samples <= LARGEST_SAMPLES:
         raise SettingError("samples", samples, f"must be a whole number from 2 to {LARGEST_SAMPLES}")
     return np.asarray(2.0 * math.pi / samples * np.arange(samples))
-
-
-def _force_at(contact: ContactResponse, kt: float, mu: float, tau: Real) -> Real:
-    """Return the friction force [N] at the angles `tau` in [0, 2π), segment by segment."""
-    ks: Integer = fourier.all_harmonics((contact.slip.size - 1) // 2)
-    top = max(int(ks[-1]), 1)
-    segments = np.zeros((segment_capacity(top), SEGMENT_COLUMNS))
-    load_ks, tables = fourier.all_harmonics(1), grid_tables(grid_size(top), top)
-    _, count = find_segments(contact.slip, ks, contact.load, load_ks, kt, mu, *tables, segments)
-
-    def slip(angle: Real) -> Real:
-        return np.asarray(fourier.basis(angle, ks.size - 1) @ contact.slip)
-
-    def load(angle: Real) -> Real:
-        return np.asarray(fourier.basis(angle, 1) @ contact.load)
-
-    force = np.zeros(tau.size)
-    for row in segments[:count]:
-        # A segment may reach beyond the period it began in.
-        inside = (tau - row[BEGIN]) % (2.0 * math.pi) <= row[END] - row[BEGIN]
-        here, onset = tau[inside], np.array([row[ONSET]])
-        if row[MOTION] == SLIP:
-            force[inside] = row[DIRECTION] * mu * load(here)
-        elif row[BEGAN] == UNLOADED:
-            force[inside] = kt * slip(here)
-        else:
-            kept = row[DIRECTION] * mu * load(onset) if row[BEGAN] == AFTER_SLIP else 0.0
-            force[inside] = kt * (slip(here) - slip(onset)) + kept
-    return force

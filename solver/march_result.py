@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.kernels.march import Record
+from solver.kernels.march_state import Record
 
 FloatArray = NDArray[np.float64]
 N_HARMONICS = 10

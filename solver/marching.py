@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
 from solver.errors import SettingError
-from solver.kernels import march as kernel
+from solver.kernels import march as stepping
+from solver.kernels import march_state as kernel
+from solver.march_contacts import columns, rows
 from solver.march_result import MarchResult, MarchStatus, describe
 from solver.matrices.equations import equations
 from solver.scene import CyclicStructure, End, Excitation, LumpedStructure, MatricesStructure, Scene
@@ -102,7 +104,7 @@ def march(
     Raises
     ------
     SettingError
-        An argument is out of its range.
+        An argument is out of its range, or the scene has a contact with a circular limit.
     """
     begin = time.perf_counter()
     _check(frequency_hz, tolerance, max_periods)
@@ -129,7 +131,7 @@ def march(
         order=kernel.ORDER,
         transient=_left_to_decay(coarse.changes, fine.changes),
         periods=periods,
-        contacts=tuple(contact.name for contact in whole.contacts),
+        contacts=tuple(row.name for row in rows(whole.contacts)),
         frequency_hz=frequency_hz,
         steps_per_period=fine.steps,
         status=fine.status,
@@ -170,8 +172,10 @@ def _fastest(system: kernel.System, products: int) -> float:
         )
     ]
     stuck = np.zeros(n)
-    for ends in (system.first, system.second):
-        np.add.at(stuck, ends[ends >= 0], 2.0 * system.kt[ends >= 0])
+    tangential, normal = (system.first, system.second), (system.normal_first, system.normal_second)
+    for k, pairs in ((system.kt, tangential), (system.kn, normal)):
+        for ends in pairs:
+            np.add.at(stuck, ends[ends >= 0], 2.0 * k[ends >= 0])
     stiffness = _largest(sizes[0] + sizes[2] @ diags_array(stuck), products)
     return float(max(math.sqrt(stiffness), _largest(sizes[1], products)))
 
@@ -223,7 +227,8 @@ def _equations(scene: Scene) -> tuple[csr_array, csr_array, csr_array, dict[str,
     """A = M⁻¹ K, B = M⁻¹ C, W = M⁻¹ and the coordinate of each DOF in use."""
     structure = scene.structure
     if isinstance(structure, MatricesStructure):
-        ends = [end.dof for contact in scene.contacts for end in contact.ends if end.dof is not None]
+        pairs = [pair for contact in scene.contacts for pair in contact.pair_ends]
+        ends = [end.dof for pair in pairs for end in pair if end.dof is not None]
         used = [*ends, *(force.dof for force in scene.excitation), scene.observe.dof]
         found = equations(structure, used)
         return csr_array(found.A), csr_array(found.B), csr_array(found.W), found.index
@@ -239,9 +244,7 @@ def _system(scene: Scene, omega: float) -> tuple[kernel.System, int]:
     """The equations of a scene in the angle tau = omega t, and the coordinate observed."""
     A, B, W, index = _equations(scene)
     A, B, W = A / omega**2, B / omega, W / omega**2
-    forces, contacts = scene.excitation, scene.contacts
-    places = [[-1 if end.dof is None else index[end.dof] for end in contact.ends] for contact in contacts]
-    first, second = np.array(places, dtype=np.int64).reshape(-1, 2).T
+    forces = scene.excitation
     system = kernel.System(
         A_start=A.indptr.astype(np.int64),
         A_column=A.indices.astype(np.int64),
@@ -256,22 +259,18 @@ def _system(scene: Scene, omega: float) -> tuple[kernel.System, int]:
         force_amplitude=np.array([force.amplitude for force in forces]),
         force_phase=np.array([force.phase for force in forces]),
         force_harmonic=np.array([force.harmonic for force in forces], dtype=np.int64),
-        first=first.copy(),
-        second=second.copy(),
-        kt=np.array([contact.kt for contact in contacts]),
-        mu=np.array([contact.mu for contact in contacts]),
-        N0=np.array([contact.N0 for contact in contacts]),
-        N1=np.array([contact.N1_value for contact in contacts]),
-        N1_phase=np.array([contact.N1_phase for contact in contacts]),
+        **columns(rows(scene.contacts), index),
     )
     return system, index[scene.observe.dof]
 
 
 def _at_rest(system: kernel.System) -> kernel.State:
-    """No motion, no contact force; open where the load pulls at tau = 0 or friction never acts."""
+    """No motion, no friction force; open where nothing presses at tau = 0 or friction never acts."""
     n, n_contacts = system.A_start.size - 1, system.kt.size
-    load = system.mu * (system.N0 + system.N1 * np.cos(system.N1_phase))
-    mode = np.where(load > 0.0, kernel.STICK, kernel.SEPARATED).astype(np.int64)
+    load = system.N0 + system.N1 * np.cos(system.N1_phase)
+    closed = np.where(system.law == kernel.ELASTIC_NORMAL, load, system.mu * load) > 0.0
+    closed = np.where(system.law == kernel.GAP, system.gap < 0.0, closed) | (system.law == kernel.POLYNOMIAL)
+    mode = np.where(closed, kernel.STICK, kernel.SEPARATED).astype(np.int64)
     return kernel.State(np.zeros(n), np.zeros(n), np.zeros(n_contacts), mode)
 
 
@@ -283,7 +282,7 @@ def _run(plan: _Plan, start: kernel.State, steps: int, *, done: int) -> _Run:
     many = max(1, min(MOST_PERIODS, int(WORK / (steps * (state.x.size + 8 * state.force.size)))))
     while changes.size < plan.max_periods:
         chunk = np.empty(min(many, plan.max_periods - changes.size))
-        code, periods = kernel.run_periods(
+        code, periods = stepping.run_periods(
             plan.system, state, steps, plan.tolerance, plan.dof, nothing, chunk
         )
         changes = np.append(changes, chunk[:periods])
@@ -298,7 +297,7 @@ def _run(plan: _Plan, start: kernel.State, steps: int, *, done: int) -> _Run:
             break
     record = _record(plan, steps * math.ceil(SAMPLES_PER_PERIOD / steps))
     if status not in (MarchStatus.CHATTER, MarchStatus.NOT_FINITE):
-        code, _ = kernel.run_periods(plan.system, state, steps, 0.0, plan.dof, record, np.empty(1))
+        code, _ = stepping.run_periods(plan.system, state, steps, 0.0, plan.dof, record, np.empty(1))
         status = _STATUS.get(code, status) if code in (kernel.CHATTER, kernel.NOT_FINITE) else status
     return _Run(state=state, record=record, status=status, steps=steps, changes=changes)
 

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
 
 from solver.errors import SettingError
 from solver.fourier import Real
+from solver.kernels import laws_columns as columns
 from solver.kernels import system as kernel
-from solver.scene import Scene
+from solver.scene import ElasticNormalContact, Scene
+from solver.scene_paths import has_parameter
 
 
 class Kind(IntEnum):
-    """What a parameter changes; the numbers are those of `solver.kernels.system`."""
+    """What a parameter changes; the numbers are those of `solver.kernels.system` and `laws_columns`.
+
+    OWN_1 … OWN_9 are the columns of the contact table that each law uses as it likes.
+    """
 
     FREQUENCY = kernel.FREQUENCY
     LEVEL = kernel.LEVEL
@@ -27,6 +32,15 @@ class Kind(IntEnum):
     LOAD_PHASE = kernel.LOAD_PHASE
     STIFFNESS = kernel.STIFFNESS
     FRICTION = kernel.FRICTION
+    OWN_1 = columns.OWN_KIND
+    OWN_2 = columns.OWN_KIND + 1
+    OWN_3 = columns.OWN_KIND + 2
+    OWN_4 = columns.OWN_KIND + 3
+    OWN_5 = columns.OWN_KIND + 4
+    OWN_6 = columns.OWN_KIND + 5
+    OWN_7 = columns.OWN_KIND + 6
+    OWN_8 = columns.OWN_KIND + 7
+    OWN_9 = columns.OWN_KIND + 8
 
 
 _CONTACT_KINDS = {
@@ -36,20 +50,21 @@ _CONTACT_KINDS = {
     "N1_phase": Kind.LOAD_PHASE,
     "kt": Kind.STIFFNESS,
     "mu": Kind.FRICTION,
+    "kn": Kind(columns.OWN_KIND + columns.KN - columns.OWN),
+    "k": Kind(columns.OWN_KIND + columns.K_GAP - columns.OWN),
+    "gap": Kind(columns.OWN_KIND + columns.GAP - columns.OWN),
+    **{
+        f"a{j + 1}": Kind(columns.OWN_KIND + columns.A_1 + j - columns.OWN)
+        for j in range(columns.MOST_DEGREE)
+    },
 }
 _UNITS = {
-    Kind.FREQUENCY: "Hz", Kind.LEVEL: "N", Kind.FORCE_PHASE: "rad", Kind.NORMAL_LOAD: "N",
-    Kind.LOAD_AMPLITUDE: "N", Kind.LOAD_RATIO: "", Kind.LOAD_PHASE: "rad", Kind.STIFFNESS: "N/m",
-    Kind.FRICTION: "", Kind.STRUCTURE: "SI",
+    "frequency": "Hz", "excitation.amplitude": "N", "excitation.phase": "rad", "N0": "N", "N1": "N",
+    "N1_ratio": "", "N1_phase": "rad", "kt": "N/m", "mu": "", "kn": "N/m", "k": "N/m", "gap": "m",
+    "a1": "N/m", **{f"a{j}": f"N/m^{j}" for j in range(2, columns.MOST_DEGREE + 1)},
 }  # fmt: skip
-# Smallest value that means something; a load amplitude may be negative (it is then in antiphase).
-_LEAST = {
-    Kind.NORMAL_LOAD: 0.0,
-    Kind.STIFFNESS: 0.0,
-    Kind.FRICTION: 0.0,
-    Kind.STRUCTURE: 0.0,
-    Kind.LEVEL: 0.0,
-}
+# What means nothing below 0; a load amplitude may be negative (it is then in antiphase).
+_NOT_NEGATIVE = ("excitation.amplitude", "N0", "kt", "mu", "kn", "k")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +83,8 @@ class Parameter:
         Name of the structural parameter, else empty.
     unit : str
         Unit of the values at the user boundary.
+    least : float
+        Smallest value that means something.
     """
 
     path: str
@@ -75,6 +92,7 @@ class Parameter:
     active: Real
     name: str
     unit: str
+    least: float
 
     def inside(self, value: float) -> float:
         """Convert a user value to the one inside (Hz to rad/s)."""
@@ -104,7 +122,7 @@ class Parameter:
             raise SettingError(name, value, f"must be a finite number ({self.path})")
         if self.kind is Kind.FREQUENCY and value <= 0.0:
             raise SettingError(name, value, "must be a frequency > 0 Hz")
-        if value < _LEAST.get(self.kind, -math.inf):
+        if value < self.least:
             raise SettingError(name, value, f"must be >= 0, a value of `{self.path}`")
         return float(value)
 
@@ -120,15 +138,26 @@ def resolve(scene: Scene, path: str) -> Parameter:
     scene.check_path(path)
     nobody = np.zeros(len(scene.contacts))
     if path == "frequency":
-        return _parameter(path, Kind.FREQUENCY, nobody)
+        return _parameter(path, Kind.FREQUENCY, nobody, path)
     owner, _, key = path.rpartition(".")
     if owner == "excitation":
-        return _parameter(path, Kind.LEVEL if key == "amplitude" else Kind.FORCE_PHASE, nobody)
+        return _parameter(path, Kind.LEVEL if key == "amplitude" else Kind.FORCE_PHASE, nobody, path)
     if owner == "structure":
-        return _parameter(path, Kind.STRUCTURE, nobody, key)
-    active = np.array([1.0 if owner in (contact.name, contact.group) else 0.0 for contact in scene.contacts])
-    return _parameter(path, _CONTACT_KINDS[key], active)
+        return _parameter(path, Kind.STRUCTURE, nobody, key, structural=True)
+    members = [contact for contact in scene.contacts if has_parameter(contact, owner, key)]
+    active = np.array([float(has_parameter(contact, owner, key)) for contact in scene.contacts])
+    # A rubbing contact may stand apart at rest.
+    apart = key == "N0" and all(isinstance(contact, ElasticNormalContact) for contact in members)
+    parameter = _parameter(path, _CONTACT_KINDS[key], active, key)
+    return replace(parameter, least=-math.inf) if apart else parameter
 
 
-def _parameter(path: str, kind: Kind, active: Real, name: str = "") -> Parameter:
-    return Parameter(path=path, kind=kind, active=active, name=name, unit=_UNITS[kind])
+def _parameter(path: str, kind: Kind, active: Real, key: str, *, structural: bool = False) -> Parameter:
+    return Parameter(
+        path=path,
+        kind=kind,
+        active=active,
+        name=key if structural else "",
+        unit="SI" if structural else _UNITS[key],
+        least=0.0 if structural or key in _NOT_NEGATIVE else -math.inf,
+    )

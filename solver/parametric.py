@@ -81,8 +81,8 @@ class LinearModel:
         Damping [N s/m]; `Cp` couples to the next sector, 0 if lumped.
     K0, Kp : (n, n) array
         Stiffness [N/m]; `Kp` couples to the next sector, 0 if lumped.
-    contact_here, contact_next : (n_contacts, n) array
-        L(theta) = contact_here + contact_next e^{j theta}; slip u = L x, x the coordinates.
+    contact_here, contact_next : (n_ports, n) array
+        L(theta) = contact_here + contact_next e^{j theta}; relative motions u = L x, x the coordinates.
     forces : tuple of ForceTerm
         The excitation.
     observe : (n,) array
@@ -177,7 +177,7 @@ def _model(scene: Scene, matrices: _Matrices, shapes: FloatArray) -> LinearModel
     """Add contacts and forces to the matrices."""
     structure = scene.structure
     dofs = tuple(structure.dofs)
-    here, beyond = _contact_selection(dofs, tuple(contact.between for contact in scene.contacts))
+    here, beyond = _contact_selection(dofs, tuple(pair for c in scene.contacts for pair in c.pairs))
     whole = isinstance(structure, MatricesStructure)
 
     def rows(selected: FloatArray) -> FloatArray:

@@ -14,12 +14,13 @@ from solver.accuracy import truncation_error
 from solver.adaptive import solve_to
 from solver.balance import Balance, build, check_frequency
 from solver.fourier import Real
-from solver.kernels.events import LIFTING, SEPARATED, STUCK
+from solver.kernels.events import LIFTING, SEPARATED, SLIPPING, STUCK
 from solver.kernels.jacobian import fill_jacobian
+from solver.kernels.laws_columns import CLOSED, DEFORMING, TOUCHING
 from solver.kernels.observe import HALF_RANGE, MAX_ABS, MEAN
 from solver.kernels.system import evaluation_by_value
 from solver.savings import Effects
-from solver.scene import Scene
+from solver.scene import AnyContact, ElasticNormalContact, FrictionContact, PlanarContact, Scene
 from solver.workspace import PointSolution, Workspace
 
 # A stuck contact below this share of its friction limit cannot have slipped while the vibration built up from
@@ -37,9 +38,21 @@ class ContactState(Enum):
     STUCK = "stuck"
     SLIPPING = "stick and slip"
     LIFTING = "stick, slip and separation"
+    CLOSED = "closed"
+    TOUCHING = "opens and closes"
+    DEFORMING = "deforms"
 
 
-_STATES = tuple(ContactState)
+_STATES = {
+    SEPARATED: ContactState.SEPARATED,
+    STUCK: ContactState.STUCK,
+    SLIPPING: ContactState.SLIPPING,
+    LIFTING: ContactState.LIFTING,
+    CLOSED: ContactState.CLOSED,
+    TOUCHING: ContactState.TOUCHING,
+    DEFORMING: ContactState.DEFORMING,
+}
+_OPENS = (ContactState.SEPARATED, ContactState.LIFTING, ContactState.TOUCHING)
 
 
 class SolutionStatus(Enum):
@@ -69,8 +82,11 @@ class ContactResponse:
         Coefficients of the slip motion u [m].
     force : (2H + 1,) array
         Coefficients of the friction force [N].
-    load : (3,) array
-        Coefficients of the normal load N [N] before it is cut at 0.
+    load : (3,) or (2H + 1,) array
+        Coefficients of the normal load N [N] before it is cut at 0; 0 of a contact without friction.
+    second_motion, second_force : (2H + 1,) array or None
+        The other relative motion of the contact [m] and the force along it [N]: the normal one of a rubbing
+        contact, or the second direction it slides in.
     utilisation : float
         max|f| / (μ N) of a stuck contact, 1 for one that slips, NaN for one that is separated throughout.
     """
@@ -81,6 +97,18 @@ class ContactResponse:
     force: Real
     load: Real
     utilisation: float
+    second_motion: Real | None = None
+    second_force: Real | None = None
+
+    @property
+    def motions(self) -> tuple[Real, ...]:
+        """Coefficients of all its relative motions [m]."""
+        return (self.slip,) if self.second_motion is None else (self.slip, self.second_motion)
+
+    @property
+    def forces(self) -> tuple[Real, ...]:
+        """Coefficients of the forces along them [N]."""
+        return (self.force,) if self.second_force is None else (self.force, self.second_force)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -237,32 +265,46 @@ def contact_responses(workspace: Workspace, u: Real, p: float) -> tuple[ContactR
     ks, top = balance.system.ks, balance.n_harmonics
     slips = fourier.to_full(u.reshape(balance.n_ports, balance.n_coefficients), ks, top)
     forces = fourier.to_full(point.F, ks, top)
-    responses = []
-    for contact, state, slip, force in zip(balance.scene.contacts, point.states, slips, forces, strict=True):
-        load = _load(contact.N0, contact.N1_value, contact.N1_phase)
-        responses.append(_contact(contact.name, int(state), slip, force, load, contact.mu))
-    return tuple(responses)
+    ports = np.split(np.arange(balance.n_ports), balance.system.first_port[1:-1])
+    return tuple(
+        _contact(contact, int(state), slips[port], forces[port])
+        for contact, state, port in zip(balance.scene.contacts, point.states, ports, strict=True)
+    )
 
 
-def _load(N0: float, N1: float, phase: float) -> Real:
-    """Return the coefficients of N0 + N1 cos(τ + phase)."""
-    return np.array([N0, N1 * math.cos(phase), -N1 * math.sin(phase)])
+def _load(contact: AnyContact, motions: Real) -> Real:
+    """Return the coefficients of N0 + N1 cos(τ + phase), and of kn v where the load moves with the parts."""
+    if not isinstance(contact, FrictionContact):
+        return np.zeros(3)
+    N1, phase = contact.N1_value, contact.N1_phase
+    load = np.array([contact.N0, N1 * math.cos(phase), -N1 * math.sin(phase)])
+    if isinstance(contact, ElasticNormalContact):
+        moving = contact.kn * motions[1]
+        load = np.pad(load, (0, max(moving.size - load.size, 0)))
+        load[: moving.size] += moving
+    return load
 
 
-def _contact(name: str, state: int, slip: Real, force: Real, load: Real, mu: float) -> ContactResponse:
-    utilisation = 1.0
-    if state == STUCK:
-        tau = np.linspace(0.0, 2.0 * np.pi, max(360, 8 * slip.size), endpoint=False)
-        limit = mu * (fourier.basis(tau, 1) @ load)
-        carried = np.abs(fourier.basis(tau, (force.size - 1) // 2) @ force)
+def _contact(contact: AnyContact, state: int, motions: Real, forces: Real) -> ContactResponse:
+    load, utilisation = _load(contact, motions), 1.0
+    if state == STUCK and isinstance(contact, FrictionContact):
+        tau = np.linspace(0.0, 2.0 * np.pi, max(360, 8 * motions.shape[1]), endpoint=False)
+        limit = contact.mu * (fourier.basis(tau, (load.size - 1) // 2) @ load)
+        parts = np.abs(forces @ fourier.basis(tau, (motions.shape[1] - 1) // 2).T)
+        carried = parts[0]
+        if isinstance(contact, PlanarContact):
+            carried = parts.max(axis=0) if contact.limit == "box" else np.hypot(*parts)
         with np.errstate(divide="ignore", invalid="ignore"):
             shares = np.where(carried > 0.0, carried / limit, 0.0)
         utilisation = float(min(shares.max(), 1.0))
     elif state == SEPARATED:
         utilisation = math.nan
     return ContactResponse(
-        name=name, state=_STATES[state], slip=slip, force=force, load=load, utilisation=utilisation
-    )
+        name=contact.name, state=_STATES[state], slip=motions[0], force=forces[0], load=load,
+        utilisation=utilisation,
+        second_motion=motions[1] if len(motions) > 1 else None,
+        second_force=forces[1] if len(forces) > 1 else None,
+    )  # fmt: skip
 
 
 def _nothing_holds_a_part(workspace: Workspace) -> bool:
@@ -282,7 +324,7 @@ def _flags(contacts: tuple[ContactResponse, ...], *, nothing_holds: bool) -> tup
         flags.append(MEAN_UNDETERMINED)
     if stuck and len(stuck) == len(contacts):
         flags.append("all_stuck")
-    if any(contact.state in (_STATES[LIFTING], _STATES[SEPARATED]) for contact in contacts):
+    if any(contact.state in _OPENS for contact in contacts):
         flags.append("separation")
     return tuple(flags)
 

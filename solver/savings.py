@@ -13,7 +13,14 @@ from dataclasses import dataclass, fields
 
 from solver.errors import SettingError
 from solver.parametric import linear_model
-from solver.scene import Scene
+from solver.scene import (
+    AnyContact,
+    ElasticNormalContact,
+    FrictionContact,
+    GapSpring,
+    PolynomialSpring,
+    Scene,
+)
 from solver.structure import has_loose_parts
 
 
@@ -73,8 +80,9 @@ def even_harmonics_reason(scene: Scene, paths: Iterable[str] = ()) -> str | None
     paths : parameters that will be changed or differentiated by; a load amplitude breaks the symmetry.
     """
     for contact in scene.contacts:
-        if contact.N1_value != 0.0:
-            return f"the normal load of {contact.name} varies by {abs(contact.N1_value):g} N"
+        reason = _breaks_symmetry(contact)
+        if reason is not None:
+            return reason
     for force in scene.excitation:
         if force.harmonic % 2 == 0:
             kind = "static" if force.harmonic == 0 else f"of harmonic {force.harmonic}"
@@ -84,4 +92,19 @@ def even_harmonics_reason(scene: Scene, paths: Iterable[str] = ()) -> str | None
     for path in paths:
         if path.endswith((".N1", ".N1_ratio")):
             return f"{path} changes the variation of a normal load"
+        if path.endswith((".a2", ".a4", ".a6", ".a8")):
+            return f"{path} changes an even power of the motion"
+    return None
+
+
+def _breaks_symmetry(contact: AnyContact) -> str | None:
+    """Return why a contact answers a motion and its negative differently, or None."""
+    if isinstance(contact, ElasticNormalContact):
+        return f"the normal load of {contact.name} moves with the parts"
+    if isinstance(contact, FrictionContact) and contact.N1_value != 0.0:
+        return f"the normal load of {contact.name} varies by {abs(contact.N1_value):g} N"
+    if isinstance(contact, GapSpring):
+        return f"{contact.name} pushes on one side only"
+    if isinstance(contact, PolynomialSpring) and any(contact.coefficients[1::2]):
+        return f"{contact.name} has an even power of the motion"
     return None

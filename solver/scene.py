@@ -11,10 +11,19 @@ from solver import scene_paths
 from solver.cyclic_checks import cyclic_issues
 from solver.errors import Issue, SceneError
 from solver.scene_checks import cross_issues, field_issues, plain
+from solver.scene_contacts import (
+    AnyContact,
+    Contact,
+    ContactOfAnyLaw,
+    ElasticNormalContact,
+    FrictionContact,
+    GapSpring,
+    PlanarContact,
+    PolynomialSpring,
+)
 from solver.scene_io import load_raw, scene_folder, shipped_scenes
 from solver.scene_parts import (
     KINDS,
-    Contact,
     CyclicStructure,
     Damper,
     End,
@@ -33,16 +42,23 @@ from solver.scene_parts import (
 
 __all__ = [
     "KINDS",
+    "AnyContact",
     "Contact",
+    "ContactOfAnyLaw",
     "CyclicStructure",
     "Damper",
+    "ElasticNormalContact",
     "End",
     "Excitation",
+    "FrictionContact",
+    "GapSpring",
     "LumpedStructure",
     "Mass",
     "MatricesStructure",
     "Mistuning",
     "Observe",
+    "PlanarContact",
+    "PolynomialSpring",
     "Scene",
     "Spring",
     "Structure",
@@ -61,8 +77,8 @@ class Scene(Part):
         Name of the scene.
     structure : LumpedStructure, CyclicStructure or MatricesStructure
         Masses, springs and dashpots, or matrices.
-    contacts : tuple of Contact
-        The friction contacts; may be empty.
+    contacts : tuple of Contact and the classes of other laws
+        What is not linear: friction contacts, rubbing contacts, gaps, nonlinear springs; may be empty.
     excitation : tuple of Excitation
         The forces, at least one. A single one may be given without a list.
     observe : Observe
@@ -76,7 +92,7 @@ class Scene(Part):
 
     name: Name
     structure: Annotated[Structure, Field(discriminator="kind")]
-    contacts: tuple[Contact, ...] = ()
+    contacts: tuple[ContactOfAnyLaw, ...] = ()
     excitation: tuple[Excitation, ...]
     observe: Observe
 

@@ -15,10 +15,10 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from solver.errors import Issue
+from solver.scene_contacts import LAW_TAG, LAWS
 from solver.scene_parts import (
     GROUND,
     KINDS,
-    Contact,
     CyclicStructure,
     Damper,
     Excitation,
@@ -33,6 +33,7 @@ from solver.scene_parts import (
 
 MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
 RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe")
+BETWEEN_KEYS = ("between", "normal_between", "between_second")
 _SCENE_KEYS = ("name", "structure", "contacts", "excitation", "observe")
 _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     (): ("a scene", _SCENE_KEYS),
@@ -44,7 +45,14 @@ _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     ("structure", "springs"): ("a spring", tuple(Spring.model_fields)),
     ("structure", "dampers"): ("a damper", tuple(Damper.model_fields)),
     ("structure", "mistuning"): ("mistuning", tuple(Mistuning.model_fields)),
-    ("contacts",): ("a contact", tuple(Contact.model_fields)),
+    ("contacts",): ("a contact", tuple(LAWS["coulomb"].model_fields)),
+    **{
+        ("contacts", LAW_TAG + law): (
+            "a contact" if law == "coulomb" else f"a contact with the law `{law}`",
+            tuple(each.model_fields),
+        )
+        for law, each in LAWS.items()
+    },
     ("excitation",): ("an excitation", tuple(Excitation.model_fields)),
     ("observe",): ("observe", tuple(Observe.model_fields)),
 }
@@ -119,9 +127,11 @@ def _field_issue(found: ErrorDetails, raw: dict[str, Any]) -> Issue:
         known = f"known keys: {listing(keys)}{nearest(key, keys)}"
         message = f"`{key}` = {quoted(last)} is not a key of {table}; {known}"
     elif kind in ("union_tag_invalid", "union_tag_not_found"):
-        got = last.get("kind") if isinstance(last, dict) else None
-        steps = [*steps, "kind"]
-        message = f"`kind` must be one of {listing(KINDS)}, got {quoted(got)}"
+        tag, tags = ("law", tuple(LAWS)) if steps[:1] == ["contacts"] else ("kind", KINDS)
+        got = last.get(tag) if isinstance(last, dict) else None
+        steps = [*steps, tag]
+        hint = nearest(got, tags) if isinstance(got, str) else ""
+        message = f"`{tag}` must be one of {listing(tags)}, got {quoted(got)}{hint}"
     elif kind == "value_error":
         message = str(context["error"])
     elif kind in _BOUNDS:
@@ -223,29 +233,31 @@ def _end_issues(
         (["structure", *steps], row) for key in ("springs", "dampers") for steps, row in _rows(structure, key)
     ]
     for steps, row in [*elements, *_rows(raw, "contacts")]:
-        between = row.get("between")
-        if not (isinstance(between, list) and len(between) == 2 and all(isinstance(e, str) for e in between)):
-            continue
-        here = [*steps, "between"]
-        if between[0] == between[1]:
-            yield Issue(
-                pointer=_pointer(here), message=f"`between` must join two different ends, got {between!r}"
-            )
-        elif all(parse_end(end).next for end in between):
-            yield Issue(
-                pointer=_pointer(here), message=f"`between` must have one end in this sector, got {between!r}"
-            )
-        for i, end in enumerate(between):
-            yield from _one_end([*here, i], end, dofs, cyclic)
+        for key in BETWEEN_KEYS:
+            yield from _pair_issues([*steps, key], row.get(key), dofs, cyclic)
+
+
+def _pair_issues(steps: list[int | str], pair: object, dofs: _Known | None, cyclic: bool) -> Iterator[Issue]:
+    """What is wrong with a pair of ends; its form is pydantic's matter."""
+    if not (isinstance(pair, list) and len(pair) == 2 and all(isinstance(end, str) for end in pair)):
+        return
+    key = steps[-1]
+    if pair[0] == pair[1]:
+        yield Issue(pointer=_pointer(steps), message=f"`{key}` must join two different ends, got {pair!r}")
+    elif all(parse_end(end).next for end in pair):
+        message = f"`{key}` must have one end in this sector, got {pair!r}"
+        yield Issue(pointer=_pointer(steps), message=message)
+    for i, end in enumerate(pair):
+        yield from _one_end([*steps, i], end, dofs, cyclic)
 
 
 def _one_end(steps: list[int | str], text: str, dofs: _Known | None, cyclic: bool) -> Iterator[Issue]:
-    end = parse_end(text)
+    end, key = parse_end(text), str(steps[-2])
     if end.next and not cyclic:
-        message = f"`between`: {text!r} needs a cyclic structure; this one has no next sector"
+        message = f"`{key}`: {text!r} needs a cyclic structure; this one has no next sector"
         yield Issue(pointer=_pointer(steps), message=message)
     if end.dof is not None and dofs is not None and end.dof not in dofs:
-        yield Issue(pointer=_pointer(steps), message=_unknown_dof("between", text, end.dof, [*dofs, GROUND]))
+        yield Issue(pointer=_pointer(steps), message=_unknown_dof(key, text, end.dof, [*dofs, GROUND]))
 
 
 def _unknown_dof(key: str, text: str, dof: str, known: Sequence[str]) -> str:

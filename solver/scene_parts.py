@@ -52,7 +52,7 @@ def parse_end(text: str) -> End:
     return End(base, True) if at and suffix == NEXT else End(text, False)
 
 
-class _Element(Part):
+class Element(Part):
     """Something that joins two ends."""
 
     between: Between
@@ -104,14 +104,14 @@ class Mass(_Grouped):
     m: Positive
 
 
-class Spring(_Element, _Grouped):
+class Spring(Element, _Grouped):
     """A spring, with an optional dashpot beside it: `k` [N/m], `c` [N s/m]."""
 
     k: NonNegative
     c: NonNegative = 0.0
 
 
-class Damper(_Element, _Grouped):
+class Damper(Element, _Grouped):
     """A dashpot: `c` [N s/m]."""
 
     c: NonNegative
@@ -226,56 +226,6 @@ class CyclicStructure(_Structure):
 
 Structure = LumpedStructure | CyclicStructure | MatricesStructure
 KINDS: tuple[str, ...] = ("lumped", "cyclic", "matrices")
-
-
-class Contact(_Element):
-    """A friction contact: elastic Coulomb with a normal load N(t) = N0 + N1 cos(omega t + N1_phase).
-
-    Attributes
-    ----------
-    name : str
-        Name in parameter paths.
-    between : (str, str)
-        Its ends; the slip is x(first) - x(second).
-    kt : float
-        Tangential contact stiffness [N/m].
-    mu : float
-        Friction coefficient.
-    N0 : float
-        Mean normal load [N].
-    N1, N1_ratio : float or None
-        Amplitude of the load [N], or that amplitude as a multiple of N0; one of them or neither (no
-        variation). `N1_value` is the amplitude whichever was given. Where N1 > N0 the contact opens.
-    N1_phase : float
-        Phase of the load [rad].
-    group : str or None
-        A name that sets several contacts at once in parameter paths.
-    """
-
-    name: MemberName
-    kt: Positive
-    mu: Friction
-    N0: NonNegative
-    N1: Signed | None = None
-    N1_ratio: Signed | None = None
-    N1_phase: Angle = 0.0
-    group: Name | None = None
-
-    @model_validator(mode="after")
-    def _one_of_n1(self) -> Contact:
-        if self.N1 is not None and self.N1_ratio is not None:
-            raise ValueError(
-                f"`N1` and `N1_ratio` of contact `{self.name}` exclude each other: give one, "
-                f"got N1 = {self.N1!r} and N1_ratio = {self.N1_ratio!r}"
-            )
-        return self
-
-    @property
-    def N1_value(self) -> float:
-        """Amplitude of the normal load [N], from `N1` or `N1_ratio`."""
-        if self.N1_ratio is not None:
-            return self.N1_ratio * self.N0
-        return 0.0 if self.N1 is None else self.N1
 
 
 class Excitation(Part):

@@ -10,9 +10,9 @@ from pydantic import ValidationError
 
 from solver.errors import SettingError
 from solver.scene_checks import listing, nearest
+from solver.scene_contacts import AnyContact, FrictionContact
 from solver.scene_parts import (
     LARGEST,
-    Contact,
     Damper,
     Excitation,
     Mass,
@@ -29,9 +29,10 @@ FREQUENCY = "frequency"
 AMPLITUDE = "excitation.amplitude"
 PHASE = "excitation.phase"
 PROPORTIONAL = ("stiffness_proportional_damping", "mass_proportional_damping")
-CONTACT_KEYS = ("N0", "N1", "N1_ratio", "N1_phase", "kt", "mu")
 _RANGES = {
-    "N0": "must be a number >= 0 and <= 1e15 [N]",
+    "N0": "must be a number >= 0 (from -1e15 with the law elastic-normal) and <= 1e15 [N]",
+    "kn": "must be a number > 0 and <= 1e15 [N/m]",
+    "gap": "must be a number from -1e15 to 1e15 [m]",
     "N1": "must be a number from -1e15 to 1e15 [N]",
     "N1_ratio": "must be a number from -1e15 to 1e15",
     "N1_phase": "must be a number from -1e4 to 1e4 [rad]",
@@ -49,9 +50,10 @@ _Named = Mass | Spring | Damper
 
 def parameter_paths(scene: Scene) -> tuple[str, ...]:
     """Every path that has a value in the scene."""
-    members = [contact.name for contact in scene.contacts]
-    groups = dict.fromkeys(contact.group for contact in scene.contacts if contact.group is not None)
-    contacts = [f"{name}.{key}" for name in [*groups, *members] for key in CONTACT_KEYS]
+    contacts = dict.fromkeys(
+        f"{contact.group}.{key}" for contact in scene.contacts if contact.group for key in contact.PARAMETERS
+    )
+    contacts |= dict.fromkeys(f"{c.name}.{key}" for c in scene.contacts for key in c.PARAMETERS)
     return (AMPLITUDE, PHASE, *contacts, *(f"structure.{name}" for name in structure_names(scene.structure)))
 
 
@@ -76,6 +78,11 @@ def share(part: _Named, name: str) -> float:
     return 1.0 if part.factor is None else part.factor
 
 
+def has_parameter(contact: AnyContact, owner: str, key: str) -> bool:
+    """Whether the path ``owner.key`` acts on a contact: its name or group, and a parameter of its law."""
+    return owner in (contact.name, contact.group) and key in contact.PARAMETERS
+
+
 def check_path(scene: Scene, path: str) -> None:
     """Raise SettingError unless `path` is ``frequency`` or a path of the scene."""
     if path != FREQUENCY and path not in parameter_paths(scene):
@@ -96,8 +103,8 @@ def value(scene: Scene, path: str) -> float:
         if part is None:
             raise _unknown(scene, path)
         return cast(float, getattr(part, _quantity(part))) / share(part, key)
-    contact = next((c for c in scene.contacts if owner in (c.name, c.group)), None)
-    if contact is None or key not in CONTACT_KEYS:
+    contact = next((c for c in scene.contacts if has_parameter(c, owner, key)), None)
+    if contact is None:
         raise _unknown(scene, path)
     return _contact_value(contact, key)
 
@@ -118,13 +125,13 @@ def _with_value(scene: Scene, path: str, new: float) -> Scene:
     owner, _, key = path.rpartition(".")
     if owner == "structure":
         return scene.model_copy(update={"structure": _with_structure(scene, path, key, new)})
-    if key not in CONTACT_KEYS or not any(owner in (c.name, c.group) for c in scene.contacts):
+    if not any(has_parameter(contact, owner, key) for contact in scene.contacts):
         raise _unknown(scene, path)
     update: dict[str, object] = {key: new}
     if key in ("N1", "N1_ratio"):
         update = {"N1": None, "N1_ratio": None, key: new}
     contacts = tuple(
-        _changed(contact, update, path, new) if owner in (contact.name, contact.group) else contact
+        _changed(contact, update, path, new) if has_parameter(contact, owner, key) else contact
         for contact in scene.contacts
     )
     return scene.model_copy(update={"contacts": contacts})
@@ -174,10 +181,13 @@ def _changed(part: _PartT, update: Mapping[str, object], path: str, new: float) 
         return type(part).model_validate({**part.__dict__, **update})
     except ValidationError as error:
         key = next((k for k in update if update[k] is not None), "")
-        raise SettingError(path, new, _RANGES[key]) from error
+        wanted = _RANGES.get(key, "must be a number from -1e15 to 1e15")
+        raise SettingError(path, new, wanted) from error
 
 
-def _contact_value(contact: Contact, key: str) -> float:
+def _contact_value(contact: AnyContact, key: str) -> float:
+    if not isinstance(contact, FrictionContact):
+        return getattr(contact, key) or 0.0
     if key == "N1":
         return contact.N1_value
     if key != "N1_ratio":

@@ -12,10 +12,11 @@ from typing import TypeVar
 
 from solver.errors import SettingError
 from solver.scene import (
-    Contact,
+    ContactOfAnyLaw,
     CyclicStructure,
     Damper,
     Excitation,
+    FrictionContact,
     LumpedStructure,
     Mass,
     Observe,
@@ -23,8 +24,9 @@ from solver.scene import (
     Spring,
     parse_end,
 )
+from solver.scene_checks import BETWEEN_KEYS
 
-_JoinT = TypeVar("_JoinT", Spring, Damper, Contact)
+_JoinT = TypeVar("_JoinT", Spring, Damper)
 _NamedT = TypeVar("_NamedT", Spring, Damper, Mass)
 
 
@@ -140,7 +142,7 @@ def annulus(scene: Scene) -> Scene:
         contacts=tuple(
             _contact(c, j, _turn(order * j, n), standing=standing)
             for j in sectors
-            for c in _joining(scene.contacts, j, n)
+            for c in _placed(scene.contacts, j, n)
         ),
         excitation=tuple(
             _force(e, j, _turn(e.harmonic * order * j, n), standing=standing)
@@ -205,6 +207,24 @@ def _joining(parts: tuple[_JoinT, ...], j: int, n: int) -> tuple[_JoinT, ...]:
     return tuple(part.model_copy(update={"between": ends}) for part, ends in placed if ends[0] != ends[1])
 
 
+def _placed(contacts: tuple[ContactOfAnyLaw, ...], j: int, n: int) -> tuple[ContactOfAnyLaw, ...]:
+    """The contacts of sector j between their ends in the annulus."""
+    placed = []
+    for contact in contacts:
+        pairs = {
+            key: (_end(pair[0], j, n), _end(pair[1], j, n))
+            for key in BETWEEN_KEYS
+            if (pair := getattr(contact, key, None)) is not None
+        }
+        joined = [ends for ends in pairs.values() if ends[0] != ends[1]]
+        if joined and len(joined) < len(pairs):
+            wanted = f"must have two sectors or more: `{contact.name}` joins one to itself in one direction"
+            raise SettingError("sectors", n, wanted)
+        if joined:
+            placed.append(contact.model_copy(update=pairs))
+    return tuple(placed)
+
+
 def _renamed(part: _NamedT, j: int) -> _NamedT:
     if part.name is None:
         return part
@@ -215,15 +235,15 @@ def _mass(mass: Mass, j: int) -> Mass:
     return _renamed(mass, j).model_copy(update={"dof": _in_sector(mass.dof, j)})
 
 
-def _contact(contact: Contact, j: int, turn: float, *, standing: bool) -> Contact:
+def _contact(contact: ContactOfAnyLaw, j: int, turn: float, *, standing: bool) -> ContactOfAnyLaw:
     update: dict[str, object] = {
         "name": _in_sector(contact.name, j),
         "group": contact.group or contact.name,
     }
-    if standing:
+    if isinstance(contact, FrictionContact) and standing:
         share = _cosine(turn)
         update |= {key: share * value for key in ("N1", "N1_ratio") if (value := getattr(contact, key))}
-    else:
+    elif isinstance(contact, FrictionContact):
         update["N1_phase"] = contact.N1_phase + turn
     return contact.model_copy(update=update)
 

@@ -60,7 +60,8 @@ def reduce_model(
     ----------
     model : the matrices of one sector, or of the whole structure.
     ks : (nk,) harmonics kept.
-    kt : (nc,) contact stiffnesses [N/m], used as the shift where contacts alone hold a part in place.
+    kt : (nc,) stiffness of every port of the contacts [N/m], used as the shift where contacts alone
+        hold a part in place.
     derivative : by the structural parameter that is continued in; then the dense form is kept.
     whole_matrices : keep the dense form whatever the damping is.
 

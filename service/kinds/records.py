@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from service.arrays import encode
 from service.jobs import ContactValues, SweepRecord
 from service.strict_json import digest
-from solver.scene import Contact, Scene
+from solver.scene import AnyContact, FrictionContact, Scene
 
 if TYPE_CHECKING:
     from solver import Branch
@@ -62,7 +62,9 @@ def contact_values(scene: Scene, parameter: str) -> tuple[ContactValues, ...]:
     )
 
 
-def _values(contact: Contact, swept: str) -> ContactValues:
+def _values(contact: AnyContact, swept: str) -> ContactValues:
+    if not isinstance(contact, FrictionContact):
+        return ContactValues(name=contact.name, kt=None, mu=None, N0=None, N1=None, N1_phase=None)
     load_follows = swept in ("N1", "N1_ratio") or (swept == "N0" and contact.N1_ratio is not None)
     return ContactValues(
         name=contact.name,

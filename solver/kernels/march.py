@@ -16,102 +16,35 @@ Nothing here is shared with the harmonic balance: this is its referee.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.kernels.compiled import compiled
 from solver.kernels.falls import NONE, first_fall, value_at
-
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
-
-ORDER = 8  # of the Taylor series; stable on the imaginary axis for h |lambda| < 3.4
-# What a contact does; a slipping one has its direction, +1 or -1.
-STICK, SEPARATED = 0, 2
-# How a run of periods ended.
-RAN, SETTLED, CHATTER, NOT_FINITE = 0, 1, 2, 3
-
-
-class System(NamedTuple):
-    """The equations in tau: x'' = W (force - L^T F) - A x - B x', with A, B and W as compressed sparse rows.
-
-    W is the inverse of the mass matrix times omega^-2.
-    """
-
-    A_start: Whole
-    A_column: Whole
-    A_value: Real
-    B_start: Whole
-    B_column: Whole
-    B_value: Real
-    W_start: Whole
-    W_column: Whole
-    W_value: Real
-    force_dof: Whole
-    force_amplitude: Real
-    force_phase: Real
-    force_harmonic: Whole
-    first: Whole
-    second: Whole
-    kt: Real
-    mu: Real
-    N0: Real
-    N1: Real
-    N1_phase: Real
-
-
-class State(NamedTuple):
-    """Motion and contacts at one instant; changed in place. `mode`: STICK, SEPARATED, +1 or -1."""
-
-    x: Real
-    v: Real
-    force: Real
-    mode: Whole
-
-
-class Series(NamedTuple):
-    """Taylor coefficients over a step, row k belongs to s^k, s = 0..1; `pull` is scratch, a force a DOF."""
-
-    x: Real
-    v: Real
-    force: Real
-    load: Real
-    pull: Real
-
-
-class Record(NamedTuple):
-    """Samples of one period, evenly spaced; empty arrays record nothing."""
-
-    x: Real
-    v: Real
-    slip: Real
-    force: Real
-    load: Real
-
-
-@compiled
-def _product(start: Whole, column: Whole, value: Real, x: Real, row: int) -> float:
-    total = 0.0
-    for j in range(start[row], start[row + 1]):
-        total += value[j] * x[column[j]]
-    return total
-
-
-@compiled
-def _slip(system: System, x: Real, c: int) -> float:
-    """Return x(first end) - x(second end) of contact c; an end of -1 is the ground."""
-    first, second = system.first[c], system.second[c]
-    return (x[first] if first >= 0 else 0.0) - (x[second] if second >= 0 else 0.0)
-
-
-@compiled
-def _wave(k: int, angle: float) -> float:
-    """Return the k-th derivative of the cosine."""
-    turn = k % 4
-    value = math.cos(angle) if turn % 2 == 0 else math.sin(angle)
-    return value if turn in (0, 3) else -value
+from solver.kernels.march_state import (
+    CHATTER,
+    COULOMB,
+    ELASTIC_NORMAL,
+    GAP,
+    NOT_FINITE,
+    ORDER,
+    POLYNOMIAL,
+    RAN,
+    SEPARATED,
+    SETTLED,
+    STICK,
+    Real,
+    Record,
+    Series,
+    State,
+    System,
+    motion_size,
+    normal_slip,
+    power_series,
+    product,
+    slip,
+    wave,
+)
 
 
 @compiled
@@ -119,20 +52,31 @@ def _load_series(system: System, tau: float, h: float, series: Series) -> None:
     for c in range(system.kt.size):
         factor = system.N1[c]
         for k in range(ORDER + 1):
-            series.load[k, c] = factor * _wave(k, tau + system.N1_phase[c])
+            series.load[k, c] = factor * wave(k, tau + system.N1_phase[c])
             factor *= h / (k + 1)
         series.load[0, c] += system.N0[c]
 
 
 @compiled
 def _contact_series(system: System, state: State, series: Series, k: int) -> None:
-    """Coefficient k of the contact forces from the motion's and the load's."""
+    """Coefficient k of the contact forces from the motion's and the given load's."""
     for c in range(system.kt.size):
-        mode = state.mode[c]
-        if mode == SEPARATED:
+        mode, law = state.mode[c], system.law[c]
+        if law == ELASTIC_NORMAL:
+            series.load[k, c] += system.kn[c] * normal_slip(system, series.x[k], c)
+            series.normal[k, c] = 0.0 if mode == SEPARATED else series.load[k, c]
+            if k == 0:
+                series.normal[k, c] -= system.rest[c]
+        if mode == SEPARATED or (law == ELASTIC_NORMAL and system.mu[c] == 0.0):
             series.force[k, c] = 0.0
+        elif law == POLYNOMIAL:
+            series.force[k, c] = power_series(system, series, c, k)
         elif mode == STICK:
-            series.force[k, c] = state.force[c] if k == 0 else system.kt[c] * _slip(system, series.x[k], c)
+            series.force[k, c] = system.kt[c] * slip(system, series.x[k], c)
+            if law == GAP and k == 0:
+                series.force[k, c] -= system.kt[c] * system.gap[c]
+            elif k == 0:
+                series.force[k, c] = state.force[c]
         else:
             series.force[k, c] = mode * system.mu[c] * series.load[k, c]
 
@@ -145,14 +89,20 @@ def _pull(system: System, tau: float, k: int, scale: float, series: Series) -> N
         pull[i] = 0.0
     for e in range(system.force_dof.size):
         harmonic = system.force_harmonic[e]
-        wave = _wave(k, harmonic * tau + system.force_phase[e])
-        pull[system.force_dof[e]] += system.force_amplitude[e] * wave * scale * float(harmonic) ** k
+        turn = wave(k, harmonic * tau + system.force_phase[e])
+        pull[system.force_dof[e]] += system.force_amplitude[e] * turn * scale * float(harmonic) ** k
     for c in range(system.kt.size):
         first, second = system.first[c], system.second[c]
         if first >= 0:
             pull[first] -= f[c]
         if second >= 0:
             pull[second] += f[c]
+        if system.law[c] == ELASTIC_NORMAL:
+            first, second = system.normal_first[c], system.normal_second[c]
+            if first >= 0:
+                pull[first] -= series.normal[k, c]
+            if second >= 0:
+                pull[second] += series.normal[k, c]
 
 
 @compiled
@@ -169,9 +119,9 @@ def _expand(system: System, state: State, tau: float, h: float, series: Series) 
         x, v, rise, pull = series.x[k], series.v[k], series.v[k + 1], series.pull
         _pull(system, tau, k, scale, series)
         for i in range(n):
-            rise[i] = _product(system.W_start, system.W_column, system.W_value, pull, i)
-            rise[i] -= _product(system.A_start, system.A_column, system.A_value, x, i)
-            rise[i] -= _product(system.B_start, system.B_column, system.B_value, v, i)
+            rise[i] = product(system.W_start, system.W_column, system.W_value, pull, i)
+            rise[i] -= product(system.A_start, system.A_column, system.A_value, x, i)
+            rise[i] -= product(system.B_start, system.B_column, system.B_value, v, i)
             rise[i] *= h / (k + 1)
             series.x[k + 1, i] = h / (k + 1) * v[i]
         scale *= h / (k + 1)
@@ -212,13 +162,24 @@ def _next_change(
 
     A margin far below the accuracy (1e-13 of the limit) keeps rounding from undoing a change just made.
     """
-    mode, mu = state.mode[c], system.mu[c]
-    margin = 1e-13 * (system.N0[c] + abs(system.N1[c]))
+    mode, mu, law = state.mode[c], system.mu[c], system.law[c]
     when, target = NONE, mode
+    if law == POLYNOMIAL:
+        return when, target
+    if law == GAP:
+        return _gap_change(system, series, c, mode, q)
+    margin = abs(system.N0[c]) + abs(system.N1[c])
+    if law == ELASTIC_NORMAL:
+        margin += system.kn[c] * motion_size(system, series, c, True)
+    margin *= 1e-13
     if mode == SEPARATED:
         _load(series, c, -1, q)
         q[0] += margin
         return first_fall(q), STICK
+    if mu == 0.0:
+        _load(series, c, 1, q)
+        q[0] += margin
+        return first_fall(q), SEPARATED
     if mode == STICK:
         for direction in (1, -1):
             _limit(system, series, c, direction, q)
@@ -234,6 +195,17 @@ def _next_change(
     q[0] += margin
     s = first_fall(q)
     return (s, SEPARATED) if s < when else (when, target)
+
+
+@compiled
+def _gap_change(system: System, series: Series, c: int, mode: int, q: Real) -> tuple[float, int]:
+    """Return where in the step a gap closes or opens, and the state it goes to."""
+    sign = -1.0 if mode == SEPARATED else 1.0
+    for k in range(q.size):
+        q[k] = sign * slip(system, series.x[k], c)
+    margin = 1e-13 * (abs(system.gap[c]) + motion_size(system, series, c, False))
+    q[0] += margin - sign * system.gap[c]
+    return first_fall(q), STICK if mode == SEPARATED else SEPARATED
 
 
 @compiled
@@ -255,8 +227,12 @@ def _change(system: System, state: State, tau: float, c: int, target: int) -> No
         state.force[c] = 0.0
     elif before == SEPARATED:
         state.force[c] = 0.0
-        pull = system.kt[c] * _slip(system, state.v, c)
+        if system.mu[c] == 0.0:
+            return
+        pull = system.kt[c] * slip(system, state.v, c)
         push = -system.mu[c] * system.N1[c] * math.sin(tau + system.N1_phase[c])
+        if system.law[c] == ELASTIC_NORMAL:
+            push += system.mu[c] * system.kn[c] * normal_slip(system, state.v, c)
         if abs(pull) > push:
             state.mode[c] = 1 if pull > 0.0 else -1
 
@@ -267,8 +243,8 @@ def _sample(system: System, series: Series, place: float, index: int, dof: int, 
     record.v[index] = value_at(series.v[:, dof], place)
     for c in range(system.kt.size):
         first, second = system.first[c], system.second[c]
-        slip = value_at(series.x[:, first], place) if first >= 0 else 0.0
-        record.slip[c, index] = slip - (value_at(series.x[:, second], place) if second >= 0 else 0.0)
+        motion = value_at(series.x[:, first], place) if first >= 0 else 0.0
+        record.slip[c, index] = motion - (value_at(series.x[:, second], place) if second >= 0 else 0.0)
         record.force[c, index] = value_at(series.force[:, c], place)
         record.load[c, index] = max(value_at(series.load[:, c], place), 0.0)
 
@@ -287,7 +263,7 @@ def _step(
         _expand(system, state, start + gone, rest, series)
         when, target, which = NONE, STICK, -1
         for c in range(system.kt.size):
-            if system.mu[c] * (system.N0[c] + abs(system.N1[c])) > 0.0:
+            if system.law[c] != COULOMB or system.mu[c] * (system.N0[c] + abs(system.N1[c])) > 0.0:
                 s, mode = _next_change(system, state, series, rest, c, q)
                 if s < when:
                     when, target, which = s, mode, c
@@ -354,7 +330,7 @@ def run_periods(
     n, n_contacts, rows = state.x.size, system.kt.size, ORDER + 1
     series = Series(
         np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, n_contacts)), np.empty((rows, n_contacts)),
-        np.empty(n),
+        np.empty(n), np.empty((rows, n_contacts)), np.empty((n_contacts, system.powers.shape[1], rows)),
     )  # fmt: skip
     q = np.empty(rows)
     for period in range(change.size):

@@ -15,6 +15,8 @@ import numpy as np
 from solver.fourier import Real, coefficient_count, cosine_position
 from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.jacobian import factorise, step_back
+from solver.kernels.laws import held_stiffness, is_friction
+from solver.kernels.laws_columns import ELASTIC_NORMAL, KN
 from solver.kernels.linear import copy_to, invert, set_to
 from solver.kernels.receptance import receptance
 from solver.kernels.residual import contact_values, evaluate
@@ -140,7 +142,9 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
     for i in range(system.ks.size):
         for c in range(nc):
             for d in range(nc):
-                matrix[c, d] = linear.A[0, i, c, d] * (table[system.owner[d], KT] - system.shift[d])
+                e = system.owner[d]
+                held = held_stiffness(system.laws[e], table[e], d - system.first_port[e])
+                matrix[c, d] = linear.A[0, i, c, d] * (held - system.shift[d])
             matrix[c, c] += 1.0
         good = invert(matrix, inverse)
         here = cosine_position(system.ks, i)
@@ -153,16 +157,25 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
                 u[c * n + here + 1] = -motion.imag if good else 0.0
     added = 0.0
     for c in range(nc):
-        row = table[system.owner[c]]
-        if row[MU] <= 0.0:
+        e = system.owner[c]
+        row, rubs = table[e], system.laws[e] == ELASTIC_NORMAL
+        if row[MU] <= 0.0 or not is_friction(system.laws[e]) or (rubs and c > system.first_port[e]):
             continue
-        reach = 0.0
-        for i in range(system.ks.size):
-            here = c * n + cosine_position(system.ks, i)
-            reach += abs(u[here]) if system.ks[i] == 0 else math.hypot(u[here], u[here + 1])
-        needed = 1.05 * row[KT] * reach / row[MU] - (row[N0] - abs(row[N1]))
+        needed = 1.05 * row[KT] * _reach(system, u, c) / row[MU] - (row[N0] - abs(row[N1]))
+        if rubs:
+            needed += 1.05 * row[KN] * _reach(system, u, c + 1)
         added = max(added, needed)
     return added
+
+
+@compiled
+def _reach(system: System, u: Real, c: int) -> float:
+    """Return a bound of the motion at port c: the sum of its amplitudes [m]."""
+    n, reach = coefficient_count(system.ks), 0.0
+    for i in range(system.ks.size):
+        here = c * n + cosine_position(system.ks, i)
+        reach += abs(u[here]) if system.ks[i] == 0 else math.hypot(u[here], u[here + 1])
+    return reach
 
 
 @compiled
@@ -171,7 +184,7 @@ def load_scale(system: System, p: float) -> float:
     table, _, _, _ = contact_values(system, p, 0.0)
     scale = 0.0
     for c in range(table.shape[0]):
-        scale = max(scale, table[c, N0] + abs(table[c, N1]))
+        scale = max(scale, abs(table[c, N0]) + abs(table[c, N1]))
     return scale
 
 

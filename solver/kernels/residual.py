@@ -10,6 +10,8 @@ from solver.fourier import Real, coefficient_count, cosine_position
 from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED, piece_of
 from solver.kernels.force import contact_force
+from solver.kernels.laws import law_force
+from solver.kernels.laws_columns import COLUMNS, COULOMB, OWN, OWN_KIND
 from solver.kernels.linear import copy_block
 from solver.kernels.sampled import sampled_force
 from solver.kernels.system import (
@@ -41,7 +43,7 @@ def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, 
     """
     out_of_line()
     nc = system.laws.size
-    table, slope = np.empty((nc, 6)), np.zeros((nc, 6))
+    table, slope = np.empty((nc, COLUMNS)), np.zeros((nc, COLUMNS))
     copy_block(table, system.contacts)
     for c in range(nc):
         row, d = table[c], slope[c]
@@ -59,6 +61,9 @@ def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, 
                 row[KT], d[KT] = p, 1.0
             elif system.kind == FRICTION:
                 row[MU], d[MU] = p, 1.0
+            elif system.kind >= OWN_KIND:
+                column = OWN + system.kind - OWN_KIND
+                row[column], d[column] = p, 1.0
         if tied:
             row[N1] = row[RATIO] * row[N0]
             d[N1] = row[RATIO] * d[N0] + d[RATIO] * row[N0]
@@ -88,7 +93,11 @@ def evaluate(system: System, linear: Receptance, u: Real, p: float, added: float
             return np.nan
     table, load, slope, dload = contact_values(system, p, added)
     for e in range(system.laws.size):
-        if not _coulomb(system, e, u, table[e], load[e], slope[e], dload[e], out):
+        if system.laws[e] == COULOMB:
+            good = _coulomb(system, e, u, table[e], load[e], slope[e], dload[e], out)
+        else:
+            good = _any_law(system, e, u, table[e], load[e], slope[e], dload[e], out)
+        if not good:
             return np.nan
     return _residual(system, linear, u, least_size(system, p), out)
 
@@ -125,6 +134,23 @@ def _coulomb(
             total += out.dF_dN[i, j] * dload[j]
         out.dF_dp[c, i] = total
     return True
+
+
+@compiled
+def _any_law(
+    system: System, e: int, u: Real, table: Real, load: Real, slope: Real, dload: Real, out: Evaluation
+) -> bool:
+    """Evaluate an element of any law; False if it failed."""
+    out_of_line()
+    n, c, block = coefficient_count(system.ks), system.first_port[e], system.first_block[e]
+    end, last = system.first_port[e + 1], system.first_block[e + 1]
+    U = u[c * n : end * n].reshape((end - c, n))
+    state, piece = law_force(
+        system.laws[e], U, system.ks, load, system.load_ks, table, slope, dload, system.cos_table,
+        system.sin_table, out.segments, out.F[c:end], out.dF_dU[block:last], out.dF_dp[c:end],
+    )  # fmt: skip
+    out.states[e], out.pieces[e], out.slopes[e] = state, piece, np.nan
+    return bool(state != FAILED)
 
 
 @compiled

@@ -37,7 +37,7 @@ from solver.kernels.trigpoly import FALLING, RISING, at_point, bracketed_root, o
 
 
 @compiled
-def _contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, out: Real) -> int:
+def contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, out: Real) -> int:
     """Fill `out` with [begin, end] of every interval with N > 0, when N < 0 somewhere; return their number.
 
     The intervals are unwrapped: an end may exceed 2π. −1 means N never becomes negative.
@@ -96,8 +96,8 @@ def _contact_intervals(c: Real, s: Real, degree: int, value: Real, slope: Real, 
 
 
 @compiled
-def _one_wave(mean: float, cosine: float, sine: float, out: Real) -> int:
-    """Fill `out` with the interval where mean + cosine cos τ + sine sin τ > 0; as `_contact_intervals`.
+def one_wave(mean: float, cosine: float, sine: float, out: Real) -> int:
+    """Fill `out` with the interval where mean + cosine cos τ + sine sin τ > 0; as `contact_intervals`.
 
     With ψ its phase and R its amplitude it is |τ − ψ| < h, tan²(h/2) = (R + mean)/(R − mean).
     """
@@ -185,9 +185,9 @@ def find_segments(
     intervals = np.empty((load_ks[-1] + 1, 2))
     n_intervals = 0 if load_max <= 0.0 else -1
     if load_ks[-1] == 1:
-        n_intervals = _one_wave(nc[0], nc[1], ns[1], intervals)
+        n_intervals = one_wave(nc[0], nc[1], ns[1], intervals)
     elif load_ks[-1] > 1:
-        n_intervals = _contact_intervals(nc, ns, load_ks[-1], load, dload, intervals)
+        n_intervals = contact_intervals(nc, ns, load_ks[-1], load, dload, intervals)
     if n_intervals == 0 or load_max <= 0.0:
         return SEPARATED, 0
     if n_intervals < 0:

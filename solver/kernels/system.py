@@ -34,8 +34,6 @@ MODES, POLES, DENSE = 0, 1, 2
 # Columns of the contact table.
 KT, MU, N0, N1, RATIO, PHASE = 0, 1, 2, 3, 4, 5
 LOAD_COEFFICIENTS = 3
-# Laws of an element.
-COULOMB = 0
 
 
 class System(NamedTuple):
@@ -50,11 +48,11 @@ class System(NamedTuple):
     which: Integer  # (nk,) structure of each harmonic
     cos_table: Real
     sin_table: Real
-    laws: Integer  # (ne,) COULOMB, …
+    laws: Integer  # (ne,) COULOMB, … of `solver.kernels.laws_columns`
     first_port: Integer  # (ne + 1,) where the ports of each element begin
     first_block: Integer  # (ne + 1,) where its blocks of dF_dU begin: ports² of them, row after row
     owner: Integer  # (nc,) element of each port
-    contacts: Real  # (ne, 6) kt, mu, N0, N1, N1_ratio (NaN: not tied), N1_phase
+    contacts: Real  # (ne, COLUMNS) kt, mu, N0, N1, N1_ratio (NaN: not tied), N1_phase, and a law's own
     active: Real  # (ne,) 1.0 where λ acts
     shift: Real  # (nc,) stiffness moved into the structure [N/m]
     samples: int  # in a period, for contact forces by samples in time; 0: in closed form
