@@ -12,7 +12,7 @@ GROUPS = {"chains": ("chain-8", "chain-32", "one-slider")}
 
 
 def _cases() -> dict[str, Callable[[], None]]:
-    from benchmarks import against_peers, disk, large, responses, robustness
+    from benchmarks import against_peers, beam, disk, large, responses, robustness, savings
 
     return {
         "responses": responses.responses,
@@ -25,6 +25,8 @@ def _cases() -> dict[str, Callable[[], None]]:
         "one-slider": against_peers.one_slider,
         "optimum": against_peers.optimum,
         "disk": disk.disk_response,
+        "beam": beam.beams,
+        "savings": savings.savings,
         "two-hundred": large.two_hundred_contacts,
         "robustness": robustness.robustness,
     }
