@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.accuracy import ErrorEstimator
-from solver.balance import Balance
+from solver.balance import Balance, fewer_harmonics
 from solver.branch import Branch, BranchStatus
 from solver.errors import SettingError
 from solver.fourier import Real
@@ -120,12 +120,13 @@ def _fewest(first: _Attempt, p: float, accuracy: float, size: float | None = Non
     while not high.good:
         if high.harmonics >= limit:
             return high
-        grown = _with(high, min(next_harmonics(high.harmonics, high.excess), limit), p, accuracy, size)
+        count = min(next_harmonics(high.harmonics, high.excess), limit)
+        grown = _with(high, count, p, accuracy, size)
         if grown is None:
             return high
         low, high = high, grown
     while not low.good and high.harmonics - low.harmonics > 1:
-        middle = _with(low, (low.harmonics + high.harmonics) // 2, p, accuracy, size)
+        middle = _with(high, (low.harmonics + high.harmonics) // 2, p, accuracy, size)
         if middle is None:
             return high
         low, high = (low, middle) if middle.good else (middle, high)
@@ -139,15 +140,22 @@ def next_harmonics(harmonics: int, excess: float) -> int:
 
 
 def _with(
-    attempt: _Attempt, harmonics: int, p: float, accuracy: float, size: float | None
-) -> _Attempt | None:
-    """Return the same response with more harmonics; None where Newton's method does not get there."""
-    balance = attempt.workspace.balance
-    workspace = Workspace.of(more_harmonics(balance, harmonics))
-    found = workspace.solve(p, pad(attempt.found.u, balance, workspace.balance))
-    spent = attempt.found.iterations + found.iterations
+    like: _Attempt, harmonics: int, p: float, accuracy: float, size: float | None
+) -> _Attempt | None:  # fmt: skip
+    """Return the same response with another number of harmonics; None where Newton's method fails."""
+    known = like.workspace.balance
+    if harmonics >= known.n_harmonics:
+        balance = more_harmonics(known, harmonics)
+        guess = pad(like.found.u, known, balance)
+    else:
+        fewer = fewer_harmonics(known, int(np.count_nonzero(known.system.ks <= harmonics)))
+        balance = replace(fewer, n_harmonics=harmonics)
+        guess = like.found.u.reshape(-1, known.n_coefficients)[:, : balance.n_coefficients].reshape(-1)
+    workspace = Workspace.of(balance)
+    found = workspace.solve(p, guess)
     if not found.converged:
         return None
+    spent = like.found.iterations + found.iterations
     total = PointSolution(converged=True, u=found.u, iterations=spent, residual=found.residual)
     return _judged(workspace, total, p, accuracy, size)
 

@@ -32,7 +32,9 @@ def accuracy_figure(study: Mapping[str, Any]) -> Figure:
         looks = [_CLOSED if count == 0 else _SAMPLED[i % len(_SAMPLED)] for i, count in enumerate(counts, -1)]
         for count, look in zip(counts, looks, strict=True):
             _draw(axes, [row for row in rows if row["samples"] == count], look, study["reference"], least)
-        axes.axhspan(0.0, least / study["reference"], color=style.GREY, alpha=0.15, linewidth=0.0)
+        axes.axhspan(
+            0.0, least / study["reference"], color=style.GREY, alpha=0.15, linewidth=0.0, label="not known"
+        )  # fmt: skip
         axes.set_xscale("log")
         axes.set_yscale("log")
         style.plain_log(axes.xaxis)
