@@ -47,7 +47,7 @@ class AccuracyRow:
     error : float
         |max_abs − reference| [m].
     milliseconds : float
-        Median time of Newton's method from a neighbouring solution.
+        Median processor time of Newton's method from a neighbouring solution.
     iterations : int
         Newton iterations of it.
     residual : float
@@ -152,13 +152,14 @@ def accuracy_study(
     workspace, u, exact = reference
     ways = [(h, 0) for h in harmonics]
     ways += [(h, n) for n in samples for h in harmonics if n >= _PER_WAVE * max(h, 1)]
-    rows: list[AccuracyRow] = []
+    prepared: list[tuple[AccuracyRow, Callable[[], object]]] = []
     for done, (highest, count) in enumerate(ways):
-        row = _row(scene, p, highest, count, exact, repeats)
-        if row is not None:
-            rows.append(row)
+        way = _prepared(scene, p, highest, count, exact)
+        if way is not None:
+            prepared.append(way)
         if on_progress is not None:
-            on_progress((done + 1) / len(ways), len(rows))
+            on_progress((done + 1) / len(ways), len(prepared))
+    rows = _timed(prepared, repeats)
     return AccuracyStudy(
         scene=scene.name, frequency_hz=frequency_hz, reference=exact,
         reference_harmonics=workspace.balance.n_harmonics,
@@ -206,10 +207,10 @@ def _reference(scene: Scene, p: float, top: int) -> tuple[Workspace, Real, float
     return None if measures is None else (workspace, found.u, float(measures.values[MAX_ABS]))
 
 
-def _row(
-    scene: Scene, p: float, harmonics: int, samples: int, exact: float, repeats: int
-) -> AccuracyRow | None:
-    """Return one way's row; None where it does not converge."""
+def _prepared(
+    scene: Scene, p: float, harmonics: int, samples: int, exact: float
+) -> tuple[AccuracyRow, Callable[[], object]] | None:
+    """Return one way's row without its time, and what is to be timed; None where it does not converge."""
     balance = build(scene, harmonics=harmonics)
     workspace = Workspace.of(sampled(balance, samples) if samples else balance)
     neighbour = workspace.solve(p * (1.0 + _AWAY))
@@ -219,17 +220,28 @@ def _row(
     measures = workspace.measure(found.u, p) if found.converged else None
     if measures is None:
         return None
-    seconds = []
-    for _ in range(repeats):
-        begun = time.perf_counter()
-        workspace.solve(p, neighbour.u)
-        seconds.append(time.perf_counter() - begun)
     max_abs = float(measures.values[MAX_ABS])
-    return AccuracyRow(
+    row = AccuracyRow(
         harmonics=harmonics, evaluator=SAMPLED if samples else CLOSED_FORM, samples=samples, max_abs=max_abs,
-        error=abs(max_abs - exact), milliseconds=1e3 * float(np.median(seconds)), iterations=found.iterations,
+        error=abs(max_abs - exact), milliseconds=math.nan, iterations=found.iterations,
         residual=found.residual,
     )  # fmt: skip
+    return row, lambda: workspace.solve(p, neighbour.u)
+
+
+def _timed(prepared: list[tuple[AccuracyRow, Callable[[], object]]], repeats: int) -> list[AccuracyRow]:
+    """Return the rows with their times, all measured in turn: a busy moment slows every one of them."""
+    seconds = np.zeros((repeats, len(prepared)))
+    for turn in range(repeats):
+        for i, (_, work) in enumerate(prepared):
+            work()  # the one before may have filled the caches
+            begun = time.thread_time()  # other programs do not count
+            work()
+            seconds[turn, i] = time.thread_time() - begun
+    medians = 1e3 * np.median(seconds, axis=0)
+    return [
+        replace(row, milliseconds=float(ms)) for (row, _), ms in zip(prepared, medians, strict=True)
+    ]  # fmt: skip
 
 
 def _leads(row: AccuracyRow, rows: Sequence[AccuracyRow]) -> bool:

@@ -20,14 +20,18 @@ TRUTH = 121  # harmonics
 ROUNDING = 1e-9  # of the amplitude: what Newton's tolerance allows
 
 
-def converged(workspace: Workspace, u: np.ndarray, p: float, top: int = TRUTH) -> np.ndarray:
-    """Measures of the same response with `top` harmonics, reached by and by: it stays on its branch."""
+def converged(workspace: Workspace, u: np.ndarray, p: float, top: int = TRUTH) -> np.ndarray | None:
+    """Measures of the same response with `top` harmonics, reached by and by: it stays on its branch.
+
+    None where that ends: a response of few harmonics need not have one of many.
+    """
     highest = workspace.balance.n_harmonics
     while highest < top:
         highest = min(top, 8 * highest // 5 + 2)
         wider = Workspace.of(more_harmonics(workspace.balance, highest))
         found = wider.solve(p, pad(u, workspace.balance, wider.balance))
-        assert found.converged
+        if not found.converged:
+            return None
         workspace, u = wider, found.u
     measures = workspace.measure(u, p)
     assert measures is not None
@@ -36,7 +40,7 @@ def converged(workspace: Workspace, u: np.ndarray, p: float, top: int = TRUTH) -
 
 def shares(seeds: range, harmonics: int | None = None) -> tuple[float, float, np.ndarray]:
     """How many estimates are above the true error, how many of these within ten times, and the ratios."""
-    above, ratios = [], []
+    above, ratios, lost = [], [], 0
     for seed in seeds:
         scene, frequency_hz, drawn = random_scene(seed)
         p = 2.0 * math.pi * frequency_hz
@@ -46,11 +50,15 @@ def shares(seeds: range, harmonics: int | None = None) -> tuple[float, float, np
         estimate = truncation_error(workspace, found.u, p)
         measures, truth = workspace.measure(found.u, p), converged(workspace, found.u, p)
         assert measures is not None
+        if truth is None:
+            lost += 1
+            continue
         for column, guess in ((MAX_ABS, estimate.max_abs), (HALF_RANGE, estimate.half_peak_to_peak)):
             error = abs(measures.values[column] - truth[column])
             above.append(error <= guess + ROUNDING * truth[column])
             if max(error, guess) > 10.0 * ROUNDING * truth[column]:
                 ratios.append(guess / error if error > 0.0 else math.inf)
+    assert lost <= 0.01 * len(seeds)
     known = np.array(ratios)
     return float(np.mean(above)), float(np.mean((known >= 1.0) & (known <= 10.0))), known
 

@@ -40,7 +40,7 @@ def accuracy_figure(study: Mapping[str, Any]) -> Figure:
         style.plain_log(axes.xaxis)
         axes.yaxis.set_major_locator(LogLocator(numticks=12))
         axes.yaxis.set_minor_formatter(NullFormatter())
-        style.label(axes, "time of a point by Newton's method [ms]", "relative error of max|x|")
+        style.label(axes, "processor time of a point by Newton's method [ms]", "relative error of max|x|")
         axes.set_title(
             f"{study['scene']} at {study['frequency_hz']:.6g} Hz: {units.length(study['reference'])};"
             " the numbers are harmonics"
