@@ -1,0 +1,93 @@
+"""The record of everything known of a response at one (u, ω, p); see `solver.kernels.stationary`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numba.experimental import structref
+
+from solver.fourier import Integer, Real, coefficient_count
+from solver.kernels.compiled import compiled
+from solver.kernels.events import SEGMENT_COLUMNS, segment_capacity
+from solver.kernels.jets import Jets, new_jets
+from solver.kernels.laws_columns import COLUMNS
+from solver.kernels.system import LOAD_COEFFICIENTS, System
+
+# Entries of `Summit.numbers`.
+NORM, AMPLITUDE, G, DA_DP, CURVE, DG_DP, TAU, DTAU, SIGN, CORNER, DRIFT, RATE = range(12)
+NUMBERS = 12
+
+
+class Summit(NamedTuple):
+    """Everything at one (u, ω, p); nt unknowns, nc contacts, n coefficients each."""
+
+    jets: Jets
+    F: Real  # (nc, n) forces less shift · u
+    dF_dU: Real  # (nc, n, n) likewise
+    dF_dN: Real  # (nc, n, 3)
+    dF_dkt: Real  # (nc, n)
+    dF_dmu: Real  # (nc, n)
+    dF_dp: Real  # (nc, n)
+    states: Integer  # (nc,)
+    counts: Integer  # (nc,) segments of each
+    pieces: Integer  # (nc,)
+    segments: Real  # (nc, capacity, columns)
+    table: Real  # (nc, COLUMNS) contacts at p, their loads, and both differentiated by p
+    load: Real  # (nc, 3)
+    slope: Real  # (nc, COLUMNS)
+    dload: Real  # (nc, 3)
+    jacobian: Real  # (nt, nt)
+    matrix: Real  # (nt, nt) scratch
+    rhs: Real  # (3, nt) the solutions of J x = r, dr/dω, dr/dp
+    adjoint: Real  # (1, nt) λ
+    h: Real  # (nt,) change of g by u
+    x: Real  # (n,) observed motion
+    dx: Real  # (n,) its derivative by ω along the response
+    along: Real  # (nc, n) derivative of F along the response
+    z: Real  # (ORDERS, nc, n) weights of the forces
+    numbers: Real  # (NUMBERS,)
+
+
+@structref.register
+class _SummitType(numba.types.StructRef):
+    """Numba's type of a `Summit` by reference."""
+
+
+class _SummitReference(structref.StructRefProxy):
+    """A `Summit` by reference."""
+
+
+structref.define_proxy(_SummitReference, _SummitType, list(Summit._fields))
+
+_new: Callable[..., Summit] = _SummitReference
+
+
+@compiled
+def new_summit(system: System) -> Summit:
+    """Return empty arrays for `system`."""
+    nc, n = system.shift.size, coefficient_count(system.ks)
+    nt, m = nc * n, LOAD_COEFFICIENTS
+    capacity = segment_capacity(max(system.ks[-1], system.load_ks[-1]))
+    return _new(
+        new_jets(system), np.zeros((nc, n)), np.zeros((nc, n, n)), np.zeros((nc, n, m)), np.zeros((nc, n)),
+        np.zeros((nc, n)), np.zeros((nc, n)), np.zeros(nc, np.int64), np.zeros(nc, np.int64),
+        np.zeros(nc, np.int64), np.zeros((nc, capacity, SEGMENT_COLUMNS)), np.zeros((nc, COLUMNS)),
+        np.zeros((nc, m)), np.zeros((nc, COLUMNS)), np.zeros((nc, m)), np.zeros((nt, nt)), np.zeros((nt, nt)),
+        np.zeros((3, nt)), np.zeros((1, nt)), np.zeros(nt), np.zeros(n), np.zeros(n), np.zeros((nc, n)),
+        np.zeros((5, nc, n)), np.zeros(NUMBERS),
+    )  # fmt: skip
+
+
+@compiled
+def summit_numbers(at: Summit) -> Real:
+    """Return the numbers of a summit as Python can read them (a view)."""
+    return at.numbers
+
+
+@compiled
+def summit_step(at: Summit) -> Real:
+    """Return the Newton step of a summit as Python can read it (a view)."""
+    return at.rhs[0]
