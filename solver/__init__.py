@@ -18,11 +18,14 @@ if TYPE_CHECKING:
     from solver.errors import Issue, SceneError, SettingError, SolverError
     from solver.floquet import Growth, Stability, branch_stability, stability
     from solver.histories import hysteresis_loop, motion, time_history
+    from solver.maps import MapStatus, ResponseMap, response_map
     from solver.marching import march
     from solver.mistuning import BladeAmplitudes, BladePeaks, blade_amplitudes, blade_peaks, mistuned
+    from solver.peak_tracks import LeastPeak, PeakTrack, TrackStatus
     from solver.response import Solution, SolutionStatus, solve
     from solver.scene import Scene, load_scene, shipped_scenes
     from solver.sectors import Extent, annulus, sectors_needed
+    from solver.tracking import least_peak, track_peak
 
 _HOME = {
     "AccuracyRow": "accuracy_cost", "AccuracyStudy": "accuracy_cost", "accuracy_study": "accuracy_cost",
@@ -38,6 +41,9 @@ _HOME = {
     "Extent": "sectors", "sectors_needed": "sectors", "annulus": "sectors",
     "march": "marching", "PowerBalance": "energy", "power_balance": "energy",
     "hysteresis_loop": "histories", "motion": "histories", "time_history": "histories",
+    "MapStatus": "maps", "ResponseMap": "maps", "response_map": "maps", "LeastPeak": "peak_tracks",
+    "PeakTrack": "peak_tracks", "TrackStatus": "peak_tracks", "least_peak": "tracking",
+    "track_peak": "tracking",
 }  # fmt: skip
 
 __all__ = [
@@ -53,10 +59,14 @@ __all__ = [
     "Extent",
     "Growth",
     "Issue",
+    "LeastPeak",
+    "MapStatus",
     "Peak",
+    "PeakTrack",
     "Plan",
     "PowerBalance",
     "Predictor",
+    "ResponseMap",
     "Scene",
     "SceneError",
     "SettingError",
@@ -64,6 +74,7 @@ __all__ = [
     "SolutionStatus",
     "SolverError",
     "Stability",
+    "TrackStatus",
     "accuracy_study",
     "annulus",
     "blade_amplitudes",
@@ -71,18 +82,21 @@ __all__ = [
     "branch_errors",
     "branch_stability",
     "hysteresis_loop",
+    "least_peak",
     "load_scene",
     "march",
     "mistuned",
     "motion",
     "plan",
     "power_balance",
+    "response_map",
     "sectors_needed",
     "shipped_scenes",
     "solve",
     "stability",
     "sweep",
     "time_history",
+    "track_peak",
 ]
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli import import_command, service_commands, solver_commands, submit_commands
+from service.cli import import_command, service_commands, solver_commands, submit_commands, track_commands
 from service.cli.failures import REPORTED, report
 from service.cli.inputs import join_variables
 
@@ -35,6 +35,8 @@ _SUBMITTED: tuple[Callable[..., None], ...] = (
 
 for _command in _ALONE:
     app.command()(_command)
+app.command(name="peaks")(track_commands.peaks)
+app.command(name="map")(track_commands.response_map)
 for _command in _SUBMITTED:
     _submit.command()(_command)
 _database.command()(service_commands.upgrade)

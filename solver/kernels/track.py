@@ -1,0 +1,232 @@
+"""A peak of the response followed over a parameter, by continuation with exact tangents.
+
+The parameter is followed in z, which is p or ln p. At an end of the band the frequency stays fixed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.fourier import Real
+from solver.kernels.climb import MOST, climb, find_summit
+from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.linear import copy_to
+from solver.kernels.summit import AMPLITUDE, CORNER, CURVE, DRIFT, RATE, SIGN, TAU, G, Summit
+from solver.kernels.system import System
+
+# Columns of a tracked peak.
+Z, P, OMEGA, HEIGHT, DHEIGHT, DOMEGA, PLACE, SLOPE, BEND, KINK = range(10)
+COLUMNS = 10
+# How a track ended.
+ARRIVED, VANISHED, LEFT_BAND, TOO_LONG, NOT_FOUND = range(5)
+
+
+class Ridge(NamedTuple):
+    """Settings of a track."""
+
+    start: float  # z
+    stop: float
+    logarithmic: bool  # z = ln p
+    low: float  # rad/s, the band
+    high: float
+    fixed: bool  # the frequency stays: an end of the band
+    first_step: float
+    largest_step: float
+    smallest_step: float
+    height_error: float  # relative error of the trapezoidal rule in a step
+    omega_error: float
+
+
+@compiled
+def value_of(z: float, logarithmic: bool) -> tuple[float, float]:
+    """Return p and dp/dz."""
+    if logarithmic:
+        p = math.exp(z)
+        return p, p
+    return z, 1.0
+
+
+@compiled
+def record(
+    ridge: Ridge, u: Real, omega: float, z: float, at: Summit, row: Real, solution: Real, tangent: Real
+) -> None:
+    """Write a peak with its derivatives by z into one row of the result."""
+    out_of_line()
+    p, by_z = value_of(z, ridge.logarithmic)
+    numbers = at.numbers
+    drift = 0.0 if ridge.fixed else numbers[DRIFT]
+    row[Z], row[P], row[OMEGA], row[HEIGHT], row[PLACE] = z, p, omega, numbers[AMPLITUDE], numbers[TAU]
+    row[DHEIGHT], row[DOMEGA] = numbers[RATE] * by_z, drift * by_z
+    row[SLOPE], row[BEND], row[KINK] = numbers[G], numbers[CURVE], numbers[CORNER]
+    copy_to(solution, u)
+    for i in range(u.size):
+        tangent[i] = -(at.rhs[2, i] + at.rhs[1, i] * drift) * by_z
+
+
+@compiled
+def between_rows(
+    left: Real, right: Real, u_left: Real, u_right: Real, du_left: Real, du_right: Real, z: float, u: Real
+) -> float:
+    """Fill `u` with the cubic through two rows (also beyond them) at `z`; return ω there."""
+    length = right[Z] - left[Z]
+    t = (z - left[Z]) / length
+    r = 1.0 - t
+    value0, value1 = (1.0 + 2.0 * t) * r * r, t * t * (3.0 - 2.0 * t)
+    slope0, slope1 = t * r * r * length, -t * t * r * length
+    for i in range(u.size):
+        u[i] = value0 * u_left[i] + value1 * u_right[i] + slope0 * du_left[i] + slope1 * du_right[i]
+    return value0 * left[OMEGA] + value1 * right[OMEGA] + slope0 * left[DOMEGA] + slope1 * right[DOMEGA]
+
+
+@compiled
+def _correct(
+    system: System, ridge: Ridge, u: Real, omega: float, p: float, tau: float, corner: bool, reach: float,
+    at: Summit,
+) -> tuple[bool, int, float]:  # fmt: skip
+    """Find the peak from a prediction: Newton's method, and at a corner or where it fails uphill."""
+    iterations = 0
+    if not corner:
+        kept = u.copy()
+        good, iterations, found = find_summit(system, u, omega, p, tau, ridge.fixed, at)
+        if good or ridge.fixed:
+            return good, iterations, found
+        copy_to(u, kept)
+    low, high = max(omega - reach, ridge.low), min(omega + reach, ridge.high)
+    if not low < omega < high:
+        return False, iterations, omega
+    good, found = climb(system, u, omega, p, tau, 1e-2 * reach, low, high, at)
+    return good, iterations, found
+
+
+@compiled
+def _predict(
+    rows: Real, solutions: Real, tangents: Real, count: int, smooth: bool, z: float, guess: Real
+) -> float:
+    """Fill `guess` with the prediction at `z` from the last rows; return the predicted ω."""
+    out_of_line()
+    here = rows[count - 1]
+    length = z - here[Z]
+    if smooth and abs(length) < 3.0 * abs(here[Z] - rows[count - 2, Z]):
+        return between_rows(
+            rows[count - 2], here, solutions[count - 2], solutions[count - 1], tangents[count - 2],
+            tangents[count - 1], z, guess,
+        )  # fmt: skip
+    for i in range(guess.size):
+        guess[i] = solutions[count - 1, i] + length * tangents[count - 1, i]
+    return here[OMEGA] + length * here[DOMEGA]
+
+
+@compiled
+def track(
+    system: System, ridge: Ridge, u: Real, omega: float, tau: float, sign: float, at: Summit,
+    rows: Real, solutions: Real, tangents: Real,
+) -> tuple[int, int]:  # fmt: skip
+    """Follow one peak from `ridge.start` to `ridge.stop`.
+
+    Parameters
+    ----------
+    u, omega, tau, sign : near the peak at the start; sign 0 lets the larger of max x and −min x be chosen.
+    rows : (most, COLUMNS); solutions, tangents : (most, nt) u and du/dz; filled.
+
+    Returns
+    -------
+    (how it ended, number of rows).
+    """
+    out_of_line()
+    n, most = u.size, rows.shape[0]
+    at.numbers[SIGN] = sign
+    trial, guess = u.copy(), np.empty(n)
+    p, _ = value_of(ridge.start, ridge.logarithmic)
+    good, _, omega = _correct(system, ridge, trial, omega, p, tau, False, 2e-3 * omega, at)
+    if not good:
+        return NOT_FOUND, 0
+    record(ridge, trial, omega, ridge.start, at, rows[0], solutions[0], tangents[0])
+    if ridge.start == ridge.stop:
+        return ARRIVED, 1
+    forward = 1.0 if ridge.stop >= ridge.start else -1.0
+    count, step, smooth = 1, ridge.first_step, False
+    while count < most:
+        here = rows[count - 1]
+        z = here[Z] + forward * step
+        last = (z - ridge.stop) * forward >= 0.0 or abs(z - ridge.stop) < 0.1 * ridge.smallest_step
+        if last:
+            z = ridge.stop
+        length = z - here[Z]
+        predicted = _predict(rows, solutions, tangents, count, smooth, z, guess)
+        p, _ = value_of(z, ridge.logarithmic)
+        reach = 3.0 * abs(predicted - here[OMEGA]) + 1e-3 * here[OMEGA]
+        copy_to(trial, guess)
+        good, iterations, omega = False, MOST, predicted
+        if ridge.low <= predicted <= ridge.high:
+            good, iterations, omega = _correct(
+                system, ridge, trial, predicted, p, here[PLACE], here[KINK] > 0.0, reach, at
+            )
+        error = np.inf
+        if good and ridge.low <= omega <= ridge.high:
+            record(ridge, trial, omega, z, at, rows[count], solutions[count], tangents[count])
+            error = step_error(ridge, here, rows[count])
+        if not error <= 1.0:
+            outside = not (ridge.low <= predicted <= ridge.high) or (
+                good and not ridge.low <= omega <= ridge.high
+            )
+            step, smooth = 0.5 * abs(length), False
+            if step < ridge.smallest_step:
+                return (LEFT_BAND if outside else VANISHED), count
+            continue
+        growth = min(2.0, max(0.5, 0.8 * (error + 1e-3) ** (-1.0 / 3.0)))
+        if iterations > 4:
+            growth = min(growth, 0.8)
+        step, smooth = min(abs(length) * growth, ridge.largest_step), True
+        count += 1
+        if last:
+            return ARRIVED, count
+    return TOO_LONG, count
+
+
+@compiled
+def step_error(ridge: Ridge, left: Real, right: Real) -> float:
+    """Return how far two rows are from fitting together, 1 being the most allowed.
+
+    The derivatives at both ends give each end from the other by the trapezoidal rule: another peak, or a step
+    too long for cubics to predict what lies between, does not fit.
+    """
+    length = right[Z] - left[Z]
+    height = abs(right[HEIGHT] - left[HEIGHT] - 0.5 * length * (left[DHEIGHT] + right[DHEIGHT]))
+    height /= ridge.height_error * max(left[HEIGHT], right[HEIGHT])
+    omega = abs(right[OMEGA] - left[OMEGA] - 0.5 * length * (left[DOMEGA] + right[DOMEGA]))
+    omega /= ridge.omega_error * left[OMEGA]
+    if not math.isfinite(height + omega):
+        return np.inf
+    return max(height, omega)
+
+
+@compiled
+def polish(
+    system: System, ridge: Ridge, left: int, z: float, sign: float, at: Summit, rows: Real, solutions: Real,
+    tangents: Real, row: Real, solution: Real, tangent: Real,
+) -> bool:  # fmt: skip
+    """Find the tracked peak itself at `z`, guessed between rows `left` and `left` + 1.
+
+    Parameters
+    ----------
+    rows, solutions, tangents : of `track`.
+    row (COLUMNS,), solution (nt,), tangent (nt,) : the peak there, filled.
+    """
+    out_of_line()
+    at.numbers[SIGN] = sign
+    u = np.empty(solution.size)
+    here, ahead = rows[left], rows[left + 1]
+    omega = between_rows(
+        here, ahead, solutions[left], solutions[left + 1], tangents[left], tangents[left + 1], z, u
+    )
+    p, _ = value_of(z, ridge.logarithmic)
+    tau, corner = here[PLACE], here[KINK] > 0.0 and ahead[KINK] > 0.0
+    reach = 3.0 * abs(ahead[OMEGA] - here[OMEGA]) + 1e-4 * omega
+    good, _, omega = _correct(system, ridge, u, omega, p, tau, corner, reach, at)
+    if not good:
+        return False
+    record(ridge, u, omega, z, at, row, solution, tangent)
+    return max(step_error(ridge, here, row), step_error(ridge, row, ahead)) <= 2.0

@@ -1,0 +1,170 @@
+"""Tracked peaks: what `solver.tracking` returns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from solver.fourier import Real
+
+
+class TrackStatus(Enum):
+    """How tracking ended; the value is a sentence a user can act on."""
+
+    TRACKED = "The peaks were tracked over the whole range; every sweep made to check found nothing higher."
+    GAPS = "Somewhere in the range no peak could be tracked: use a shorter range or more harmonics."
+    UNPROVEN = "The sweeps went on finding higher peaks: use a shorter range, or compare sweeps of your own."
+    OTHER_BRANCH = (
+        "The highest tracked peak is on a response that a sweep does not reach: compare sweeps of your own."
+    )
+    NO_RESPONSE = "No frequency response could be computed: start somewhere else, or use more harmonics."
+    STOPPED = "The tracking was stopped by the caller."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActivePeak:
+    """A peak that is highest at the optimum.
+
+    Attributes
+    ----------
+    frequency : float
+        Hz.
+    value : float
+        m.
+    slope : float
+        d value / d parameter.
+    """
+
+    frequency: float
+    value: float
+    slope: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeastPeak:
+    """Where the highest peak is least.
+
+    Attributes
+    ----------
+    status : TrackStatus
+        TRACKED only if it is proven.
+    at : float
+        The value of the parameter (NaN without a response).
+    peak : float
+        The highest peak there [m].
+    active : tuple of ActivePeak
+        The peaks that are equally high there, highest first.
+    sweeps : int
+        Frequency responses computed.
+    seconds : float
+        Time in all.
+    """
+
+    status: TrackStatus
+    at: float
+    peak: float
+    active: tuple[ActivePeak, ...]
+    sweeps: int
+    seconds: float
+
+    def to_json(self) -> dict[str, object]:
+        """Return the optimum as one JSON object."""
+        active = [{"frequency": a.frequency, "value": a.value, "slope": a.slope} for a in self.active]
+        return {"at": _number(self.at), "peak": _number(self.peak), "active": active}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CompetingPeak:
+    """One peak over the parameter, in the direction of the range.
+
+    Attributes
+    ----------
+    parameter, peak, frequency, slope : (P,) arrays
+        Values of the parameter, height [m], frequency [Hz], d height / d parameter.
+    ends : (str, str)
+        Why it begins and ends where it does.
+    at_band_end : bool
+        The amplitude at an end of the band instead of a stationary peak.
+    """
+
+    parameter: Real
+    peak: Real
+    frequency: Real
+    slope: Real
+    ends: tuple[str, str]
+    at_band_end: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PeakTrack:
+    """The highest peak over a parameter.
+
+    Attributes
+    ----------
+    scene, parameter_path, unit : str
+        Name of the scene, path and unit of the parameter.
+    parameter, peak, frequency, slope : (P,) arrays
+        Values of the parameter from start to stop, highest peak [m], its frequency [Hz], its derivative by
+        the parameter; where two peaks change places both are listed.
+    optimum : LeastPeak
+        Where the peak is least.
+    competing : tuple of CompetingPeak
+        Every peak that was followed.
+    exchanges : tuple of (float, float)
+        Values of the parameter where another peak becomes the highest, and the height there.
+    status : TrackStatus
+        How it ended.
+    """
+
+    scene: str
+    parameter_path: str
+    unit: str
+    parameter: Real
+    peak: Real
+    frequency: Real
+    slope: Real
+    optimum: LeastPeak
+    competing: tuple[CompetingPeak, ...]
+    exchanges: tuple[tuple[float, float], ...]
+    n_harmonics: int
+    sweeps: int
+    status: TrackStatus
+    seconds: float
+
+    @property
+    def completed(self) -> bool:
+        """Whether the whole range was covered and checked."""
+        return self.status is TrackStatus.TRACKED
+
+    def to_json(self) -> dict[str, object]:
+        """Return the track as one JSON object."""
+        return {
+            "scene": self.scene,
+            "parameter": self.parameter.tolist(),
+            "parameter_path": self.parameter_path,
+            "unit": self.unit,
+            "peak": self.peak.tolist(),
+            "frequency": self.frequency.tolist(),
+            "slope": self.slope.tolist(),
+            "optimum": self.optimum.to_json(),
+            "exchanges": [{"at": at, "peak": peak} for at, peak in self.exchanges],
+            "competing": [
+                {
+                    "parameter": line.parameter.tolist(), "peak": line.peak.tolist(),
+                    "frequency": line.frequency.tolist(), "ends": list(line.ends),
+                    "at_band_end": line.at_band_end,
+                }
+                for line in self.competing
+            ],
+            "n_harmonics": self.n_harmonics,
+            "sweeps": self.sweeps,
+            "seconds": self.seconds,
+            "completed": self.completed,
+            "status": self.status.value,
+        }  # fmt: skip
+
+
+def _number(value: float) -> float | None:
+    """Return a float that JSON can carry (null for NaN)."""
+    return value if math.isfinite(value) else None

@@ -1,0 +1,290 @@
+"""Peaks of the frequency response as lines over a parameter: found by sweeps, followed by continuation.
+
+A tracked peak is an attained amplitude at every value of the parameter, so the highest of all lines bounds
+the highest peak from below everywhere; a sweep shows what no line has reached yet.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from solver import fourier
+from solver.balance import build
+from solver.branch import Branch, Peak
+from solver.continuation import sweep
+from solver.errors import SettingError
+from solver.fourier import Integer, Real
+from solver.kernels import track as kernel
+from solver.kernels.laws_columns import COULOMB
+from solver.kernels.summit import SIGN, Summit, new_summit, summit_numbers
+from solver.kernels.system import System, by_reference
+from solver.kernels.track import (
+    COLUMNS,
+    DHEIGHT,
+    DOMEGA,
+    HEIGHT,
+    OMEGA,
+    PLACE,
+    SLOPE,
+    Ridge,
+    Z,
+    polish,
+    track,
+)
+from solver.savings import Effects
+from solver.scale import scale_of
+from solver.scene import Scene
+
+SAME = (
+    1e-3  # relative distance, in height and a fifth of it in frequency, within which two peaks are the same
+)
+_MOST_ROWS = 600
+_FIRST_STEP, _LARGEST_STEP, _SMALLEST_STEP = 0.02, 0.125, 1e-4  # shares of the range
+_HEIGHT_ERROR, _OMEGA_ERROR = 3e-3, 1e-3
+
+
+class LineEnd(Enum):
+    """Why a line ends where it does; the value is what a user reads."""
+
+    ARRIVED = "the end of the range"
+    VANISHED = "the peak vanishes"
+    LEFT_BAND = "the peak leaves the band"
+    TOO_LONG = "too many steps"
+    NOT_FOUND = "not found again"
+
+
+_ENDS = {
+    kernel.ARRIVED: LineEnd.ARRIVED,
+    kernel.VANISHED: LineEnd.VANISHED,
+    kernel.LEFT_BAND: LineEnd.LEFT_BAND,
+    kernel.TOO_LONG: LineEnd.TOO_LONG,
+    kernel.NOT_FOUND: LineEnd.NOT_FOUND,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """One peak over the parameter, ascending in z (the parameter or its logarithm).
+
+    Attributes
+    ----------
+    rows : (P, COLUMNS) array
+        Columns named in `solver.kernels.track`; derivatives are by z.
+    solutions, tangents : (P, n_unknowns) array
+        Slip motions [m] and their derivatives by z.
+    sign : float
+        1 for a peak of max x, −1 for one of −min x.
+    fixed : bool
+        The amplitude at an end of the band, not a stationary peak.
+    ends : (LineEnd, LineEnd)
+        Why it ends below and above.
+    """
+
+    rows: Real
+    solutions: Real
+    tangents: Real
+    sign: float
+    fixed: bool
+    ends: tuple[LineEnd, LineEnd]
+
+    @property
+    def low(self) -> float:
+        """Smallest z it covers."""
+        return float(self.rows[0, Z])
+
+    @property
+    def high(self) -> float:
+        """Largest z it covers."""
+        return float(self.rows[-1, Z])
+
+    def heights(self, z: Real) -> Real:
+        """Return the height by cubics between the rows; −inf beyond the line."""
+        return self._cubic(z, HEIGHT, DHEIGHT)
+
+    def frequencies(self, z: Real) -> Real:
+        """Return ω likewise [rad/s]."""
+        return self._cubic(z, OMEGA, DOMEGA)
+
+    def _cubic(self, z: Real, value: int, slope: int) -> Real:
+        rows = self.rows
+        if len(rows) == 1:
+            return np.where(z == rows[0, Z], rows[0, value], -np.inf)
+        right = np.clip(np.searchsorted(rows[:, Z], z), 1, len(rows) - 1)
+        a, b = rows[right - 1], rows[right]
+        length = b[:, Z] - a[:, Z]
+        t = (z - a[:, Z]) / length
+        r = 1.0 - t
+        cubic = (1.0 + 2.0 * t) * r * r * a[:, value] + t * t * (3.0 - 2.0 * t) * b[:, value]
+        cubic += t * r * length * (r * a[:, slope] - t * b[:, slope])
+        return np.where((z >= self.low) & (z <= self.high), cubic, -np.inf)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Look:
+    """One sweep over the band at one z; surprising if it found what no line had reached."""
+
+    z: float
+    branch: Branch
+    surprising: bool
+
+    @property
+    def top(self) -> float:
+        """The highest peak [m]; −inf if there is none."""
+        return self.branch.peaks[0].value if self.branch.peaks else -math.inf
+
+
+class Tracker:
+    """Sweeps and lines of one scene and parameter; the arrays of the compiled loops are its own."""
+
+    def __init__(
+        self, scene: Scene, parameter: str, start: float, stop: float, harmonics: int, effects: Effects | None
+    ) -> None:
+        self.scale = scale_of(scene, parameter, start, stop)
+        self.balance = build(
+            scene, parameter, harmonics=harmonics, frequency_hz=scene.observe.band[0], effects=effects
+        )
+        if (self.balance.system.laws != COULOMB).any() or self.balance.system.samples > 0:
+            raise SettingError(
+                "parameter", parameter, "is tracked with exact contact forces of friction contacts only"
+            )
+        self._effects = effects
+        self.lines: list[Line] = []
+        self.looks: list[Look] = []
+        self._scene, self._harmonics = self.balance.scene, harmonics
+        self._system: System = by_reference(self.balance.system)
+        self._summit: Summit = new_summit(self._system)
+
+    def look(self, z: float, share: float) -> Look:
+        """Sweep at z, and follow every peak above `share` of the highest that is on no line yet."""
+        path = self.balance.parameter.path
+        branch = sweep(
+            self._scene.with_values({path: self.scale.outside(z)}), harmonics=self._harmonics,
+            effects=self._effects,
+        )  # fmt: skip
+        top = branch.peaks[0].value if branch.peaks else -math.inf
+        higher = bool(self.lines) and top > float(self.envelope(np.array([z]))[0]) * (1.0 + SAME)
+        look = Look(z=z, branch=branch, surprising=higher)
+        self.looks.append(look)
+        for peak in branch.peaks:
+            if peak.value >= share * look.top and not self.known(z, peak):
+                self._follow(z, peak, branch.balance.system.ks)
+        return look
+
+    def known(self, z: float, peak: Peak) -> bool:
+        """Return whether a peak at z is on a line."""
+        omega, here = 2.0 * math.pi * peak.at, np.array([z])
+        for line in self.lines:
+            near = abs(line.frequencies(here)[0] - omega) <= 0.2 * SAME * omega
+            if near and abs(line.heights(here)[0] - peak.value) <= SAME * peak.value:
+                return True
+        return False
+
+    def envelope(self, z: Real) -> Real:
+        """Return the height of the highest line; −inf where there is none."""
+        heights = [line.heights(z) for line in self.lines]
+        return np.max(heights, axis=0) if heights else np.full(z.size, -np.inf)
+
+    def exact(self, line: Line, z: float) -> Real | None:
+        """Return the row of a line at z, solved; None if it is not found there."""
+        same = np.flatnonzero(line.rows[:, Z] == z)
+        if same.size:
+            exact_row: Real = line.rows[same[0]]
+            return exact_row
+        if not line.low < z < line.high:
+            return None
+        left = int(np.searchsorted(line.rows[:, Z], z)) - 1
+        row, nt = np.zeros(COLUMNS), self.balance.n_unknowns
+        good = polish(
+            self._system, self._ridge(line.low, line.high, fixed=line.fixed), left, z, line.sign,
+            self._summit, line.rows, line.solutions, line.tangents, row, np.zeros(nt), np.zeros(nt),
+        )  # fmt: skip
+        return row if good else None
+
+    def _follow(self, z: float, peak: Peak, ks: Integer) -> None:
+        """Follow a peak from z to both ends of the range."""
+        band = self._scene.observe.band
+        at_end = min(abs(peak.at - end) for end in band) <= 1e-9 * band[1]
+        if not peak.interior and not at_end:
+            return
+        u = self._fitted(peak.solution, ks)
+        self._draw(z, 2.0 * math.pi * peak.at, u, (0.0, 0.0), fixed=not peak.interior)
+
+    def _draw(self, z: float, omega: float, u: Real, extremum: tuple[float, float], *, fixed: bool) -> None:
+        """Add the line through a peak; `extremum` is its sign (0: the larger of the two) and place."""
+        up = self._track(z, self.scale.high, omega, u, extremum, fixed=fixed)
+        down = self._track(z, self.scale.low, omega, u, extremum, fixed=fixed)
+        if len(up[1]) == 0 or len(down[1]) == 0:
+            return
+        line = Line(
+            rows=np.concatenate([down[1][:0:-1], up[1]]), solutions=np.concatenate([down[2][:0:-1], up[2]]),
+            tangents=np.concatenate([down[3][:0:-1], up[3]]), sign=up[4], fixed=fixed, ends=(down[0], up[0]),
+        )  # fmt: skip
+        self.lines.append(line)
+        for end, row in zip(line.ends, (0, -1), strict=True):
+            if end is LineEnd.LEFT_BAND:
+                edge = min(self._band, key=lambda omega: abs(omega - line.rows[row, OMEGA]))
+                extremum = line.sign, float(line.rows[row, PLACE])
+                self._draw(float(line.rows[row, Z]), edge, line.solutions[row].copy(), extremum, fixed=True)
+        if fixed:
+            self._enter(line)
+
+    def _enter(self, line: Line) -> None:
+        """Follow the peak that comes in at an end of the band: there the amplitude begins to fall outward."""
+        outward = 1.0 if line.rows[0, OMEGA] > 0.5 * sum(self._band) else -1.0
+        inward = np.flatnonzero(line.rows[:, SLOPE] * outward < 0.0)
+        if inward.size == 0 or inward.size == len(line.rows):
+            return
+        begin = inward[0] if inward[0] > 0 else inward[np.flatnonzero(np.diff(inward, append=-1) != 1)[0]]
+        row = line.rows[begin]
+        z, omega, u = float(row[Z]), float(row[OMEGA]), line.solutions[begin].copy()
+        for other in self.lines:
+            if not other.fixed and abs(other.frequencies(np.array([z]))[0] - omega) <= 2.0 * SAME * omega:
+                return
+        self._draw(z, omega, u, (line.sign, float(row[PLACE])), fixed=False)
+
+    @property
+    def _band(self) -> tuple[float, float]:
+        low, high = self._scene.observe.band
+        return 2.0 * math.pi * low, 2.0 * math.pi * high
+
+    def _ridge(self, start: float, stop: float, *, fixed: bool) -> Ridge:
+        low, high = self._band
+        return Ridge(
+            start=start, stop=stop, logarithmic=self.scale.logarithmic, low=low, high=high, fixed=fixed,
+            first_step=_FIRST_STEP * self.scale.span, largest_step=_LARGEST_STEP * self.scale.span,
+            smallest_step=_SMALLEST_STEP * self.scale.span, height_error=_HEIGHT_ERROR,
+            omega_error=_OMEGA_ERROR,
+        )  # fmt: skip
+
+    def _track(
+        self, start: float, stop: float, omega: float, u: Real, extremum: tuple[float, float], *, fixed: bool
+    ) -> tuple[LineEnd, Real, Real, Real, float]:
+        """Follow a peak one way; return why it ended, its rows, solutions, tangents and its sign."""
+        nt = self.balance.n_unknowns
+        rows = np.zeros((_MOST_ROWS, COLUMNS))
+        solutions, tangents = np.zeros((_MOST_ROWS, nt)), np.zeros((_MOST_ROWS, nt))
+        ridge = self._ridge(start, stop, fixed=fixed)
+        code, count = track(
+            self._system, ridge, u, omega, extremum[1], extremum[0], self._summit, rows, solutions, tangents
+        )
+        found = float(summit_numbers(self._summit)[SIGN])
+        return (
+            _ENDS[code], rows[:count].copy(), solutions[:count].copy(), tangents[:count].copy(), found,
+        )  # fmt: skip
+
+    def _fitted(self, solution: Real, ks: Integer) -> Real:
+        """Return a solution of a sweep with the harmonics kept here."""
+        mine, n = self.balance.system.ks, self.balance.n_coefficients
+        if np.array_equal(ks, mine):
+            return solution.copy()
+        top = int(max(ks[-1], mine[-1]))
+        full = fourier.to_full(solution.reshape(-1, 2 * ks.size - int(ks[0] == 0)), ks, top)
+        columns = [0] if mine[0] == 0 else []
+        for k in mine[mine > 0]:
+            columns += [2 * int(k) - 1, 2 * int(k)]
+        fitted: Real = np.ascontiguousarray(full[:, columns]).reshape(-1)
+        return fitted if fitted.size == n * (self.balance.n_unknowns // max(n, 1)) else solution.copy()
