@@ -6,6 +6,7 @@ import math
 import time
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import pairwise
 
 import numpy as np
 
@@ -265,7 +266,7 @@ def contact_responses(workspace: Workspace, u: Real, p: float) -> tuple[ContactR
     ks, top = balance.system.ks, balance.n_harmonics
     slips = fourier.to_full(u.reshape(balance.n_ports, balance.n_coefficients), ks, top)
     forces = fourier.to_full(point.F, ks, top)
-    ports = np.split(np.arange(balance.n_ports), balance.system.first_port[1:-1])
+    ports = [slice(first, end) for first, end in pairwise(balance.system.first_port)]
     return tuple(
         _contact(contact, int(state), slips[port], forces[port])
         for contact, state, port in zip(balance.scene.contacts, point.states, ports, strict=True)
