@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from solver.mistuning import BladeAmplitudes, BladePeaks, blade_amplitudes, blade_peaks, mistuned
     from solver.peak_tracks import LeastPeak, PeakTrack, TrackStatus
     from solver.response import Solution, SolutionStatus, solve
+    from solver.savings import Effects
     from solver.scene import Scene, load_scene, shipped_scenes
     from solver.sectors import Extent, annulus, sectors_needed
     from solver.tracking import least_peak, track_peak
@@ -33,7 +34,8 @@ _HOME = {
     "Band": "branch", "Branch": "branch", "BranchStatus": "branch", "Peak": "branch",
     "ContinuationSettings": "continuation", "Predictor": "continuation", "sweep": "continuation",
     "Issue": "errors", "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
-    "Plan": "effects", "plan": "effects", "Scene": "scene", "load_scene": "scene", "shipped_scenes": "scene",
+    "Effects": "savings", "Plan": "effects", "plan": "effects",
+    "Scene": "scene", "load_scene": "scene", "shipped_scenes": "scene",
     "Solution": "response", "SolutionStatus": "response", "solve": "response",
     "Growth": "floquet", "Stability": "floquet", "branch_stability": "floquet", "stability": "floquet",
     "BladePeaks": "mistuning", "blade_peaks": "mistuning",
@@ -55,6 +57,7 @@ __all__ = [
     "Branch",
     "BranchStatus",
     "ContinuationSettings",
+    "Effects",
     "ErrorEstimate",
     "Extent",
     "Growth",

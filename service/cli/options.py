@@ -44,6 +44,14 @@ Accuracy = Annotated[
         help="Estimated error relative to the amplitude; chooses the harmonics, in place of --harmonics.",
     ),
 ]  # fmt: skip
+Effects = Annotated[
+    str,
+    typer.Option(
+        "--effects", metavar="auto|all|NAME,…",
+        help="What to pay for though the scene does not call for it: even-harmonics, every-contact, "
+        "every-sector, whole-matrices.",
+    ),
+]  # fmt: skip
 Parameter = Annotated[
     str, typer.Option("--parameter", metavar="PATH", help="What is swept: frequency, shroud.N0, …")
 ]

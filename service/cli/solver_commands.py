@@ -30,12 +30,14 @@ def plan(
     name: options.Scene,
     values: options.Values = None,
     harmonics: options.Harmonics = 11,
+    effects: options.Effects = "auto",
     as_json: options.Json = False,
 ) -> None:
     """Say which effects a scene calls for, and why."""
     import solver
 
-    found = solver.plan(inputs.scene(name, values), harmonics=harmonics)
+    asked = solver.Effects.read(effects)
+    found = solver.plan(inputs.scene(name, values), harmonics=harmonics, effects=asked)
     if as_json:
         print_json(found.to_json())
     else:
@@ -48,6 +50,7 @@ def solve(
     values: options.Values = None,
     harmonics: options.Harmonics = 11,
     accuracy: options.Accuracy = None,
+    effects: options.Effects = "auto",
     plot: options.Plot = None,
     as_json: options.Json = False,
 ) -> None:
@@ -55,9 +58,11 @@ def solve(
     import solver
 
     picture = inputs.output_path("--plot", plot, SUFFIXES)
-    scene = inputs.scene(name, values)
+    scene, asked = inputs.scene(name, values), solver.Effects.read(effects)
     with patience():
-        solution = solver.solve(scene, frequency_hz=frequency, harmonics=harmonics, accuracy=accuracy)
+        solution = solver.solve(
+            scene, frequency_hz=frequency, harmonics=harmonics, accuracy=accuracy, effects=asked
+        )
     if solution.converged and picture is not None:
         from service.plots.motion import Motion, motion_figure
         from service.plots.style import save
@@ -80,6 +85,7 @@ def sweep(
     limit: options.Limit = None,
     harmonics: options.Harmonics = 11,
     accuracy: options.Accuracy = None,
+    effects: options.Effects = "auto",
     plot: options.Plot = None,
     as_json: options.Json = False,
 ) -> None:
@@ -90,11 +96,11 @@ def sweep(
     import solver
 
     picture = inputs.output_path("--plot", plot, SUFFIXES)
-    scene = inputs.scene(name, values)
+    scene, asked = inputs.scene(name, values), solver.Effects.read(effects)
     with inputs.path_of("--parameter"), bar("sweep") as on_progress:
         branch = solver.sweep(
             scene, parameter, start, stop, harmonics=harmonics, accuracy=accuracy, frequency_hz=frequency,
-            limit=limit, on_progress=on_progress,
+            limit=limit, effects=asked, on_progress=on_progress,
         )  # fmt: skip
     if picture is not None and len(branch.values):
         from service.plots.curves import Response
