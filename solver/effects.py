@@ -134,7 +134,7 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
             _stiffness_shift(balance.system.shift),
         ),
         unknowns=n,
-        linear_dofs=_linear_dofs(scene),
+        linear_dofs=_linear_dofs(balance.scene),
         contacts=len(balance.scene.contacts),
         harmonics=harmonics,
         seconds_a_point=_ITERATIONS_A_POINT * iteration,

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from scene_cases import bladed_disk, critically_damped, loose_mass, mixed_disk, oscillator, two_dof
 
-from solver import Plan, Scene, SettingError, plan
+from solver import Effects, Plan, Scene, SettingError, plan
 from solver.balance import build
 
 
@@ -44,6 +44,8 @@ def test_condensation():
 
 
 def test_one_sector_stands_for_the_annulus():
+    whole = plan(bladed_disk(), effects=Effects(every_sector=True))
+    assert (whole.linear_dofs, whole.contacts) == (8 * 4, 8 * 2)
     assert effect(bladed_disk(), "one sector for the annulus").used
     assert "8" in effect(bladed_disk(), "one sector for the annulus").reason
     assert not effect(two_dof(), "one sector for the annulus").used
