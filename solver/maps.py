@@ -15,6 +15,7 @@ from solver.errors import SettingError
 from solver.fourier import Integer, Real
 from solver.kernels.rows import GIVEN, MAX_ABS, RESIDUAL, ROW_VALUES, SOLVED, solve_row
 from solver.peak_tracks import PeakTrack
+from solver.ridges import check_laws
 from solver.savings import Effects
 from solver.scale import scale_of
 from solver.scene import Scene
@@ -126,14 +127,16 @@ def response_map(
     Raises
     ------
     SettingError
-        A bad path, range, grid or number of harmonics.
+        A bad path, range, grid or number of harmonics, or a ridge asked for that cannot be tracked.
     """
     begun = time.perf_counter()
     for name, value in (("steps", steps), ("frequencies", frequencies)):
         if isinstance(value, bool) or not isinstance(value, int) or value < 2:
             raise SettingError(name, value, "must be a whole number >= 2")
     if steps * frequencies > MOST_POINTS:
-        raise SettingError("steps", steps, f"times `frequencies` must be at most {MOST_POINTS}")
+        raise SettingError("steps", steps, f"times the frequencies must be at most {MOST_POINTS}")
+    if ridge:
+        check_laws(scene)
     scale = scale_of(scene, parameter, start, stop)
     values = scale.spaced(steps)
     band = np.linspace(*scene.observe.band, frequencies)

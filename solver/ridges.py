@@ -15,6 +15,7 @@ import numpy as np
 from solver import fourier
 from solver.balance import build
 from solver.branch import Branch, Peak
+from solver.contact_rows import law_numbers
 from solver.continuation import sweep
 from solver.errors import SettingError
 from solver.fourier import Integer, Real
@@ -137,6 +138,23 @@ class Look:
         return self.branch.peaks[0].value if self.branch.peaks else -math.inf
 
 
+def check_laws(scene: Scene) -> None:
+    """Refuse contacts whose force has no exact second derivatives here.
+
+    Raises
+    ------
+    SettingError
+        A contact that is not elastic Coulomb friction under a given load.
+    """
+    laws = law_numbers(scene)
+    others = [contact.name for contact, law in zip(scene.contacts, laws, strict=True) if law != COULOMB]
+    if others:
+        wanted = (
+            f"has contacts with another law than coulomb ({', '.join(others)}), so its peaks are not tracked"
+        )
+        raise SettingError("scene", scene.name, f"{wanted}: use sweeps, or a map without the ridge")
+
+
 class Tracker:
     """Sweeps and lines of one scene and parameter; the arrays of the compiled loops are its own."""
 
@@ -147,10 +165,7 @@ class Tracker:
         self.balance = build(
             scene, parameter, harmonics=harmonics, frequency_hz=scene.observe.band[0], effects=effects
         )
-        if (self.balance.system.laws != COULOMB).any() or self.balance.system.samples > 0:
-            raise SettingError(
-                "parameter", parameter, "is tracked with exact contact forces of friction contacts only"
-            )
+        check_laws(self.balance.scene)
         self._effects = effects
         self.lines: list[Line] = []
         self.looks: list[Look] = []

@@ -155,6 +155,8 @@ def test_bad_scenes_are_named(run: Run, tmp_path: Path, command: str, case: str)
         ("solve two-dof --frequency 1 --set bumper.N0=5", ["--set", "bumper.N0", "damper.N0"]),
         ("solve two-dof --frequency 1 --plot picture.gif", ["--plot", "picture.gif", ".png"]),
         ("solve two-dof --frequency 1 --plot nowhere/picture.png", ["--plot", "nowhere"]),
+        ("solve two-dof --frequency 1 --effects most", ["--effects", "most", "even-harmonics"]),
+        ("plan two-dof --effects most", ["--effects", "most", "every-sector"]),
         ("sweep two-dof --from 1 --to 1", ["--to", "1.0"]),
         ("sweep two-dof --from 0 --to 1", ["--from", "0.0"]),
         ("sweep two-dof --limit -1", ["--limit", "-1.0"]),

@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import solver
 from service.cli import main
+from service.plots.tracks import ridge_lines
 
 PEAKS = ["peaks", "two-dof", "--parameter", "damper.N0", "--from", "80", "--to", "130", "--checks", "0"]
 MAP = [
@@ -66,11 +69,49 @@ def test_pictures_are_written(
     [
         ("peaks two-dof --parameter damper.N7 --from 1 --to 2", "damper.N7"),
         ("peaks two-dof --parameter damper.N0 --from 5 --to 5", "differ"),
-        ("peaks two-dof --parameter frequency --from 1 --to 2", "frequency"),
-        ("map two-dof --parameter damper.N0 --from 1 --to 2 --steps 1", "steps"),
+        ("peaks two-dof --parameter frequency --from 1 --to 2", "`--parameter`"),
+        ("peaks two-dof --parameter damper.N0 --from 1 --to 2 --checks -1", "`--checks`"),
+        ("map two-dof --parameter damper.N0 --from 1 --to 2 --steps 1", "`--steps`"),
+        ("map two-dof --parameter damper.N0 --from 1 --to 2 --frequencies 1", "`--frequencies`"),
+        ("map two-dof --parameter damper.N0 --from 1 --to 2 --steps 4001 --frequencies 1000", "`--steps`"),
         ("map two-dof --parameter damper.N0 --from 1 --to x", "x"),
     ],
 )
 def test_bad_input_ends_with_two(arguments: str, word: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(arguments.split()) == 2
     assert word in capsys.readouterr().err
+
+
+def test_the_ridge_is_broken_only_where_another_peak_becomes_the_highest() -> None:
+    """Between 85 and 120 N the peak of the disk moves by 100 Hz, which is no jump; at 185 N there is one."""
+    track = solver.track_peak(solver.load_scene("bladed-disk"), "shroud.N0", 60.0, 300.0, checks=0)
+    parameter, frequency = ridge_lines(track)
+    assert np.array_equal(parameter[~np.isnan(parameter)], track.parameter)
+    assert np.array_equal(frequency[~np.isnan(frequency)], track.frequency)
+    breaks = np.flatnonzero(np.isnan(parameter))
+    assert np.isnan(frequency[breaks]).all()
+    exchanges = [at for at, _ in track.exchanges]
+    assert pytest.approx(exchanges[-1], abs=0.01) == 185.46
+    assert parameter[breaks - 1] == pytest.approx(exchanges)
+    assert parameter[breaks + 1] == pytest.approx(exchanges)
+
+
+def test_contacts_of_other_laws_are_mapped_but_not_tracked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (Path(solver.__file__).parent / "scenes" / "two-dof.toml").read_text()
+    stop = '[[contacts]]\nname = "stop"\nlaw = "gap"\nbetween = ["m1", "ground"]\nk = 10.0\ngap = 1.0\n\n'
+    scene = tmp_path / "stop.toml"
+    scene.write_text(text.replace("[excitation]", f"{stop}[excitation]"))
+    asked = [str(scene), *PEAKS[2:8]]
+    grid = ["--steps", "2", "--frequencies", "3"]
+    for arguments in (["peaks", *asked], ["map", *asked, *grid]):
+        assert main(arguments) == 2
+        out, err = capsys.readouterr()
+        assert out == ""
+        assert "`scene`" in err
+        assert "(stop)" in err
+    assert main(["map", *asked, *grid, "--no-ridge", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["ridge"] is None
+    assert None not in found["amplitude"][0]

@@ -32,6 +32,10 @@ Frequencies = Annotated[
     int, typer.Option("--frequencies", metavar="N", parser=whole_number, help="Frequencies over the band.")
 ]
 
+NoRidge = Annotated[
+    bool, typer.Option("--no-ridge", help="Do not track the peaks: faster, and for contacts of every law.")
+]
+
 
 def peaks(
     name: options.Scene,
@@ -77,6 +81,7 @@ def response_map(
     frequencies: Frequencies = 400,
     values: options.Values = None,
     harmonics: options.Harmonics = 11,
+    no_ridge: NoRidge = False,
     plot: options.Plot = None,
     as_json: options.Json = False,
 ) -> None:
@@ -90,7 +95,7 @@ def response_map(
     with inputs.path_of("--parameter"), bar("map") as on_progress:
         found = solver.response_map(
             scene, parameter, start, stop, steps=steps, frequencies=frequencies, harmonics=harmonics,
-            on_progress=on_progress,
+            ridge=not no_ridge, on_progress=on_progress,
         )  # fmt: skip
     if picture is not None and np.isfinite(found.amplitude).any():
         from service.plots.style import save

@@ -12,12 +12,14 @@ from matplotlib.figure import Figure
 from service import units
 from service.plots import style
 from service.plots.responses import axis_name
+from solver.fourier import Real
 
 if TYPE_CHECKING:
     from solver.maps import ResponseMap
     from solver.peak_tracks import PeakTrack
 
 _LOGARITHMIC_FROM = 5.0  # ratio of the ends from which an axis is logarithmic
+_SAME_FREQUENCY = 2e-3  # relative distance from a tracked peak within which a point lies on it
 
 
 def track_figure(track: PeakTrack, *, dof: str) -> Figure:
@@ -35,7 +37,7 @@ def track_figure(track: PeakTrack, *, dof: str) -> Figure:
             heights.plot(line.parameter, line.peak * unit.per_metre, color=style.GREY, linewidth=0.8)
             places.plot(line.parameter, line.frequency, color=style.GREY, linewidth=0.8)
         heights.plot(track.parameter, track.peak * unit.per_metre, color=style.BLUE)
-        places.plot(track.parameter, track.frequency, color=style.BLUE)
+        places.plot(*ridge_lines(track), color=style.BLUE)
         best = track.optimum
         if np.isfinite(best.at):
             heights.plot([best.at], [best.peak * unit.per_metre], **_DOT)
@@ -91,6 +93,23 @@ def map_figure(found: ResponseMap, *, dof: str) -> Figure:
     return page
 
 
+def ridge_lines(track: PeakTrack) -> tuple[Real, Real]:
+    """Return parameter and frequency of the highest peak, with a NaN where another peak becomes the highest.
+
+    However fast a peak moves, it is one line: two points are joined if one tracked peak passes through both.
+    """
+    p, f = track.parameter, track.frequency
+    joined = np.zeros(max(p.size - 1, 0), bool)
+    for line in track.competing:
+        order = np.argsort(line.parameter)
+        known, place = line.parameter[order], line.frequency[order]
+        inside = (p >= known[0]) & (p <= known[-1])
+        on = inside & (np.abs(np.interp(p, known, place) - f) <= _SAME_FREQUENCY * f)
+        joined |= on[:-1] & on[1:] & (np.diff(p) != 0.0)
+    gaps = np.flatnonzero(~joined) + 1
+    return np.insert(p, gaps, np.nan), np.insert(f, gaps, np.nan)
+
+
 _DOT: dict[str, Any] = {
     "color": style.VERMILION,
     "marker": "o",
@@ -104,9 +123,7 @@ def _draw_ridge(axes: Axes, ridge: PeakTrack) -> None:
     """Competing peaks as dots, the highest as a line that is broken where another becomes the highest."""
     for line in ridge.competing:
         axes.plot(line.frequency, line.parameter, color="white", linewidth=0.7, linestyle=":")
-    jumps = np.flatnonzero(np.abs(np.diff(ridge.frequency)) > 0.005 * ridge.frequency[:-1]) + 1
-    frequency = np.insert(ridge.frequency, jumps, np.nan)
-    parameter = np.insert(ridge.parameter, jumps, np.nan)
+    parameter, frequency = ridge_lines(ridge)
     axes.plot(frequency, parameter, color="white", linewidth=1.4)
     best = ridge.optimum
     for peak in best.active:
