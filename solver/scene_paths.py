@@ -86,7 +86,7 @@ def has_parameter(contact: AnyContact, owner: str, key: str) -> bool:
 def check_path(scene: Scene, path: str) -> None:
     """Raise SettingError unless `path` is ``frequency`` or a path of the scene."""
     if path != FREQUENCY and path not in parameter_paths(scene):
-        raise _unknown(scene, path)
+        raise _unknown(scene, path, FREQUENCY)
 
 
 def value(scene: Scene, path: str) -> float:
@@ -222,8 +222,8 @@ def _number(path: str, new: object) -> float:
     return number
 
 
-def _unknown(scene: Scene, path: object) -> SettingError:
+def _unknown(scene: Scene, path: object, *besides: str) -> SettingError:
     if path == FREQUENCY:
         return SettingError("path", path, "must name a value of the scene; the frequency belongs to the run")
-    known = (FREQUENCY, *parameter_paths(scene))
+    known = (*besides, *parameter_paths(scene))
     return SettingError("path", path, f"must be one of {listing(known)}", nearest(str(path), known))

@@ -158,6 +158,8 @@ def test_bad_scenes_are_named(run: Run, tmp_path: Path, command: str, case: str)
         ("solve two-dof --frequency 1 --effects most", ["--effects", "most", "even-harmonics"]),
         ("plan two-dof --effects most", ["--effects", "most", "every-sector"]),
         ("sweep two-dof --from 1 --to 1", ["--to", "1.0"]),
+        ("sweep two-dof --frequency 1.2", ["--frequency", "1.2", "--from"]),
+        ("solve two-dof --frequency 1 --set frequency=5", ["--set", "belongs to the run"]),
         ("sweep two-dof --from 0 --to 1", ["--from", "0.0"]),
         ("sweep two-dof --limit -1", ["--limit", "-1.0"]),
         ("sweep two-dof --parameter bumper.N0 --from 1 --to 2 --frequency 1", ["--parameter", "bumper.N0"]),
@@ -192,6 +194,11 @@ def test_bad_options_are_named(run: Run, tmp_path: Path, arguments: str, words: 
     assert "Traceback" not in err
     assert [word for word in words if word not in out + err] == []
     assert [file.name for file in tmp_path.iterdir()] == ["file"]
+
+
+def test_the_frequency_is_offered_only_where_it_can_be_swept(run: Run) -> None:
+    assert "one of excitation.amplitude," in run("solve two-dof --frequency 1 --set bumper.N0=5")[2]
+    assert "one of frequency," in run("sweep two-dof --parameter bumper.N0 --from 1 --to 2 --frequency 1")[2]
 
 
 @pytest.mark.parametrize("as_json", [False, True])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import typer
 
 from service.cli import inputs, options, reports
-from service.cli.failures import FELL_SHORT
+from service.cli.failures import FELL_SHORT, InputError
 from service.cli.output import print_json
 from service.cli.progress import bar, patience
 from service.plots import SUFFIXES
@@ -96,6 +96,10 @@ def sweep(
     import solver
 
     picture = inputs.output_path("--plot", plot, SUFFIXES)
+    if parameter == "frequency" and frequency is not None:
+        raise InputError(
+            f"`--frequency` is for sweeps of another --parameter, got {frequency!r}: try --from, --to"
+        )
     scene, asked = inputs.scene(name, values), solver.Effects.read(effects)
     with inputs.path_of("--parameter"), bar("sweep") as on_progress:
         branch = solver.sweep(
