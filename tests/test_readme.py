@@ -1,4 +1,4 @@
-"""The README: every snippet runs as it stands."""
+"""The README and the pages of docs/: every snippet runs as it stands."""
 
 from __future__ import annotations
 
@@ -10,26 +10,44 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from matrix_cases import beam, hb_text
+from scipy import sparse
+from scipy.io import mmwrite
 
 import solver
 from service.cli import main
+from service.cli.app import app
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 ADDRESS = "http://127.0.0.1:8000"
-BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
-LINES = [line for language, text in BLOCKS if language == "sh" for line in text.splitlines()]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+BLOCKS = [
+    block
+    for page in PAGES
+    for block in re.findall(r"^```(\w+)\n(.*?)^```$", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+]
+COMMANDS = dict.fromkeys(line for language, text in BLOCKS if language == "sh" for line in text.splitlines())
+LONGEST_README = 250
 
 
 def blocks(language: str) -> list[str]:
     return [text for name, text in BLOCKS if name == language]
 
 
+def matrix_files(folder: Path) -> set[str]:
+    """The matrices the pages speak of, of a beam of 50 elements; their names."""
+    M, K = beam(50, EI=1000.0)
+    mmwrite(folder / "beam-M.mtx", sparse.coo_array(M), symmetry="symmetric")
+    (folder / "beam-K.rsa").write_text(hb_text(K, "RSA"))
+    return {"beam-M.mtx", "beam-K.rsa"}
+
+
 def test_every_language_is_looked_at() -> None:
     assert {language for language, _ in BLOCKS} == {"sh", "python", "toml"}
 
 
-@pytest.mark.parametrize("line", [line for line in LINES if line.startswith("make ")])
+@pytest.mark.parametrize("line", [line for line in COMMANDS if line.startswith("make ")])
 def test_make_knows_the_targets(line: str) -> None:
     if shutil.which("make") is None:
         pytest.skip("make is not installed")
@@ -37,7 +55,7 @@ def test_make_knows_the_targets(line: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("line", [line for line in LINES if not line.startswith("make ")])
+@pytest.mark.parametrize("line", [line for line in COMMANDS if not line.startswith("make ")])
 def test_commands_run(
     line: str, request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -49,9 +67,10 @@ def test_commands_run(
         words.append("--help")
     if words[1] == "submit":
         monkeypatch.setenv("STICKSLIP_URL", request.getfixturevalue("server"))
+    given = matrix_files(tmp_path) if words[1] == "import" else set()
     assert main(words[1:]) == 0
-    written = [word for word, before in zip(words[1:], words, strict=False) if before == "--plot"]
-    assert [file.name for file in tmp_path.iterdir()] == written
+    written = {word for word, before in zip(words[1:], words, strict=False) if before in ("--plot", "--out")}
+    assert {file.name for file in tmp_path.iterdir()} == given | written
 
 
 @pytest.mark.parametrize("code", blocks("python"))
@@ -62,18 +81,50 @@ def test_python_runs(code: str, request: pytest.FixtureRequest, capsys: pytest.C
     assert len(capsys.readouterr().out.splitlines()) >= 2
 
 
-@pytest.mark.parametrize("text", blocks("toml"))
-def test_scenes_work(text: str) -> None:
-    scene = solver.Scene.from_dict(tomllib.loads(text))
-    branch = solver.sweep(scene)
+@pytest.mark.parametrize("text", [text for text in blocks("toml") if text.startswith("name =")])
+def test_scenes_work(text: str, tmp_path: Path) -> None:
+    matrix_files(tmp_path)
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    branch = solver.sweep(solver.load_scene(tmp_path / "scene.toml"))
     assert branch.completed
     assert branch.peak is not None
     assert branch.peak.interior
 
 
-def test_links_and_pictures_exist() -> None:
-    targets = re.findall(r"\]\(([^)]+)\)", README)
-    assert [t for t in targets if not t.startswith("http") and not (ROOT / t).is_file()] == []
+def test_parts_of_scenes_are_read() -> None:
+    """The disk of the page on disks, and every contact of the page on laws."""
+    (mistuning,) = [text for text in blocks("toml") if text.startswith("[structure.mistuning]")]
+    raw = solver.load_scene("bladed-disk").to_dict()
+    raw["structure"] |= tomllib.loads(mistuning)["structure"]
+    assert solver.sectors_needed(solver.Scene.from_dict(raw)).sectors == 8
+    (contacts,) = [text for text in blocks("toml") if text.startswith("[[contacts]]")]
+    names = re.findall(r'"(\w+)(?:@next)?"', " ".join(re.findall(r"between.* = (\[.*?\])", contacts)))
+    dofs = sorted({*names} - {"ground"})
+    raw["structure"] = {
+        "kind": "cyclic", "sectors": 8, "masses": dict.fromkeys(dofs, 1.0),
+        "springs": [{"between": [dof, "ground"], "k": 1e6, "c": 1.0} for dof in dofs],
+    }  # fmt: skip
+    raw |= tomllib.loads(contacts)
+    raw["excitation"] = {"dof": dofs[0], "amplitude": 1.0, "engine_order": 1}
+    raw["observe"] = {"dof": dofs[0], "band": [10.0, 20.0]}
+    laws = [contact.law for contact in solver.Scene.from_dict(raw).contacts]
+    assert laws == ["elastic-normal", "coulomb-2d", "gap", "polynomial"]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_and_pictures_exist(page: Path) -> None:
+    targets = re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8"))
+    assert [t for t in targets if not t.startswith("http") and not (page.parent / t).is_file()] == []
+
+
+def test_the_readme_is_short_and_knows_every_page_and_command() -> None:
+    assert len(README.splitlines()) <= LONGEST_README
+    assert [page.name for page in PAGES[1:] if f"(docs/{page.name})" not in README] == []
+    names = [command.name or command.callback.__name__ for command in app.registered_commands]  # type: ignore[union-attr]
+    groups = [group.name for group in app.registered_groups]
+    assert [
+        name for name in [*names, *groups] if not re.search(rf"^\|.*`{name}\b", README, re.MULTILINE)
+    ] == []
 
 
 def test_the_peaks_the_readme_quotes() -> None:
