@@ -23,7 +23,7 @@ import numpy as np
 
 from solver.fourier import Real
 from solver.kernels.compiled import compiled, out_of_line
-from solver.kernels.trigpoly import FALLING, RISING, at_point, bracketed_root
+from solver.kernels.trigpoly import FALLING, RISING, at_point, bracketed_root, cubic_root, cubic_turn
 
 # What a contact does over the period.
 SEPARATED, STUCK, SLIPPING, LIFTING, FAILED = 0, 1, 2, 3, 4
@@ -66,8 +66,7 @@ def largest(c: Real, s: Real, degree: int, value: Real, slope: Real) -> tuple[fl
             above = min(value[j] + delta * slope[j], value[after] - delta * slope[after])
             if max(above, max(value[j], value[after])) < near:
                 continue
-            fall = slope[j] - slope[after]
-            guess = delta * (j + (slope[j] / fall if fall > 0.0 else 0.5))
+            guess = delta * j + cubic_turn(value[j], slope[j], value[after], slope[after], delta)
             tau = bracketed_root(c, s, degree, 1, 0.0, delta * j, delta * (j + 1), guess, FALLING)
             here = at_point(c, s, degree, tau)[0]
             if here > best:
@@ -95,7 +94,7 @@ def _crosses(
             return np.inf
         if min(g_lo + slope_lo * width, g_hi - slope_hi * width) <= tol:
             return np.inf
-        guess = lo + width * slope_lo / (slope_lo - slope_hi)
+        guess = lo + cubic_turn(g_lo, slope_lo, g_hi, slope_hi, width)
         end = bracketed_root(c, s, degree, 1, 0.0, lo, hi, guess, FALLING)
         g_hi = at_point(c, s, degree, end)[0] + shift
         if g_hi <= tol:
@@ -117,6 +116,8 @@ def _crosses(
             g_hi = at_point(c, s, degree, end)[0] + shift
     rise = g_hi - g_lo
     guess = begin + (end - begin) * (-g_lo / rise if rise > 0.0 else 0.5)
+    if begin == lo and end == hi:
+        guess = lo + cubic_root(g_lo, slope_lo, g_hi, slope_hi, hi - lo)
     return bracketed_root(c, s, degree, 0, shift, begin, end, guess, RISING)
 
 
@@ -174,7 +175,9 @@ def leave_stick(
 
 
 @compiled
-def leave_slip(c: Real, s: Real, degree: int, slope: Real, start: float, end: float, tol: float) -> float:
+def leave_slip(
+    c: Real, s: Real, degree: int, value: Real, slope: Real, start: float, end: float, tol: float
+) -> float:
     """Return when a slipping contact sticks (w' crosses 0 downward), or `end`.
 
     Between grid points a dip of w' below 0 is looked for where the grid has a local minimum.
@@ -199,6 +202,8 @@ def leave_slip(c: Real, s: Real, degree: int, slope: Real, start: float, end: fl
         if rate_hi < -tol * degree * degree:
             fall = rate - rate_hi
             guess = lo + (hi - lo) * (rate / fall if fall > 0.0 else 0.5)
+            if not last and lo > start:
+                guess = lo + cubic_turn(value[at - 1], rate, value[at], rate_hi, hi - lo)
             return bracketed_root(c, s, degree, 1, 0.0, lo, hi, guess, FALLING)
         if not last and j * delta - start > delta:
             before, after = slope[at - 1], slope[at + 1 if at + 1 < n else 0]
@@ -247,7 +252,7 @@ def march(
         else:
             row[BEGAN] = AFTER_SLIP
             x = 0 if direction > 0.0 else 1
-            tau = leave_slip(c[x], s[x], degree, slope[x], tau, end, tol)
+            tau = leave_slip(c[x], s[x], degree, value[x], slope[x], tau, end, tol)
             offset = -direction * at_point(c[x], s[x], degree, tau)[0]
             motion, began = STICK, AFTER_SLIP
         row[END] = tau

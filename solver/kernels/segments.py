@@ -158,16 +158,19 @@ def find_segments(
     (state, number of segments); the state is SEPARATED, STUCK, SLIPPING, LIFTING or FAILED.
     """
     out_of_line()
+    at_once = _plain(U, ks, N, load_ks, kt, mu, segments)
+    if at_once >= 0:
+        return at_once, 1 if at_once == STUCK else 0
     degree = max(ks[-1], load_ks[-1])
     n_grid = 2 * (cos_table.shape[1] - 1)
-    uc, us = np.empty(degree + 1), np.empty(degree + 1)
-    nc, ns = np.empty(degree + 1), np.empty(degree + 1)
+    curves, waves = np.empty((8, n_grid)), np.empty((8, degree + 1))
+    uc, us, nc, ns = waves[0], waves[1], waves[2], waves[3]
     unpack(U, ks, uc, us)
     unpack(N, load_ks, nc, ns)
-    u, du, load, dload = np.empty(n_grid), np.empty(n_grid), np.empty(n_grid), np.empty(n_grid)
-    on_grid(nc, ns, load_ks[-1], cos_table, sin_table, load, dload)
+    u, du, load, dload = curves[0], curves[1], curves[2], curves[3]
     on_grid(uc, us, ks[-1], cos_table, sin_table, u, du)
-    value, slope = np.empty((2, n_grid)), np.empty((2, n_grid))
+    on_grid(nc, ns, load_ks[-1], cos_table, sin_table, load, dload)
+    value, slope = curves[4:6], curves[6:8]
     u_max, load_max = 0.0, 0.0
     for j in range(n_grid):
         a, b = kt * u[j], mu * load[j]
@@ -178,10 +181,12 @@ def find_segments(
     if not (math.isfinite(u_max) and math.isfinite(load_max)):
         return FAILED, 0
     tol = ROUNDING * (kt * u_max + mu * load_max)
-    c, s = np.empty((2, degree + 1)), np.empty((2, degree + 1))
+    c, s = waves[4:6], waves[6:8]
     for k in range(degree + 1):
         c[0, k], c[1, k] = kt * uc[k] - mu * nc[k], -kt * uc[k] - mu * nc[k]
         s[0, k], s[1, k] = kt * us[k] - mu * ns[k], -kt * us[k] - mu * ns[k]
+    if is_symmetric(ks, N):
+        return _march_half(c, s, degree, value, slope, tol, segments)
     intervals = np.empty((load_ks[-1] + 1, 2))
     n_intervals = 0 if load_max <= 0.0 else -1
     if load_ks[-1] == 1:
@@ -193,6 +198,71 @@ def find_segments(
     if n_intervals < 0:
         return _march_circle(c, s, degree, value, slope, tol, segments)
     return _march_intervals(c, s, degree, value, slope, tol, intervals, n_intervals, segments)
+
+
+@compiled
+def is_symmetric(ks: Integer, N: Real) -> bool:
+    """Return whether the force is half-wave symmetric: odd harmonics under a constant load."""
+    for i in range(ks.size):
+        if ks[i] % 2 == 0:
+            return False
+    for j in range(1, N.size):
+        if N[j] != 0.0:
+            return False
+    return N[0] > 0.0
+
+
+@compiled
+def _plain(U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, segments: Real) -> int:
+    """Return STUCK or SEPARATED where the sums of the amplitudes alone show it, else −1."""
+    reach, swing, mean, here = 0.0, 0.0, 0.0, 0
+    for i in range(ks.size):
+        if ks[i] == 0:
+            reach += abs(U[0])
+            here += 1
+        else:
+            reach += math.hypot(U[here], U[here + 1])
+            here += 2
+    here = 0
+    for i in range(load_ks.size):
+        if load_ks[i] == 0:
+            mean = N[0]
+            here += 1
+        else:
+            swing += math.hypot(N[here], N[here + 1])
+            here += 2
+    if mean + swing <= 0.0 and math.isfinite(reach):
+        return SEPARATED
+    if kt * reach <= mu * (mean - swing):
+        row = segments[0]
+        row[MOTION], row[BEGIN], row[END] = STICK, 0.0, 2.0 * math.pi
+        row[DIRECTION], row[ONSET], row[BEGAN] = 1.0, 0.0, UNLOADED
+        return STUCK
+    return -1
+
+
+@compiled
+def _march_half(
+    c: Real, s: Real, degree: int, value: Real, slope: Real, tol: float, segments: Real
+) -> tuple[int, int]:
+    """March half a period of a half-wave symmetric contact: the other half mirrors it, limits exchanged."""
+    high, begin = largest(c[1], s[1], degree, value[1], slope[1])
+    if 2.0 * high <= tol:
+        row = segments[0]
+        row[MOTION], row[BEGIN], row[END] = STICK, 0.0, 2.0 * math.pi
+        row[DIRECTION], row[ONSET], row[BEGAN] = 1.0, 0.0, UNLOADED
+        return STUCK, 1
+    none = int(np.int64(0))
+    end = begin + math.pi
+    count = march(c, s, degree, value, slope, begin, end, STICK, -1.0, high, AFTER_SLIP, tol, segments, none)
+    if count < 0 or 2 * count > segments.shape[0]:
+        return FAILED, 0
+    for i in range(count):
+        row, mirrored = segments[i], segments[count + i]
+        mirrored[MOTION], mirrored[BEGAN], mirrored[DIRECTION] = row[MOTION], row[BEGAN], -row[DIRECTION]
+        mirrored[BEGIN], mirrored[END] = row[BEGIN] + math.pi, row[END] + math.pi
+        mirrored[ONSET] = row[ONSET] + math.pi
+    return SLIPPING, 2 * count
 
 
 @compiled

@@ -41,10 +41,8 @@ def on_grid(
     out_of_line()
     n = value.size
     half = n // 2
-    even = np.zeros(half + 1)
-    odd = np.zeros(half + 1)
-    slope_even = np.zeros(half + 1)
-    slope_odd = np.zeros(half + 1)
+    parts = np.zeros((4, half + 1))
+    even, odd, slope_even, slope_odd = parts[0], parts[1], parts[2], parts[3]
     for k in range(1, degree + 1):
         ck, sk = c[k], s[k]
         if ck == 0.0 and sk == 0.0:
@@ -125,6 +123,45 @@ def bracketed_root(
         if moved <= 4.0 * small or moved * moved * moved <= small * before * before or hi - lo <= 4.0 * small:
             break
     return x
+
+
+@compiled
+def cubic_root(g_lo: float, slope_lo: float, g_hi: float, slope_hi: float, width: float) -> float:
+    """Return where in (0, width) the cubic through values and slopes at both ends is 0; a guess, no more.
+
+    A few Newton steps from the root of the chord; the ends have opposite signs.
+    """
+    rise = g_hi - g_lo
+    a, b = slope_lo * width, slope_hi * width
+    square, cube = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
+    t = -g_lo / rise if rise != 0.0 else 0.5
+    for _ in range(3):
+        g = g_lo + t * (a + t * (square + t * cube))
+        slope = a + t * (2.0 * square + 3.0 * t * cube)
+        t = t - g / slope if slope != 0.0 else 0.5
+        if not (0.0 < t < 1.0):
+            return 0.5 * width
+    return t * width
+
+
+@compiled
+def cubic_turn(g_lo: float, slope_lo: float, g_hi: float, slope_hi: float, width: float) -> float:
+    """Return where in (0, width) the cubic through values and slopes at both ends turns; a guess, no more.
+
+    Its slope is a parabola with the given ends and mean; the ends have opposite signs.
+    """
+    mean = (g_hi - g_lo) / width
+    bend = 3.0 * (slope_lo + slope_hi - 2.0 * mean)
+    tilt = 6.0 * mean - 4.0 * slope_lo - 2.0 * slope_hi
+    inside = tilt * tilt - 4.0 * bend * slope_lo
+    if inside >= 0.0:
+        # The root in (0, 1), written so that nothing cancels.
+        q = -0.5 * (tilt + math.copysign(math.sqrt(inside), tilt))
+        for t in (q / bend if bend != 0.0 else -1.0, slope_lo / q if q != 0.0 else -1.0):
+            if 0.0 < t < 1.0:
+                return t * width
+    fall = slope_lo - slope_hi
+    return width * slope_lo / fall if fall != 0.0 else 0.5 * width
 
 
 @compiled
