@@ -11,7 +11,7 @@ import numpy as np
 from solver.balance import Balance
 from solver.fourier import Integer, Real
 from solver.kernels.observe import HALF_RANGE, MAX_ABS, MEAN, RESIDUAL, SLOPE
-from solver.kernels.path import FINISHED, LEFT_RANGE, NO_START, STALLED
+from solver.kernels.walk import FINISHED, LEFT_RANGE, NO_START, STALLED
 
 
 class BranchStatus(Enum):

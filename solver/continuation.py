@@ -19,9 +19,10 @@ from solver.balance import Balance, build
 from solver.branch import ENDINGS, Branch, BranchStatus
 from solver.errors import SettingError
 from solver.fourier import Integer, Real, to_full
-from solver.kernels import path
+from solver.kernels import walk as state_of
 from solver.kernels.observe import MEASURES
-from solver.kernels.path import Control, begin_walk, walk_by_value, walk_on
+from solver.kernels.path import begin_walk, walk_on
+from solver.kernels.walk import Control, walk_by_value
 from solver.peaks import Points, Survey, band_limit
 from solver.savings import Effects
 from solver.scene import Scene
@@ -217,11 +218,11 @@ def walk(
         yield _no_start(balance, found.iterations)
         return
     code, state = begin_walk(system, linear, point, control, found.u)
-    while code == path.RUNNING:
+    while code == state_of.RUNNING:
         rows = _rows(balance, _STRETCH)
         code, count = walk_on(system, linear, point, control, state, _STRETCH, *rows)
         yield _stretch(rows, count, ENDINGS.get(code), state, found.iterations)
-    if code == path.NO_START:
+    if code == state_of.NO_START:
         yield _no_start(balance, found.iterations)
 
 
@@ -245,14 +246,14 @@ def _rows(balance: Balance, count: int) -> tuple[Real, Real, Integer, Real, Real
 
 
 def _stretch(
-    rows: tuple[Real, Real, Integer, Real, Real], count: int, status: BranchStatus | None, state: path.Walk,
+    rows: tuple[Real, Real, Integer, Real, Real], count: int, status: BranchStatus | None, state: state_of.Walk,
     spent: int,
 ) -> Stretch:  # fmt: skip
     numbers = walk_by_value(state).numbers
     return Stretch(
         solutions=rows[0][:count], tangents=rows[1][:count], states=rows[2][:count], observed=rows[3][:count],
-        measures=rows[4][:count], status=status, newton_iterations=spent + int(numbers[path.ITERATIONS]),
-        rejected_steps=int(numbers[path.REJECTED]), stepped_over=int(numbers[path.STEPPED_OVER]),
+        measures=rows[4][:count], status=status, newton_iterations=spent + int(numbers[state_of.ITERATIONS]),
+        rejected_steps=int(numbers[state_of.REJECTED]), stepped_over=int(numbers[state_of.STEPPED_OVER]),
     )  # fmt: skip
 
 

@@ -10,80 +10,50 @@ piece of their law and the branch all but straight, the angle decides.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import NamedTuple
 
-import numba
 import numpy as np
-from numba.experimental import structref
 
 from solver.fourier import Integer, Real
 from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.frozen import frozen_arc
 from solver.kernels.jacobian import AT_BRANCH_POINT, factorise, step_back
-from solver.kernels.linear import copy_to, largest_entry, set_to
+from solver.kernels.linear import copy_to, set_to
 from solver.kernels.newton import arc_newton, newton
 from solver.kernels.observe import RESIDUAL, measure
+from solver.kernels.predict import predict
 from solver.kernels.receptance import receptance
-from solver.kernels.residual import evaluate, least_size
+from solver.kernels.residual import evaluate
 from solver.kernels.system import Evaluation, Receptance, System
+from solver.kernels.walk import (
+    CUBIC,
+    FINISHED,
+    FRESH,
+    FROZEN,
+    ITERATIONS,
+    LEFT_RANGE,
+    NO_START,
+    NORM,
+    ORIENTATION,
+    PIECE,
+    REJECTED,
+    ROUGH,
+    RUNNING,
+    STALLED,
+    STEP,
+    STEPPED_OVER,
+    Control,
+    P,
+    Walk,
+    accept,
+    distance,
+    new_walk,
+    turned_back,
+    undo,
+    weights,
+)
 
 _TINY = 64.0  # smallest steps: a step as short as this may turn as it likes
 STRAIGHT_ON = 0.98  # cosine of the turn at a branch point; more than that is a step across a sharp peak
-# How a stretch of continuation ended.
-RUNNING, FINISHED, NO_START, STALLED, LEFT_RANGE = 0, 1, 2, 3, 4
-TANGENT, SECANT, CUBIC = 0, 1, 2
-
-
-class Control(NamedTuple):
-    """Settings of a continuation; lengths are relative: to the range of λ and to the size of u."""
-
-    start: float
-    stop: float
-    first_step: float
-    largest_step: float
-    smallest_step: float
-    wanted_iterations: int
-    most_iterations: int
-    predictor: int
-    largest_turn: float  # relative distance corrector/predictor beyond which a step is halved
-    range_weight: float  # the range of λ counts as this many units of arc length
-
-
-class Walk(NamedTuple):
-    """The state between two steps; `numbers` is indexed by the names below (P, STEP, …).
-
-    Whenever a point is accepted, the evaluation and the receptance the steps share belong to that point.
-    """
-
-    u: Real  # (nt,)
-    before: Real  # (nt + 1,) the point before, λ last
-    tangent: Real  # (nt + 1,)
-    before_tangent: Real  # (nt + 1,) at the point before
-    numbers: Real  # (12,)
-
-
-@structref.register
-class _WalkType(numba.types.StructRef):
-    """Numba's type of a `Walk` by reference."""
-
-
-class _WalkReference(structref.StructRefProxy):
-    """A `Walk` by reference."""
-
-
-structref.define_proxy(_WalkReference, _WalkType, list(Walk._fields))
-
-_new_walk: Callable[..., Walk] = _WalkReference
-
-
-@compiled
-def walk_by_value(walk: Walk) -> Walk:
-    """Return the arrays of a walk as a tuple that Python can read (views, not copies)."""
-    return Walk(walk.u, walk.before, walk.tangent, walk.before_tangent, walk.numbers)
-
-
-P, STEP, ORIENTATION, ITERATIONS, REJECTED, STEPPED_OVER, COUNT, NORM, FRESH, ROUGH, PIECE, FROZEN = range(12)
 FROZEN_FROM = 64  # unknowns from which old factors beat new ones (measured)
 
 
@@ -94,7 +64,7 @@ def begin_walk(
     """Begin a branch at a solution `u` for the start of the range: its first point and tangent."""
     out_of_line()
     nt, p = u.size, control.start
-    walk = _new_walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(12))
+    walk = new_walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(12))
     copy_to(walk.u, u)
     walk.numbers[P] = p
     walk.numbers[STEP] = control.first_step
@@ -106,15 +76,6 @@ def begin_walk(
     set_to(walk.before[:nt], walk.u, -control.first_step, walk.tangent)
     walk.before[nt] = p - control.first_step * walk.tangent[nt]
     return RUNNING, walk
-
-
-@compiled
-def _weights(system: System, walk: Walk, control: Control) -> tuple[float, float]:
-    """Return the weights of the scalar product: u relative to its size, λ relative to its range."""
-    size = max(largest_entry(walk.u), least_size(system, walk.numbers[P]))
-    span = abs(control.stop - control.start) / control.range_weight
-    weight_u = 1.0 / (size * size) if size > 0.0 else 1.0
-    return weight_u, 1.0 / (span * span) if span > 0.0 else 1.0
 
 
 @compiled
@@ -131,7 +92,7 @@ def _turn(system: System, linear: Receptance, point: Evaluation, control: Contro
     """Replace the tangent by the one at the new point (`point` is evaluated there), oriented onward."""
     out_of_line()
     n = walk.u.size
-    weight_u, weight_p = _weights(system, walk, control)
+    weight_u, weight_p = weights(system, walk, control)
     rhs = np.zeros(n + 1)
     rhs[n] = 1.0
     sign = factorise(system, linear, point, walk.tangent, weight_u, weight_p)
@@ -158,78 +119,6 @@ def _turn(system: System, linear: Receptance, point: Evaluation, control: Contro
     for i in range(n + 1):
         walk.tangent[i] = rhs[i] / length
     return True
-
-
-@compiled
-def _predict(system: System, walk: Walk, control: Control, step: float, guess: Real) -> float:
-    """Fill `guess` with the predicted u at arc length `step`; return the predicted λ."""
-    n = walk.u.size
-    p = walk.numbers[P]
-    if control.predictor == SECANT and walk.numbers[COUNT] > 0:
-        weight_u, weight_p = _weights(system, walk, control)
-        length = weight_p * (p - walk.before[n]) ** 2
-        for i in range(n):
-            length += weight_u * (walk.u[i] - walk.before[i]) ** 2
-        if length > 0.0:
-            scale = step / math.sqrt(length)
-            for i in range(n):
-                guess[i] = walk.u[i] + scale * (walk.u[i] - walk.before[i])
-            return p + scale * (p - walk.before[n])
-    if control.predictor == CUBIC and walk.numbers[COUNT] > 0 and walk.numbers[ROUGH] == 0.0:
-        return _extrapolate(system, walk, control, step, guess)
-    set_to(guess, walk.u, step, walk.tangent)
-    return p + step * walk.tangent[n]
-
-
-@compiled
-def _extrapolate(system: System, walk: Walk, control: Control, step: float, guess: Real) -> float:
-    """Predict by the cubic through the last two points and their tangents; return the predicted λ."""
-    n = walk.u.size
-    p = walk.numbers[P]
-    weight_u, weight_p = _weights(system, walk, control)
-    chord = weight_p * (p - walk.before[n]) ** 2
-    here, there = weight_p * walk.tangent[n] ** 2, weight_p * walk.before_tangent[n] ** 2
-    for i in range(n):
-        chord += weight_u * (walk.u[i] - walk.before[i]) ** 2
-        here += weight_u * walk.tangent[i] ** 2
-        there += weight_u * walk.before_tangent[i] ** 2
-    length = math.sqrt(chord)
-    if not step < 3.0 * length:
-        set_to(guess, walk.u, step, walk.tangent)
-        return p + step * walk.tangent[n]
-    t = 1.0 + step / length
-    value0, value1 = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
-    slope0 = t * (1.0 - t) ** 2 * length / math.sqrt(there)
-    slope1 = t * t * (t - 1.0) * length / math.sqrt(here)
-    for i in range(n):
-        guess[i] = (
-            value0 * walk.before[i] + value1 * walk.u[i]
-            + slope0 * walk.before_tangent[i] + slope1 * walk.tangent[i]
-        )  # fmt: skip
-    return value0 * walk.before[n] + value1 * p + slope0 * walk.before_tangent[n] + slope1 * walk.tangent[n]
-
-
-@compiled
-def _distance(u: Real, p: float, v: Real, q: float, weight_u: float, weight_p: float) -> float:
-    """Return the weighted distance of two points."""
-    total = weight_p * (p - q) ** 2
-    for i in range(u.size):
-        total += weight_u * (u[i] - v[i]) ** 2
-    return math.sqrt(total)
-
-
-@compiled
-def _accept(walk: Walk, trial: Real, p: float, norm: float) -> None:
-    """Move the walk to a converged point."""
-    n = trial.size
-    copy_to(walk.before[:n], walk.u)
-    walk.before[n] = walk.numbers[P]
-    copy_to(walk.before_tangent, walk.tangent)
-    copy_to(walk.u, trial)
-    walk.numbers[P] = p
-    walk.numbers[ROUGH] = 0.0
-    walk.numbers[COUNT] += 1
-    walk.numbers[NORM], walk.numbers[FRESH] = norm, 1.0
 
 
 @compiled
@@ -268,10 +157,10 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
     n = walk.u.size
     guess, trial = np.empty(n), np.empty(n)
     forward = 1.0 if control.stop >= control.start else -1.0
-    weight_u, weight_p = _weights(system, walk, control)
+    weight_u, weight_p = weights(system, walk, control)
     while walk.numbers[STEP] >= control.smallest_step:
         step = walk.numbers[STEP]
-        p_guess = _predict(system, walk, control, step, guess)
+        p_guess = predict(system, walk, control, step, guess)
         last = (p_guess - control.stop) * forward >= 0.0
         good, iterations, p, norm = False, 0, p_guess, np.inf
         if not last:
@@ -293,7 +182,7 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
             good, iterations, norm = newton(system, linear, trial, p, 0.0, point)
             walk.numbers[ITERATIONS] += iterations
         if good:
-            off = _distance(trial, p, guess, p_guess, weight_u, weight_p)
+            off = distance(trial, p, guess, p_guess, weight_u, weight_p)
             turned = off / (step + 1e-300)
             if turned > control.largest_turn and step > _TINY * control.smallest_step:
                 good = False
@@ -311,42 +200,18 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
         )
         if (p - control.start) * forward < -1e-9 * abs(control.stop - control.start):
             return LEFT_RANGE
-        _accept(walk, trial, p, norm)
+        accept(walk, trial, p, norm)
         if last:
             _turn(system, linear, point, control, walk)
             return FINISHED
         orientation, piece = walk.numbers[ORIENTATION], walk.numbers[PIECE]
         if not _turn(system, linear, point, control, walk):
             return STALLED
-        if step <= _TINY * control.smallest_step and _turned_back(system, control, walk):
-            _undo(walk, orientation, piece)
+        if step <= _TINY * control.smallest_step and turned_back(system, control, walk):
+            undo(walk, orientation, piece)
             return STALLED
         return RUNNING
     return STALLED
-
-
-@compiled
-def _turned_back(system: System, control: Control, walk: Walk) -> bool:
-    """Return whether the last step led back on another piece: near a cusp both meet the corrector's plane."""
-    n = walk.u.size
-    weight_u, weight_p = _weights(system, walk, control)
-    along = weight_p * walk.tangent[n] * (walk.numbers[P] - walk.before[n])
-    for i in range(n):
-        along += weight_u * walk.tangent[i] * (walk.u[i] - walk.before[i])
-    return along < 0.0
-
-
-@compiled
-def _undo(walk: Walk, orientation: float, piece: float) -> None:
-    """Take the last step back."""
-    n = walk.u.size
-    copy_to(walk.u, walk.before[:n])
-    copy_to(walk.tangent, walk.before_tangent)
-    walk.numbers[P] = walk.before[n]
-    walk.numbers[ORIENTATION], walk.numbers[PIECE] = orientation, piece
-    walk.numbers[ROUGH], walk.numbers[FRESH] = 1.0, 0.0
-    walk.numbers[COUNT] -= 1
-    walk.numbers[REJECTED] += 1
 
 
 @compiled
@@ -372,11 +237,11 @@ def _step_over(system: System, linear: Receptance, point: Evaluation, control: C
         walk.numbers[ITERATIONS] += iterations
         if not good:
             continue
-        weight_u, weight_p = _weights(system, walk, control)
-        if _distance(trial, p, walk.u, walk.numbers[P], weight_u, weight_p) > 4.0 * control.largest_step:
+        weight_u, weight_p = weights(system, walk, control)
+        if distance(trial, p, walk.u, walk.numbers[P], weight_u, weight_p) > 4.0 * control.largest_step:
             continue
         walk.numbers[STEPPED_OVER] += 1
-        _accept(walk, trial, p, norm)
+        accept(walk, trial, p, norm)
         for i in range(n):
             walk.tangent[i] = walk.u[i] - walk.before[i]
         walk.tangent[n] = p - walk.before[n]
