@@ -34,9 +34,9 @@ _STRETCH = 64  # points between two looks at the caller
 class Predictor(IntEnum):
     """How the next point is guessed."""
 
-    TANGENT = path.TANGENT
-    SECANT = path.SECANT
-    CUBIC = path.CUBIC
+    TANGENT = state_of.TANGENT
+    SECANT = state_of.SECANT
+    CUBIC = state_of.CUBIC
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -246,8 +246,8 @@ def _rows(balance: Balance, count: int) -> tuple[Real, Real, Integer, Real, Real
 
 
 def _stretch(
-    rows: tuple[Real, Real, Integer, Real, Real], count: int, status: BranchStatus | None, state: state_of.Walk,
-    spent: int,
+    rows: tuple[Real, Real, Integer, Real, Real], count: int, status: BranchStatus | None,
+    state: state_of.Walk, spent: int,
 ) -> Stretch:  # fmt: skip
     numbers = walk_by_value(state).numbers
     return Stretch(
