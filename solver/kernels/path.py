@@ -255,6 +255,47 @@ def _step_over(system: System, linear: Receptance, point: Evaluation, control: C
 
 
 @compiled
+def _turn_over(system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk) -> int:
+    """Get past a kink that is a fold: look for the other piece a little back in λ, where u goes on."""
+    out_of_line()
+    n = walk.u.size
+    span, t = abs(control.stop - control.start), walk.tangent[n]
+    if t == 0.0:
+        return STALLED
+    trial = np.empty(n)
+    for rung in range(14):
+        share = span * 1e-8 * 4.0**rung / abs(t)
+        p = walk.numbers[P] - share * t
+        if share * abs(t) > 0.05 * span or (p - control.start) * (control.stop - control.start) < 0.0:
+            break
+        receptance(system, p, linear)
+        set_to(trial, walk.u, share, walk.tangent)
+        good, iterations, norm = newton(system, linear, trial, p, 0.0, point)
+        walk.numbers[ITERATIONS] += iterations
+        if not good:
+            continue
+        # The piece one came on passes through λ = p as well: it is told by the distance to its line.
+        weight_u, _ = weights(system, walk, control)
+        off, along = 0.0, 0.0
+        for i in range(n):
+            off += weight_u * (trial[i] - walk.u[i] + share * walk.tangent[i]) ** 2
+            along += weight_u * (share * walk.tangent[i]) ** 2
+        if off <= 0.01 * along or off > (4.0 * control.largest_step) ** 2:
+            continue
+        orientation, piece = walk.numbers[ORIENTATION], walk.numbers[PIECE]
+        accept(walk, trial, p, norm)
+        walk.numbers[ROUGH] = 1.0
+        walk.numbers[STEP] = max(control.first_step * 0.1, 256.0 * control.smallest_step)
+        if not _turn(system, linear, point, control, walk):
+            return STALLED
+        if not turned_back(system, control, walk):
+            walk.numbers[STEPPED_OVER] += 1
+            return RUNNING
+        undo(walk, orientation, piece)
+    return STALLED
+
+
+@compiled
 def walk_on(
     system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk,
     most_points: int, points: Real, tangents: Real, states: Integer, observed: Real, measures: Real,
@@ -277,6 +318,8 @@ def walk_on(
             status = _step(system, linear, point, control, walk)
             if status == STALLED:
                 status = _step_over(system, linear, point, control, walk)
+            if status == STALLED:
+                status = _turn_over(system, linear, point, control, walk)
         if walk.numbers[FRESH] > 0.0:
             _record(system, linear, point, walk, count, points, tangents, states, observed, measures)
             walk.numbers[FRESH] = 0.0

@@ -104,7 +104,7 @@ def bracketed_root(
     x = guess
     if not (lo < x < hi):
         x = 0.5 * (lo + hi)
-    moved = 4.0 * (hi - lo)
+    moved = 0.0
     for _ in range(80):
         f, slope = order_at(c, s, degree, x, order, shift)
         if f == 0.0:
@@ -118,7 +118,7 @@ def bracketed_root(
             step_to = 0.5 * (lo + hi)
         before, moved = moved, abs(step_to - x)
         x = step_to
-        # A quadratically converging step leaves an error of about moved³/before².
+        # From the second step on, a quadratically converging one leaves an error of about moved³/before².
         small = 1e-16 * (1.0 + abs(x))
         if moved <= 4.0 * small or moved * moved * moved <= small * before * before or hi - lo <= 4.0 * small:
             break
