@@ -188,7 +188,7 @@ def test_bad_input_names_the_argument_and_the_value(arguments: dict[str, object]
 def test_a_scene_without_contacts_needs_variables() -> None:
     raw = solver.load_scene("two-dof").to_dict()
     raw["contacts"] = []
-    with pytest.raises(DesignError, match="no contact"):
+    with pytest.raises(DesignError, match="no friction contact"):
         optim.design(solver.Scene.from_dict(raw))
 
 

@@ -121,25 +121,17 @@ def test_all_contacts_switch_at_one_instant():
         np.testing.assert_allclose(root.force, roots[0].force, atol=1e-9 * np.abs(roots[0].force).max())
 
 
-@pytest.mark.parametrize(
-    "kt",
-    [
-        0.5,
-        pytest.param(
-            50.0,
-            marks=pytest.mark.xfail(
-                reason="the residual is relative to the response without the contact, 1e10 times as large",
-                strict=True,
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize("kt", [0.5, 50.0])
 def test_no_damping_but_the_contact(kt: float):
     """At the free resonance the contact alone limits the motion: it no longer depends on the damping."""
     at = 1.0 / (2.0 * math.pi)
     one, other = (solve(weakly_damped(c, N0=3.0, kt=kt), frequency_hz=at) for c in (1e-6, 1e-10))
-    assert one.half_peak_to_peak == pytest.approx(other.half_peak_to_peak, rel=1e-5)
+    for mine, its in zip(one.contacts, other.contacts, strict=True):
+        np.testing.assert_allclose(mine.slip, its.slip, atol=1e-7 * np.abs(its.slip).max())
+    # The motion is the difference of what force and contact do, 1e10 times as large: its last bits are lost.
+    assert one.half_peak_to_peak == pytest.approx(other.half_peak_to_peak, rel=3e-4)
     for solution in (one, other):
+        assert abs(solution.half_peak_to_peak - one.half_peak_to_peak) <= solution.error_estimate
         assert lost_power(solution) <= 1e-4  # what cancels is 1e10 times as large
 
 

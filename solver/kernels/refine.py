@@ -14,6 +14,7 @@ from solver.kernels.newton import arc_newton
 from solver.kernels.observe import HIGH_SLOPE, LOW_SLOPE, MAX_ABS, RESIDUAL, measure
 from solver.kernels.system import Evaluation, Receptance, System
 
+_AT_A_FOLD = 1e-9  # weight of λ there
 HIGH_PEAK, LOW_PEAK, EDGE = 0, 1, 2
 
 
@@ -59,6 +60,9 @@ def between(
     size, span = largest_entry(left[:n]), abs(chord[n])
     weight_u = 1.0 / (size * size) if size > 0.0 else 1.0
     weight_p = 1.0 / (span * span) if span > 0.0 else 1.0
+    if left_slope[n] * right_slope[n] < 0.0:
+        # A fold between the points: λ goes there and back, and only u tells the places on the arc apart.
+        weight_p *= _AT_A_FOLD
     set_to(plane, left, share, chord)
     t, r = share, 1.0 - share
     for i in range(n + 1):

@@ -34,6 +34,8 @@ from solver.kernels.system import (
     System,
 )
 
+_CANCELLED, _LOST = 1e-3, 1e-5  # shares of |A| |F| and |A| |dF/dU| |u| a residual is relative to at least
+
 
 @compiled
 def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, Real, Real]:
@@ -84,8 +86,7 @@ def evaluate(system: System, linear: Receptance, u: Real, p: float, added: float
 
     Returns
     -------
-    The relative residual: max|r| over the largest |ū|, and |u| and |A F| of harmonics ≥ 1 (NaN if a contact
-    failed, or Z is singular).
+    The relative residual, see `_residual` (NaN if a contact failed, or Z is singular).
     """
     out_of_line()
     for i in range(system.ks.size):
@@ -162,18 +163,48 @@ def least_size(system: System, p: float) -> float:
 
 
 @compiled
+def _sizes(system: System, u: Real, out: Evaluation) -> tuple[float, float]:
+    """Return the largest coefficient of the vibration, and the force that a residual of A F is relative to.
+
+    That is a share of the largest force, or a smaller one of the motion times the slope of a force: the
+    rounding of a motion, its mean included, reaches the force multiplied by it, which is what counts for
+    stiff contacts.
+    """
+    n, first = coefficient_count(system.ks), 1 if system.ks[0] == 0 else 0
+    motion, mean, force, steepest = 0.0, 0.0, 0.0, 0.0
+    for c in range(system.owner.size):
+        e = system.owner[c]
+        ports, port = system.first_port[e + 1] - system.first_port[e], c - system.first_port[e]
+        block = system.first_block[e] + port * ports + port
+        for j in range(first, n):
+            motion = max(motion, abs(u[c * n + j]))
+            force = max(force, abs(out.F[c, j] - system.shift[c] * u[c * n + j]))
+            steepest = max(steepest, abs(out.dF_dU[block, j, j]))
+        if first == 1:
+            mean = max(mean, abs(u[c * n]))
+    return motion, max(_CANCELLED * force, _LOST * steepest * max(motion, mean))
+
+
+@compiled
 def _residual(system: System, linear: Receptance, u: Real, least: float, out: Evaluation) -> float:
-    """Put r and dr/dλ together from the contact forces and the receptance."""
+    """Put r and dr/dλ together from the contact forces and the receptance.
+
+    Each harmonic's residual is taken relative to the largest of its own ū and A F and of all motions: near an
+    undamped resonance ū and A F of one harmonic are huge and cancel, and must not hide what is left of the
+    others. Where A F is the difference of large forces only their rounding is left, see `_sizes`.
+    """
     out_of_line()
     nc, n = system.owner.size, coefficient_count(system.ks)
     r, dr = out.residual, out.dr_dp
-    scale, largest_residual = least, 0.0
+    motion, force_scale = _sizes(system, u, out)
+    worst, check = 0.0, 0.0
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
         has_sine = system.ks[i] > 0
+        scale, residual = max(least, motion), 0.0
         for c in range(nc):
             row = c * n + here
-            response, dresponse = complex(0.0), complex(0.0)
+            response, dresponse, reach = complex(0.0), complex(0.0), 0.0
             for d in range(nc):
                 at = d * n + here
                 stiffness = system.shift[d]
@@ -186,18 +217,22 @@ def _residual(system: System, linear: Receptance, u: Real, least: float, out: Ev
                 force, dforce = complex(fc, -fs), complex(out.dF_dp[d, here], -dfs)
                 response += a * force
                 dresponse += a * dforce + da * force
+                reach = max(reach, abs(a.real) + abs(a.imag))
             free, dfree = linear.u_linear[0, i, c], linear.u_linear[1, i, c]
-            scale = max(scale, abs(free))
+            scale = max(scale, abs(free), reach * force_scale)
             if has_sine:
                 # The mean of a part that nothing holds may drift without bound: it must not hide a residual.
-                scale = max(scale, abs(response), abs(u[row]))
+                scale = max(scale, abs(response))
             r[row] = u[row] - free.real + response.real
             dr[row] = -dfree.real + dresponse.real
-            largest_residual = max(largest_residual, abs(r[row]))
+            residual = max(residual, abs(r[row]))
+            check += r[row]
             if has_sine:
                 r[row + 1] = u[row + 1] + free.imag - response.imag
                 dr[row + 1] = dfree.imag - dresponse.imag
-                largest_residual = max(largest_residual, abs(r[row + 1]))
-    if scale == 0.0:
-        return largest_residual
-    return largest_residual / scale
+                residual = max(residual, abs(r[row + 1]))
+                check += r[row + 1]
+        if residual > 0.0:
+            worst = max(worst, residual / scale if scale > 0.0 else residual)
+    # `max` passes over NaN, a sum does not.
+    return worst if math.isfinite(check) else np.nan
