@@ -29,6 +29,7 @@ class Row:
     wanted: str
     peak: str
     peer: PeerRun | None
+    same_band: bool = True
 
     def cells(self) -> tuple[str, ...]:
         """Return the columns of the table of responses."""
@@ -38,7 +39,9 @@ class Row:
         if peer is not None:  # over another band only the time of a point compares
             theirs = f"{1e3 * peer.cpu_seconds:.0f} ms, {peer.points} points"
             each = (peer.cpu_seconds / peer.points) / (mine / points)
-            ratio = f"{peer.cpu_seconds / mine:.0f} ({each:.0f} a point)"
+            ratio = f"{each:.0f} a point"
+            if self.same_band:
+                ratio = f"{peer.cpu_seconds / mine:.0f} ({ratio})"
         return (
             self.name, str(points), f"{1e3 * mine:.2f}", f"{1e3 * self.timing.least:.2f}",
             f"{1e3 * mine / points:.4f}", self.wanted, theirs, ratio, self.peak,

@@ -60,8 +60,12 @@ def chain(masses: int, *, sliders: bool) -> Scene:
 
 
 def graded_chain(masses: int) -> Scene:
-    """A chain with a slider and a force on each, the loads rising along it: some slip, some stick."""
-    scene = chain(masses, sliders=True)
+    """A chain with a slider and a force on each, the loads rising along it: some slip, some stick.
+
+    The first mass is observed, where the contacts slip: far along the chain the motion is linear.
+    """
+    raw = chain(masses, sliders=True).to_dict()
+    scene = Scene.from_dict({**raw, "observe": {"dof": "m1", "band": list(BAND)}})
     return scene.with_values(
         {f"{contact.name}.N0": N0 * (0.2 + 8.0 * i / masses) for i, contact in enumerate(scene.contacts)}
     )
