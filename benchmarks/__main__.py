@@ -25,6 +25,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "one-slider": against_peers.one_slider,
         "optimum": against_peers.optimum,
         "disk": disk.disk_response,
+        "map": disk.disk_map,
         "beam": beam.beams,
         "savings": savings.savings,
         "two-hundred": large.two_hundred_contacts,

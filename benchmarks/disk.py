@@ -30,3 +30,26 @@ def disk_response() -> None:
     table("Bladed disk", header, [row])
     cells = distance(branch, timing.cpu).cells()
     table("Distance to the least a point can cost", ("response", *HEADER), [("bladed disk", *cells)])
+
+
+def disk_map() -> None:
+    """The map of 60 loads of the shroud and 400 frequencies, every value a converged solution."""
+    scene = solver.load_scene("bladed-disk")
+    rows = []
+    for what, ridge in (("map alone", False), ("with the ridge of peaks", True)):
+        found, timing = timed(
+            lambda ridge=ridge: solver.response_map(
+                scene, "shroud.N0", 20.0, 3000.0, steps=60, frequencies=400, ridge=ridge
+            ),
+            runs=2,
+        )
+    XX
+        row, column = 17, 229
+        one = solver.solve(
+            scene.with_values({"shroud.N0": float(found.parameter[row])}),
+            frequency_hz=float(found.frequency[column]),
+        )
+        value = check("a value of the map", float(found.amplitude[row, column]), one.max_abs, 1e-8)
+        rows.append((what, "60 x 400", f"{timing.cpu:.2f}", f"{timing.least:.2f}", "1.5", value))
+    header = ("map of the bladed disk", "points", "s (process)", "s (wall)", "wanted s", "a value, solved")
+    table("Map of load and frequency", header, rows)

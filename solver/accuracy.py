@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lapack
 
 from solver.branch import Branch, Peak
 from solver.fourier import Real
+from solver.kernels.jacobian import factorise, step_back
 from solver.kernels.observe import extremes, observed_motion
 from solver.kernels.receptance import receptance
+from solver.kernels.residual import evaluate
 from solver.kernels.system import by_reference, evaluation_by_value, new_receptance, receptance_by_value
 from solver.parametric import linear_model
 from solver.widening import linear_part, more_harmonics, pad
@@ -21,8 +22,8 @@ from solver.workspace import Workspace
 # Harmonics looked at beyond those kept, for a solution with H of them: H + max(H, 8).
 _LEAST_BEYOND = 8
 # How much farther the receptance is looked at.
-_LOST_BITS = 16.0  # of the sums behind a motion, in units of their rounding
 _TAIL = 4
+_LOST_BITS = 16.0  # of the sums behind a motion, in units of their rounding
 # Fitted to 600 random scenes, see docs/accuracy.md: 98 % of the true errors are below the estimate.
 SAFETY = 1.7
 # The change of the motion at its worst instant counts with this share: max|x| may change little by accident.
@@ -76,8 +77,8 @@ class ErrorEstimator:
         """
         larger, kept = self._larger, self._workspace.balance
         before = self._motion(self._workspace, u, p)
-        border = self._border(u, p) if across else None
-        if before is None or (across and border is None):
+        tangent = self._tangent() if across else np.zeros(self._larger.balance.n_unknowns + 1)
+        if before is None or tangent is None:
             return _UNKNOWN
         x = pad(before, kept, larger.balance)
         U = pad(u, kept, larger.balance)
@@ -85,16 +86,18 @@ class ErrorEstimator:
             return _UNKNOWN
         point = evaluation_by_value(larger.point)
         tail = self._tail(point.F, p)
-        matrix = point.jacobian.copy()
-        if border is not None:
-            matrix = np.block([[matrix, point.dr_dp[:, None]], [border[None, :]]])
-        solver = _Factorised(matrix)
+        # Across the branch, u and λ each count relative to their size.
+        size = max(float(np.abs(u).max(initial=0.0)), 1e-150)
+        weights = (1.0 / size**2, 1.0 / (p * p if p != 0.0 else 1.0)) if across else (0.0, 0.0)
+        if factorise(larger.system, larger.linear, larger.point, tangent, *weights) == 0.0:
+            return _UNKNOWN
         changes = []
         for _ in range(2):
-            step = solver.solve(point.residual)
-            if step is None:
+            step = np.append(point.residual, 0.0) if across else point.residual.copy()
+            step_back(larger.system, larger.point, step)
+            if not np.all(np.isfinite(step)):
                 return _UNKNOWN
-            U, p = U - step[: U.size], p - (0.0 if border is None else float(step[-1]))
+            U, p = U - step[: U.size], p - (float(step[-1]) if across else 0.0)
             after = self._motion(larger, U, p)
             if after is None:
                 return _UNKNOWN
@@ -117,7 +120,8 @@ class ErrorEstimator:
     @staticmethod
     def _motion(workspace: Workspace, u: Real, p: float) -> Real | None:
         """Return the observed coefficients at (u, p), the evaluation in the workspace; None if it failed."""
-        norm, _ = workspace.evaluate(u, p)
+        receptance(workspace.system, p, workspace.linear)
+        norm = evaluate(workspace.system, workspace.linear, u, p, 0.0, workspace.point)
         if not math.isfinite(norm):
             return None
         x = np.zeros(workspace.balance.n_coefficients)
@@ -133,19 +137,15 @@ class ErrorEstimator:
         half_range = 0.5 * abs(high_after - low_after - high + low)
         return max(max_abs, _ANYWHERE * max(rise, -sink)), max(half_range, 0.5 * _ANYWHERE * (rise - sink))
 
-    def _border(self, u: Real, p: float) -> Real | None:
-        """Return the row that keeps a step orthogonal to the branch, u and λ each relative to its size."""
-        point = evaluation_by_value(self._workspace.point)
-        slope = _Factorised(point.jacobian).solve(point.dr_dp)
-        if slope is None:
+    def _tangent(self) -> Real | None:
+        """Return the tangent of the branch where the workspace was evaluated, λ last; None if singular."""
+        kept = self._workspace
+        slope = -evaluation_by_value(kept.point).dr_dp
+        if factorise(kept.system, kept.linear, kept.point, slope, 0.0, 0.0) == 0.0:
             return None
-        size = max(float(np.abs(u).max(initial=0.0)), 1e-150)
-        row: Real = np.append(
-            pad(-slope, self._workspace.balance, self._larger.balance) / size**2,
-            1.0 / (p * p if p != 0.0 else 1.0),
-        )
-        row /= np.abs(row).max()
-        return row
+        step_back(kept.system, kept.point, slope)
+        tangent: Real = np.append(pad(slope, kept.balance, self._larger.balance), 1.0)
+        return tangent if np.all(np.isfinite(tangent)) else None
 
     def _tail(self, F: Real, p: float) -> float:
         """Return the motion of the observed DOF by harmonics beyond those of the larger balance [m]."""
@@ -156,27 +156,6 @@ class ErrorEstimator:
         pairs = F[:, F.shape[1] - 2 * (ks.size - late) :].reshape(F.shape[0], ks.size - late, 2)
         falling = np.max(np.hypot(pairs[..., 0], pairs[..., 1]) * ks[late:] ** 2, axis=1, initial=0.0)
         return float(np.sum(B @ falling / self._beyond_ks[ks.size :] ** 2))
-
-
-class _Factorised:
-    """A square matrix, factorised once."""
-
-    def __init__(self, matrix: Real) -> None:
-        self._size = matrix.shape[0]
-        self._singular = False
-        if self._size:
-            self._lu, self._pivots, info = lapack.dgetrf(matrix)
-            self._singular = info != 0
-
-    def solve(self, right: Real) -> Real | None:
-        """Return the solution, `right` filled up with zeros; None if the matrix is singular."""
-        if self._singular:
-            return None
-        full = np.zeros(self._size)
-        full[: right.size] = right
-        if self._size:
-            full, _ = lapack.dgetrs(self._lu, self._pivots, full)
-        return full if np.all(np.isfinite(full)) else None
 
 
 def truncation_error(workspace: Workspace, u: Real, p: float) -> ErrorEstimate:

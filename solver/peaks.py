@@ -48,7 +48,7 @@ class _Node:
 
     solution: Real
     tangent: Real
-    measures: Real
+    measures: list[float]  # not an array: they are looked at one by one
 
 
 class Survey:
@@ -57,7 +57,7 @@ class Survey:
     def __init__(self, workspace: Workspace, points: Points) -> None:
         self.spent = 0
         self._workspace = workspace
-        rows = zip(points.solutions, points.tangents, points.measures, strict=True)
+        rows = zip(points.solutions, points.tangents, points.measures.tolist(), strict=True)
         self._nodes = [_Node(solution=s, tangent=t, measures=m) for s, t, m in rows]
         self._peaks: list[Peak] = []
         if self._nodes:
@@ -152,9 +152,9 @@ class Survey:
         pieces, crossings = [], []
         for left, right in zip(self._nodes[:-1], self._nodes[1:], strict=True):
             gaps = left.measures[MAX_ABS] - limit, right.measures[MAX_ABS] - limit
-            begin, end = left.solution, right.solution
             if gaps[0] <= 0.0 and gaps[1] <= 0.0:
                 continue
+            begin, end = left.solution, right.solution
             if (gaps[0] > 0.0) != (gaps[1] > 0.0):
                 edge = self._edge(left, right, limit, gaps)
                 crossings.append(edge)
@@ -192,7 +192,7 @@ class Survey:
             values,
         )  # fmt: skip
         self.spent += int(iterations)
-        return _Node(solution=found, tangent=tangent, measures=values) if good else None
+        return _Node(solution=found, tangent=tangent, measures=values.tolist()) if good else None
 
     def _refine(
         self, left: _Node, right: _Node, what: int, level: float, g_left: float, g_right: float
@@ -207,7 +207,7 @@ class Survey:
             found, tangent, observed, values,
         )  # fmt: skip
         self.spent += int(iterations)
-        return _Node(solution=found, tangent=tangent, measures=values) if good else None
+        return _Node(solution=found, tangent=tangent, measures=values.tolist()) if good else None
 
     def _rows(self, like: _Node) -> tuple[Real, Real, Real, Real]:
         size = like.solution.size
@@ -225,7 +225,7 @@ def band_limit(limit: float | None, peaks: tuple[Peak, ...], kind: Kind) -> floa
 def _slope(node: _Node) -> float:
     """Return the slope of max|x| along the node's tangent."""
     higher = HIGH_SLOPE if node.measures[HIGH] >= node.measures[LOW] else LOW_SLOPE
-    return float(node.measures[higher])
+    return node.measures[higher]
 
 
 def _scales(left: _Node, right: _Node) -> tuple[float, float]:

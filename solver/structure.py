@@ -97,6 +97,8 @@ def _least_size(contact_modes: Complex, modal_forces: Complex, eigenvalues: Comp
     sizes = np.maximum(np.abs(eigenvalues), 1e-12 * np.abs(eigenvalues).max(initial=0.0))
     shares, largest = np.abs(contact_modes), 0.0
     for i, s in enumerate(which):
+        if not np.any(modal_forces[i]):
+            continue
         with np.errstate(divide="ignore", invalid="ignore"):
             sums = shares[s] @ (np.abs(modal_forces[i]) / sizes[s])
         largest = max(largest, float(np.nan_to_num(sums, posinf=0.0).max(initial=0.0)))

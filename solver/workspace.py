@@ -30,6 +30,9 @@ FEWEST_HARMONICS = (
 )
 
 
+_LEAST_RISE = 1e-3  # share of the excitation below which it is raised no further
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointSolution:
     """One attempt to solve the balance at one value of λ.
@@ -88,7 +91,7 @@ class Workspace:
 
         From nothing, Newton starts at the fully stuck response; if that fails, the harmonics are added
         little by little, beginning with the first alone; if that fails too, the load is walked down rung by
-        rung from full stick.
+        rung from full stick, and at last the excitation is raised from nothing.
         """
         system, linear, point = self.system, self.linear, self.point
         u, spent = np.zeros(self.balance.n_unknowns), 0
@@ -107,7 +110,30 @@ class Workspace:
         if not good:
             good, more, norm = ladder(system, linear, u, p, point)
             spent += more
+        if not good:
+            good, more, norm = self._by_level(u, p)
+            spent += more
         return PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
+
+    def _by_level(self, u: Real, p: float) -> tuple[bool, int, float]:
+        """Raise the excitation from nothing, the result in `u`; as `newton`."""
+        reached, step, spent, norm = 0.0, 0.1, 0, np.inf
+        kept = np.zeros(u.size)
+        while reached < 1.0 and step > _LEAST_RISE:
+            level = min(1.0, reached + step)
+            u[:] = kept * (level / reached) if reached > 0.0 else kept
+            receptance(self.system, p, self.linear)
+            linear = receptance_by_value(self.linear)
+            linear.u_linear *= level
+            linear.x_linear *= level
+            good, more, norm = newton(self.system, self.linear, u, p, 0.0, self.point)
+            spent += more
+            if good:
+                kept, reached, step = u.copy(), level, 1.5 * step
+            else:
+                step *= 0.5
+        receptance(self.system, p, self.linear)
+        return reached == 1.0, spent, norm
 
     def _with_fewer_harmonics(self, p: float) -> PointSolution:
         """Solve with about two thirds of the harmonics, found in the same way from still fewer."""
