@@ -43,7 +43,7 @@ def disk_map() -> None:
             ),
             runs=2,
         )
-    XX
+        expect(f"map: {found.status.value}", found.completed)
         row, column = 17, 229
         one = solver.solve(
             scene.with_values({"shroud.N0": float(found.parameter[row])}),

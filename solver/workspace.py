@@ -124,8 +124,8 @@ class Workspace:
             u[:] = kept * (level / reached) if reached > 0.0 else kept
             receptance(self.system, p, self.linear)
             linear = receptance_by_value(self.linear)
-            linear.u_linear *= level
-            linear.x_linear *= level
+            linear.u_linear[...] *= level
+            linear.x_linear[...] *= level
             good, more, norm = newton(self.system, self.linear, u, p, 0.0, self.point)
             spent += more
             if good:
