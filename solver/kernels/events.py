@@ -139,13 +139,21 @@ def leave_stick(
     delta = 2.0 * math.pi / n
     j = math.floor(start / delta) + 1
     lo = start
-    g_lo, slope_lo = np.empty(2), np.empty(2)
+    from_here = np.empty((3, 2))
+    g_lo, slope_lo, begin = from_here[0], from_here[1], from_here[2]
     for x in range(2):
-        q, dq, _, _ = at_point(c[x], s[x], degree, start)
+        q, dq, curve, _ = at_point(c[x], s[x], degree, start)
         g_lo[x] = q + (1 - 2 * x) * offset
-        slope_lo[x] = dq
+        slope_lo[x], begin[x] = dq, start
         if g_lo[x] > -tol and dq > tol * degree * degree:
             return start, x
+        if dq <= 0.0 < curve and g_lo[x] < -tol:
+            # It dips first: a rise and fall that follow within the interval would not show at its ends.
+            turn = start - 2.0 * dq / curve
+            if turn < min(j * delta, end):
+                q, dq, _, _ = at_point(c[x], s[x], degree, turn)
+                if dq > 0.0 and q + (1 - 2 * x) * offset < -tol:
+                    g_lo[x], slope_lo[x], begin[x] = q + (1 - 2 * x) * offset, dq, turn
     at = j % n
     while lo < end:
         hi = j * delta
@@ -162,16 +170,25 @@ def leave_stick(
             g_hi = q + shift
             # Nearly every interval ends below the limit without a maximum inside: nothing to look for there.
             if g_hi > tol or (slope_lo[x] > 0.0 and dq < 0.0):
-                tau = _crosses(c[x], s[x], degree, shift, tol, lo, hi, g_lo[x], slope_lo[x], g_hi, dq)
+                tau = _crosses(c[x], s[x], degree, shift, tol, begin[x], hi, g_lo[x], slope_lo[x], g_hi, dq)
                 if tau < first:
                     first, which = tau, x
-            g_lo[x], slope_lo[x] = g_hi, dq
+            g_lo[x], slope_lo[x], begin[x] = g_hi, dq, hi
         if which >= 0:
             return first, which
         lo = hi
         j += 1
         at = at + 1 if at + 1 < n else 0
     return end, -1
+
+
+@compiled
+def _dip(c: Real, s: Real, degree: int, lo: float, hi: float, tol: float) -> float:
+    """Return where the slope is least inside (lo, hi), if it has a minimum below 0 there, else −1."""
+    if at_point(c, s, degree, hi)[2] <= 0.0:
+        return -1.0
+    dip = bracketed_root(c, s, degree, 2, 0.0, lo, hi, 0.5 * (lo + hi), RISING)
+    return dip if at_point(c, s, degree, dip)[1] < -tol * degree * degree else -1.0
 
 
 @compiled
@@ -205,6 +222,10 @@ def leave_slip(
             if not last and lo > start:
                 guess = lo + cubic_turn(value[at - 1], rate, value[at], rate_hi, hi - lo)
             return bracketed_root(c, s, degree, 1, 0.0, lo, hi, guess, FALLING)
+        if lo == start and curve < 0.0:
+            dip = _dip(c, s, degree, lo, hi, tol)
+            if dip > 0.0:
+                return bracketed_root(c, s, degree, 1, 0.0, lo, dip, 0.5 * (lo + dip), FALLING)
         if not last and j * delta - start > delta:
             before, after = slope[at - 1], slope[at + 1 if at + 1 < n else 0]
             if rate_hi <= before and rate_hi <= after:

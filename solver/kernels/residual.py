@@ -34,7 +34,7 @@ from solver.kernels.system import (
     System,
 )
 
-_CANCELLED, _LOST = 1e-3, 1e-6  # shares of |A| |F| and |A| |dF/dU| |u| a residual is relative to at least
+_CANCELLED, _LOST = 1e-3, 1e-5  # shares of |A| |F| and |A| |dF/dU| |u| a residual is relative to at least
 
 
 @compiled
