@@ -260,3 +260,14 @@ def shifted(q: np.ndarray, turn: float) -> np.ndarray:
     """Coefficients of q(tau + turn)."""
     amplitudes = fourier.to_complex(q)
     return fourier.to_real(amplitudes * np.exp(1j * turn * np.arange(amplitudes.size)))
+
+
+def test_a_brief_slip_within_one_grid_interval():
+    """A stiff contact slips back and forth between two points of the grid: nothing is missed."""
+    kt, mu, N = 1e12, 0.3, np.array([200.0, 60.0, 0.0])
+    rng = np.random.default_rng(5)
+    for _ in range(40):
+        U = np.concatenate([[0.0], rng.normal(size=22) * np.repeat(np.arange(1, 12.0) ** -1.5, 2)]) * 1e-4
+        case = Case(U=U, N=N, kt=kt, mu=mu)
+        crude = crude_force(case, 400_000)
+        np.testing.assert_allclose(evaluate(case).F, crude, atol=1e-4 * np.abs(crude).max())

@@ -58,7 +58,7 @@ def largest(c: Real, s: Real, degree: int, value: Real, slope: Real) -> tuple[fl
     for j in range(n):
         top = max(top, value[j])
         bottom = min(bottom, value[j])
-    near = top - 1e-3 * (top - bottom)
+    near = top - 2e-2 * (top - bottom)
     best, place = -np.inf, 0.0
     for j in range(n):
         after = j + 1 if j + 1 < n else 0
@@ -92,7 +92,9 @@ def _crosses(
         width = hi - lo
         if slope_lo <= 0.0 or slope_hi >= 0.0:
             return np.inf
-        if min(g_lo + slope_lo * width, g_hi - slope_hi * width) <= tol:
+        # Above neither tangent by more than the curvature allows, |w''| ≤ degree² max|w| (Bernstein).
+        room = 0.5 * (degree * width) ** 2 * tol / ROUNDING
+        if min(g_lo + slope_lo * width, g_hi - slope_hi * width) + room <= tol:
             return np.inf
         guess = lo + cubic_turn(g_lo, slope_lo, g_hi, slope_hi, width)
         end = bracketed_root(c, s, degree, 1, 0.0, lo, hi, guess, FALLING)
