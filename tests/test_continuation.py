@@ -376,3 +376,16 @@ def test_one_solution_whatever_the_guess():
             np.testing.assert_allclose(found.u, truth, atol=1e-7 * np.abs(truth).max())
             reached += 1
         assert reached == 60
+
+
+@pytest.mark.parametrize("predictor", Predictor)
+@pytest.mark.parametrize(("level", "damping"), [(0.3, -0.05), (0.5, -0.1)])
+def test_folds_that_are_kinks_are_passed(level: float, damping: float, predictor: Predictor):
+    """At the edge of full stick the branch turns back at a sharp corner, and later forward again."""
+    scene = UNSTABLE.with_values({"excitation.amplitude": level})
+    found = walked(with_damping(scene, "frequency", damping), 0.05, 0.4, predictor)
+    assert found.status is BranchStatus.COMPLETED
+    assert found.values[-1] == pytest.approx(0.4)
+    turns = np.count_nonzero(np.diff(np.sign(np.diff(found.values))))
+    assert turns >= 2
+    assert turns % 2 == 0
