@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from optim.errors import DesignError
-    from optim.problem import design
     from optim.result import DesignResult, DesignStatus
+    from optim.search import design
 
-_HOME = {"design": "problem", "DesignResult": "result", "DesignStatus": "result", "DesignError": "errors"}
+_HOME = {"design": "search", "DesignResult": "result", "DesignStatus": "result", "DesignError": "errors"}
 
 __all__ = ["DesignError", "DesignResult", "DesignStatus", "design"]
 

@@ -1,4 +1,4 @@
-"""The two criteria of a damper, peak amplitude and resonance band, with analytic gradients.
+"""Derivatives of amplitudes and band edges of a response by design parameters, through the whole solve.
 
 Peak: at a maximum over the frequency ∂a/∂ω = 0, so its derivative by a parameter is the partial one there
 (envelope theorem). At an end of the band the frequency does not move either, so the same holds. Band edge:
@@ -8,134 +8,15 @@ a(ω_e, p) = limit, so dω_e/dp = (dlimit/dp − ∂a/∂p)/(∂a/∂ω).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
-from optim.scaling import Real
+from optim.variables import Real
 from solver.balance import Balance, for_parameter
-from solver.branch import Branch, Edge, Peak
-from solver.continuation import sweep
+from solver.branch import Edge, Peak
 from solver.kernels.observe import SLOPE
-from solver.peaks import HALF_POWER
-from solver.savings import Effects, even_harmonics_reason
-from solver.scene import Scene
 from solver.workspace import Workspace
-
-# Peaks below this share of the highest are not handed to the optimiser: within one step they cannot lead.
-COMPETES = 0.6
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PeakCriterion:
-    """One peak over the band.
-
-    Attributes
-    ----------
-    value : float
-        max|x| of the observed DOF [m].
-    at : float
-        Its frequency [Hz].
-    gradient : (n_variables,) array
-        By each parameter [m per unit of it]; NaN where the balance is singular.
-    """
-
-    value: float
-    at: float
-    gradient: Real
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BandCriterion:
-    """The measure of the frequencies where the amplitude exceeds a limit.
-
-    Attributes
-    ----------
-    width : float
-        Hz.
-    limit : float
-        Amplitude [m]; half power of the highest peak unless the user gave one.
-    gradient : (n_variables,) array
-        Hz per unit of each parameter.
-    """
-
-    width: float
-    limit: float
-    gradient: Real
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Criteria:
-    """Both criteria of one design.
-
-    Attributes
-    ----------
-    values : mapping
-        The design: parameter path to value.
-    branch : Branch
-        The frequency response behind the numbers.
-    peaks : tuple of PeakCriterion
-        All that compete, highest first; empty unless the response covered the whole band.
-    band : BandCriterion or None
-        None without a peak.
-    """
-
-    values: Mapping[str, float]
-    branch: Branch
-    peaks: tuple[PeakCriterion, ...]
-    band: BandCriterion | None
-
-    @property
-    def good(self) -> bool:
-        """Whether the whole band was covered, so that the numbers mean something."""
-        return self.branch.completed and bool(self.peaks) and math.isfinite(self.peaks[0].value)
-
-
-def evaluate(
-    scene: Scene,
-    values: Mapping[str, float],
-    *,
-    harmonics: int,
-    limit: float | None,
-    gradients: bool = True,
-    should_stop: Callable[[], bool] | None = None,
-) -> Criteria:
-    """Evaluate both criteria of one design.
-
-    Parameters
-    ----------
-    scene : the scene; its `observe.band` is searched.
-    values : the design.
-    harmonics : highest harmonic kept.
-    limit : amplitude [m] of the band; half power of the highest peak if None.
-    gradients : compute them (otherwise they are NaN).
-    should_stop : asked while the response is computed.
-    """
-    here = scene.with_values(dict(values))
-    # A slope by the variation of a load needs the harmonics that variation brings in.
-    effects = Effects(even_harmonics=even_harmonics_reason(here, values) is not None)
-    branch = sweep(here, harmonics=harmonics, limit=limit, effects=effects, should_stop=should_stop)
-    if not branch.completed:
-        return Criteria(values=dict(values), branch=branch, peaks=(), band=None)
-    competing = [peak for peak in branch.peaks if peak.value >= COMPETES * branch.peaks[0].value]
-    paths = tuple(values)
-    sensitivity = Sensitivity(branch.balance, paths) if gradients else None
-    nothing = np.full(len(paths), np.nan)
-    peaks = tuple(
-        PeakCriterion(
-            value=peak.value, at=peak.at, gradient=nothing if sensitivity is None else sensitivity.peak(peak)
-        )
-        for peak in competing
-    )
-    band = None
-    if branch.band is not None:
-        slope = nothing
-        if sensitivity is not None:
-            dlimit = np.zeros(len(paths)) if limit is not None else peaks[0].gradient * HALF_POWER
-            slope = sensitivity.band(branch.band.edges, dlimit)
-        band = BandCriterion(width=branch.band.width, limit=branch.band.limit, gradient=slope)
-    return Criteria(values=dict(values), branch=branch, peaks=peaks, band=band)
 
 
 class Sensitivity:

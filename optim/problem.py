@@ -1,254 +1,253 @@
-"""`design`: the best damper of a scene."""
+"""The description of a design problem: what may be chosen, what is minimised, what is limited."""
 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
 
-import numpy as np
-from scipy.stats import qmc
-
-from optim.criteria import Criteria, evaluate
+from optim.cases import Case, number_pair, read_cases
 from optim.errors import DesignError
-from optim.minimax import Local, is_flat, local_search
-from optim.result import DesignResult, DesignStatus
-from optim.scaling import Real, Variable, check_variables
-from optim.subproblem import SLACK_WEIGHT
+from optim.rows import Quantity
+from optim.variables import Variable, check_variables
 from solver.balance import check_harmonics
-from solver.scene import Scene
+from solver.scene import FrictionContact, Scene
 
-COARSE_ONE = 9  # designs of the coarse stage with one variable
-COARSE_EACH = 6  # and for each variable with more
-WORTH_A_LOOK = 1.15  # relative height up to which an interval of the coarse stage is halved
-BASINS = 2  # of the coarse stage that are searched to the end
-MOST_EVALUATIONS = 400
-SAME_HEIGHT = 1e-5  # relative distance within which peaks count as equally high
+Ranges = tuple[tuple[float, float], ...]
+NEVER_SEPARATES = "never-separates"
 
 
-class _StoppedError(Exception):
-    """The caller asked to stop, or the evaluations are used up."""
+class Method(Enum):
+    """How the optimum is searched; the value is the word users write."""
 
-    def __init__(self, status: DesignStatus) -> None:
-        self.status = status
-        super().__init__(status.value)
-
-
-class _Search:
-    """Evaluates designs, keeps all of them, reports progress and looks whether to stop."""
-
-    def __init__(
-        self, scene: Scene, variables: tuple[Variable, ...], harmonics: int, limit: float | None,
-        on_progress: Callable[[float, int], None] | None, should_stop: Callable[[], bool] | None,
-    ) -> None:  # fmt: skip
-        self.history: list[Criteria] = []
-        self.variables = variables
-        self._scene = scene
-        self._harmonics = harmonics
-        self._limit = limit
-        self._on_progress = on_progress
-        self._should_stop = should_stop
-
-    def __call__(self, values: Mapping[str, float]) -> Criteria:
-        """Evaluate one design with gradients."""
-        if self._should_stop is not None and self._should_stop():
-            raise _StoppedError(DesignStatus.STOPPED)
-        if len(self.history) >= MOST_EVALUATIONS:
-            raise _StoppedError(DesignStatus.TOO_MANY)
-        criteria = evaluate(
-            self._scene, values, harmonics=self._harmonics, limit=self._limit, should_stop=self._should_stop
-        )
-        self.history.append(criteria)
-        if self._on_progress is not None:
-            # The number of evaluations is not known beforehand: the share approaches 1 from below.
-            done = len(self.history)
-            self._on_progress(done / (done + 12.0), done)
-        return criteria
+    AUTO = "auto"
+    TRACKED = "tracked"
+    MINIMAX = "minimax"
+    IPOPT = "ipopt"
 
 
-def design(
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What a design must keep.
+
+    Attributes
+    ----------
+    peak : float or None
+        Largest amplitude over the band of any case [m].
+    band_hz : float or None
+        Widest resonance band of any case [Hz].
+    forbidden_hz : mapping of case name to ranges
+        Frequencies [Hz] in which the amplitude must not exceed the limit that defines the band.
+    friction_work : mapping of contact to float
+        Largest friction work in a cycle at any frequency of the band [J].
+    in_contact : tuple of str
+        Contacts that must never separate.
+    """
+
+    peak: float | None
+    band_hz: float | None
+    forbidden_hz: Mapping[str, Ranges]
+    friction_work: Mapping[str, float]
+    in_contact: tuple[str, ...]
+
+    @property
+    def any(self) -> bool:
+        """Whether there is a limit at all."""
+        given = (self.forbidden_hz, self.friction_work, self.in_contact)
+        return self.peak is not None or self.band_hz is not None or any(given)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Problem:
+    """A design problem, checked.
+
+    Attributes
+    ----------
+    scene : Scene
+        What is designed.
+    variables : tuple of Variable
+        What may be chosen.
+    cases : tuple of Case
+        The responses it is judged by.
+    limit : float or None
+        Amplitude [m] above which the resonance band is measured; half power of the highest peak if None.
+    weights : mapping of Quantity to float
+        What is minimised: the largest peak [m] and the widest band [Hz], each times its weight, summed.
+    limits : Limits
+        What must be kept.
+    harmonics : int
+        Highest harmonic kept.
+    start : mapping or None
+        A design to start from, variable name to value.
+    method : Method
+        How it is searched.
+    """
+
+    scene: Scene
+    variables: tuple[Variable, ...]
+    cases: tuple[Case, ...]
+    limit: float | None
+    weights: Mapping[Quantity, float]
+    limits: Limits
+    harmonics: int
+    start: Mapping[str, float] | None
+    method: Method
+
+    @property
+    def plain(self) -> bool:
+        """Whether it asks for nothing but the least peak of one case."""
+        return len(self.cases) == 1 and not self.limits.any and self.weights[Quantity.BAND] == 0.0
+
+
+def pose(
     scene: Scene,
     *,
     variables: Mapping[str, tuple[float, float]] | None = None,
+    scaling: Mapping[str, str] | None = None,
+    cases: Sequence[Mapping[str, object]] | None = None,
     limit: float | None = None,
+    weights: Mapping[str, float] | None = None,
+    max_peak: float | None = None,
     max_band_hz: float | None = None,
+    forbidden_hz: Sequence[Sequence[float]] | None = None,
+    speeds_rpm: Sequence[Sequence[float]] | None = None,
+    max_friction_work: Mapping[str, float] | float | None = None,
+    contact_states: Mapping[str, str] | None = None,
     harmonics: int = 11,
     start: Mapping[str, float] | None = None,
-    on_progress: Callable[[float, int], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-) -> DesignResult:
-    """Choose parameters within bounds so that the highest peak over the scene's band is least.
-
-    Parameters
-    ----------
-    scene : the scene; `observe` says which DOF and which band.
-    variables : parameter path to (low, high); the N0 of the contact with a tied N1 if left out.
-    limit : amplitude [m] above which the resonance band is measured; half power of the peak if left out.
-    max_band_hz : largest width of that band allowed [Hz].
-    harmonics : highest harmonic kept.
-    start : a design to start from, path to value; it is tried along with those of the coarse stage.
-    on_progress : called with (share done, frequency responses so far).
-    should_stop : asked between responses and within them.
-
-    Returns
-    -------
-    The best design with everything tried on the way; look at its status.
+    method: str | Method = Method.AUTO,
+) -> Problem:
+    """Check a design problem and put it together; the arguments are those of `optim.design`.
 
     Raises
     ------
-    SettingError, DesignError
-        Bad paths, bounds, limits or start.
+    SettingError, SceneError, DesignError
+        What is wrong: the argument, the value, and what would be right.
     """
-    begun = time.perf_counter()
-    chosen = check_variables(scene, variables)
-    check_harmonics(harmonics)
-    for name, value in (("limit", limit), ("max_band_hz", max_band_hz)):
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if value is not None and not (number and math.isfinite(value) and value > 0.0):
-            raise DesignError(name, value, "must be a number > 0")
-    first = _check_start(chosen, start)
-    search = _Search(scene, chosen, harmonics, limit, on_progress, should_stop)
-    local, status = None, DesignStatus.STOPPED
-    try:
-        local, status = _search(search, first, max_band_hz)
-    except _StoppedError as stop:
-        status = stop.status
-    if on_progress is not None and local is not None:
-        on_progress(1.0, len(search.history))
-    return _result(scene, search, local, status, max_band_hz, time.perf_counter() - begun)
-
-
-def _check_start(
-    variables: tuple[Variable, ...], start: Mapping[str, float] | None
-) -> dict[str, float] | None:
-    """Return the start with every variable in it, or None.
-
-    Raises
-    ------
-    DesignError
-        A path that is no variable, a missing one, or a value out of bounds.
-    """
-    if start is None:
-        return None
-    paths = [variable.path for variable in variables]
-    for path in start:
-        if path not in paths:
-            raise DesignError("start", path, f"must name the variables {', '.join(paths)}")
-    for variable in variables:
-        value = start.get(variable.path)
-        if value is None or not variable.low <= value <= variable.high:
-            raise DesignError(
-                f"start.{variable.path}", value, f"must be from {variable.low} to {variable.high}"
-            )
-    return {path: float(start[path]) for path in paths}
-
-
-def _search(
-    search: _Search, start: dict[str, float] | None, max_band_hz: float | None
-) -> tuple[Local | None, DesignStatus]:
-    """Run the coarse stage, then a local search from the best designs of it that lie in different basins."""
-    for values in _coarse(search.variables, start):
-        search(values)
-    if len(search.variables) == 1:
-        for values in _between(search, max_band_hz):
-            search(values)
-    good = [criteria for criteria in search.history if criteria.good]
-    if not good:
-        return None, DesignStatus.NO_RESPONSE
-    if all(is_flat(criteria, search.variables) for criteria in good):
-        nothing = np.zeros(len(good[0].peaks))
-        return Local(
-            criteria=good[0], settled=True, optimality=0.0, peak_multipliers=nothing
-        ), DesignStatus.FLAT
-    found = [
-        local_search(search, search.variables, criteria, max_band_hz)
-        for criteria in _basins(good, search.variables, max_band_hz)
-    ]
-    best = min(found, key=lambda local: _merit(local.criteria, max_band_hz))
-    band = best.criteria.band
-    if max_band_hz is not None and band is not None and band.width > max_band_hz * (1.0 + 1e-6):
-        return best, DesignStatus.BAND_INFEASIBLE
-    return best, DesignStatus.OPTIMAL if best.settled else DesignStatus.KINK
-
-
-def _coarse(variables: tuple[Variable, ...], start: dict[str, float] | None) -> list[dict[str, float]]:
-    """Return the designs of the coarse stage: even in scaled variables, the start first."""
-    n = len(variables)
-    points: Real
-    if n == 1:
-        points = np.linspace(0.0, 1.0, COARSE_ONE)[:, None]
-    else:
-        points = qmc.Sobol(n, scramble=False).random(2 ** math.ceil(math.log2(COARSE_EACH * n)))
-    designs = [
-        {variable.path: variable.outside(float(z)) for variable, z in zip(variables, point, strict=True)}
-        for point in points
-    ]
-    return [start, *designs] if start is not None and start not in designs else designs
-
-
-def _between(search: _Search, max_band_hz: float | None) -> list[dict[str, float]]:
-    """Return the middles of those coarse intervals in which a design may beat the best one so far."""
-    variable = search.variables[0]
-    good = sorted(
-        (criteria for criteria in search.history if criteria.good), key=lambda c: c.values[variable.path]
-    )
-    merits = [_merit(criteria, max_band_hz) for criteria in good]
-    places = [variable.inside(criteria.values[variable.path]) for criteria in good]
-    return [
-        {variable.path: variable.outside(0.5 * (places[i] + places[i + 1]))}
-        for i in range(len(good) - 1)
-        if min(merits[i], merits[i + 1]) <= WORTH_A_LOOK * min(merits)
-    ]
-
-
-def _merit(criteria: Criteria, max_band_hz: float | None) -> float:
-    """Return the highest peak with the penalty of the search on the band."""
-    excess = 0.0
-    if max_band_hz is not None and criteria.band is not None:
-        excess = max(criteria.band.width / max_band_hz - 1.0, 0.0)
-    return criteria.peaks[0].value * (1.0 + SLACK_WEIGHT * excess)
-
-
-def _basins(
-    good: list[Criteria], variables: tuple[Variable, ...], max_band_hz: float | None
-) -> list[Criteria]:
-    """Return the best designs of the coarse stage; with one variable the best of its local minima."""
-    ranked = sorted(good, key=lambda criteria: _merit(criteria, max_band_hz))
-    if len(variables) > 1:
-        return ranked[:BASINS]
-    path = variables[0].path
-    along = sorted(good, key=lambda criteria: criteria.values[path])
-    merits = [math.inf, *(_merit(criteria, max_band_hz) for criteria in along), math.inf]
-    minima = [c for i, c in enumerate(along) if merits[i] >= merits[i + 1] <= merits[i + 2]]
-    return sorted(minima, key=lambda criteria: _merit(criteria, max_band_hz))[:BASINS]
-
-
-def _result(
-    scene: Scene, search: _Search, local: Local | None, status: DesignStatus, max_band_hz: float | None,
-    seconds: float,
-) -> DesignResult:  # fmt: skip
-    """Put the result together; after a stop the best design so far stands in it."""
-    good = [criteria for criteria in search.history if criteria.good]
-    best = local.criteria if local else min(good, key=lambda c: _merit(c, max_band_hz), default=None)
-    multipliers = () if local is None else tuple(float(x) for x in local.peak_multipliers if x > 1e-6)
-    return DesignResult(
-        scene=scene.name, status=status, optimum={} if best is None else dict(best.values), criteria=best,
-        active=() if best is None else _active(best, search.variables, max_band_hz),
-        optimality=math.nan if local is None else local.optimality, multipliers=multipliers,
-        history=tuple(search.history), seconds=seconds,
+    chosen = check_variables(scene, variables, scaling)
+    read = read_cases(scene, cases)
+    for name, value in (("limit", limit), ("max_peak", max_peak), ("max_band_hz", max_band_hz)):
+        if value is not None:
+            _positive(name, value)
+    limits = Limits(
+        peak=max_peak, band_hz=max_band_hz, forbidden_hz=_forbidden(read, forbidden_hz, speeds_rpm),
+        friction_work=_friction_work(scene, max_friction_work), in_contact=_in_contact(scene, contact_states),
+    )  # fmt: skip
+    if limits.forbidden_hz and limit is None:
+        raise DesignError("limit", None, "must be given with forbidden ranges: the amplitude allowed there")
+    return Problem(
+        scene=scene, variables=chosen, cases=read, limit=limit, weights=_weights(weights), limits=limits,
+        harmonics=check_harmonics(harmonics), start=_start(chosen, start), method=_method(method),
     )  # fmt: skip
 
 
-def _active(best: Criteria, variables: tuple[Variable, ...], max_band_hz: float | None) -> tuple[str, ...]:
-    """Return what holds the optimum in place, in words."""
-    top = best.peaks[0].value
-    active = [f"peak at {peak.at:.6g} Hz" for peak in best.peaks if peak.value >= top * (1.0 - SAME_HEIGHT)]
+def _positive(name: str, value: object) -> float:
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not number or not math.isfinite(value) or not value > 0.0:  # type: ignore[arg-type,operator]
+        raise DesignError(name, value, "must be a number > 0")
+    return float(value)  # type: ignore[arg-type]
+
+
+def _weights(weights: Mapping[str, float] | None) -> dict[Quantity, float]:
+    """Return the weights of peak and band; the peak alone without any."""
+    if weights is None:
+        return {Quantity.PEAK: 1.0, Quantity.BAND: 0.0}
+    if not isinstance(weights, Mapping):
+        raise DesignError("weights", weights, 'must be a table such as {"peak": 1.0, "band": 0.0}')
+    found = {Quantity.PEAK: 0.0, Quantity.BAND: 0.0}
+    for name, value in weights.items():
+        quantity = next((q for q in found if q.value == name), None)
+        if quantity is None:
+            raise DesignError(f"weights.{name}", value, "is not known; `peak` and `band` can be minimised")
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not number or not math.isfinite(value) or value < 0.0:
+            raise DesignError(f"weights.{name}", value, "must be a number >= 0")
+        found[quantity] = float(value)
+    if not any(found.values()):
+        raise DesignError("weights", dict(weights), "must have at least one number > 0")
+    return found
+
+
+def _forbidden(
+    cases: tuple[Case, ...], forbidden_hz: object, speeds_rpm: object
+) -> dict[str, Ranges]:  # fmt: skip
+    """Return the forbidden frequencies of every case: those given, and those its order makes of the speeds."""
+    hertz, speeds = _ranges("forbidden_hz", forbidden_hz), _ranges("speeds_rpm", speeds_rpm)
+    found = {}
+    for case in cases:
+        ranges = hertz + tuple((low * case.order / 60.0, high * case.order / 60.0) for low, high in speeds)
+        if ranges:
+            found[case.name] = ranges
+    return found
+
+
+def _ranges(name: str, ranges: object) -> Ranges:
+    if ranges is None:
+        return ()
+    if not isinstance(ranges, Sequence) or isinstance(ranges, str) or not ranges:
+        raise DesignError(name, ranges, "must be a list of ranges, [[low, high], …]")
+    found = tuple(number_pair(f"{name}[{i}]", pair) for i, pair in enumerate(ranges))
+    for i, (low, high) in enumerate(found):
+        if not 0.0 < low < high:
+            raise DesignError(f"{name}[{i}]", [low, high], "must have 0 < low < high")
+    return found
+
+
+def _friction_work(scene: Scene, limits: object) -> dict[str, float]:
+    """Return the limit of every contact named; a single number is that of every friction contact."""
+    if limits is None:
+        return {}
+    names = [contact.name for contact in scene.contacts]
+    if not isinstance(limits, Mapping):
+        rubbing = [contact.name for contact in scene.contacts if isinstance(contact, FrictionContact)]
+        return dict.fromkeys(rubbing, _positive("max_friction_work", limits))
+    for name in limits:
+        if name not in names:
+            raise DesignError("max_friction_work", name, f"must name contacts: {', '.join(names)}")
+    return {name: _positive(f"max_friction_work.{name}", value) for name, value in limits.items()}
+
+
+def _in_contact(scene: Scene, states: object) -> tuple[str, ...]:
+    if states is None:
+        return ()
+    if not isinstance(states, Mapping):
+        raise DesignError(
+            "contact_states", states, f'must be a table such as {{"damper": "{NEVER_SEPARATES}"}}'
+        )
+    names = [contact.name for contact in scene.contacts if isinstance(contact, FrictionContact)]
+    for name, state in states.items():
+        if name not in names:
+            raise DesignError("contact_states", name, f"must name friction contacts: {', '.join(names)}")
+        if state != NEVER_SEPARATES:
+            raise DesignError(f"contact_states.{name}", state, f"must be {NEVER_SEPARATES}")
+    return tuple(states)
+
+
+def _start(variables: tuple[Variable, ...], start: Mapping[str, float] | None) -> dict[str, float] | None:
+    """Return the start with every variable in it, or None."""
+    if start is None:
+        return None
+    if not isinstance(start, Mapping):
+        raise DesignError("start", start, "must be a table of variables and values")
+    names = [variable.name for variable in variables]
+    for name in start:
+        if name not in names:
+            raise DesignError("start", name, f"must name the variables {', '.join(names)}")
     for variable in variables:
-        value = best.values[variable.path]
-        for bound, name in ((variable.low, "lower"), (variable.high, "upper")):
-            if abs(value - bound) <= 1e-9 * max(abs(bound), 1e-300):
-                active.append(f"{name} bound of {variable.path}")
-    band = best.band
-    if max_band_hz is not None and band is not None and band.width >= max_band_hz * (1.0 - 1e-4):
-        active.append(f"band limit of {max_band_hz:g} Hz")
-    return tuple(active)
+        value = start.get(variable.name)
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not number or not variable.low <= value <= variable.high:  # type: ignore[operator]
+            raise DesignError(
+                f"start.{variable.name}", value, f"must be from {variable.low} to {variable.high}"
+            )
+    return {name: float(start[name]) for name in names}
+
+
+def _method(method: object) -> Method:
+    if isinstance(method, Method):
+        return method
+    known = [one.value for one in Method]
+    if method not in known:
+        raise DesignError("method", method, f"must be one of {', '.join(known)}")
+    return Method(method)

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from optim.criteria import Criteria
+from optim.model import Conditions
+from optim.problem import Method, Problem
+from optim.rows import UNITS, Evaluation, Quantity, Row
 from solver.branch import Branch
+
+SAME_HEIGHT = 1e-5  # relative distance within which rows count as equally high
+AT_LIMIT = 1e-4  # relative distance from a bound within which a limited row holds the design
 
 
 class DesignStatus(Enum):
@@ -22,13 +28,17 @@ class DesignStatus(Enum):
         "The peak does not depend on these variables (no friction, or contacts that never slip): "
         "choose others."
     )
-    BAND_INFEASIBLE = (
-        "No design within the bounds keeps the band below its limit; the one with the narrowest band is "
-        "given: allow a wider band, a higher amplitude limit, or wider bounds."
+    INFEASIBLE = (
+        "No design within the bounds keeps all limits; the one that breaks them least is given, with what "
+        "each limit would have to be: relax one of those, or allow wider bounds."
     )
     NO_RESPONSE = (
         "The frequency response could not be computed over the whole band for any design tried: "
         "use more harmonics or a narrower band."
+    )
+    NOT_SETTLED = (
+        "The solver of the nonlinear programme did not converge; the best design it saw is given: use the "
+        "method minimax, or start from that design."
     )
     TOO_MANY = "The largest number of responses was used up before the search settled: allow more."
     STOPPED = "The search was stopped by the caller."
@@ -43,36 +53,73 @@ class DesignPeak:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Basin:
+    """A local optimum.
+
+    Attributes
+    ----------
+    values : mapping
+        Variable name to value.
+    peak : float
+        Highest peak [m].
+    objective : float
+        What is minimised.
+    settled, feasible : bool
+        Whether the first-order conditions hold and the limits are kept there.
+    """
+
+    values: Mapping[str, float]
+    peak: float
+    objective: float
+    settled: bool
+    feasible: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DesignResult:
     """The best design found.
 
     Attributes
     ----------
+    problem : Problem
+        What was asked.
+    method : Method
+        How the optimum was found.
     status : DesignStatus
         How the search ended.
-    optimum : mapping
-        Parameter path to value; empty when no design could be evaluated.
-    criteria : Criteria or None
-        Peaks and band of the optimum with their gradients.
-    active : tuple of str
-        What holds the optimum in place: peaks at the same height, bounds, the band limit.
-    optimality : float
-        Norm of the projected gradient of the Lagrangian, relative peak per scaled variable.
-    multipliers : tuple of float
-        Of the active peaks; they sum to 1.
-    history : tuple of Criteria
+    evaluation : Evaluation or None
+        Rows and responses of the optimum.
+    conditions : Conditions or None
+        First-order conditions there.
+    basins : tuple of Basin
+        Every local optimum found, best first.
+    history : tuple of Evaluation
         Every design evaluated, in order; the optimum is among them.
+    work : float
+        What the search cost, in frequency responses.
+    seconds : float
+        Time in all.
     """
 
-    scene: str
+    problem: Problem
+    method: Method
     status: DesignStatus
-    optimum: Mapping[str, float]
-    criteria: Criteria | None
-    active: tuple[str, ...]
-    optimality: float
-    multipliers: tuple[float, ...]
-    history: tuple[Criteria, ...]
+    evaluation: Evaluation | None
+    conditions: Conditions | None
+    basins: tuple[Basin, ...]
+    history: tuple[Evaluation, ...]
+    work: float
     seconds: float
+
+    @property
+    def scene(self) -> str:
+        """Name of the scene."""
+        return self.problem.scene.name
+
+    @property
+    def optimum(self) -> Mapping[str, float]:
+        """Variable name to value; empty when no design could be evaluated."""
+        return {} if self.evaluation is None else dict(self.evaluation.values)
 
     @property
     def reached(self) -> bool:
@@ -82,58 +129,164 @@ class DesignResult:
     @property
     def peak(self) -> DesignPeak | None:
         """The highest peak of the optimum."""
-        if self.criteria is None or not self.criteria.peaks:
+        if self.evaluation is None or not self.evaluation.peaks:
             return None
-        return DesignPeak(value=self.criteria.peaks[0].value, at=self.criteria.peaks[0].at)
+        return DesignPeak(value=self.evaluation.peaks[0].value, at=self.evaluation.peaks[0].at_hz)
 
     @property
     def band_hz(self) -> float | None:
-        """Width of the resonance band of the optimum [Hz]."""
-        return None if self.criteria is None or self.criteria.band is None else self.criteria.band.width
+        """Width of the widest resonance band of the optimum [Hz]."""
+        band = None if self.evaluation is None else self.evaluation.band
+        return None if band is None else band.value
 
     @property
     def limit(self) -> float | None:
         """Amplitude at which the band is measured [m]."""
-        return None if self.criteria is None or self.criteria.band is None else self.criteria.band.limit
+        if self.evaluation is None or self.evaluation.band is None:
+            return None
+        branches = [r.branch for r in self.evaluation.responses if r.case == self.evaluation.band.case]
+        return None if branches[0].band is None else branches[0].band.limit
 
     @property
     def evaluations(self) -> int:
-        """Frequency responses computed."""
+        """Designs evaluated."""
         return len(self.history)
 
     @property
+    def optimality(self) -> float:
+        """Largest component of the gradient of the Lagrangian, relative objective per scaled variable."""
+        return math.nan if self.conditions is None else self.conditions.residual
+
+    @property
+    def multipliers(self) -> tuple[float, ...]:
+        """Of the active peaks; they sum to 1."""
+        if self.conditions is None:
+            return ()
+        return tuple(x for row, x in self.conditions.rows if row.quantity is Quantity.PEAK and x > 1e-6)
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """What holds the optimum in place, in words: equally high peaks, bounds, limits."""
+        if self.evaluation is None or not self.evaluation.rows:
+            return ()
+        held = [row.what for row in _highest(self.evaluation)]
+        for variable in self.problem.variables:
+            value = self.evaluation.values[variable.name]
+            for bound, name in ((variable.low, "lower"), (variable.high, "upper")):
+                if abs(value - bound) <= 1e-9 * max(abs(bound), 1e-300):
+                    held.append(f"{name} bound of {variable.name}")
+        return (*held, *(limit_words(row) for row in self.evaluation.rows if at_limit(row)))
+
+    @property
+    def broken(self) -> tuple[Row, ...]:
+        """The limited rows that the design does not keep, worst first."""
+        if self.evaluation is None:
+            return ()
+        rows = [row for row in self.evaluation.rows if row.bound is not None and row.value > row.bound]
+        return tuple(sorted(rows, key=lambda row: -row.excess(1.0)))
+
+    @property
     def sweeps(self) -> tuple[Branch, ...]:
-        """Every frequency response computed, the one of the optimum last."""
-        others = [criteria for criteria in self.history if criteria is not self.criteria]
-        return tuple(criteria.branch for criteria in (*others, *([self.criteria] if self.criteria else [])))
+        """Every frequency response computed, those of the optimum last."""
+        return tuple(branch for _, branch in self._responses())
 
     @property
     def sweep_values(self) -> tuple[Mapping[str, float], ...]:
         """The designs of `sweeps`, in the same order."""
-        others = [criteria for criteria in self.history if criteria is not self.criteria]
-        return tuple(criteria.values for criteria in (*others, *([self.criteria] if self.criteria else [])))
+        return tuple(values for values, _ in self._responses())
+
+    def _responses(self) -> list[tuple[Mapping[str, float], Branch]]:
+        others = [evaluation for evaluation in self.history if evaluation is not self.evaluation]
+        last = [] if self.evaluation is None else [self.evaluation]
+        return [(e.values, response.branch) for e in [*others, *last] for response in e.responses]
 
     def to_json(self) -> dict[str, object]:
         """Return the result as one JSON object."""
-        peak, criteria = self.peak, self.criteria
+        peak, evaluation = self.peak, self.evaluation
+        peaks = () if evaluation is None else evaluation.peaks
         return {
             "scene": self.scene,
+            "method": self.method.value,
             "optimum": dict(self.optimum),
             "peak": None if peak is None else {"value": peak.value, "at": peak.at},
-            "peaks": [] if criteria is None else [{"value": p.value, "at": p.at} for p in criteria.peaks],
+            "peaks": [{"value": p.value, "at": p.at_hz, "case": p.case} for p in peaks],
             "band_hz": self.band_hz,
             "limit": self.limit,
+            "objective": None if evaluation is None or not evaluation.rows else evaluation.objective,
+            "rows": [] if evaluation is None else [_row(row) for row in evaluation.rows],
             "evaluations": self.evaluations,
-            "newton_iterations": sum(criteria.branch.newton_iterations for criteria in self.history),
+            "newton_iterations": sum(branch.newton_iterations for branch in self.sweeps),
             "tried": [
-                {"values": dict(c.values), "peak": c.peaks[0].value, "at": c.peaks[0].at}
-                for c in self.history
-                if c.good
+                {"values": dict(e.values), "peak": e.peaks[0].value, "at": e.peaks[0].at_hz}
+                for e in self.history
+                if e.good and e.peaks
             ],
+            "basins": [_basin(basin) for basin in self.basins],
             "seconds": self.seconds,
+            "work": _number(self.work),
             "active": list(self.active),
-            "optimality": self.optimality,
+            "optimality": _number(self.optimality),
             "multipliers": list(self.multipliers),
+            "conditions": None if self.conditions is None else _conditions(self.conditions),
+            "broken": [{**_row(row), "by": row.value - (row.bound or 0.0)} for row in self.broken],
             "reached": self.reached,
             "status": self.status.value,
         }
+
+
+def at_limit(row: Row) -> bool:
+    """Return whether a limited row holds a design in place."""
+    if row.bound is None:
+        return False
+    return row.value >= row.bound - AT_LIMIT * (abs(row.bound) or 1.0)
+
+
+def limit_words(row: Row) -> str:
+    """Return the limit of a row in words."""
+    words = {
+        Quantity.PEAK: "peak limit", Quantity.BAND: "band limit", Quantity.FORBIDDEN: "limit in a forbidden range",
+        Quantity.FRICTION_WORK: "friction work limit", Quantity.SEPARATION: "separation limit",
+    }  # fmt: skip
+    where = "" if row.quantity in (Quantity.BAND, Quantity.PEAK) else f" ({row.what})"
+    return f"{words[row.quantity]} of {row.bound:g} {UNITS[row.quantity]}{where}"
+
+
+def _highest(evaluation: Evaluation) -> list[Row]:
+    """Return the rows that are equally high, of every quantity that is minimised."""
+    found: list[Row] = []
+    for quantity in Quantity:
+        rows = [row for row in evaluation.of(quantity) if row.weight > 0.0]
+        top = max((row.weight * row.value for row in rows), default=0.0)
+        found += [row for row in rows if row.weight * row.value >= top * (1.0 - SAME_HEIGHT)]
+    return found
+
+
+def _row(row: Row) -> dict[str, object]:
+    return {
+        "quantity": row.quantity.value, "case": row.case, "what": row.what, "value": row.value,
+        "unit": UNITS[row.quantity], "at": _number(row.at_hz), "bound": row.bound, "weight": row.weight,
+    }  # fmt: skip
+
+
+def _basin(basin: Basin) -> dict[str, object]:
+    return {
+        "values": dict(basin.values), "peak": basin.peak, "objective": basin.objective,
+        "settled": basin.settled, "feasible": basin.feasible,
+    }  # fmt: skip
+
+
+def _conditions(found: Conditions) -> dict[str, object]:
+    return {
+        "residual": _number(found.residual),
+        "violation": found.violation,
+        "rows": [
+            {"what": row.what, "case": row.case, "quantity": row.quantity.value, "multiplier": x}
+            for row, x in found.rows
+        ],
+        "bounds": [{"variable": name, "side": side, "multiplier": x} for name, side, x in found.bounds],
+    }
+
+
+def _number(value: float) -> float | None:
+    """Return a float that JSON can carry (null for NaN)."""
+    return value if math.isfinite(value) else None

@@ -216,7 +216,7 @@ def test_a_band_nobody_can_keep_is_status_1(run: Run) -> None:
     status, out, err = run(arguments)
     assert status == 1
     assert json.loads(out)["reached"] is False
-    assert optim.DesignStatus.BAND_INFEASIBLE.value in err
+    assert optim.DesignStatus.INFEASIBLE.value in err
 
 
 @pytest.mark.parametrize(

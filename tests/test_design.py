@@ -10,9 +10,16 @@ import pytest
 
 import optim
 import solver
-from optim.criteria import evaluate
 from optim.errors import DesignError
+from optim.evaluation import evaluate
+from optim.problem import pose
 from optim.result import DesignStatus
+
+
+def peak_of(scene: solver.Scene, values: dict[str, float]) -> float:
+    """The highest peak of a design, by a sweep."""
+    problem = pose(scene, variables={path: (0.5 * value, 2.0 * value) for path, value in values.items()})
+    return evaluate(problem, values, gradients=False).peaks[0].value
 
 
 @cache
@@ -47,17 +54,15 @@ def test_no_neighbour_of_the_optimum_is_better(name: str, path: str) -> None:
     assert result.peak is not None
     scene = solver.load_scene(name)
     for factor in (0.5, 0.8, 0.95, 0.99, 0.999, 1.001, 1.01, 1.05, 1.25, 2.0):
-        there = evaluate(
-            scene, {path: result.optimum[path] * factor}, harmonics=11, limit=None, gradients=False
-        )
-        assert there.peaks[0].value >= result.peak.value * (1.0 - 1e-9)
+        there = peak_of(scene, {path: result.optimum[path] * factor})
+        assert there >= result.peak.value * (1.0 - 1e-9)
 
 
 def test_the_shape_of_the_paper_steep_below_90_and_flat_to_1000_newton() -> None:
     scene = solver.load_scene("bladed-disk")
 
     def peak(N0: float) -> float:
-        return evaluate(scene, {"shroud.N0": N0}, harmonics=11, limit=None, gradients=False).peaks[0].value
+        return peak_of(scene, {"shroud.N0": N0})
 
     least = best("bladed-disk", "shroud.N0", None).peak.value  # type: ignore[union-attr]
     assert peak(60.0) > 20.0 * least
@@ -103,8 +108,8 @@ def test_springs_of_the_structure_can_be_designed() -> None:
     result = optim.design(scene, variables={"structure.k2": (35.0, 45.0)})
     assert result.status is DesignStatus.OPTIMAL
     for k2 in (35.0, 38.0, 40.0, 42.0, 45.0):
-        there = evaluate(scene, {"structure.k2": k2}, harmonics=11, limit=None, gradients=False)
-        assert there.peaks[0].value >= result.peak.value * (1.0 - 1e-9)  # type: ignore[union-attr]
+        there = peak_of(scene, {"structure.k2": k2})
+        assert there >= result.peak.value * (1.0 - 1e-9)  # type: ignore[union-attr]
 
 
 def test_without_friction_there_is_nothing_to_choose() -> None:
@@ -117,7 +122,7 @@ def test_without_friction_there_is_nothing_to_choose() -> None:
 def test_a_band_that_no_design_keeps_says_so_and_gives_the_narrowest() -> None:
     scene = solver.load_scene("two-dof")
     result = optim.design(scene, variables={"damper.N0": (90.0, 130.0)}, limit=1.0, max_band_hz=0.01)
-    assert result.status is DesignStatus.BAND_INFEASIBLE
+    assert result.status is DesignStatus.INFEASIBLE
     assert result.band_hz is not None
     assert result.band_hz > 0.01
 

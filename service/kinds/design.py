@@ -76,7 +76,7 @@ def resolve(request: DesignRequest, source: SceneSource) -> Resolved:
 def _variables(request: DesignRequest, scene: Scene) -> dict[str, list[float]]:
     """The variables with their bounds, each checked by the design layer."""
     # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
-    from optim.scaling import check_variables
+    from optim.variables import check_variables
 
     issues: list[Issue] = []
     found: dict[str, list[float]] = {}
@@ -89,7 +89,7 @@ def _variables(request: DesignRequest, scene: Scene) -> dict[str, list[float]]:
         except (SettingError, DesignError) as error:
             issues.append(refusal(where, str(error)))
             continue
-        found |= {variable.path: [variable.low, variable.high] for variable in checked}
+        found |= {variable.name: [variable.low, variable.high] for variable in checked}
     require(issues)
     return found
 

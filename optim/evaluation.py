@@ -1,0 +1,201 @@
+"""Evaluating a design: the responses of all its cases and the rows they give, with gradients."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from optim.cases import Case
+from optim.criteria import Sensitivity
+from optim.problem import Problem
+from optim.rows import Evaluation, Quantity, Response, Row
+from optim.variables import Real, parameter_values
+from solver.branch import Branch
+from solver.continuation import sweep
+from solver.peaks import HALF_POWER
+from solver.savings import Effects, even_harmonics_reason
+from solver.scene import FrictionContact, Scene
+
+# Peaks below this share of the highest are not handed to the optimiser: within one step they cannot lead.
+COMPETES = 0.6
+
+ShouldStop = Callable[[], bool] | None
+
+
+def evaluate(
+    problem: Problem, values: Mapping[str, float], *, gradients: bool = True, should_stop: ShouldStop = None
+) -> Evaluation:
+    """Compute everything a design is judged by.
+
+    Parameters
+    ----------
+    problem : what is judged.
+    values : the design, variable name to value.
+    gradients : compute them (otherwise they are NaN).
+    should_stop : asked while the responses are computed.
+
+    Returns
+    -------
+    The evaluation; without rows if a response does not cover its range, for whatever reason.
+    """
+    responses: list[Response] = []
+    rows: list[Row] = []
+    for case in problem.cases:
+        found = _case(problem, case, values, gradients, should_stop)
+        responses += found[0]
+        rows += found[1]
+        if not all(response.branch.completed for response in found[0]):
+            return Evaluation(values=dict(values), responses=tuple(responses), rows=())
+    return Evaluation(values=dict(values), responses=tuple(responses), rows=tuple(rows))
+
+
+def _case(
+    problem: Problem, case: Case, values: Mapping[str, float], gradients: bool, should_stop: ShouldStop
+) -> tuple[list[Response], list[Row]]:
+    """Compute the responses and rows of one case."""
+    here = case.scene.with_values(parameter_values(problem.variables, values))
+    effects = effects_of(problem, here)
+    judge = Judge(problem=problem, case=case, scene=here, gradients=gradients)
+    branch = sweep(
+        here, harmonics=problem.harmonics, limit=problem.limit, effects=effects, should_stop=should_stop
+    )
+    responses, rows = [Response(case=case.name, branch=branch)], judge.response(branch)
+    for low, high in problem.limits.forbidden_hz.get(case.name, ()):
+        branch = sweep(
+            here, start=low, stop=high, harmonics=problem.harmonics, effects=effects, should_stop=should_stop
+        )
+        responses.append(Response(case=case.name, branch=branch))
+        rows += judge.forbidden(branch, low, high)
+    return responses, rows + judge.separation()
+
+
+def effects_of(problem: Problem, scene: Scene) -> Effects:
+    """Return what has to be computed for the slopes: those by a load's variation need the even harmonics."""
+    paths = [path for variable in problem.variables for path in variable.paths]
+    return Effects(even_harmonics=even_harmonics_reason(scene, paths) is not None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judge:
+    """Turns the responses of one case into rows.
+
+    Attributes
+    ----------
+    problem, case : what is judged.
+    scene : the case's scene with the design's values.
+    gradients : compute them (otherwise they are NaN).
+    """
+
+    problem: Problem
+    case: Case
+    scene: Scene
+    gradients: bool
+
+    @property
+    def _paths(self) -> tuple[str, ...]:
+        return tuple(path for variable in self.problem.variables for path in variable.paths)
+
+    def _sensitivity(self, branch: Branch) -> Sensitivity | None:
+        return Sensitivity(branch.balance, self._paths) if self.gradients else None
+
+    def _gathered(self, by_path: Real) -> Real:
+        """Return a gradient by the variables from one by all their paths."""
+        owners = np.repeat(
+            np.arange(len(self.problem.variables)), [len(v.paths) for v in self.problem.variables]
+        )
+        gathered = np.zeros(len(self.problem.variables))
+        np.add.at(gathered, owners, by_path)
+        return gathered
+
+    def _nothing(self) -> Real:
+        return np.full(len(self.problem.variables), np.nan)
+
+    def response(self, branch: Branch) -> list[Row]:
+        """Return the rows of the response over the band: peaks and the resonance band."""
+        if not branch.completed or not branch.peaks:
+            return []
+        sensitivity, limits = self._sensitivity(branch), self.problem.limits
+        weight = self.problem.weights[Quantity.PEAK] * self.case.weight
+        rows = self._maxima(branch, sensitivity, Quantity.PEAK, "peak", weight, limits.peak)
+        if branch.band is not None:
+            slope = self._nothing()
+            if sensitivity is not None:
+                fixed = self.problem.limit is not None
+                dlimit = np.zeros(len(self._paths))
+                if not fixed:
+                    dlimit = HALF_POWER * sensitivity.peak(branch.peaks[0])
+                slope = self._gathered(sensitivity.band(branch.band.edges, dlimit))
+            rows.append(
+                Row(
+                    quantity=Quantity.BAND, case=self.case.name,
+                    what=f"band above {branch.band.limit:.6g} m", value=branch.band.width, gradient=slope,
+                    at_hz=math.nan, weight=self.problem.weights[Quantity.BAND], bound=limits.band_hz,
+                )
+            )  # fmt: skip
+        return rows
+
+    def forbidden(self, branch: Branch, low: float, high: float) -> list[Row]:
+        """Return the rows of a response over a forbidden range."""
+        if not branch.completed:
+            return []
+        what = f"amplitude from {low:g} to {high:g} Hz, highest"
+        return self._maxima(
+            branch, self._sensitivity(branch), Quantity.FORBIDDEN, what, 0.0, self.problem.limit
+        )
+
+    def _maxima(
+        self, branch: Branch, sensitivity: Sensitivity | None, quantity: Quantity, what: str, weight: float,
+        bound: float | None,
+    ) -> list[Row]:  # fmt: skip
+        """Return a row for every local maximum that competes."""
+        competing = [peak for peak in branch.peaks if peak.value >= COMPETES * branch.peaks[0].value]
+        return [
+            Row(
+                quantity=quantity, case=self.case.name, what=f"{what} at {peak.at:.6g} Hz", value=peak.value,
+                gradient=self._nothing()
+                if sensitivity is None
+                else self._gathered(sensitivity.peak(peak)),
+                at_hz=peak.at, weight=weight, bound=bound,
+            )
+            for peak in competing
+        ]  # fmt: skip
+
+    def separation(self) -> list[Row]:
+        """Return |N1| − N0 of every contact that must never separate: its load falls to 0 where that is 0."""
+        rows = []
+        for contact in self.scene.contacts:
+            if contact.name not in self.problem.limits.in_contact or not isinstance(contact, FrictionContact):
+                continue
+            rows.append(
+                Row(
+                    quantity=Quantity.SEPARATION, case=self.case.name,
+                    what=f"|N1| - N0 of {contact.name}", value=abs(contact.N1_value) - contact.N0,
+                    gradient=self._load_slope(contact), at_hz=math.nan, weight=0.0, bound=0.0,
+                )
+            )  # fmt: skip
+        return rows
+
+    def _load_slope(self, contact: FrictionContact) -> Real:
+        """Return d(|N1| − N0)/dp of one contact by the variables."""
+        by_path = []
+        sign = math.copysign(1.0, contact.N1_value)
+        ratio = contact.N1_ratio
+        for path in self._paths:
+            owner, _, key = path.rpartition(".")
+            slope = 0.0
+            if owner in (contact.name, contact.group):
+                by_key = {"N0": sign * (ratio or 0.0) - 1.0, "N1": sign, "N1_ratio": sign * contact.N0}
+                slope = by_key.get(key, 0.0)
+            by_path.append(slope)
+        return self._gathered(np.array(by_path))
+
+
+def natural_scales(problem: Problem) -> dict[Quantity, float]:
+    """Return what an excess over a bound of 0 is relative to: for separation the scene's normal loads."""
+    loads = [c.N0 for c in problem.scene.contacts if isinstance(c, FrictionContact) and c.N0 > 0.0]
+    scales = dict.fromkeys(Quantity, 1.0)
+    scales[Quantity.SEPARATION] = max(loads, default=1.0)
+    return scales

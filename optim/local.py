@@ -1,0 +1,58 @@
+"""Where a local search ended, judged by the first-order conditions themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from optim.model import Conditions, Model, conditions
+from optim.rows import Evaluation
+from optim.variables import Variable
+
+KKT_TOLERANCE = 1e-3  # relative objective per scaled variable
+KEPT = 1e-6  # relative excess over a bound up to which it counts as kept
+FLAT_SLOPE = 1e-9  # relative objective per scaled variable below which there is nothing to choose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Local:
+    """Where a local search ended.
+
+    Attributes
+    ----------
+    evaluation : Evaluation
+        The best design.
+    merit : float
+        Its objective, with the penalty on the limits it does not keep.
+    settled : bool
+        Whether the first-order conditions hold: of the objective, or, if limits are not kept, of the largest
+        excess over them.
+    feasible : bool
+        Whether the limits are kept.
+    conditions : Conditions
+        Multipliers and residual.
+    """
+
+    evaluation: Evaluation
+    merit: float
+    settled: bool
+    feasible: bool
+    conditions: Conditions
+
+
+def ended(here: Evaluation, model: Model, variables: Sequence[Variable]) -> Local:
+    """Return the end of a search at a design."""
+    feasible = model.violation <= KEPT
+    found = conditions(model, variables, feasibility=not feasible)
+    return Local(
+        evaluation=here, merit=model.merit, settled=found.residual <= KKT_TOLERANCE, feasible=feasible,
+        conditions=found,
+    )  # fmt: skip
+
+
+def is_flat(model: Model) -> bool:
+    """Return whether no row depends on any variable."""
+    both = np.concatenate([model.slopes.reshape(-1), model.excess_slopes.reshape(-1)])
+    return bool(np.all(np.abs(both) <= FLAT_SLOPE))
