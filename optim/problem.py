@@ -172,7 +172,7 @@ def _weights(weights: Mapping[str, float] | None) -> dict[Quantity, float]:
 def _forbidden(
     cases: tuple[Case, ...], forbidden_hz: object, speeds_rpm: object
 ) -> dict[str, Ranges]:  # fmt: skip
-    """Return the forbidden frequencies of every case: those given, and those its order makes of the speeds."""
+    """Return the forbidden frequencies of every case: those given, and those of the speeds by its order."""
     hertz, speeds = _ranges("forbidden_hz", forbidden_hz), _ranges("speeds_rpm", speeds_rpm)
     found = {}
     for case in cases:
