@@ -26,7 +26,10 @@ if TYPE_CHECKING:
     from solver.savings import Effects
     from solver.scene import Scene, load_scene, shipped_scenes
     from solver.sectors import Extent, annulus, sectors_needed
+    from solver.segments_of import Shares
     from solver.tracking import least_peak, track_peak
+    from solver.wear import ContactWear, Measured, WearSensitivity, contact_wear
+    from solver.wear_peaks import Measure, WorstWear, worst_friction_work, worst_wear
 
 _HOME = {
     "AccuracyRow": "accuracy_cost", "AccuracyStudy": "accuracy_cost", "accuracy_study": "accuracy_cost",
@@ -45,7 +48,10 @@ _HOME = {
     "hysteresis_loop": "histories", "motion": "histories", "time_history": "histories",
     "MapStatus": "maps", "ResponseMap": "maps", "response_map": "maps", "LeastPeak": "peak_tracks",
     "PeakTrack": "peak_tracks", "TrackStatus": "peak_tracks", "least_peak": "tracking",
-    "track_peak": "tracking",
+    "track_peak": "tracking", "Shares": "segments_of",
+    "ContactWear": "wear", "Measured": "wear", "WearSensitivity": "wear", "contact_wear": "wear",
+    "Measure": "wear_peaks", "WorstWear": "wear_peaks", "worst_friction_work": "wear_peaks",
+    "worst_wear": "wear_peaks",
 }  # fmt: skip
 
 __all__ = [
@@ -56,6 +62,7 @@ __all__ = [
     "BladePeaks",
     "Branch",
     "BranchStatus",
+    "ContactWear",
     "ContinuationSettings",
     "Effects",
     "ErrorEstimate",
@@ -64,6 +71,8 @@ __all__ = [
     "Issue",
     "LeastPeak",
     "MapStatus",
+    "Measure",
+    "Measured",
     "Peak",
     "PeakTrack",
     "Plan",
@@ -73,17 +82,21 @@ __all__ = [
     "Scene",
     "SceneError",
     "SettingError",
+    "Shares",
     "Solution",
     "SolutionStatus",
     "SolverError",
     "Stability",
     "TrackStatus",
+    "WearSensitivity",
+    "WorstWear",
     "accuracy_study",
     "annulus",
     "blade_amplitudes",
     "blade_peaks",
     "branch_errors",
     "branch_stability",
+    "contact_wear",
     "hysteresis_loop",
     "least_peak",
     "load_scene",
@@ -100,6 +113,8 @@ __all__ = [
     "sweep",
     "time_history",
     "track_peak",
+    "worst_friction_work",
+    "worst_wear",
 ]
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -40,6 +41,18 @@ class Points:
     solutions: Real
     tangents: Real
     measures: Real
+
+
+class OnBranch(Protocol):
+    """A point of a branch: solution and tangent, λ last."""
+
+    @property
+    def solution(self) -> Real:
+        """Motions [m], λ last."""
+
+    @property
+    def tangent(self) -> Real:
+        """Direction of the branch."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +95,7 @@ class Survey:
         """Return the nodes to be inserted between two."""
         if max(left.measures[MAX_ABS], right.measures[MAX_ABS]) < FAR_BELOW * top:
             return []
-        by_share = _scales(left, right)
+        by_share = share_scales(left, right)
         reach = 0.0
         for value, slope, _ in _CURVES:
             rise = max(left.measures[slope] * by_share[0], 0.0) + max(
@@ -135,7 +148,7 @@ class Survey:
         higher = left if left.measures[value] > right.measures[value] else right
         if higher.measures[value] < WORTH_POLISHING * top:
             return higher
-        by_share = _scales(left, right)
+        by_share = share_scales(left, right)
         g_left, g_right = left.measures[slope] * by_share[0], right.measures[slope] * by_share[1]
         node = self._refine(left, right, what, 0.0, g_left, g_right)
         return node if node is not None and node.measures[value] >= higher.measures[value] else higher
@@ -184,7 +197,7 @@ class Survey:
     def _between(self, left: _Node, right: _Node, share: float) -> _Node | None:
         """Return the node at a share of the way between two, or None if there is no solution there."""
         found, tangent, observed, values = self._rows(left)
-        by_share = _scales(left, right)
+        by_share = share_scales(left, right)
         workspace = self._workspace
         good, iterations = between(
             workspace.system, workspace.linear, workspace.point, left.solution, left.tangent * by_share[0],
@@ -199,7 +212,7 @@ class Survey:
     ) -> _Node | None:
         """Return the peak or edge between two nodes, or None if there is no solution on the way."""
         found, tangent, observed, values = self._rows(left)
-        by_share = _scales(left, right)
+        by_share = share_scales(left, right)
         workspace = self._workspace
         good, iterations = refine(
             workspace.system, workspace.linear, workspace.point, left.solution, left.tangent * by_share[0],
@@ -228,7 +241,7 @@ def _slope(node: _Node) -> float:
     return node.measures[higher]
 
 
-def _scales(left: _Node, right: _Node) -> tuple[float, float]:
+def share_scales(left: OnBranch, right: OnBranch) -> tuple[float, float]:
     """Return the factors that turn both tangents into derivatives by the share of the chord between them."""
     chord = right.solution - left.solution
     weights = np.full(chord.size, 1.0 / max(float(np.abs(left.solution[:-1]).max(initial=0.0)) ** 2, 1e-300))
