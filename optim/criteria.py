@@ -13,43 +13,28 @@ from collections.abc import Sequence
 import numpy as np
 
 from optim.variables import Real
-from solver.balance import Balance, for_parameter
+from solver.balance import Balance
 from solver.branch import Edge, Peak
-from solver.kernels.observe import SLOPE
-from solver.workspace import Workspace
+from solver.sensitivity import Sensitivities
 
 
 class Sensitivity:
     """Derivatives of the amplitude at points of a response by parameter paths, through the whole solve."""
 
     def __init__(self, balance: Balance, paths: Sequence[str]) -> None:
-        self._paths = tuple(paths)
-        self._balance = balance
-        self._by_frequency = Workspace.of(self._balance)
-
-    def _by_parameters(self, at_hz: float, solution: Real) -> Real:
-        """Return ∂a/∂p at a fixed frequency for every path."""
-        slopes = np.full(len(self._paths), np.nan)
-        for i, path in enumerate(self._paths):
-            balance = for_parameter(self._balance, path, at_hz)
-            value = balance.parameter.inside(self._balance.scene.value(path))
-            measures = Workspace.of(balance).measure(solution, value)
-            if measures is not None:
-                slopes[i] = measures.values[SLOPE]
-        return slopes
+        self._slopes = Sensitivities(balance, paths)
 
     def peak(self, peak: Peak) -> Real:
         """Return d peak / dp, (n_paths,)."""
-        return self._by_parameters(peak.at, peak.solution)
+        return self._slopes.gradient(peak.solution, peak.at).by_parameters
 
     def band(self, edges: Sequence[Edge], dlimit: Real) -> Real:
         """Return d width / dp [Hz per unit], (n_paths,), for a limit that changes by `dlimit`."""
-        total = np.zeros(len(self._paths))
+        total = np.zeros(dlimit.shape)
         for edge in edges:
-            measures = self._by_frequency.measure(edge.solution, 2.0 * math.pi * edge.at)
-            if measures is None or measures.values[SLOPE] == 0.0:
-                return np.full(len(self._paths), np.nan)
-            by_hz = measures.values[SLOPE] * 2.0 * math.pi
-            moves = (dlimit - self._by_parameters(edge.at, edge.solution)) / by_hz
+            slopes = self._slopes.gradient(edge.solution, edge.at)
+            if not math.isfinite(slopes.by_frequency) or slopes.by_frequency == 0.0:
+                return np.full(dlimit.shape, np.nan)
+            moves = (dlimit - slopes.by_parameters) / slopes.by_frequency
             total += -moves if edge.opens else moves
         return total

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from solver.scene import Scene, load_scene, shipped_scenes
     from solver.sectors import Extent, annulus, sectors_needed
     from solver.segments_of import Shares
+    from solver.sensitivity import Gradient, Sensitivities
     from solver.tracking import least_peak, track_peak
     from solver.wear import ContactWear, Measured, WearSensitivity, contact_wear
     from solver.wear_peaks import Measure, WorstWear, worst_friction_work, worst_wear
@@ -44,6 +45,7 @@ _HOME = {
     "BladePeaks": "mistuning", "blade_peaks": "mistuning",
     "BladeAmplitudes": "mistuning", "blade_amplitudes": "mistuning", "mistuned": "mistuning",
     "Extent": "sectors", "sectors_needed": "sectors", "annulus": "sectors",
+    "Gradient": "sensitivity", "Sensitivities": "sensitivity",
     "march": "marching", "PowerBalance": "energy", "power_balance": "energy",
     "hysteresis_loop": "histories", "motion": "histories", "time_history": "histories",
     "MapStatus": "maps", "ResponseMap": "maps", "response_map": "maps", "LeastPeak": "peak_tracks",
@@ -67,6 +69,7 @@ __all__ = [
     "Effects",
     "ErrorEstimate",
     "Extent",
+    "Gradient",
     "Growth",
     "Issue",
     "LeastPeak",
@@ -81,6 +84,7 @@ __all__ = [
     "ResponseMap",
     "Scene",
     "SceneError",
+    "Sensitivities",
     "SettingError",
     "Shares",
     "Solution",
