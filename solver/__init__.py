@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from solver.accuracy_cost import AccuracyRow, AccuracyStudy, accuracy_study
     from solver.branch import Band, Branch, BranchStatus, Peak
     from solver.continuation import ContinuationSettings, Predictor, sweep
+    from solver.curvature import AmplitudeHessian, EdgeHessian, PeakHessian
     from solver.effects import Plan, plan
     from solver.energy import PowerBalance, power_balance
     from solver.errors import Issue, SceneError, SettingError, SolverError
@@ -45,7 +46,8 @@ _HOME = {
     "BladePeaks": "mistuning", "blade_peaks": "mistuning",
     "BladeAmplitudes": "mistuning", "blade_amplitudes": "mistuning", "mistuned": "mistuning",
     "Extent": "sectors", "sectors_needed": "sectors", "annulus": "sectors",
-    "Gradient": "sensitivity", "Sensitivities": "sensitivity",
+    "Gradient": "sensitivity", "Sensitivities": "sensitivity", "AmplitudeHessian": "curvature",
+    "EdgeHessian": "curvature", "PeakHessian": "curvature",
     "march": "marching", "PowerBalance": "energy", "power_balance": "energy",
     "hysteresis_loop": "histories", "motion": "histories", "time_history": "histories",
     "MapStatus": "maps", "ResponseMap": "maps", "response_map": "maps", "LeastPeak": "peak_tracks",
@@ -59,6 +61,7 @@ _HOME = {
 __all__ = [
     "AccuracyRow",
     "AccuracyStudy",
+    "AmplitudeHessian",
     "Band",
     "BladeAmplitudes",
     "BladePeaks",
@@ -66,6 +69,7 @@ __all__ = [
     "BranchStatus",
     "ContactWear",
     "ContinuationSettings",
+    "EdgeHessian",
     "Effects",
     "ErrorEstimate",
     "Extent",
@@ -77,6 +81,7 @@ __all__ = [
     "Measure",
     "Measured",
     "Peak",
+    "PeakHessian",
     "PeakTrack",
     "Plan",
     "PowerBalance",

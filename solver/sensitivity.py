@@ -14,6 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.balance import Balance
+from solver.contact_seconds import ContactForces, check_laws, check_loads, contact_forces
+from solver.curvature import (
+    Adjoint,
+    AmplitudeHessian,
+    Directions,
+    PeakHessian,
+    Responses,
+    lagrangian_hessian,
+    no_hessian,
+)
 from solver.errors import SettingError
 from solver.fourier import Complex, Real, cosine_position
 from solver.kernels.adjoint import (
@@ -31,6 +41,7 @@ from solver.kernels.adjoint import (
     TAU,
     amplitude_slopes,
 )
+from solver.kernels.jacobian import factorise, step_back
 from solver.kernels.laws import law_force
 from solver.kernels.laws_columns import COULOMB
 from solver.kernels.system import KT, MU, N0, N1, PHASE, evaluation_by_value
@@ -40,6 +51,7 @@ from solver.whole_motion import WholeMotion, times, whole_motion
 from solver.workspace import Workspace
 
 TWO_PI = 2.0 * math.pi
+_KINK = 1e-8  # relative difference of the slopes of max x and −min x beyond which a parameter parts them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,15 +147,10 @@ class Sensitivities:
 
         Where max x and −min x are the same, the derivatives are those of the one that leads onward.
         """
-        u, omega = np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz
-        count = amplitude_slopes(
-            self._workspace.system, self._workspace.linear, u, omega, self._workspace.point, self._wanted,
-            self._x, self._tops, self._weights, self._pulls, self._by,
-        )  # fmt: skip
-        if count == 0:
+        found = self._slopes_of(np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz)
+        if not found:
             nothing = np.full(len(self.paths), math.nan)
             return Gradient(value=math.nan, by_frequency=math.nan, by_parameters=nothing)
-        found = [self._one(u, omega, top) for top in range(count)]
         by_frequency, by_parameters = found[0]
         for other_frequency, other_parameters in found[1:]:
             by_frequency = max(by_frequency, other_frequency)
@@ -152,6 +159,104 @@ class Sensitivities:
             value=float(self._tops[0, AMPLITUDE]), by_frequency=by_frequency * TWO_PI,
             by_parameters=by_parameters,
         )  # fmt: skip
+
+    def hessian(self, solution: Real, at_hz: float) -> AmplitudeHessian:
+        """Return the amplitude to second order in the frequency and all parameters.
+
+        Parameters
+        ----------
+        solution : (n_unknowns,) slip motions [m], converged.
+        at_hz : their frequency [Hz].
+
+        Rows and columns of a parameter are NaN where the amplitude has a kink by it (it breaks a symmetry in
+        which max x = −min x), and of a load or friction coefficient where that coefficient is 0.
+
+        Raises
+        ------
+        SettingError
+            A contact that is not elastic Coulomb friction under a given load, or paths of one load that
+            contradict each other.
+        """
+        system = self.balance.system
+        check_laws(self.balance.scene)
+        check_loads(system, self._parameters, self._slopes)
+        u, omega = np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz
+        found = self._slopes_of(u, omega)
+        if not found:
+            return no_hessian(len(self.paths))
+        try:
+            motion, contacts = whole_motion(system, self._matrices, omega), contact_forces(system, u)
+        except (np.linalg.LinAlgError, FloatingPointError):
+            return no_hessian(len(self.paths))
+        turn = self._tops[0, SIGN] * self._amplitudes.turn(self._tops[0, TAU])
+        adjoint = Adjoint(w=self._weights[0].copy(), y=self._adjoint_motion(motion, 0), turn=turn)
+        along = self._directions()
+        responses = self._responses(u, omega, motion, contacts, along)
+        if responses is None:
+            return no_hessian(len(self.paths))
+        twice = lagrangian_hessian(self._amplitudes.ks, motion, contacts, along, responses, adjoint)
+        by_frequency, gradient = found[0]
+        for _, other in found[1:]:
+            kinks = np.flatnonzero(np.abs(other - gradient) > _KINK * np.abs(gradient).clip(np.abs(other)))
+            twice[kinks + 1], twice[:, kinks + 1] = math.nan, math.nan
+        return AmplitudeHessian(
+            value=float(self._tops[0, AMPLITUDE]), by_frequency=by_frequency * TWO_PI, gradient=gradient,
+            by_frequency_twice=float(twice[0, 0]) * TWO_PI**2, mixed=twice[0, 1:] * TWO_PI,
+            hessian=twice[1:, 1:],
+        )  # fmt: skip
+
+    def peak_hessian(self, solution: Real, at_hz: float) -> PeakHessian:
+        """Return a peak, where the amplitude is stationary in the frequency, to second order; as `hessian`.
+
+        Of a peak at an end of the band, which does not move, `hessian` is the answer.
+        """
+        return self.hessian(solution, at_hz).of_peak()
+
+    def _slopes_of(self, u: Real, omega: float) -> list[tuple[float, Real]]:
+        """Return the derivatives by ω and by the paths of each extreme that is max|x|; none if singular."""
+        count = amplitude_slopes(
+            self._workspace.system, self._workspace.linear, u, omega, self._workspace.point, self._wanted,
+            self._x, self._tops, self._weights, self._pulls, self._by,
+        )  # fmt: skip
+        return [self._one(u, omega, top) for top in range(count)]
+
+    def _directions(self) -> Directions:
+        """Return what ω and every path change."""
+        n_paths = len(self._parameters)
+        kinds = np.array([parameter.kind for parameter in self._parameters], dtype=np.int64)
+        level = np.where(kinds == Kind.LEVEL, 1.0 / _level(self.balance), 0.0)
+        phase = (kinds == Kind.FORCE_PHASE).astype(np.float64)
+        return Directions(
+            slopes=np.concatenate([np.zeros((1, *self._slopes.shape[1:])), self._slopes]),
+            loads=np.concatenate([np.zeros((1, *self._loads.shape[1:])), self._loads]),
+            level=np.append(0.0, level), phase=np.append(0.0, phase).reshape(n_paths + 1),
+        )  # fmt: skip
+
+    def _responses(
+        self, u: Real, omega: float, motion: WholeMotion, contacts: ContactForces, along: Directions
+    ) -> Responses | None:
+        """Return the derivatives of the solution along ω and every path; None where dr/du is singular.
+
+        With v_i = Z⁻¹ (f_i − Lᴴ ∂F/∂p_i − Z_i x) the slip motions obey dr/du U_i = L v_i.
+        """
+        workspace, amplitudes, shift = self._workspace, self._amplitudes, self.balance.system.shift[:, None]
+        if not math.isfinite(workspace.evaluate(u, omega)[0]):
+            return None
+        if factorise(workspace.system, workspace.linear, workspace.point, u, 0.0, 0.0) == 0.0:
+            return None
+        x = motion.solve(motion.forces - motion.pushed(amplitudes.of(contacts.F - shift * contacts.U)))
+        rates = along.level[:, None] + 1j * along.phase[:, None] * (amplitudes.ks > 0)
+        pushes = rates[:, :, None] * motion.forces
+        pushes -= motion.pushed(amplitudes.of(contacts.along(along.slopes, along.loads)))
+        pushes[0] -= times(motion.by_omega, x)
+        for i, (by_q, _) in motion.by_structure.items():
+            pushes[i + 1] -= times(by_q, x)
+        v = motion.solve(pushes)
+        dU = amplitudes.coefficients(motion.relative(v))
+        for row in dU.reshape(len(dU), u.size):
+            step_back(workspace.system, workspace.point, row)
+        dF = np.einsum("cij,pcj->pci", contacts.dF_dU, dU) - shift * dU
+        return Responses(x=x, dx=v - motion.solve(motion.pushed(amplitudes.of(dF))), dU=dU)
 
     def _one(self, u: Real, omega: float, top: int) -> tuple[float, Real]:
         """Return the derivatives of one extreme by ω and by the paths."""

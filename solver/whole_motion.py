@@ -46,9 +46,7 @@ class WholeMotion:
 
     def solve_transposed(self, eta: Complex) -> Complex:
         """Return Z⁻ᵀ η, (..., nk, N)."""
-        if self.inverse.ndim == 2:
-            return np.asarray(self.inverse * eta)
-        return np.asarray(np.einsum("kab,...ka->...kb", self.inverse, eta))
+        return times_transposed(self.inverse, eta)
 
     def pushed(self, forces: Complex) -> Complex:
         """Return Lᴴ F, (..., nk, N), of amplitudes (..., nc, nk)."""
@@ -68,6 +66,13 @@ def times(matrix: Complex, x: Complex) -> Complex:
     if matrix.ndim == 2:
         return np.asarray(matrix * x)
     return np.asarray(np.einsum("kab,...kb->...ka", matrix, x))
+
+
+def times_transposed(matrix: Complex, x: Complex) -> Complex:
+    """Return matrixᵀ @ x for each harmonic, as `times`."""
+    if matrix.ndim == 2:
+        return np.asarray(matrix * x)
+    return np.asarray(np.einsum("kab,...ka->...kb", matrix, x))
 
 
 def whole_motion(system: System, matrices: Matrices | None, omega: float) -> WholeMotion:
