@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,9 @@ import numpy as np
 from optim.model import Conditions, Model, conditions
 from optim.rows import Evaluation
 from optim.variables import Variable
+
+Evaluate = Callable[[Mapping[str, float]], Evaluation]
+ModelOf = Callable[[Evaluation], Model]
 
 KKT_TOLERANCE = 1e-3  # relative objective per scaled variable
 KEPT = 1e-6  # relative excess over a bound up to which it counts as kept
@@ -56,3 +59,6 @@ def is_flat(model: Model) -> bool:
     """Return whether no row depends on any variable."""
     both = np.concatenate([model.slopes.reshape(-1), model.excess_slopes.reshape(-1)])
     return bool(np.all(np.abs(both) <= FLAT_SLOPE))
+
+
+LocalSearch = Callable[[Evaluate, tuple[Variable, ...], Evaluation, ModelOf], Local]

@@ -8,25 +8,20 @@ Lagrangian gives the curvature between exchanges. Reference: Conn, Gould, Toint,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from optim.local import Local, ended
+from optim.local import Evaluate, Local, ModelOf, ended
 from optim.model import Model
 from optim.rows import Evaluation, Row, nearest
 from optim.subproblem import Step, solve_subproblem
-from optim.variables import Real, Variable, unscaled
-
-Evaluate = Callable[[Mapping[str, float]], Evaluation]
-ModelOf = Callable[[Evaluation], Model]
+from optim.variables import Real, Variable, snapped, unscaled
 
 FIRST_RADIUS = 0.1
 LARGEST_RADIUS = 0.5
 SMALLEST_RADIUS = 1e-9
 STATIONARY = 1e-11  # predicted relative decrease below which a design is optimal
-SNAP = 1e-7  # scaled distance within which a variable is put on its bound
 MOST_STEPS = 40
 NOTHING = 1e-9  # multipliers below it are rounding of the conic solver
 
@@ -54,7 +49,7 @@ def minimax_search(
         decrease = model.merit - step.predicted
         if decrease <= STATIONARY * model.merit or radius <= SMALLEST_RADIUS:
             break
-        trial = evaluate(unscaled(variables, _snapped(model.z + step.step)))
+        trial = evaluate(unscaled(variables, snapped(model.z + step.step)))
         if not trial.good:
             radius *= 0.25
             continue
@@ -107,14 +102,6 @@ def _update(hessian: Real, s: Real, y: Real) -> Real:
         curvature = float(s @ y)
     updated: Real = hessian - np.outer(Bs, Bs) / quadratic + np.outer(y, y) / curvature
     return updated
-
-
-def _snapped(z: Real) -> Real:
-    """Return scaled variables within their bounds; the conic solver stops a hair's breadth inside them."""
-    inside = np.clip(z, 0.0, 1.0)
-    inside[inside <= SNAP] = 0.0
-    inside[inside >= 1.0 - SNAP] = 1.0
-    return inside
 
 
 def _root(hessian: Real) -> Real:

@@ -244,9 +244,12 @@ def at_limit(row: Row) -> bool:
 def limit_words(row: Row) -> str:
     """Return the limit of a row in words."""
     words = {
-        Quantity.PEAK: "peak limit", Quantity.BAND: "band limit", Quantity.FORBIDDEN: "limit in a forbidden range",
-        Quantity.FRICTION_WORK: "friction work limit", Quantity.SEPARATION: "separation limit",
-    }  # fmt: skip
+        Quantity.PEAK: "peak limit",
+        Quantity.BAND: "band limit",
+        Quantity.FORBIDDEN: "limit in a forbidden range",
+        Quantity.FRICTION_WORK: "friction work limit",
+        Quantity.SEPARATION: "separation limit",
+    }
     where = "" if row.quantity in (Quantity.BAND, Quantity.PEAK) else f" ({row.what})"
     return f"{words[row.quantity]} of {row.bound:g} {UNITS[row.quantity]}{where}"
 

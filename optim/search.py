@@ -9,8 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from scipy.stats import qmc
 
 from optim.evaluation import evaluate, natural_scales
-from optim.local import Local, is_flat
-from optim.minimax import minimax_search
+from optim.local import Local, LocalSearch, is_flat
 from optim.model import Model, model_of
 from optim.problem import Method, Problem, pose
 from optim.result import Basin, DesignResult, DesignStatus
@@ -187,9 +186,21 @@ def _search(search: Search, found: list[Local]) -> DesignStatus:
         return DesignStatus.NO_RESPONSE
     if all(is_flat(search.model(evaluation)) for evaluation in good):
         return DesignStatus.FLAT
+    local_search = local_search_of(search.problem.method)
     for begin in _basins(search, good):
-        found.append(minimax_search(search, search.variables, begin, search.model))
+        found.append(local_search(search, search.variables, begin, search.model))
     return judge(min(found, key=lambda local: local.merit))
+
+
+def local_search_of(method: Method) -> LocalSearch:
+    """Return the local search of a method; CasADi and CVXPY are loaded when they are needed."""
+    if method is Method.IPOPT:
+        from optim.nlp import ipopt_search
+
+        return ipopt_search
+    from optim.minimax import minimax_search
+
+    return minimax_search
 
 
 def judge(best: Local) -> DesignStatus:

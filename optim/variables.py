@@ -15,6 +15,7 @@ from solver.parameter import Kind, resolve
 from solver.scene import FrictionContact, Scene
 
 Real = NDArray[np.float64]
+SNAP = 1e-7  # scaled distance within which a variable is put on its bound
 LOGARITHMIC_FROM = 5.0  # ratio of the bounds from which a variable is scaled logarithmically
 
 
@@ -86,6 +87,14 @@ def scaled(variables: Sequence[Variable], values: Mapping[str, float]) -> Real:
 def unscaled(variables: Sequence[Variable], z: Real | Sequence[float]) -> dict[str, float]:
     """Return the design of scaled variables, name to value."""
     return {variable.name: variable.outside(float(x)) for variable, x in zip(variables, z, strict=True)}
+
+
+def snapped(z: Real) -> Real:
+    """Return scaled variables within their bounds; convex solvers stop a hair's breadth inside them."""
+    inside = np.clip(z, 0.0, 1.0)
+    inside[inside <= SNAP] = 0.0
+    inside[inside >= 1.0 - SNAP] = 1.0
+    return inside
 
 
 def slopes(variables: Sequence[Variable], values: Mapping[str, float]) -> Real:
