@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from optim.cases import Case
+from optim.contact_rows import contact_rows
 from optim.criteria import Sensitivity
 from optim.problem import Problem
 from optim.rows import Evaluation, Quantity, Response, Row
-from optim.variables import Real, parameter_values
+from optim.variables import Real, by_variables, parameter_values
 from solver.branch import Branch
 from solver.continuation import sweep
 from solver.peaks import HALF_POWER
@@ -69,13 +70,12 @@ def _case(
         )
         responses.append(Response(case=case.name, branch=branch))
         rows += judge.forbidden(branch, low, high)
-    return responses, rows + judge.separation()
+    return responses, rows
 
 
 def effects_of(problem: Problem, scene: Scene) -> Effects:
     """Return what has to be computed for the slopes: those by a load's variation need the even harmonics."""
-    paths = [path for variable in problem.variables for path in variable.paths]
-    return Effects(even_harmonics=even_harmonics_reason(scene, paths) is not None)
+    return Effects(even_harmonics=even_harmonics_reason(scene, problem.paths) is not None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,21 +94,8 @@ class Judge:
     scene: Scene
     gradients: bool
 
-    @property
-    def _paths(self) -> tuple[str, ...]:
-        return tuple(path for variable in self.problem.variables for path in variable.paths)
-
     def _sensitivity(self, branch: Branch) -> Sensitivity | None:
-        return Sensitivity(branch.balance, self._paths) if self.gradients else None
-
-    def _gathered(self, by_path: Real) -> Real:
-        """Return a gradient by the variables from one by all their paths."""
-        owners = np.repeat(
-            np.arange(len(self.problem.variables)), [len(v.paths) for v in self.problem.variables]
-        )
-        gathered = np.zeros(len(self.problem.variables))
-        np.add.at(gathered, owners, by_path)
-        return gathered
+        return Sensitivity(branch.balance, self.problem.paths) if self.gradients else None
 
     def _nothing(self) -> Real:
         return np.full(len(self.problem.variables), np.nan)
@@ -124,10 +111,10 @@ class Judge:
             slope = self._nothing()
             if sensitivity is not None:
                 fixed = self.problem.limit is not None
-                dlimit = np.zeros(len(self._paths))
+                dlimit = np.zeros(len(self.problem.paths))
                 if not fixed:
                     dlimit = HALF_POWER * sensitivity.peak(branch.peaks[0])
-                slope = self._gathered(sensitivity.band(branch.band.edges, dlimit))
+                slope = by_variables(self.problem.variables, sensitivity.band(branch.band.edges, dlimit))
             rows.append(
                 Row(
                     quantity=Quantity.BAND, case=self.case.name,
@@ -135,7 +122,7 @@ class Judge:
                     at_hz=math.nan, weight=self.problem.weights[Quantity.BAND], bound=limits.band_hz,
                 )
             )  # fmt: skip
-        return rows
+        return rows + contact_rows(self.problem, self.case, branch, gradients=self.gradients)
 
     def forbidden(self, branch: Branch, low: float, high: float) -> list[Row]:
         """Return the rows of a response over a forbidden range."""
@@ -157,40 +144,11 @@ class Judge:
                 quantity=quantity, case=self.case.name, what=f"{what} at {peak.at:.6g} Hz", value=peak.value,
                 gradient=self._nothing()
                 if sensitivity is None
-                else self._gathered(sensitivity.peak(peak)),
+                else by_variables(self.problem.variables, sensitivity.peak(peak)),
                 at_hz=peak.at, weight=weight, bound=bound,
             )
             for peak in competing
         ]  # fmt: skip
-
-    def separation(self) -> list[Row]:
-        """Return |N1| − N0 of every contact that must never separate: its load falls to 0 where that is 0."""
-        rows = []
-        for contact in self.scene.contacts:
-            if contact.name not in self.problem.limits.in_contact or not isinstance(contact, FrictionContact):
-                continue
-            rows.append(
-                Row(
-                    quantity=Quantity.SEPARATION, case=self.case.name,
-                    what=f"|N1| - N0 of {contact.name}", value=abs(contact.N1_value) - contact.N0,
-                    gradient=self._load_slope(contact), at_hz=math.nan, weight=0.0, bound=0.0,
-                )
-            )  # fmt: skip
-        return rows
-
-    def _load_slope(self, contact: FrictionContact) -> Real:
-        """Return d(|N1| − N0)/dp of one contact by the variables."""
-        by_path = []
-        sign = math.copysign(1.0, contact.N1_value)
-        ratio = contact.N1_ratio
-        for path in self._paths:
-            owner, _, key = path.rpartition(".")
-            slope = 0.0
-            if owner in (contact.name, contact.group):
-                by_key = {"N0": sign * (ratio or 0.0) - 1.0, "N1": sign, "N1_ratio": sign * contact.N0}
-                slope = by_key.get(key, 0.0)
-            by_path.append(slope)
-        return self._gathered(np.array(by_path))
 
 
 def natural_scales(problem: Problem) -> dict[Quantity, float]:

@@ -95,6 +95,11 @@ class Problem:
     method: Method
 
     @property
+    def paths(self) -> tuple[str, ...]:
+        """Every parameter path of every variable."""
+        return tuple(path for variable in self.variables for path in variable.paths)
+
+    @property
     def plain(self) -> bool:
         """Whether it asks for nothing but the least peak of one case."""
         return len(self.cases) == 1 and not self.limits.any and self.weights[Quantity.BAND] == 0.0

@@ -79,6 +79,14 @@ def parameter_values(variables: Sequence[Variable], values: Mapping[str, float])
     return {path: values[variable.name] for variable in variables for path in variable.paths}
 
 
+def by_variables(variables: Sequence[Variable], by_path: Real) -> Real:
+    """Return a gradient by the variables from one by all their paths, (n,)."""
+    owners = np.repeat(np.arange(len(variables)), [len(variable.paths) for variable in variables])
+    gathered = np.zeros(len(variables))
+    np.add.at(gathered, owners, by_path)
+    return gathered
+
+
 def scaled(variables: Sequence[Variable], values: Mapping[str, float]) -> Real:
     """Return the scaled variables of a design, (n,)."""
     return np.array([variable.inside(values[variable.name]) for variable in variables])
