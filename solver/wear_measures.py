@@ -25,7 +25,7 @@ import numpy as np
 
 from solver import fourier
 from solver.balance import Balance
-from solver.fourier import Real
+from solver.fourier import Integer, Real
 from solver.kernels import laws_columns as columns
 from solver.kernels.events import (
     AFTER_SLIP,
@@ -52,6 +52,7 @@ _RUBBING: dict[int, tuple[int, ...]] = {
     columns.COULOMB_BOX: (0, 1),
     columns.COULOMB_PLANE: (0, 1),
 }
+_ROUNDING = 1e-13  # of the terms of a sum that cancel
 # Laws whose slider moves on a line.
 _ON_A_LINE = (columns.COULOMB, columns.ELASTIC_NORMAL)
 
@@ -147,16 +148,28 @@ def friction_work(cycle: Cycle, e: int, changes: Sequence[Change]) -> tuple[floa
     work, slopes = 0.0, np.zeros(len(changes))
     system, ports = cycle.balance.system, cycle.ports(e)
     for a in _RUBBING.get(int(system.laws[e]), ()):
-        speed = fourier.derivative(cycle.full(cycle.U[ports[a]]))
-        force = cycle.full(cycle.F[ports[a]])
-        work += math.pi * float(force @ speed)
+        speed, force = _speed(cycle.U[ports[a]], system.ks), cycle.F[ports[a]]
+        done = float(force @ speed)
+        if abs(done) <= _ROUNDING * float(np.abs(force) @ np.abs(speed)):
+            continue  # a stuck contact: what is left of terms that cancel; 0 is the least, so the slope is 0
+        work += math.pi * done
         for j, change in enumerate(changes):
             dF = change.dF[ports[a]].copy()
             for b, port in enumerate(ports):
                 dF += cycle.dF_dU[system.first_block[e] + a * len(ports) + b] @ change.dU[port]
-            dspeed = fourier.derivative(cycle.full(change.dU[ports[a]]))
-            slopes[j] += math.pi * float(cycle.full(dF) @ speed + force @ dspeed)
+            dspeed = _speed(change.dU[ports[a]], system.ks)
+            slopes[j] += math.pi * float(dF @ speed + force @ dspeed)
     return work, slopes
+
+
+def _speed(coefficients: Real, ks: Integer) -> Real:
+    """Return the coefficients (n,) of dq/dτ for those of the ascending harmonics `ks` alone."""
+    first = int(ks[0] == 0)
+    orders = ks[first:]
+    result = np.zeros_like(coefficients)
+    result[first::2] = orders * coefficients[first + 1 :: 2]
+    result[first + 1 :: 2] = -orders * coefficients[first::2]
+    return result
 
 
 def least_load(cycle: Cycle, e: int, changes: Sequence[Change]) -> tuple[float, Real] | None:
