@@ -6,13 +6,28 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from optim.campbell import campbell_diagram, forbidden_hz
+    from optim.crossings import CampbellDiagram, CampbellStatus
     from optim.errors import DesignError
     from optim.result import DesignResult, DesignStatus
     from optim.search import design
 
-_HOME = {"design": "search", "DesignResult": "result", "DesignStatus": "result", "DesignError": "errors"}
+_HOME = {
+    "design": "search", "DesignResult": "result", "DesignStatus": "result", "DesignError": "errors",
+    "CampbellDiagram": "crossings", "CampbellStatus": "crossings", "campbell_diagram": "campbell",
+    "forbidden_hz": "campbell",
+}  # fmt: skip
 
-__all__ = ["DesignError", "DesignResult", "DesignStatus", "design"]
+__all__ = [
+    "CampbellDiagram",
+    "CampbellStatus",
+    "DesignError",
+    "DesignResult",
+    "DesignStatus",
+    "campbell_diagram",
+    "design",
+    "forbidden_hz",
+]
 
 
 def __getattr__(name: str) -> object:

@@ -8,7 +8,14 @@ from typing import Annotated
 
 import typer
 
-from service.cli import import_command, service_commands, solver_commands, submit_commands, track_commands
+from service.cli import (
+    campbell_command,
+    import_command,
+    service_commands,
+    solver_commands,
+    submit_commands,
+    track_commands,
+)
 from service.cli.failures import REPORTED, report
 from service.cli.inputs import join_variables
 
@@ -37,6 +44,7 @@ for _command in _ALONE:
     app.command()(_command)
 app.command(name="peaks")(track_commands.peaks)
 app.command(name="map")(track_commands.response_map)
+app.command()(campbell_command.campbell)
 for _command in _SUBMITTED:
     _submit.command()(_command)
 _database.command()(service_commands.upgrade)

@@ -29,6 +29,9 @@ _OPTIONS = {
     "limit": "--limit",
     "max_band_hz": "--max-band",
     "variables": "--variable",
+    "speeds_rpm": "--speeds",
+    "orders": "--order",
+    "band_hz": "--band",
     "steps_per_period": "--steps",
     "max_periods": "--max-periods",
 }
@@ -45,7 +48,8 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 def option_name(name: str) -> str:
     """The option that sets an argument of the Python interface."""
-    return _OPTIONS.get(name, name)
+    # One of several values of a repeatable option has its number behind the name.
+    return _OPTIONS.get(name.partition("[")[0], name)
 
 
 class InputError(Exception):
