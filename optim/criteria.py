@@ -1,8 +1,9 @@
 """Derivatives of amplitudes and band edges of a response by design parameters, through the whole solve.
 
 Peak: at a maximum over the frequency ∂a/∂ω = 0, so its derivative by a parameter is the partial one there
-(envelope theorem). At an end of the band the frequency does not move either, so the same holds. Band edge:
-a(ω_e, p) = limit, so dω_e/dp = (dlimit/dp − ∂a/∂p)/(∂a/∂ω).
+(envelope theorem). At an end of the band the frequency does not move either, so the same holds; where a
+contact changes its state at the top, the two smooth pieces that meet there give it (`solver.corners`).
+Band edge: a(ω_e, p) = limit, so dω_e/dp = (dlimit/dp − ∂a/∂p)/(∂a/∂ω).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from optim.variables import Real
 from solver.balance import Balance
 from solver.branch import Edge, Peak
+from solver.corners import peak_gradient
 from solver.sensitivity import Sensitivities
 
 
@@ -26,7 +28,7 @@ class Sensitivity:
 
     def peak(self, peak: Peak) -> Real:
         """Return d peak / dp, (n_paths,)."""
-        return self._slopes.gradient(peak.solution, peak.at).by_parameters
+        return peak_gradient(self._slopes, peak).gradient
 
     def band(self, edges: Sequence[Edge], dlimit: Real) -> Real:
         """Return d width / dp [Hz per unit], (n_paths,), for a limit that changes by `dlimit`."""

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from solver.accuracy_cost import AccuracyRow, AccuracyStudy, accuracy_study
     from solver.branch import Band, Branch, BranchStatus, Peak
     from solver.continuation import ContinuationSettings, Predictor, sweep
+    from solver.corners import PeakGradient, PeakKind, peak_gradient
     from solver.curvature import AmplitudeHessian, EdgeHessian, PeakHessian
     from solver.effects import Plan, plan
     from solver.energy import PowerBalance, power_balance
@@ -48,6 +49,7 @@ _HOME = {
     "Extent": "sectors", "sectors_needed": "sectors", "annulus": "sectors",
     "Gradient": "sensitivity", "Sensitivities": "sensitivity", "AmplitudeHessian": "curvature",
     "EdgeHessian": "curvature", "PeakHessian": "curvature",
+    "PeakGradient": "corners", "PeakKind": "corners", "peak_gradient": "corners",
     "march": "marching", "PowerBalance": "energy", "power_balance": "energy",
     "hysteresis_loop": "histories", "motion": "histories", "time_history": "histories",
     "MapStatus": "maps", "ResponseMap": "maps", "response_map": "maps", "LeastPeak": "peak_tracks",
@@ -81,7 +83,9 @@ __all__ = [
     "Measure",
     "Measured",
     "Peak",
+    "PeakGradient",
     "PeakHessian",
+    "PeakKind",
     "PeakTrack",
     "Plan",
     "PowerBalance",
@@ -112,6 +116,7 @@ __all__ = [
     "march",
     "mistuned",
     "motion",
+    "peak_gradient",
     "plan",
     "power_balance",
     "response_map",

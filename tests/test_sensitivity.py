@@ -13,6 +13,7 @@ from test_law_scenes import scene as two_directions
 
 import solver
 from solver.balance import Balance, build, for_parameter
+from solver.corners import PeakKind, peak_gradient
 from solver.errors import SettingError
 from solver.kernels.observe import MAX_ABS, SLOPE
 from solver.savings import Effects
@@ -189,3 +190,48 @@ def test_a_singular_balance_gives_no_number() -> None:
     assert math.isnan(found.value)
     assert math.isnan(found.by_frequency)
     assert np.isnan(found.by_parameters).all()
+
+
+def height(scene: Scene, near: float, **settings: Any) -> solver.Peak:
+    branch = solver.sweep(scene, harmonics=HARMONICS, effects=Effects(even_harmonics=True), **settings)
+    return min(branch.peaks, key=lambda peak: abs(peak.at - near))
+
+
+@pytest.mark.parametrize("half", ["top", "side"])
+def test_a_peak_that_is_a_corner(half: str) -> None:
+    """The shroud begins to slip at the top: neither side's partial derivative is that of the peak."""
+    scene, paths = disk(**{"shroud.N1": 250.0}), ("shroud.N0", "shroud.kt", "shroud.N1", "root.N0")
+    peak = height(scene, 532.6)
+    balance = build(scene, harmonics=HARMONICS)
+    sensitivities = Sensitivities(balance, paths)
+    if half == "side":
+        workspace = Workspace.of(balance)
+        beside = workspace.solve(2.0 * math.pi * 0.999 * peak.at, peak.solution)
+        off = solver.Peak(value=peak.value, at=0.999 * peak.at, solution=beside.u, interior=True)
+        assert peak_gradient(sensitivities, off).kind is PeakKind.UNRESOLVED
+        return
+    found = peak_gradient(sensitivities, peak)
+    assert found.kind is PeakKind.CORNER
+    alone = sensitivities.gradient(peak.solution, peak.at).by_parameters
+    assert abs(alone[0] / found.gradient[0] - 1.0) > 0.5
+    for path, slope in zip(paths, found.gradient, strict=True):
+        value = scene.value(path)
+
+        def top(x: float, path: str = path, value: float = value) -> np.ndarray:
+            return np.array(height(scene.with_values({path: value + x}), peak.at).value)
+
+        difference = central_difference(top, 1e-4 * value)
+        assert slope == pytest.approx(float(difference), abs=1e-6 * peak.value / value * 15.0)
+
+
+def test_smooth_peaks_and_ends_of_the_band() -> None:
+    scene, paths = two_dof(), ("damper.N0", "damper.kt")
+    branch = solver.sweep(scene, harmonics=HARMONICS, start=1.1, stop=1.6)
+    sensitivities = Sensitivities(branch.balance, paths)
+    end = next(peak for peak in branch.peaks if not peak.interior)
+    found = peak_gradient(sensitivities, end)
+    assert found.kind is PeakKind.END
+    expected = sensitivities.gradient(end.solution, end.at).by_parameters
+    np.testing.assert_array_equal(found.gradient, expected)
+    smooth = height(scene, 1.0)
+    assert peak_gradient(sensitivities, smooth).kind is PeakKind.SMOOTH
