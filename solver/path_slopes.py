@@ -12,10 +12,12 @@ from solver.contact_rows import port_stiffnesses
 from solver.errors import SettingError
 from solver.fourier import Complex, Real
 from solver.kernels.laws_columns import COLUMNS, OWN, OWN_KIND
-from solver.kernels.system import KT, LOAD_COEFFICIENTS, MU, N0, N1, PHASE, RATIO
+from solver.kernels.system import KT, LOAD_COEFFICIENTS, MODES, MU, N0, N1, PHASE, RATIO
 from solver.parameter import Kind, Parameter, resolve
 from solver.parametric import linear_model, structure_derivative
 from solver.savings import even_harmonics_reason
+from solver.scene import MatricesStructure
+from solver.scene_paths import PROPORTIONAL
 from solver.structure import reduce_model
 
 _COLUMNS = {
@@ -100,10 +102,24 @@ class Matrices:
     by: dict[int, tuple[Complex, Complex, Complex]]
 
 
+def modal_dampings(balance: Balance, parameters: Sequence[Parameter]) -> dict[int, Complex]:
+    """Return ∂C/∂q in the modes, (nk, nm), by the number of each path of a proportional damping.
+
+    Empty where the modes do not carry it: a lumped or cyclic structure, damping that couples the modes, or a
+    part that contacts alone hold. Of mass-normalised modes M is 1 and K the squared frequency.
+    """
+    system, structure = balance.system, balance.scene.structure
+    if not isinstance(structure, MatricesStructure) or system.form != MODES or system.shift.any():
+        return {}
+    stiffness, mass = PROPORTIONAL
+    values = {stiffness: system.eigenvalues, mass: np.ones_like(system.eigenvalues)}
+    return {i: values[p.name][system.which] for i, p in enumerate(parameters) if p.kind is Kind.STRUCTURE}
+
+
 def matrices_of_paths(balance: Balance, parameters: Sequence[Parameter]) -> Matrices | None:
-    """Return the linear part as matrices where a parameter is one of the structure, else None."""
+    """Return the linear part as matrices where a parameter needs them, one of the structure, else None."""
     structural = {i: p.name for i, p in enumerate(parameters) if p.kind is Kind.STRUCTURE}
-    if not structural:
+    if not structural or modal_dampings(balance, parameters):
         return None
     scene, ks = balance.scene, balance.system.ks
     model = linear_model(scene)

@@ -46,7 +46,7 @@ from solver.kernels.laws import law_force
 from solver.kernels.laws_columns import COULOMB
 from solver.kernels.system import KT, MU, N0, N1, PHASE, evaluation_by_value
 from solver.parameter import Kind
-from solver.path_slopes import Matrices, contact_slopes, matrices_of_paths, resolved
+from solver.path_slopes import contact_slopes, matrices_of_paths, modal_dampings, resolved
 from solver.whole_motion import WholeMotion, times, whole_motion
 from solver.workspace import Workspace
 
@@ -126,6 +126,7 @@ class Sensitivities:
         self._slopes, self._loads = contact_slopes(balance, self._parameters)
         self._rows = self._rows_of_paths()
         self._matrices = matrices_of_paths(balance, self._parameters)
+        self._dampings = modal_dampings(balance, self._parameters)
         self._amplitudes = Amplitudes(balance)
         self._workspace = Workspace.of(balance)
         self._point = evaluation_by_value(self._workspace.point)
@@ -185,7 +186,10 @@ class Sensitivities:
         if not found:
             return no_hessian(len(self.paths))
         try:
-            motion, contacts = whole_motion(system, self._matrices, omega), contact_forces(system, u)
+            motion, contacts = (
+                whole_motion(system, self._matrices, self._dampings, omega),
+                contact_forces(system, u),
+            )
         except (np.linalg.LinAlgError, FloatingPointError):
             return no_hessian(len(self.paths))
         turn = self._tops[0, SIGN] * self._amplitudes.turn(self._tops[0, TAU])
@@ -264,8 +268,8 @@ class Sensitivities:
         slopes = self._rows @ by
         for e in self._others:
             self._add_other_law(int(e), u, self._weights[top], slopes)
-        if self._matrices is not None:
-            self._add_structure(self._matrices, u, omega, top, slopes)
+        if self._matrices is not None or self._dampings:
+            self._add_structure(u, omega, top, slopes)
         return float(by[self.balance.system.laws.size * PER_ELEMENT + BY_OMEGA]), slopes
 
     def _rows_of_paths(self) -> Real:
@@ -300,12 +304,12 @@ class Sensitivities:
             )  # fmt: skip
             slopes[i] += float(np.sum(weights[begin:end] * point.dF_dp[begin:end]))
 
-    def _add_structure(self, matrices: Matrices, u: Real, omega: float, top: int, slopes: Real) -> None:
+    def _add_structure(self, u: Real, omega: float, top: int, slopes: Real) -> None:
         """Add −Re yᵀ (∂Z/∂q) x of every harmonic."""
         try:
-            motion = whole_motion(self.balance.system, matrices, omega)
+            motion = whole_motion(self.balance.system, self._matrices, self._dampings, omega)
         except np.linalg.LinAlgError:
-            slopes[list(matrices.by)] = math.nan
+            slopes[[p.kind is Kind.STRUCTURE for p in self._parameters]] = math.nan
             return
         shifted = self._point.F - self.balance.system.shift[:, None] * u.reshape(self._weights[top].shape)
         x = motion.solve(motion.forces - motion.pushed(self._amplitudes.of(shifted)))

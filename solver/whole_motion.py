@@ -75,13 +75,16 @@ def times_transposed(matrix: Complex, x: Complex) -> Complex:
     return np.asarray(np.einsum("kab,...ka->...kb", matrix, x))
 
 
-def whole_motion(system: System, matrices: Matrices | None, omega: float) -> WholeMotion:
+def whole_motion(
+    system: System, matrices: Matrices | None, dampings: dict[int, Complex], omega: float
+) -> WholeMotion:
     """Return the linear part at ω [rad/s].
 
     Parameters
     ----------
     system : of a frequency response.
-    matrices : where a path is structural; else the modes of `system` serve, or its matrices if it has none.
+    matrices : where a path needs them; else the modes of `system` serve, or its matrices if it has none.
+    dampings : ∂C/∂q in the modes, (nk, nm), of each path that is a proportional damping, by its number.
 
     Raises
     ------
@@ -99,16 +102,17 @@ def whole_motion(system: System, matrices: Matrices | None, omega: float) -> Who
         return _of_matrices(matrices, ks[:, None, None], omega)
     values, which, k = system.eigenvalues[system.which], system.which, ks[:, None]
     if system.form == MODES:
-        dampings = system.dampings[which]
-        d = values.real - (k * omega) ** 2 + 1j * k * omega * dampings
-        slope, bend = -2.0 * k**2 * omega + 1j * k * dampings, -2.0 * k**2 + 0.0j * dampings
+        c = system.dampings[which]
+        d = values.real - (k * omega) ** 2 + 1j * k * omega * c
+        slope, bend = -2.0 * k**2 * omega + 1j * k * c, -2.0 * k**2 + 0.0j * c
     else:
         d = 1j * k * omega - values
         slope, bend = 1j * k + 0.0 * values, 0.0 * values
+    by = {i: (1j * k * omega * dC, 1j * k * dC) for i, dC in dampings.items()}
     if np.any(d == 0.0):
         raise np.linalg.LinAlgError("Z is singular")
     return WholeMotion(
-        inverse=np.asarray(1.0 / d, np.complex128), by_omega=slope, by_omega_twice=bend, by_structure={},
+        inverse=np.asarray(1.0 / d, np.complex128), by_omega=slope, by_omega_twice=bend, by_structure=by,
         contact=system.contact_modes[which], back=system.contact_duals[which],
         observe=system.observe_modes[which], forces=system.modal_forces,
     )  # fmt: skip

@@ -8,9 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from contact_cases import central_difference
+from matrix_cases import beam_scene
 from test_law_scenes import GAP
 from test_law_scenes import scene as two_directions
-from test_sensitivity import TWO_DOF, disk, loose, two_dof
+from test_sensitivity import BEAM, TWO_DOF, disk, loose, two_dof
 
 import solver
 from solver.balance import Balance, build
@@ -64,6 +65,9 @@ CASES: dict[str, tuple[Scene, float, tuple[str, ...], Effects]] = {
     "bladed disk, separating": (disk(**{"shroud.N1": 400.0}), 700.0,
                                 ("shroud.N0", "shroud.N1", "shroud.kt", "structure.middle_root"), ALL),
     "loose parts and groups": (loose(), 0.8, ("one.N0", "pair.kt", "pair.mu", "structure.both"), ALL),
+    "a beam of matrices": (beam_scene(8, mass_proportional_damping=0.1), 2.4, BEAM, Effects()),
+    "a beam of matrices, whole": (beam_scene(8, mass_proportional_damping=0.1), 2.4, BEAM,
+                                  Effects(whole_matrices=True)),
     "named parts": (named_parts(), 0.85, ("structure.first", "structure.second", "structure.one",
                                           "structure.both", "structure.dashpot", "slider.N1_ratio",
                                           "excitation.amplitude", "excitation.phase"), ALL),

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from contact_cases import central_difference
+from matrix_cases import beam_scene
 from test_law_scenes import CUBIC, GAP, PLANE, RUB
 from test_law_scenes import scene as two_directions
 
@@ -27,6 +28,8 @@ TWO_DOF = ("damper.N0", "damper.N1_ratio", "damper.N1_phase", "damper.kt", "damp
            "structure.k2", "excitation.amplitude", "excitation.phase")  # fmt: skip
 DISK = ("shroud.N0", "shroud.N1", "shroud.kt", "root.mu", "root.kt", "structure.tip_middle",
         "structure.disk_next", "excitation.amplitude")  # fmt: skip
+
+BEAM = ("c.N0", "c.kt", "structure.stiffness_proportional_damping", "structure.mass_proportional_damping")
 
 
 def two_dof(**values: float) -> Scene:
@@ -71,6 +74,15 @@ CASES: dict[str, tuple[Scene, float, tuple[str, ...]]] = {
     "bladed disk, separating": (disk(**{"shroud.N1": 400.0}), 700.0, DISK),
     "loose parts and groups": (
         loose(), 0.8, ("one.N0", "pair.kt", "pair.mu", "one.N1", "structure.both", "structure.left"),
+    ),
+    "a beam of matrices": (beam_scene(8, mass_proportional_damping=0.1), 2.4, BEAM),
+    "a beam of matrices, not proportional": (
+        beam_scene(8, mass_proportional_damping=0.1, C=np.diag(np.linspace(0.0, 0.5, 16)).tolist()), 2.4,
+        BEAM,
+    ),
+    "mistuned disk": (
+        solver.mistuned(disk(), of=["tip_middle"], spread=0.02, seed=1), 753.0,
+        ("shroud.N0", "root.kt", "structure.tip_middle"),
     ),
     "every law": (ANY_LAW, 0.2, parameter_paths(ANY_LAW)),
     "two directions": (
