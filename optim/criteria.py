@@ -3,7 +3,8 @@
 Peak: at a maximum over the frequency ∂a/∂ω = 0, so its derivative by a parameter is the partial one there
 (envelope theorem). At an end of the band the frequency does not move either, so the same holds; where a
 contact changes its state at the top, the two smooth pieces that meet there give it (`solver.corners`).
-Band edge: a(ω_e, p) = limit, so dω_e/dp = (dlimit/dp − ∂a/∂p)/(∂a/∂ω).
+Band edge: a(ω_e, p) = limit, so dω_e/dp = (dlimit/dp − ∂a/∂p)/(∂a/∂ω). The second derivatives are those of
+`solver.curvature`.
 """
 
 from __future__ import annotations
@@ -16,7 +17,10 @@ import numpy as np
 from optim.variables import Real
 from solver.balance import Balance
 from solver.branch import Edge, Peak
+from solver.contact_seconds import check_laws
 from solver.corners import peak_gradient
+from solver.errors import SettingError
+from solver.peaks import HALF_POWER
 from solver.sensitivity import Sensitivities
 
 
@@ -25,6 +29,16 @@ class Sensitivity:
 
     def __init__(self, balance: Balance, paths: Sequence[str]) -> None:
         self._slopes = Sensitivities(balance, paths)
+        self._n = len(tuple(paths))
+
+    @property
+    def has_second(self) -> bool:
+        """Whether the contacts' law has second derivatives here."""
+        try:
+            check_laws(self._slopes.balance.scene)
+        except SettingError:
+            return False
+        return True
 
     def peak(self, peak: Peak) -> Real:
         """Return d peak / dp, (n_paths,)."""
@@ -39,4 +53,21 @@ class Sensitivity:
                 return np.full(dlimit.shape, np.nan)
             moves = (dlimit - slopes.by_parameters) / slopes.by_frequency
             total += -moves if edge.opens else moves
+        return total
+
+    def peak_second(self, peak: Peak) -> Real:
+        """Return d² peak / dp², (n_paths, n_paths); NaN where it does not exist."""
+        found = self._slopes.hessian(peak.solution, peak.at)
+        return found.of_peak().hessian if peak.interior else found.hessian
+
+    def band_second(self, edges: Sequence[Edge], highest: Peak | None) -> Real:
+        """Return d² width / dp², (n_paths, n_paths); the limit is half power of `highest` if given."""
+        n = self._n
+        dlimit, ddlimit = np.zeros(n), np.zeros((n, n))
+        if highest is not None:
+            dlimit, ddlimit = HALF_POWER * self.peak(highest), HALF_POWER * self.peak_second(highest)
+        total = np.zeros((n, n))
+        for edge in edges:
+            move = self._slopes.hessian(edge.solution, edge.at).of_edge(dlimit, ddlimit).hessian
+            total += -move if edge.opens else move
         return total

@@ -13,8 +13,8 @@ from optim.contact_rows import contact_rows
 from optim.criteria import Sensitivity
 from optim.problem import Problem
 from optim.rows import Evaluation, Quantity, Response, Row
-from optim.variables import Real, by_variables, parameter_values
-from solver.branch import Branch
+from optim.variables import Real, by_variables, by_variables_twice, parameter_values
+from solver.branch import Branch, Peak
 from solver.continuation import sweep
 from solver.peaks import HALF_POWER
 from solver.savings import Effects, even_harmonics_reason
@@ -120,6 +120,7 @@ class Judge:
                     quantity=Quantity.BAND, case=self.case.name,
                     what=f"band above {branch.band.limit:.6g} m", value=branch.band.width, gradient=slope,
                     at_hz=math.nan, weight=self.problem.weights[Quantity.BAND], bound=limits.band_hz,
+                    second=self._band_second(branch, sensitivity),
                 )
             )  # fmt: skip
         return rows + contact_rows(self.problem, self.case, branch, gradients=self.gradients)
@@ -145,10 +146,21 @@ class Judge:
                 gradient=self._nothing()
                 if sensitivity is None
                 else by_variables(self.problem.variables, sensitivity.peak(peak)),
-                at_hz=peak.at, weight=weight, bound=bound,
+                at_hz=peak.at, weight=weight, bound=bound, second=self._peak_second(peak, sensitivity),
             )
             for peak in competing
         ]  # fmt: skip
+
+    def _peak_second(self, peak: Peak, sensitivity: Sensitivity | None) -> Callable[[], Real] | None:
+        if sensitivity is None or not sensitivity.has_second:
+            return None
+        return lambda: by_variables_twice(self.problem.variables, sensitivity.peak_second(peak))
+
+    def _band_second(self, branch: Branch, sensitivity: Sensitivity | None) -> Callable[[], Real] | None:
+        if sensitivity is None or branch.band is None or not sensitivity.has_second:
+            return None
+        edges, highest = branch.band.edges, None if self.problem.limit is not None else branch.peaks[0]
+        return lambda: by_variables_twice(self.problem.variables, sensitivity.band_second(edges, highest))
 
 
 def natural_scales(problem: Problem) -> dict[Quantity, float]:

@@ -1,8 +1,9 @@
 """Trust-region search for the design whose largest row is least, subject to limits on others.
 
 Each step solves the convex subproblem of `optim.subproblem` at the present design: every competing peak,
-every band is a row, so an exchange of the highest peak is nothing special; a damped BFGS matrix of the
-Lagrangian gives the curvature between exchanges. Reference: Conn, Gould, Toint, Trust-Region Methods (SIAM
+every band is a row, so an exchange of the highest peak is nothing special. The curvature between exchanges is
+that of the Lagrangian: exact where every row that pulls has second derivatives, else a damped BFGS matrix.
+Reference: Conn, Gould, Toint, Trust-Region Methods (SIAM
 2000), chapter 14, and Powell's damping (Math. Program. 14 (1978) 224).
 """
 
@@ -23,6 +24,7 @@ LARGEST_RADIUS = 0.5
 SMALLEST_RADIUS = 1e-9
 STATIONARY = 1e-11  # predicted relative decrease below which a design is optimal
 MOST_STEPS = 40
+ENOUGH = 1e-4  # share of the predicted decrease from which a step is taken
 NOTHING = 1e-9  # multipliers below it are rounding of the conic solver
 
 
@@ -42,8 +44,7 @@ def minimax_search(
     here, model = begin, model_of(begin)
     hessian, radius = np.zeros((n, n)), FIRST_RADIUS
     for _ in range(MOST_STEPS):
-        low, high = np.maximum(-model.z, -radius), np.minimum(1.0 - model.z, radius)
-        step = solve_subproblem(model, _root(hessian), low, high)
+        step = solve_subproblem(model, _root(hessian), radius)
         if step is None:
             break
         decrease = model.merit - step.predicted
@@ -54,18 +55,51 @@ def minimax_search(
             radius *= 0.25
             continue
         fresh = model_of(trial)
-        ratio = (model.merit - fresh.merit) / decrease
+        moved = fresh.z - model.z
+        ratio = (model.merit - fresh.merit) / max(decrease - 0.5 * float(moved @ hessian @ moved), 1e-300)
         if fresh.smooth:
-            pulls = _pulls(model, step)
-            hessian = _update(hessian, fresh.z - model.z, _gradient(fresh, pulls) - _gradient(model, pulls))
+            hessian = _curvature(model, fresh, _pulls(model, step), hessian, accepted=ratio > ENOUGH)
         size = float(np.abs(step.step).max())
         if ratio > 0.75 and size > 0.9 * radius:
             radius = min(2.0 * radius, LARGEST_RADIUS)
         elif ratio < 0.25:
             radius = 0.5 * size if ratio > 0.0 else 0.25 * size
-        if ratio > 1e-4 and fresh.smooth:
+        if ratio > ENOUGH and fresh.smooth:
             here, model = trial, fresh
     return ended(here, model, variables)
+
+
+def _curvature(
+    model: Model, fresh: Model, pulls: list[tuple[Row, float]], hessian: Real, *, accepted: bool
+) -> Real:
+    """Return the Hessian of the Lagrangian for the next step: exact where the solver has it, else updated.
+
+    Only its convex part serves; a step that was not taken leaves the design, and so the exact Hessian of it.
+    """
+    exact = _exact(fresh if accepted else model, pulls)
+    if exact is not None:
+        return _convex(exact)
+    return _update(hessian, fresh.z - model.z, _gradient(fresh, pulls) - _gradient(model, pulls))
+
+
+def _exact(model: Model, pulls: list[tuple[Row, float]]) -> Real | None:
+    """Return the Hessian of the Lagrangian whose multipliers belong to rows of another design."""
+    total = np.zeros((model.z.size, model.z.size))
+    for row, multiplier in pulls:
+        limited = row.weight == 0.0
+        near = nearest(row, model.limited if limited else model.rows)
+        second = None if near is None else model.limited_second(near) if limited else model.second(near)
+        if second is None:
+            return None
+        total += multiplier * second
+    return total
+
+
+def _convex(hessian: Real) -> Real:
+    """Return the nearest positive semidefinite matrix."""
+    values, vectors = np.linalg.eigh(hessian)
+    convex: Real = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    return convex
 
 
 def _gradient(model: Model, pulls: list[tuple[Row, float]]) -> Real:

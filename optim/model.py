@@ -38,6 +38,12 @@ class Model:
         The c limited rows.
     excess, excess_slopes : (c,), (c, n) arrays
         Relative excess over the bounds.
+    by_z, bends : (n,) arrays
+        First and second derivatives of the variables by z.
+    unit : float
+        The objective that counts as 1.
+    units : (c,) array
+        What each excess is relative to.
     """
 
     z: Real
@@ -48,6 +54,26 @@ class Model:
     limited: tuple[Row, ...]
     excess: Real
     excess_slopes: Real
+    by_z: Real
+    bends: Real
+    unit: float
+    units: Real
+
+    def second(self, i: int) -> Real | None:
+        """Return the second derivatives of objective row `i` by z, (n, n); None where they do not exist."""
+        row = self.rows[i]
+        return self._by_z_twice(row, row.weight / self.unit)
+
+    def limited_second(self, j: int) -> Real | None:
+        """Return those of the relative excess of limited row `j`."""
+        return self._by_z_twice(self.limited[j], 1.0 / self.units[j])
+
+    def _by_z_twice(self, row: Row, factor: float) -> Real | None:
+        if row.second is None:
+            return None
+        by_values = row.second()
+        twice = factor * (by_values * np.outer(self.by_z, self.by_z) + np.diag(row.gradient * self.bends))
+        return twice if np.all(np.isfinite(twice)) else None
 
     @property
     def objective(self) -> float:
@@ -63,6 +89,12 @@ class Model:
     def merit(self) -> float:
         """What a search decreases: the objective with the exact penalty on the limits."""
         return self.objective + PENALTY * self.violation
+
+    def predicted(self, step: Real) -> float:
+        """Return the merit after a step (n,) if every row were linear."""
+        heights, excess = self.heights + self.slopes @ step, self.excess + self.excess_slopes @ step
+        objective = sum(float(heights[self.groups == g].max()) for g in np.unique(self.groups))
+        return objective + PENALTY * max(float(excess.max(initial=0.0)), 0.0)
 
     @property
     def smooth(self) -> bool:
@@ -96,6 +128,8 @@ def model_of(
         excess_slopes=np.array(
             [row.gradient * by_z / unit for row, unit in zip(limited, units, strict=True)]
         ).reshape(-1, n),
+        by_z=by_z, bends=np.array([v.bend(evaluation.values[v.name]) for v in variables]), unit=scale,
+        units=np.array(units),
     )  # fmt: skip
 
 

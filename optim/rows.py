@@ -7,8 +7,8 @@ each is smooth, only the largest of them is not. That is what the methods of thi
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import Enum
 
 from optim.variables import Real
@@ -53,6 +53,9 @@ class Row:
         Multiplies it in what is minimised; 0 if it is only limited.
     bound : float or None
         The most it may be.
+    second : callable or None
+        Computes the exact second derivatives by the variables, (n_variables, n_variables), NaN where they do
+        not exist; None where the solver has none.
     """
 
     quantity: Quantity
@@ -63,6 +66,7 @@ class Row:
     at_hz: float
     weight: float
     bound: float | None
+    second: Callable[[], Real] | None = field(default=None, compare=False, repr=False)
 
     def excess(self, scale: float) -> float:
         """Return how far it is above its bound, relative to the bound (to `scale` if that is 0)."""

@@ -11,6 +11,7 @@ fixed number, so that the problem is compiled once for each shape and kept for t
 
 from __future__ import annotations
 
+import math
 import threading
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,6 +23,7 @@ from optim.model import PENALTY, Model
 from optim.variables import Real
 
 _BLOCK = 12  # rows are padded to multiples of it
+_LEAST = 1e-200  # unit of rows that do not change at all
 _LOCK = threading.Lock()  # a problem keeps its numbers in itself
 
 
@@ -47,18 +49,19 @@ class Step:
     limit_multipliers: Real
 
 
-def solve_subproblem(model: Model, root: Real, low: Real, high: Real) -> Step | None:
+def solve_subproblem(model: Model, root: Real, radius: float) -> Step | None:
     """Solve the subproblem of a model; None if the conic solver did not reach optimality.
 
     Parameters
     ----------
     model : rows of the present design.
-    root : (n, n) R; low, high : (n,) limits of the step.
+    root : (n, n) R.
+    radius : of the trust region, in each scaled variable.
     """
     groups = np.unique(model.groups)
     shape = tuple(_padded(int((model.groups == g).sum())) for g in groups)
     with _LOCK:
-        return _subproblem(model.z.size, shape, _padded(model.excess.size)).solve(model, root, low, high)
+        return _subproblem(model.z.size, shape, _padded(model.excess.size)).solve(model, root, radius)
 
 
 def _padded(count: int) -> int:
@@ -71,10 +74,14 @@ def _subproblem(n: int, shape: tuple[int, ...], limited: int) -> _Subproblem:
 
 
 class _Subproblem:
-    """The parametrised problem for n variables, so many rows in each group, so many limited rows."""
+    """The parametrised problem for n variables, so many rows in each group, so many limited rows.
+
+    Steps are in units of the radius and rows in units of what they change by within it, counted from the
+    largest: the conic solver's tolerances are absolute, and steps become as small as 1e-9.
+    """
 
     def __init__(self, n: int, shape: tuple[int, ...], limited: int) -> None:
-        self._d, self._t, self._s = cvxpy.Variable(n), cvxpy.Variable(len(shape)), cvxpy.Variable(nonneg=True)
+        self._d, self._t = cvxpy.Variable(n), cvxpy.Variable(len(shape))
         self._heights = [cvxpy.Parameter(m) for m in shape]
         self._slopes = [cvxpy.Parameter((m, n)) for m in shape]
         self._root, self._low, self._high = cvxpy.Parameter((n, n)), cvxpy.Parameter(n), cvxpy.Parameter(n)
@@ -86,39 +93,54 @@ class _Subproblem:
         objective = cvxpy.sum(self._t) + 0.5 * cvxpy.sum_squares(self._root @ self._d)
         self._limited = limited
         if limited:
+            self._s, self._least = cvxpy.Variable(), cvxpy.Parameter()
             self._excess, self._excess_slopes = cvxpy.Parameter(limited), cvxpy.Parameter((limited, n))
+            self._price = cvxpy.Parameter(nonneg=True)
             self._limit_row = self._excess + self._excess_slopes @ self._d <= self._s
-            constraints.append(self._limit_row)
-            objective = objective + PENALTY * self._s
+            constraints += [self._limit_row, self._least <= self._s]
+            objective = objective + self._price * self._s
         self._problem = cvxpy.Problem(cvxpy.Minimize(objective), constraints)
 
-    def solve(self, model: Model, root: Real, low: Real, high: Real) -> Step | None:
+    def solve(self, model: Model, root: Real, radius: float) -> Step | None:
         """Solve with the numbers of a model."""
+        far = -3.0 * model.z.size  # a row that far below the largest can not reach it within the radius
+        unit = max(radius * float(np.abs(model.slopes).max(initial=0.0)), _LEAST)
         places = [np.flatnonzero(model.groups == g) for g in np.unique(model.groups)]
         spread = [np.resize(mine, a.size) for mine, a in zip(places, self._heights, strict=True)]
         for some, a, g in zip(spread, self._heights, self._slopes, strict=True):
-            a.value, g.value = model.heights[some], model.slopes[some]
-        c = model.excess.size
+            below = (model.heights[some] - model.heights[some].max()) / unit
+            a.value, g.value = np.maximum(below, far), radius / unit * model.slopes[some]
+        again = np.resize(np.arange(model.excess.size), self._limited)
         if self._limited:
-            again = np.resize(np.arange(c), self._limited)
-            self._excess.value, self._excess_slopes.value = model.excess[again], model.excess_slopes[again]
-        self._root.value, self._low.value, self._high.value = root, low, high
-        try:
-            self._problem.solve(solver=cvxpy.CLARABEL, warm_start=False)
-        except cvxpy.SolverError:
+            limit_unit = max(radius * float(np.abs(model.excess_slopes).max(initial=0.0)), _LEAST)
+            below = (model.excess[again] - model.violation) / limit_unit
+            self._excess.value = np.maximum(below, far)
+            self._excess_slopes.value = radius / limit_unit * model.excess_slopes[again]
+            self._least.value = max(-model.violation / limit_unit, 2.0 * far)
+            self._price.value = PENALTY * limit_unit / unit
+        self._root.value = radius / math.sqrt(unit) * root
+        self._low.value = np.maximum(-model.z / radius, -1.0)
+        self._high.value = np.minimum((1.0 - model.z) / radius, 1.0)
+        if not self._solved():
             return None
-        if self._problem.status not in (cvxpy.OPTIMAL, cvxpy.OPTIMAL_INACCURATE) or self._d.value is None:
-            return None
-        step = np.clip(np.asarray(self._d.value, dtype=np.float64), low, high)
-        heights = model.heights + model.slopes @ step
-        predicted = sum(float(heights[mine].max()) for mine in places)
-        multipliers, limit_multipliers = np.zeros(model.heights.size), np.zeros(c)
+        step = radius * np.clip(
+            np.asarray(self._d.value, dtype=np.float64), self._low.value, self._high.value
+        )
+        multipliers, limit_multipliers = np.zeros(model.heights.size), np.zeros(model.excess.size)
         for some, row in zip(spread, self._rows, strict=True):
             np.add.at(multipliers, some, np.maximum(np.asarray(row.dual_value, dtype=np.float64), 0.0))
         if self._limited:
             duals = np.maximum(np.asarray(self._limit_row.dual_value, dtype=np.float64), 0.0)
-            np.add.at(limit_multipliers, again, duals)
-            predicted += PENALTY * max(float((model.excess + model.excess_slopes @ step).max()), 0.0)
+            np.add.at(limit_multipliers, again, duals * unit / limit_unit)
         return Step(
-            step=step, predicted=predicted, multipliers=multipliers, limit_multipliers=limit_multipliers
-        )
+            step=step, predicted=model.predicted(step), multipliers=multipliers,
+            limit_multipliers=limit_multipliers,
+        )  # fmt: skip
+
+    def _solved(self) -> bool:
+        """Run the conic solver; return whether it reached optimality."""
+        try:
+            self._problem.solve(solver=cvxpy.CLARABEL, warm_start=False)
+        except cvxpy.SolverError:
+            return False
+        return self._problem.status in (cvxpy.OPTIMAL, cvxpy.OPTIMAL_INACCURATE) and self._d.value is not None

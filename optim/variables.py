@@ -81,10 +81,21 @@ def parameter_values(variables: Sequence[Variable], values: Mapping[str, float])
 
 def by_variables(variables: Sequence[Variable], by_path: Real) -> Real:
     """Return a gradient by the variables from one by all their paths, (n,)."""
-    owners = np.repeat(np.arange(len(variables)), [len(variable.paths) for variable in variables])
-    gathered = np.zeros(len(variables))
-    np.add.at(gathered, owners, by_path)
+    gathered: Real = _members(variables) @ by_path
     return gathered
+
+
+def by_variables_twice(variables: Sequence[Variable], by_paths: Real) -> Real:
+    """Return second derivatives by the variables from those by all their paths, (n, n)."""
+    members = _members(variables)
+    gathered: Real = members @ by_paths @ members.T
+    return gathered
+
+
+def _members(variables: Sequence[Variable]) -> Real:
+    """Return which variable each path belongs to, (n_variables, n_paths) of 0 and 1."""
+    owners = np.repeat(np.arange(len(variables)), [len(variable.paths) for variable in variables])
+    return np.asarray(np.arange(len(variables))[:, None] == owners, dtype=np.float64)
 
 
 def scaled(variables: Sequence[Variable], values: Mapping[str, float]) -> Real:
