@@ -9,10 +9,12 @@ Reference: Conn, Gould, Toint, Trust-Region Methods (SIAM
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import replace
 
 import numpy as np
 
+from optim.cuts import with_cuts
 from optim.local import Evaluate, Local, ModelOf, ended
 from optim.model import Model
 from optim.rows import Evaluation, Row, nearest
@@ -25,6 +27,9 @@ SMALLEST_RADIUS = 1e-9
 STATIONARY = 1e-11  # predicted relative decrease below which a design is optimal
 MOST_STEPS = 40
 ENOUGH = 1e-4  # share of the predicted decrease from which a step is taken
+REMEMBERED = 8  # designs whose rows are kept as cuts
+CUTS_REACH = 4.0  # times the radius, as far as cuts reach
+SAME_DESIGN = 1e-5  # scaled distance within which the rows of another design tell of the optimum
 NOTHING = 1e-9  # multipliers below it are rounding of the conic solver
 
 
@@ -43,8 +48,10 @@ def minimax_search(
     n = len(variables)
     here, model = begin, model_of(begin)
     hessian, radius = np.zeros((n, n)), FIRST_RADIUS
+    seen: deque[Model] = deque(maxlen=REMEMBERED)
     for _ in range(MOST_STEPS):
-        step = solve_subproblem(model, _root(hessian), radius)
+        known = with_cuts(model, seen, CUTS_REACH * radius)
+        step = solve_subproblem(known, _root(hessian), radius)
         if step is None:
             break
         decrease = model.merit - step.predicted
@@ -58,7 +65,8 @@ def minimax_search(
         moved = fresh.z - model.z
         ratio = (model.merit - fresh.merit) / max(decrease - 0.5 * float(moved @ hessian @ moved), 1e-300)
         if fresh.smooth:
-            hessian = _curvature(model, fresh, _pulls(model, step), hessian, accepted=ratio > ENOUGH)
+            hessian = _curvature(model, fresh, _pulls(known, step), hessian, accepted=ratio > ENOUGH)
+            seen.append(model if ratio > ENOUGH else fresh)
         size = float(np.abs(step.step).max())
         if ratio > 0.75 and size > 0.9 * radius:
             radius = min(2.0 * radius, LARGEST_RADIUS)
@@ -66,7 +74,7 @@ def minimax_search(
             radius = 0.5 * size if ratio > 0.0 else 0.25 * size
         if ratio > ENOUGH and fresh.smooth:
             here, model = trial, fresh
-    return ended(here, model, variables)
+    return ended(here, with_cuts(model, seen, SAME_DESIGN), variables)
 
 
 def _curvature(
