@@ -18,7 +18,8 @@ from optim.model import Model
 from optim.rows import Row
 from optim.variables import Real
 
-ALIKE = 0.3  # relative distance of two slopes below which a cut tells nothing new
+ROUNDING = 1e-9  # relative, of a row between two evaluations
+SAME = 0.2  # share of the change of slope by which the trapezoidal rule may miss a row that is the same
 
 
 def with_cuts(model: Model, others: Iterable[Model], reach: float) -> Model:
@@ -30,44 +31,56 @@ def with_cuts(model: Model, others: Iterable[Model], reach: float) -> Model:
     others : models of designs evaluated before.
     reach : scaled distance up to which they are used.
     """
-    rows, heights, slopes = list(model.rows), list(model.heights), list(model.slopes)
-    groups, limited = list(model.groups), list(model.limited)
-    excess, excess_slopes, units = list(model.excess), list(model.excess_slopes), list(model.units)
+    mine = _Lines(model.rows, model.heights, model.slopes)
+    limits = _Lines(model.limited, model.excess, model.excess_slopes)
+    groups, units = list(model.groups), list(model.units)
     for other in others:
         back = model.z - other.z
         if not 0.0 < np.abs(back).max() <= reach:
             continue
         for i, row in enumerate(other.rows):
             top = model.heights[model.groups == other.groups[i]].max()
-            if _new(row, other.slopes[i], rows, slopes):
-                rows.append(row)
-                slopes.append(other.slopes[i])
-                heights.append(_lowered(other.heights[i] + other.slopes[i] @ back, top))
+            if mine.take(row, other.heights[i], other.slopes[i], back, top):
                 groups.append(other.groups[i])
         for j, row in enumerate(other.limited):
-            if _new(row, other.excess_slopes[j], limited, excess_slopes):
-                limited.append(row)
-                excess_slopes.append(other.excess_slopes[j])
-                value = float(other.excess[j] + other.excess_slopes[j] @ back)
-                excess.append(_lowered(value, model.excess.max()))
+            if limits.take(row, other.excess[j], other.excess_slopes[j], back, model.excess.max()):
                 units.append(other.units[j])
     return replace(
-        model, rows=tuple(rows), heights=np.array(heights), slopes=np.array(slopes).reshape(-1, model.z.size),
-        groups=np.array(groups), limited=tuple(limited), excess=np.array(excess),
-        excess_slopes=np.array(excess_slopes).reshape(-1, model.z.size), units=np.array(units),
+        model, rows=tuple(mine.rows), heights=np.array(mine.values), slopes=mine.table(model.z.size),
+        groups=np.array(groups), limited=tuple(limits.rows), excess=np.array(limits.values),
+        excess_slopes=limits.table(model.z.size), units=np.array(units),
     )  # fmt: skip
 
 
-def _new(row: Row, slope: Real, rows: list[Row], slopes: list[Real]) -> bool:
-    """Return whether no row of the same quantity and case has much the same slope."""
-    size = float(np.linalg.norm(slope))
-    return all(
-        (mine.quantity, mine.case) != (row.quantity, row.case)
-        or float(np.linalg.norm(slope - its)) > ALIKE * max(size, float(np.linalg.norm(its)))
-        for mine, its in zip(rows, slopes, strict=True)
-    )
+class _Lines:
+    """Rows with their values and slopes at the present design."""
 
+    def __init__(self, rows: tuple[Row, ...], values: Real, slopes: Real) -> None:
+        self.rows, self.values, self.slopes = list(rows), list(values), list(slopes)
+        self._own = len(rows)
 
-def _lowered(value: float, top: float) -> float:
-    """Return the height of a cut: never above what the present design shows."""
-    return float(top - abs(top - value))
+    def table(self, n: int) -> Real:
+        """Return the slopes, (rows, n)."""
+        return np.array(self.slopes).reshape(-1, n)
+
+    def take(self, row: Row, value: float, slope: Real, back: Real, top: float) -> bool:
+        """Add a row seen `back` from here as a cut, unless one of the present design is the same."""
+        if self._known(row, value, slope, back):
+            return False
+        self.rows.append(row)
+        self.slopes.append(slope)
+        # Never above what the present design shows.
+        self.values.append(float(top - abs(top - (value + slope @ back))))
+        return True
+
+    def _known(self, row: Row, value: float, slope: Real, back: Real) -> bool:
+        """Return whether the trapezoidal rule leads from the row there to one here: they are one."""
+        for mine, its, here in zip(
+            self.rows[: self._own], self.slopes[: self._own], self.values[: self._own], strict=True
+        ):
+            if (mine.quantity, mine.case) != (row.quantity, row.case):
+                continue
+            missed = abs(here - value - 0.5 * float((its + slope) @ back))
+            if missed <= SAME * abs(0.5 * float((its - slope) @ back)) + ROUNDING * abs(value):
+                return True
+        return False
