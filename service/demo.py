@@ -14,7 +14,7 @@ import numpy as np
 
 import solver
 from service.answers import JobAnswer, SweepDetail
-from service.cli import reports
+from service.cli import design_reports
 from service.cli.failures import InputError, ShortfallError
 from service.cli.output import say
 from service.cli.progress import OnProgress, bars, patience
@@ -117,7 +117,7 @@ def _designs(service: EmbeddedService, cases: Sequence[Case]) -> list[JobAnswer]
     with bars([f"design {case.scene}" for case in cases], "responses") as reporters:
         ended = [group[0] for group in _follow(service, groups, reporters)]
     for job in ended:
-        reports.design(service.results(job.id).result)
+        design_reports.design(service.results(job.id).result)
         say("")
     return ended
 

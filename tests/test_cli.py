@@ -103,7 +103,7 @@ def test_design_takes_several_variables(run: Run) -> None:
         ("march two-dof --frequency 1.2", ["1.85 m", "periods"]),
         ("--version", ["0.1.0"]),
         ("--help", ["design", "sweep", "submit", "db"]),
-        ("design --help", ["PATH LO HI", "--max-band"]),
+        ("design --help", ["PATH LO HI", "--max-band", "--problem", "--never-separates"]),
     ],
 )
 def test_people_read_values_with_units(run: Run, arguments: str, words: list[str]) -> None:
@@ -172,6 +172,31 @@ def test_bad_scenes_are_named(run: Run, tmp_path: Path, command: str, case: str)
         ("design two-dof --variable bumper.N0 1 2", ["--variable", "bumper.N0"]),
         ("design two-dof --variable damper.N0 1 2 --variable damper.N0 1 3", ["damper.N0", "twice"]),
         ("design two-dof --max-band 0", ["--max-band", "0.0"]),
+        ("design two-dof --max-peak nan", ["--max-peak", "nan"]),
+        ("design two-dof --limit -1", ["--limit", "-1.0"]),
+        ("design two-dof --harmonics 0", ["--harmonics", "0"]),
+        ("design two-dof --variable damper.N0,bumper.N0 1 2", ["--variable", "bumper.N0"]),
+        ("design two-dof --scaling damper.N0=cubic", ["--scaling", "cubic", "logarithmic"]),
+        ("design two-dof --scaling damper.kt=linear", ["--scaling", "damper.kt"]),
+        ("design two-dof --weight peak", ["--weight", "peak=1"]),
+        ("design two-dof --weight width=1", ["--weight", "width"]),
+        ("design two-dof --weight peak=-1", ["--weight", "-1.0"]),
+        ("design two-dof --forbidden 1", ["--forbidden", "LO HI"]),
+        ("design two-dof --forbidden 1 2", ["--limit", "must be given"]),
+        ("design two-dof --limit 1 --forbidden 1 2 --forbidden 2 1", ["--forbidden", "forbidden_hz[1]"]),
+        ("design two-dof --limit 1 --speeds 1 few", ["--speeds", "few"]),
+        ("design two-dof --max-work bumper=1", ["--max-work", "bumper", "damper"]),
+        ("design two-dof --max-work damper=1 --max-work damper=2", ["--max-work", "damper", "twice"]),
+        ("design two-dof --max-work 0", ["--max-work", "0.0"]),
+        ("design two-dof --never-separates bumper", ["--never-separates", "bumper", "damper"]),
+        ("design two-dof --method guess", ["--method", "guess", "minimax"]),
+        ("design two-dof --start damper.N0=1", ["--start", "1.0"]),
+        ("design two-dof --start damper.kt=1", ["--start", "damper.kt", "damper.N0"]),
+        ("design two-dof --set damper.mu=-1", ["--set", "damper.mu", "-1.0"]),
+        ("design", ["SCENE", "--problem"]),
+        ("design two-dof --problem nowhere.toml", ["--problem", "nowhere.toml"]),
+        ("design two-dof --problem file", ["--problem", ".toml", "file"]),
+        ("submit design two-dof --max-band nan", ["--max-band", "nan"]),
         ("march two-dof --frequency 1 --steps 3", ["--steps", "3"]),
         ("march two-dof --frequency 1 --max-periods 0", ["--max-periods", "0"]),
         ("serve --port 99999", ["port", "99999"]),
@@ -194,6 +219,61 @@ def test_bad_options_are_named(run: Run, tmp_path: Path, arguments: str, words: 
     assert "Traceback" not in err
     assert [word for word in words if word not in out + err] == []
     assert [file.name for file in tmp_path.iterdir()] == ["file"]
+
+
+FILES = {
+    "not TOML": ("limit = [", ["problem.toml", "TOML"]),
+    "not JSON": ('{"limit": NaN}', ["problem.json", "/limit", "finite"]),
+    "no table": ("[1, 2]", ["problem.json", "one table"]),
+    "another kind": ('kind = "sweep"', ["/kind", "design", "sweep"]),
+    "unknown key": ('colour = "red"', ["problem.toml", "/colour", "is not a known key"]),
+    "infinite": ("limit = inf", ["/limit", "finite", "inf"]),
+    "several": ("[[cases]]\nband = [5, 1]\n[[cases]]\nobserve = 'm9'", ["/cases/0/band", "/cases/1/observe"]),
+    "path": ("[variables]\n'bumper.N0' = [1, 2]", ["/variables/bumper.N0", "`bumper.N0` must be one of"]),
+    "value": ("[set]\n'damper.mu' = -1", ["/set/damper.mu", "-1"]),
+    "scene": ("[scene]\nname = 'mine'", ["/scene/structure", "missing"]),
+}
+
+
+@pytest.mark.parametrize("case", FILES)
+def test_what_is_wrong_in_a_problem_file_is_told_by_its_key(run: Run, tmp_path: Path, case: str) -> None:
+    text, words = FILES[case]
+    file = tmp_path / ("problem.json" if text.startswith(("{", "[1")) else "problem.toml")
+    file.write_text(text)
+    scene = () if case == "scene" else ("two-dof",)
+    status, out, err = run("design", *scene, "--problem", file.name)
+    assert (status, out) == (2, "")
+    assert "Traceback" not in err
+    assert [word for word in words if word not in err] == []
+
+
+def test_an_option_replaces_the_key_of_the_file(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "deep" / "mine.toml").write_text(GOOD.read_text().replace("N0 = 100.0", "N0 = 90.0"))
+    (tmp_path / "deep" / "problem.toml").write_text(
+        "scene = 'mine.toml'\nlimit = 1.5\nharmonics = 3\n[variables]\n'damper.N0' = [90, 120]\n"
+    )
+    status, out, err = run("design --problem deep/problem.toml --limit 2 --json")
+    assert (status, err) == (0, "")
+    answer = json.loads(out)
+    assert answer["limit"] == 2.0
+    assert 90.0 <= answer["optimum"]["damper.N0"] <= 120.0
+    status, out, _ = run("design two-dof --problem deep/problem.toml --variable damper.N0 200 210 --json")
+    assert json.loads(out)["optimum"]["damper.N0"] == pytest.approx(200.0)
+    assert json.loads(out)["limit"] == 1.5
+
+
+def test_an_infeasible_design_says_what_to_relax_and_by_how_much(run: Run) -> None:
+    status, out, err = run(
+        "design two-dof --variable damper.N0 90 110 --limit 2 --max-peak 2.3 --harmonics 3"
+    )
+    assert status == 1
+    assert "relax" in err
+    assert "not all limits can be kept" in out
+    row = next(line for line in out.splitlines() if "broken by" in line)
+    assert "peak at" in row
+    assert "2.3 m " in row
+    assert float(row.split()[-2]) == pytest.approx(46.0, abs=2.0), "mm above the limit"
 
 
 def test_the_frequency_is_offered_only_where_it_can_be_swept(run: Run) -> None:

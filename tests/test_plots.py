@@ -19,7 +19,7 @@ from service.files import whole
 from service.plots import SUFFIXES, style
 from service.plots.curves import Response, above, with_peak
 from service.plots.motion import Motion, motion_figure
-from service.plots.responses import Family, family_figure, peak_figure, response_figure
+from service.plots.responses import Demands, Family, family_figure, peak_figure, response_figure
 
 
 def bump(height: float, at: float = 2.0) -> Response:
@@ -42,11 +42,11 @@ def texts(page: Figure) -> str:
 
 
 def test_a_response_has_its_peak_band_limit_and_units() -> None:
-    page = response_figure(bump(2e-4), limit=1e-4)
+    page = response_figure(bump(2e-4), asked=Demands(limit=1e-4))
     (axes,) = page.axes
     assert axes.get_xlabel() == "frequency [Hz]"
     assert axes.get_ylabel() == "amplitude, max |tip| [mm]"
-    curve, limit, dot = axes.lines
+    curve, dot, limit = axes.lines
     assert curve.get_ydata()[20] == pytest.approx(0.2)
     assert tuple(limit.get_ydata()) == pytest.approx((0.1, 0.1))
     assert (dot.get_xdata()[0], dot.get_ydata()[0]) == pytest.approx((2.0, 0.2))

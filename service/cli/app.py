@@ -10,6 +10,7 @@ import typer
 
 from service.cli import (
     campbell_command,
+    design_commands,
     import_command,
     service_commands,
     solver_commands,
@@ -17,7 +18,7 @@ from service.cli import (
     track_commands,
 )
 from service.cli.failures import REPORTED, report
-from service.cli.inputs import join_variables
+from service.cli.inputs import join_words
 
 app = typer.Typer(
     name="stickslip",
@@ -33,7 +34,7 @@ _submit = typer.Typer(help="Hand a job to a running service.", no_args_is_help=T
 _ALONE: tuple[Callable[..., None], ...] = (
     solver_commands.scenes, solver_commands.plan, solver_commands.solve, solver_commands.sweep,
     solver_commands.accuracy,
-    solver_commands.design, solver_commands.march, service_commands.demo, service_commands.serve,
+    design_commands.design, solver_commands.march, service_commands.demo, service_commands.serve,
     service_commands.worker, submit_commands.watch, submit_commands.results,
 )  # fmt: skip
 _SUBMITTED: tuple[Callable[..., None], ...] = (
@@ -77,7 +78,7 @@ def run(arguments: Sequence[str] | None) -> int:
     """Run the command and return its exit status."""
     given = sys.argv[1:] if arguments is None else arguments
     try:
-        app(args=join_variables(given), prog_name="stickslip")
+        app(args=join_words(given), prog_name="stickslip")
     except REPORTED as error:
         return report(error)
     except SystemExit as end:

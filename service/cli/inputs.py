@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from solver.scene import Scene
 
 _VARIABLE = "--variable"
+# Repeatable options of several words each, which Typer does not have, and the commands that have them.
+_WORDS = {_VARIABLE: 3, "--forbidden": 2, "--speeds": 2}
+_WITH_WORDS = ("design", "pareto", "submit")
 
 
 def number(text: str) -> float:
@@ -34,22 +37,26 @@ def whole_number(text: str) -> int:
         raise typer.BadParameter(f"must be a whole number, got {text!r}") from None
 
 
-def join_variables(arguments: Iterable[str]) -> list[str]:
-    """Make one argument of the three that follow ``--variable``, which Typer's repeatable options need."""
+def join_words(arguments: Sequence[str]) -> list[str]:
+    """Make one argument of the words that follow ``--variable``, ``--forbidden`` and ``--speeds``."""
+    if not arguments or arguments[0] not in _WITH_WORDS:
+        return list(arguments)
     joined: list[str] = []
-    waiting = 0
+    waiting, first = 0, False
     for argument in arguments:
         if waiting and argument.startswith("--"):
             waiting = 0
         if not waiting:
             joined.append(argument)
-            waiting = 3 if argument == _VARIABLE else 0
+            waiting = _WORDS.get(argument, 0)
+            first = True
+            continue
+        if first:
+            joined.append(argument)
         else:
-            if waiting == 3:
-                joined.append(argument)
-            else:
-                joined[-1] += f" {argument}"
-            waiting -= 1
+            joined[-1] += f" {argument}"
+        first = False
+        waiting -= 1
     return joined
 
 
@@ -65,7 +72,7 @@ def bounds(texts: Sequence[str] | None) -> dict[str, tuple[float, float]] | None
         path, low, high = words
         if path in variables:
             raise InputError(f"`{_VARIABLE}` names {path!r} twice; keep one")
-        variables[path] = (_part(_VARIABLE, text, low), _part(_VARIABLE, text, high))
+        variables[path] = (part(_VARIABLE, text, low), part(_VARIABLE, text, high))
     return variables
 
 
@@ -78,7 +85,7 @@ def settings(texts: Sequence[str] | None) -> dict[str, float]:
         if not equals or not path:
             raise InputError(f"`--set` takes PATH=VALUE, for example shroud.N0=150, got {text!r}")
         values.pop(path, None)
-        values[path] = _part("--set", text, value)
+        values[path] = part("--set", text, value)
     return values
 
 
@@ -115,7 +122,8 @@ def output_path(option: str, text: str | None, suffixes: Sequence[str] = ()) -> 
     return path
 
 
-def _part(option: str, text: str, word: str) -> float:
+def part(option: str, text: str, word: str) -> float:
+    """A number that is part of what was given to an option."""
     try:
         return float(word)
     except ValueError:

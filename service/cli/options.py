@@ -11,6 +11,12 @@ from service.cli.inputs import number, whole_number
 Scene = Annotated[
     str, typer.Argument(metavar="SCENE", help="Name of a shipped scene, or a scene file (.toml, .json).")
 ]
+AnyScene = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="SCENE", help="Name of a shipped scene, or a scene file; the one of the --problem file."
+    ),
+]
 Values = Annotated[
     list[str] | None,
     typer.Option(
@@ -70,18 +76,6 @@ Limit = Annotated[
         help="Amplitude [m] above which the resonance band is measured; peak/√2 if left out.",
     ),
 ]  # fmt: skip
-Variables = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--variable", metavar="PATH LO HI",
-        help="A parameter and its bounds, for example shroud.N0 20 3000; repeatable. "
-        "If left out, the normal load of the contact whose load varies.",
-    ),
-]  # fmt: skip
-MaxBand = Annotated[
-    float | None,
-    typer.Option("--max-band", metavar="HZ", parser=number, help="Widest resonance band allowed [Hz]."),
-]
 Steps = Annotated[
     int | None,
     typer.Option("--steps", metavar="N", parser=whole_number, help="Steps per period; chosen if left out."),

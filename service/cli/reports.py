@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from service import units
+from service.cli import design_reports
 from service.cli.output import print_pairs, print_table, say
 
 if TYPE_CHECKING:
@@ -91,19 +92,6 @@ def branch(found: Json) -> None:
     print_pairs(f"{title}, {found['n_harmonics']} harmonics", pairs)
 
 
-def design(found: Json) -> None:
-    """The best design."""
-    pairs = [(path, units.parameter(path, value)) for path, value in found["optimum"].items()]
-    if found["peak"] is not None:
-        pairs.append(("peak", f"{units.length(found['peak']['value'])} at {found['peak']['at']:.6g} Hz"))
-    if found["band_hz"] is not None:
-        pairs.append(("band", f"{units.number(found['band_hz'])} Hz above {units.length(found['limit'])}"))
-    if found["active"]:
-        pairs.append(("held by", "; ".join(found["active"])))
-    effort = f"{found['evaluations']} frequency responses in {units.duration(found['seconds'])}"
-    print_pairs(f"Best damper of {found['scene']}", [*pairs, ("effort", effort)])
-
-
 def accuracy(found: Json) -> None:
     """Error against time, the rows nothing beats marked."""
     size = found["reference"]
@@ -141,7 +129,7 @@ def march(found: Json) -> None:
 BY_KIND: Mapping[str, Callable[[Json], None]] = {
     "solve": solution,
     "sweep": branch,
-    "design": design,
+    "design": design_reports.design,
     "march": march,
 }
 

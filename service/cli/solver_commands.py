@@ -1,4 +1,4 @@
-"""The commands that compute here and now: scenes, plan, solve, sweep, design, march.
+"""The commands that compute here and now: scenes, plan, solve, sweep, march.
 
 What is heavy is imported inside the commands: `stickslip solve` starts without CVXPY, Matplotlib or the
 service.
@@ -108,10 +108,10 @@ def sweep(
         )  # fmt: skip
     if picture is not None and len(branch.values):
         from service.plots.curves import Response
-        from service.plots.responses import response_figure
+        from service.plots.responses import Demands, response_figure
         from service.plots.style import save
 
-        save(response_figure(Response.of_branch(branch), limit=limit), picture)
+        save(response_figure(Response.of_branch(branch), asked=Demands(limit=limit)), picture)
     if as_json:
         print_json(branch.to_json())
     else:
@@ -145,43 +145,6 @@ def accuracy(
         print_json(study)
     else:
         reports.accuracy(study)
-
-
-def design(
-    name: options.Scene,
-    variables: options.Variables = None,
-    limit: options.Limit = None,
-    max_band: options.MaxBand = None,
-    values: options.Values = None,
-    harmonics: options.Harmonics = 11,
-    plot: options.Plot = None,
-    as_json: options.Json = False,
-) -> None:
-    """Find the best damper.
-
-    Parameters are chosen within bounds so that the highest peak over the scene's band is least.
-    """
-    picture = inputs.output_path("--plot", plot, SUFFIXES)
-    bounds = inputs.bounds(variables)
-    scene = inputs.scene(name, values)
-    with inputs.path_of("--variable"), bar("design", "responses") as on_progress:
-        import optim
-
-        result = optim.design(
-            scene, variables=bounds, limit=limit, max_band_hz=max_band, harmonics=harmonics,
-            on_progress=on_progress,
-        )  # fmt: skip
-    if picture is not None and result.sweeps:
-        from service.plots.curves import Response
-        from service.plots.responses import response_figure
-        from service.plots.style import save
-
-        save(response_figure(Response.of_branch(result.sweeps[-1]), limit=limit), picture)
-    if as_json:
-        print_json(result.to_json())
-    else:
-        reports.design(result.to_json())
-    _end(result.reached, result.status.value)
 
 
 def march(

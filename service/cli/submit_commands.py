@@ -10,35 +10,36 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli import inputs, options, reports
+from service.cli import inputs, options, problem_inputs, reports
 from service.cli.failures import BAD_INPUT, FELL_SHORT, InputError, option_name
 from service.cli.output import print_json, print_table, say
+from service.cli.problem_options import ProblemFlags, takes_problem
 from service.cli.progress import bar
 
 if TYPE_CHECKING:
     from service.answers import JobAnswer, ResultsAnswer
     from service.client import Client
 
-_SCENE_FILES = (".toml", ".json")
 _INPUT_FAILURES = ("scene", "setting")
 
 
+@takes_problem
 def design(
-    name: options.Scene,
-    variables: options.Variables = None,
-    limit: options.Limit = None,
-    max_band: options.MaxBand = None,
-    values: options.Values = None,
-    harmonics: options.Harmonics = 11,
+    flags: ProblemFlags,
+    name: options.AnyScene = None,
     wait: options.Wait = False,
     as_json: options.Json = False,
     url: options.Url = options.DEFAULT_URL,
 ) -> None:
-    """Submit a design."""
-    bounds = inputs.bounds(variables)
-    body = _body("design", name, values, harmonics=harmonics, limit=limit, max_band_hz=max_band)
-    if bounds is not None:
-        body["variables"] = {path: list(pair) for path, pair in bounds.items()}
+    """Submit a design.
+
+    The problem is described by options, by a file, or by both.
+    """
+    from service.kinds.design import DesignRequest
+
+    told = problem_inputs.description(name, flags, "design")
+    problem_inputs.checked(told, DesignRequest)
+    body = {"kind": "design", **problem_inputs.body_to_submit(told)}
     _submit(url, body, wait=wait, as_json=as_json)
 
 
@@ -133,7 +134,7 @@ def results(
 def _body(kind: str, name: str, values: list[str] | None, **fields: Any) -> dict[str, Any]:
     """The body of ``POST /v1/jobs``; a scene file goes with it, a name is looked up by the service."""
     scene: Any = name
-    if name.endswith(_SCENE_FILES):
+    if name.endswith(problem_inputs.SCENE_FILES):
         import solver
 
         scene = solver.load_scene(name).to_dict()

@@ -44,28 +44,48 @@ class Family:
     dof: str
 
 
-def response_figure(response: Response, *, limit: float | None = None) -> Figure:
-    """One response with its peak marked and its band shaded.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Demands:
+    """What was asked of a response.
+
+    Attributes
+    ----------
+    limit : float or None
+        Amplitude [m] at which the band is measured, and that forbidden ranges must stay below.
+    max_peak : float or None
+        Largest amplitude allowed [m].
+    forbidden : tuple of (low, high)
+        Ranges of the parameter in which the amplitude must stay below `limit`.
+    """
+
+    limit: float | None = None
+    max_peak: float | None = None
+    forbidden: tuple[tuple[float, float], ...] = ()
+
+
+def response_figure(response: Response, *, asked: Demands | None = None, title: str | None = None) -> Figure:
+    """One response with its peak marked and its band shaded, and what was asked of it.
 
     Parameters
     ----------
     response : the curve.
-    limit : an amplitude [m] drawn as a line: the limit somebody asked for.
+    asked : limits drawn as lines, forbidden ranges shaded from the limit upwards.
+    title : the scene's name if left out.
     """
+    asked = asked or Demands()
     unit = units.length_unit(float(response.amplitude.max()))
     with style.styled():
         page, (axes,) = style.figure(6.0, 3.4)
         for low, high in response.intervals:
             axes.axvspan(low, high, color=style.SKY, alpha=0.18, linewidth=0.0)
         axes.plot(response.values, response.amplitude * unit.per_metre, color=style.BLUE)
-        if limit is not None:
-            _mark_limit(axes, limit, unit)
         if response.peak is not None:
             _mark_peak(axes, response, response.peak, unit)
         style.label(axes, axis_name(response.parameter), _amplitude_name("amplitude", response.dof, unit))
         axes.margins(x=0.0, y=0.14)
         axes.set_ylim(bottom=0.0)
-        axes.set_title(response.scene)
+        _mark_demands(axes, asked, unit)
+        axes.set_title(response.scene if title is None else title)
     return page
 
 
@@ -168,15 +188,37 @@ def _mark_peak(axes: Axes, curve: Response, peak: tuple[float, float], unit: uni
     text = f"{unit.show(height)} at {style.quantity(curve.parameter, at, 5)}"
     axes.annotate(
         text, (at, height * unit.per_metre), xytext=(0, 7), textcoords="offset points", ha=side,
-        color=style.VERMILION,
+        color=style.VERMILION, bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
     )  # fmt: skip
 
 
-def _mark_limit(axes: Axes, limit: float, unit: units.LengthUnit) -> None:
-    """A line at the limit, named at its right end."""
+def _mark_demands(axes: Axes, asked: Demands, unit: units.LengthUnit) -> None:
+    """Lines at the limits, named at their right ends; forbidden ranges hatched above the limit."""
+    lines = [("limit", asked.limit), ("largest peak allowed", asked.max_peak)]
+    heights = [height * unit.per_metre for _, height in lines if height is not None]
+    low, high = axes.get_xlim()
+    top = max([axes.get_ylim()[1], *(1.12 * height for height in heights)])
+    axes.set_ylim(top=top)
+    for begin, end in asked.forbidden:
+        if end <= low or begin >= high:
+            continue
+        bottom = 0.0 if asked.limit is None else asked.limit * unit.per_metre
+        axes.fill_between(
+            [max(begin, low), min(end, high)], bottom, top, facecolor="none", edgecolor=style.VERMILION,
+            hatch="////", alpha=0.55, linewidth=0.0, zorder=1,
+        )  # fmt: skip
+        axes.axvspan(max(begin, low), min(end, high), color=style.VERMILION, alpha=0.08, linewidth=0.0)
+    axes.set_xlim(low, high)
+    for name, height in lines:
+        if height is not None:
+            _mark_limit(axes, name, height, unit)
+
+
+def _mark_limit(axes: Axes, name: str, limit: float, unit: units.LengthUnit) -> None:
+    """A line at a limit, named at its right end."""
     height = limit * unit.per_metre
     axes.axhline(height, color=style.INK, linewidth=0.9, linestyle=_DASHED)
     axes.annotate(
-        f"limit {unit.show(limit)}", (1.0, height), xycoords=("axes fraction", "data"), xytext=(0, 3),
+        f"{name} {unit.show(limit)}", (1.0, height), xycoords=("axes fraction", "data"), xytext=(0, 3),
         textcoords="offset points", ha="right", va="bottom",
     )  # fmt: skip

@@ -204,34 +204,11 @@ def test_a_design_that_misses_its_goal_fails_and_keeps_the_best(shipped: httpx.C
     job = finished(shipped, {**body, "limit": 1.0, "max_band_hz": 1e-6})
     assert job["status"] == "failed"
     assert job["error"]["type"] == "goal-not-reached"
-    assert "wider band" in job["error"]["detail"]
+    assert "relax" in job["error"]["detail"]
+    [band] = [row for row in job["result"]["broken"] if row["quantity"] == "band"]
+    assert band["by"] == pytest.approx(band["value"] - 1e-6)
     assert job["result"]["optimum"]["damper.N0"] > 0.0
     assert job["sweeps"]
-
-
-@pytest.mark.parametrize(
-    ("change", "pointers"),
-    [
-        ({"variables": {"damper.N9": [1, 2]}}, ["/variables/damper.N9"]),
-        ({"variables": {"damper.N0": [2, 1]}}, ["/variables/damper.N0"]),
-        (
-            {"variables": {"damper.N0": [-1, 1], "frequency": [1, 2]}},
-            ["/variables/damper.N0", "/variables/frequency"],
-        ),
-        ({"variables": {"damper.N0": [1]}}, ["/variables/damper.N0"]),
-        ({"variables": {"damper.N0": [1, "x"]}}, ["/variables/damper.N0/1"]),
-        ({"variables": {}}, ["/variables"]),
-        ({"limit": -1}, ["/limit"]),
-        ({"max_band_hz": 0}, ["/max_band_hz"]),
-        ({"start": {"damper.N0": 1}}, ["/start/damper.N0"]),
-        ({"start": {}}, ["/start"]),
-        ({"start": {"damper.N0": 30, "damper.kt": 1}}, ["/start/damper.kt"]),
-    ],
-)
-def test_a_bad_design_is_refused(shipped: httpx.Client, change: dict[str, Any], pointers: list[str]) -> None:
-    body = {"scene": "two-dof", "variables": {"damper.N0": [20, 1000]}, **change}
-    problem = is_problem(shipped.post("/v1/designs", json=body), 422)
-    assert [entry["pointer"] for entry in problem["errors"]] == pointers
 
 
 def test_the_description_is_whole(shipped: httpx.Client) -> None:

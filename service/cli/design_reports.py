@@ -1,0 +1,130 @@
+"""What people read of a design, given as the JSON object a program reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from service import units
+from service.cli.output import print_pairs, print_table, say
+
+Json = Mapping[str, Any]
+Pairs = list[tuple[str, str]]
+
+_COUNTS = 1e-6  # multipliers below this hold nothing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A table to print: heading, column heads, rows, and which columns are aligned right."""
+
+    heading: str
+    columns: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+    right: str
+
+
+def design(found: Json) -> None:
+    """The best design: what it reaches, what holds it, what it must keep, and the other optima."""
+    kept = not found.get("broken")
+    title = f"Best damper of {found['scene']}"
+    print_pairs(title if kept else f"{title}: not all limits can be kept", _pairs(found))
+    for table in (_limits(found), _active(found), _basins(found)):
+        if table is not None:
+            say("")
+            print_table(table.heading, table.columns, table.rows, right=table.right)
+
+
+def values(optimum: Json) -> Pairs:
+    """The variables with their units."""
+    return [(path, units.parameter(path, value)) for path, value in optimum.items()]
+
+
+def amount(value: float, unit: str) -> str:
+    """A number of a row with its unit; lengths in the one that fits."""
+    return units.length(value) if unit == "m" else f"{units.number(value)} {unit}"
+
+
+def _pairs(found: Json) -> Pairs:
+    """What the design is and what it came to."""
+    pairs = values(found["optimum"])
+    peaks: Sequence[Json] = found.get("peaks") or ([found["peak"]] if found["peak"] else [])
+    several = len({peak.get("case") for peak in peaks}) > 1
+    if any(row["weight"] > 0.0 and row["quantity"] != "peak" for row in found.get("rows", ())):
+        pairs.append(("objective", units.number(found["objective"], 6)))
+    for index, peak in enumerate(peaks):
+        of = f" ({peak['case']})" if several else ""
+        name = "further peak" if index else "peak"
+        pairs.append((name, f"{units.length(peak['value'])} at {peak['at']:.6g} Hz{of}"))
+    if found["band_hz"] is not None:
+        pairs.append(("band", f"{units.number(found['band_hz'])} Hz above {units.length(found['limit'])}"))
+    if found["active"]:
+        pairs.append(("held by", "; ".join(found["active"])))
+    residual = found.get("optimality")
+    if residual is not None:
+        pairs.append(("KKT residual", f"{residual:.1e}"))
+    work = found.get("work") or found["evaluations"]
+    effort = f"{found['evaluations']} designs, {units.number(work, 3)} frequency responses"
+    by = f", method {found['method']}" if "method" in found else ""
+    return [*pairs, ("effort", f"{effort} in {units.duration(found['seconds'])}{by}")]
+
+
+def _limits(found: Json) -> Table | None:
+    """Every limit: what was asked, what is reached, and what is left or missing."""
+    worst: dict[tuple[str, str, str, float], Json] = {}
+    for row in found.get("rows", ()):
+        if row["bound"] is None:
+            continue
+        key = (row["quantity"], row["case"], row["what"].partition(" at ")[0], row["bound"])
+        if key not in worst or row["value"] > worst[key]["value"]:
+            worst[key] = row
+    if not worst:
+        return None
+    several = len({row["case"] for row in worst.values()}) > 1
+    rows: list[tuple[str, ...]] = []
+    for row in sorted(worst.values(), key=lambda row: row["bound"] - row["value"]):
+        left, unit = row["bound"] - row["value"], row["unit"]
+        # A limit that holds the design is kept to the search's own accuracy.
+        holds = f"{amount(left, unit)} left" if left >= 0.0 else f"broken by {amount(-left, unit)}"
+        what = f"{row['what']} ({row['case']})" if several else row["what"]
+        rows.append((what, amount(row["bound"], unit), amount(row["value"], unit), holds))
+    return Table(heading="Limits", columns=("limit", "asked", "reached", ""), rows=rows, right="12")
+
+
+def _active(found: Json) -> Table | None:
+    """The rows and bounds that hold the optimum, with their multipliers."""
+    conditions = found.get("conditions")
+    if not conditions:
+        return None
+    several = len({row["case"] for row in conditions["rows"]}) > 1
+    held = [
+        (f"{row['what']} ({row['case']})" if several else row["what"], row["multiplier"])
+        for row in conditions["rows"]
+    ]
+    held += [
+        (f"{bound['side']} bound of {bound['variable']}", bound["multiplier"])
+        for bound in conditions["bounds"]
+    ]
+    rows: list[tuple[str, ...]] = [(what, units.number(x)) for what, x in held if abs(x) > _COUNTS]
+    return Table(heading="Active", columns=("row", "multiplier"), rows=rows, right="1") if rows else None
+
+
+def _basins(found: Json) -> Table | None:
+    """The local optima, if there are several."""
+    basins: Sequence[Json] = found.get("basins", ())
+    if len(basins) < 2:
+        return None
+    names = tuple(basins[0]["values"])
+    rows: list[tuple[str, ...]] = [
+        (
+            *(units.parameter(name, basin["values"][name]) for name in names),
+            units.length(basin["peak"]),
+            "yes" if basin["settled"] else "no",
+            "yes" if basin["feasible"] else "no",
+        )
+        for basin in basins
+    ]
+    columns = (*names, "peak", "settled", "keeps the limits")
+    right = "".join(str(i) for i in range(min(len(names) + 1, 10)))
+    return Table(heading="Local optima", columns=columns, rows=rows, right=right)

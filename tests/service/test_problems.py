@@ -1,0 +1,178 @@
+"""The description of a design problem: every key, what is wrong with it, and where that is told."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import httpx
+import pytest
+from service_helpers import is_problem, job_ids
+
+import solver
+from optim.problem import Method, pose
+from service.errors import InvalidRequestError
+from service.kinds.design import DesignRequest, problem_of, resolve
+from service.kinds.problem import arguments
+from service.validation import validated
+
+VARIABLES = {"damper.N0": [20, 1000]}
+EVERY_KEY: dict[str, Any] = {
+    "scene": "bladed-disk",
+    "set": {"shroud.mu": 0.25},
+    "variables": {"shroud.N0,root.N0": [20, 3000], "shroud.kt": [1e6, 1e7]},
+    "scaling": {"shroud.kt": "linear"},
+    "cases": [
+        {"name": "first"},
+        {"name": "twice", "set": {"excitation.amplitude": 100}, "band": [600, 800], "weight": 0.5},
+        {"observe": ["tip", "middle"], "engine_order": 2, "order": 3},
+    ],
+    "limit": 8e-5,
+    "weights": {"peak": 1, "band": 1e-6},
+    "max_peak": 2e-4,
+    "max_band_hz": 60,
+    "forbidden_hz": [[520, 560], [880, 890]],
+    "speeds_rpm": [[36000, 37000]],
+    "max_friction_work": {"shroud": 0.02},
+    "contact_states": {"shroud": "never-separates"},
+    "harmonics": 5,
+    "start": {"shroud.N0,root.N0": 200, "shroud.kt": 5e6},
+    "method": "minimax",
+}
+
+
+class Shipped:
+    """The shipped scenes, without a database."""
+
+    def scene_body(self, name: str) -> dict[str, object] | None:
+        return solver.load_scene(name).to_dict() if name in solver.shipped_scenes() else None
+
+
+def pointers(change: dict[str, Any]) -> list[str]:
+    body = {"scene": "two-dof", "variables": VARIABLES, **change}
+    with pytest.raises(InvalidRequestError) as caught:
+        resolve(validated(DesignRequest, body), Shipped())
+    assert all(len(issue.message) > 20 for issue in caught.value.issues)
+    return [issue.pointer for issue in caught.value.issues]
+
+
+def test_every_key_of_the_design_layer_is_one_of_the_body_and_arrives() -> None:
+    keys = set(pose.__kwdefaults__)
+    assert keys == set(EVERY_KEY) - {"scene", "set"}
+    assert keys <= set(DesignRequest.model_fields)
+    assert DesignRequest.model_json_schema()["examples"]
+    spec = resolve(validated(DesignRequest, EVERY_KEY), Shipped()).spec
+    assert {key: spec[key] for key in keys} == {key: EVERY_KEY[key] for key in keys}
+    scene = solver.Scene.from_dict(spec["scene"])
+    assert scene.value("shroud.mu") == 0.25
+    problem = pose(scene, **problem_of(spec))
+    assert [case.name for case in problem.cases] == ["first", "twice", "case 3, tip", "case 3, middle"]
+
+
+def test_the_example_of_the_reference_is_one() -> None:
+    [example] = DesignRequest.model_json_schema()["examples"]
+    assert resolve(validated(DesignRequest, example), Shipped()).scene_name == "bladed-disk"
+
+
+def test_the_methods_are_those_of_the_design_layer() -> None:
+    for method in Method:
+        assert arguments(validated(DesignRequest, {"scene": "two-dof", "method": method.value}))["method"]
+
+
+def test_a_spec_of_the_first_version_is_still_a_problem() -> None:
+    spec = {
+        "scene": {},
+        "variables": VARIABLES,
+        "limit": None,
+        "max_band_hz": None,
+        "harmonics": 5,
+        "start": None,
+    }
+    assert problem_of(spec) == {"variables": VARIABLES, "harmonics": 5}
+
+
+CASE = {"name": "one"}
+BAD = [
+    ({"variables": {"damper.N9": [1, 2]}}, ["/variables/damper.N9"]),
+    ({"variables": {"damper.N0": [2, 1]}}, ["/variables/damper.N0"]),
+    (
+        {"variables": {"damper.N0": [-1, 1], "frequency": [1, 2]}},
+        ["/variables/damper.N0", "/variables/frequency"],
+    ),
+    ({"variables": {"damper.N0": [1]}}, ["/variables/damper.N0"]),
+    ({"variables": {"damper.N0": [1, "x"]}}, ["/variables/damper.N0/1"]),
+    ({"variables": {"damper.N0": [1, math.nan]}}, ["/variables/damper.N0/1"]),
+    ({"variables": {"damper.N0": 5}}, ["/variables/damper.N0"]),
+    ({"variables": {"damper.N0,,damper.kt": [1, 2]}}, ["/variables/damper.N0,,damper.kt"]),
+    ({"variables": {"damper.N0": [1, 2], "damper.N0,damper.kt": [1, 2]}}, ["/variables/damper.N0"]),
+    ({"variables": {}}, ["/variables"]),
+    ({"variables": ["damper.N0"]}, ["/variables"]),
+    ({"scaling": {"damper.N0": "cubic"}}, ["/scaling/damper.N0"]),
+    ({"scaling": {"damper.kt": "linear"}}, ["/scaling/damper.kt"]),
+    ({"variables": {"damper.N0": [0, 9]}, "scaling": {"damper.N0": "logarithmic"}}, ["/scaling/damper.N0"]),
+    ({"cases": []}, ["/cases"]),
+    ({"cases": [3]}, ["/cases/0"]),
+    ({"cases": [{"colour": "red"}]}, ["/cases/0/colour"]),
+    ({"cases": [CASE, {"band": [5, 1]}, {"band": [0, 1]}]}, ["/cases/1/band", "/cases/2/band"]),
+    ({"cases": [{"band": [1, "x"]}]}, ["/cases/0/band/1"]),
+    ({"cases": [{"name": ""}]}, ["/cases/0/name"]),
+    ({"cases": [CASE, CASE]}, ["/cases"]),
+    ({"cases": [{"set": {"bumper.N0": 5, "damper.mu": -1}}]}, ["/cases/0/set/bumper.N0"]),
+    ({"cases": [CASE, {"set": {"damper.mu": -1}}]}, ["/cases/1/set/damper.mu"]),
+    ({"cases": [{"observe": "m9"}]}, ["/cases/0/observe"]),
+    ({"cases": [{"observe": []}]}, ["/cases/0/observe"]),
+    ({"cases": [{"engine_order": 2}]}, ["/cases/0/engine_order"]),
+    ({"cases": [{"order": 0}]}, ["/cases/0/order"]),
+    ({"cases": [{"weight": 0}]}, ["/cases/0/weight"]),
+    ({"limit": -1}, ["/limit"]),
+    ({"weights": {"width": 1}}, ["/weights/width"]),
+    ({"weights": {"peak": -1}}, ["/weights/peak"]),
+    ({"weights": {"peak": 0}}, ["/weights"]),
+    ({"max_peak": 0}, ["/max_peak"]),
+    ({"max_band_hz": 0}, ["/max_band_hz"]),
+    ({"forbidden_hz": [[1, 2]]}, ["/limit"]),
+    ({"forbidden_hz": [[1, 2], [2, 1]], "limit": 1}, ["/forbidden_hz/1"]),
+    ({"forbidden_hz": [[1, 2, 3]]}, ["/forbidden_hz/0"]),
+    ({"forbidden_hz": [1, 2]}, ["/forbidden_hz/0", "/forbidden_hz/1"]),
+    ({"speeds_rpm": [[0, 9]], "limit": 1}, ["/speeds_rpm/0"]),
+    ({"speeds_rpm": []}, ["/speeds_rpm"]),
+    ({"max_friction_work": 0}, ["/max_friction_work"]),
+    ({"max_friction_work": "little"}, ["/max_friction_work"]),
+    ({"max_friction_work": {"damper": -1}}, ["/max_friction_work/damper"]),
+    ({"max_friction_work": {"bumper": 1}}, ["/max_friction_work/bumper"]),
+    ({"contact_states": {"damper": "sticks"}}, ["/contact_states/damper"]),
+    ({"contact_states": {"bumper": "never-separates"}}, ["/contact_states/bumper"]),
+    ({"harmonics": 0}, ["/harmonics"]),
+    ({"start": {"damper.N0": 1}}, ["/start/damper.N0"]),
+    ({"start": {}}, ["/start"]),
+    ({"start": {"damper.N0": 30, "damper.kt": 1}}, ["/start/damper.kt"]),
+    ({"method": "guess"}, ["/method"]),
+    ({"colour": "red"}, ["/colour"]),
+    (
+        {
+            "variables": {"damper.N9": [1, 2]}, "cases": [{"observe": "m9"}],
+            "contact_states": {"x": "never-separates"},
+        },
+        ["/variables/damper.N9", "/cases/0/observe", "/contact_states/x"],
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "where"), BAD, ids=[str(change)[:60] for change, _ in BAD])
+def test_what_is_wrong_is_told_where_it_is(change: dict[str, Any], where: list[str]) -> None:
+    assert pointers(change) == where
+
+
+def test_a_scene_without_friction_has_nothing_to_choose_by_itself() -> None:
+    raw = solver.load_scene("two-dof").to_dict()
+    raw["contacts"] = []
+    assert pointers({"scene": raw, "variables": None}) == ["/variables"]
+
+
+def test_over_http_nothing_is_written_of_what_is_refused(shipped: httpx.Client) -> None:
+    before = job_ids(shipped)
+    body = {"scene": "two-dof", "cases": [{"band": [5, 1]}], "max_friction_work": {"bumper": 1}}
+    problem = is_problem(shipped.post("/v1/designs", json=body), 422)
+    assert [entry["pointer"] for entry in problem["errors"]] == ["/cases/0/band", "/max_friction_work/bumper"]
+    assert "low < high" in problem["errors"][0]["detail"]
+    assert job_ids(shipped) == before
