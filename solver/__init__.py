@@ -20,17 +20,18 @@ if TYPE_CHECKING:
     from solver.errors import Issue, SceneError, SettingError, SolverError
     from solver.floquet import Growth, Stability, branch_stability, stability
     from solver.histories import hysteresis_loop, motion, time_history
+    from solver.least import least_peak
     from solver.maps import MapStatus, ResponseMap, response_map
     from solver.marching import march
     from solver.mistuning import BladeAmplitudes, BladePeaks, blade_amplitudes, blade_peaks, mistuned
-    from solver.peak_tracks import LeastPeak, PeakTrack, TrackStatus
+    from solver.peak_tracks import Basin, LeastPeak, PeakTrack, TrackStatus
     from solver.response import Solution, SolutionStatus, solve
     from solver.savings import Effects
     from solver.scene import Scene, load_scene, shipped_scenes
     from solver.sectors import Extent, annulus, sectors_needed
     from solver.segments_of import Shares
     from solver.sensitivity import Gradient, Sensitivities
-    from solver.tracking import least_peak, track_peak
+    from solver.tracking import track_peak
     from solver.wear import ContactWear, Measured, WearSensitivity, contact_wear
     from solver.wear_peaks import Measure, WorstWear, worst_friction_work, worst_wear
 
@@ -53,7 +54,7 @@ _HOME = {
     "march": "marching", "PowerBalance": "energy", "power_balance": "energy",
     "hysteresis_loop": "histories", "motion": "histories", "time_history": "histories",
     "MapStatus": "maps", "ResponseMap": "maps", "response_map": "maps", "LeastPeak": "peak_tracks",
-    "PeakTrack": "peak_tracks", "TrackStatus": "peak_tracks", "least_peak": "tracking",
+    "Basin": "peak_tracks", "PeakTrack": "peak_tracks", "TrackStatus": "peak_tracks", "least_peak": "least",
     "track_peak": "tracking", "Shares": "segments_of",
     "ContactWear": "wear", "Measured": "wear", "WearSensitivity": "wear", "contact_wear": "wear",
     "Measure": "wear_peaks", "WorstWear": "wear_peaks", "worst_friction_work": "wear_peaks",
@@ -65,6 +66,7 @@ __all__ = [
     "AccuracyStudy",
     "AmplitudeHessian",
     "Band",
+    "Basin",
     "BladeAmplitudes",
     "BladePeaks",
     "Branch",

@@ -3,10 +3,14 @@
 Between two places the height of every line is the cubic through its values and slopes there. The least
 maximum of the cubics is the next place, the bracket shrinks to the side the highest line falls towards, and
 the cubics become exact: it converges faster than linearly at a smooth minimum and at a crossing alike.
+
+The highest line may have several minima. Those whose cubics are nearly as low as the lowest are solved too,
+so that the cubics do not decide between them.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -16,76 +20,119 @@ from solver.fourier import Real
 from solver.kernels.track import DHEIGHT, HEIGHT, Z
 from solver.ridges import Tracker
 
-SUBDIVIDED = 6  # places between two rows at which the envelope is looked at
 NEAR_THE_TOP = 0.95  # share of the envelope from which a line may be the highest within a bracket
 SHARP = 1e-12  # of the range, where the search ends
+DOUBT = 0.01  # relative error that is allowed for where cubics tell which minimum is lower
+EVEN = 1e-9  # relative change over the range up to which a peak does not depend on the parameter
+RISE = 1e-4  # relative height of what has to lie between two minima that are told apart
 _MOST = 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lowest:
-    """The place of the least highest peak.
+    """The place of a least highest peak.
 
     Attributes
     ----------
     z : float
         Where.
     rows : mapping of line to row
-        The lines near the top there, solved; the highest first.
-    settled : bool
-        Whether the search ended by its own criterion.
+        The lines near the top there, solved, the highest first; empty if they are not solved.
+    height : float
+        The highest line there [m].
     """
 
     z: float
     rows: Mapping[int, Real]
-    settled: bool
+    height: float
 
     @property
-    def height(self) -> float:
-        """The highest peak there [m]."""
-        return float(max(row[HEIGHT] for row in self.rows.values()))
+    def solved(self) -> bool:
+        """Whether the lines are solved there, rather than read from their cubics."""
+        return bool(self.rows)
 
 
-def places(tracker: Tracker) -> Real:
-    """Return the places where the envelope is looked at: all rows of all lines, and between them."""
-    ends = np.array([tracker.scale.low, tracker.scale.high])
-    nodes = np.unique(np.concatenate([ends, *(line.rows[:, Z] for line in tracker.lines)]))
-    share = np.arange(SUBDIVIDED) / SUBDIVIDED
-    between = nodes[:-1, None] + share * np.diff(nodes)[:, None]
-    return np.append(between.reshape(-1), nodes[-1])
+def flat(tracker: Tracker) -> bool:
+    """Return whether the highest line is everywhere, and does not depend on the parameter."""
+    heights = tracker.envelope(tracker.places())
+    return bool(np.isfinite(heights).all() and np.ptp(heights) <= EVEN * heights.max())
 
 
-def lowest(tracker: Tracker) -> Lowest | None:
-    """Return where the highest line is least; None if the lines cannot be solved there."""
-    z = places(tracker)
+def minima(tracker: Tracker, doubt: float = DOUBT) -> list[Lowest]:
+    """Return the minima of the highest line over the range, lowest first; the low ones are solved.
+
+    Empty where no line is. Minima with no rise between them count as one; of a peak that does not depend on
+    the parameter the place of the first sweep is returned.
+
+    Parameters
+    ----------
+    doubt : relative height above the lowest up to which a minimum is solved for.
+    """
+    if not tracker.lines:
+        return []
+    if flat(tracker):
+        rows = _solve(tracker, list(range(len(tracker.lines))), tracker.looks[0].z)
+        if rows:
+            top = next(iter(rows.values()))
+            return [Lowest(z=tracker.looks[0].z, rows=rows, height=float(top[HEIGHT]))]
+    z = tracker.places()
     heights = tracker.envelope(z)
     heights[~np.isfinite(heights)] = np.inf
-    best = int(np.argmin(heights))
-    low, high = float(z[max(best - 1, 0)]), float(z[min(best + 1, z.size - 1)])
-    near = [
-        index
-        for index, line in enumerate(tracker.lines)
-        if np.any(line.heights(z[[best]]) >= NEAR_THE_TOP * heights[best])
+    before, after = np.append(np.inf, heights[:-1]), np.append(heights[1:], np.inf)
+    at = np.flatnonzero((heights < before) & (heights <= after))
+    kept: list[int] = []
+    for index in at[np.argsort(heights[at], kind="stable")]:
+        if all(_apart(heights, int(index), other) for other in kept):
+            kept.append(int(index))
+    # A line that only shows that it is high enough has no minima of a peak.
+    kept = kept[:1] + [index for index in kept[1:] if heights[index] < tracker.enough]
+    if not kept:
+        return []
+    limit = heights[kept[0]] * (1.0 + doubt)
+    found = [
+        _solved(tracker, z, heights, index)
+        if heights[index] <= limit
+        else Lowest(z=float(z[index]), rows={}, height=float(heights[index]))
+        for index in kept
     ]
-    return _search(tracker, near, float(z[best]), low, high)
+    return sorted(found, key=lambda one: one.height)
 
 
-def _search(tracker: Tracker, near: list[int], best: float, low: float, high: float) -> Lowest | None:
-    """Close the bracket [low, high] on the least maximum of the lines `near`."""
-    sides = [_solve(tracker, near, place) for place in (low, high)]
-    if not sides[0] or not sides[1]:
-        rows = _solve(tracker, near, best)
-        return Lowest(z=best, rows=rows, settled=False) if rows else None
-    left, right = sides
-    before = np.inf
+def _apart(heights: Real, one: int, other: int) -> bool:
+    """Return whether the highest line rises between two places, above both."""
+    low, high = min(one, other), max(one, other)
+    return bool(heights[low : high + 1].max() > max(heights[one], heights[other]) * (1.0 + RISE))
+
+
+def _solved(tracker: Tracker, z: Real, heights: Real, index: int) -> Lowest:
+    """Return a minimum of the highest line near a place, solved if that succeeds."""
+    low, high = float(z[max(index - 1, 0)]), float(z[min(index + 1, z.size - 1)])
+    near = [
+        number
+        for number, line in enumerate(tracker.lines)
+        if np.any(line.heights(z[[index]]) >= NEAR_THE_TOP * heights[index])
+    ]
+    rows = _search(tracker, near, float(z[index]), low, high)
+    if not rows:
+        return Lowest(z=float(z[index]), rows={}, height=float(heights[index]))
+    top = next(iter(rows.values()))
+    if top[HEIGHT] < tracker.envelope(top[[Z]])[0] * (1.0 - RISE):
+        # A line that is higher ends there: what is low lies beyond its end.
+        rows = _solve(tracker, near, float(z[index]))
+        return Lowest(z=float(z[index]), rows=rows, height=float(heights[index]))
+    return Lowest(z=float(top[Z]), rows=rows, height=float(top[HEIGHT]))
+
+
+def _search(tracker: Tracker, near: list[int], best: float, low: float, high: float) -> Mapping[int, Real]:
+    """Close the bracket [low, high] on the least maximum of the lines `near`; return the rows there."""
+    left, right = (_solve(tracker, near, place) for place in (low, high))
+    if not left or not right:
+        return _solve(tracker, near, best)
+    before = math.inf
     for _ in range(_MOST):
         z = _least(left, right)
-        if (
-            abs(z - before) <= SHARP * tracker.scale.span
-            or not left[next(iter(left))][Z] < z < right[next(iter(right))][Z]
-        ):
-            nearer = min((left, right), key=lambda side: abs(next(iter(side.values()))[Z] - z))
-            return Lowest(z=float(next(iter(nearer.values()))[Z]), rows=nearer, settled=True)
+        if abs(z - before) <= SHARP * tracker.scale.span or not _place(left) < z < _place(right):
+            return min((left, right), key=lambda side: abs(_place(side) - z))
         rows = _solve(tracker, near, z)
         if not rows:
             break
@@ -94,8 +141,12 @@ def _search(tracker: Tracker, near: list[int], best: float, low: float, high: fl
         else:
             left = rows
         before = z
-    nearer = min((left, right), key=lambda side: next(iter(side.values()))[HEIGHT])
-    return Lowest(z=float(next(iter(nearer.values()))[Z]), rows=nearer, settled=False)
+    return min((left, right), key=lambda side: next(iter(side.values()))[HEIGHT])
+
+
+def _place(rows: Mapping[int, Real]) -> float:
+    """Return where rows are."""
+    return float(next(iter(rows.values()))[Z])
 
 
 def _solve(tracker: Tracker, near: list[int], z: float) -> dict[int, Real]:
@@ -108,7 +159,7 @@ def _solve(tracker: Tracker, near: list[int], z: float) -> dict[int, Real]:
 def _least(left: Mapping[int, Real], right: Mapping[int, Real]) -> float:
     """Return where the highest of the cubics between two sets of rows is least."""
     cubics = [(left[index], right[index]) for index in left if index in right]
-    low, high = float(next(iter(left.values()))[Z]), float(next(iter(right.values()))[Z])
+    low, high = _place(left), _place(right)
     if not cubics:
         return 0.5 * (low + high)
     length = high - low

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
+from solver.branch import Branch
 from solver.fourier import Real
 
 
@@ -13,6 +14,10 @@ class TrackStatus(Enum):
     """How tracking ended; the value is a sentence a user can act on."""
 
     TRACKED = "The peaks were tracked over the whole range; every sweep made to check found nothing higher."
+    AT_BOUND = (
+        "The highest peak is least at an end of the range and still falls there: a wider range may do better."
+    )
+    FLAT = "The highest peak does not depend on the parameter: every value in the range is as good."
     GAPS = "Somewhere in the range no peak could be tracked: use a shorter range or more harmonics."
     UNPROVEN = "The sweeps went on finding higher peaks: use a shorter range, or compare sweeps of your own."
     OTHER_BRANCH = (
@@ -20,6 +25,11 @@ class TrackStatus(Enum):
     )
     NO_RESPONSE = "No frequency response could be computed: start somewhere else, or use more harmonics."
     STOPPED = "The tracking was stopped by the caller."
+
+    @property
+    def proven(self) -> bool:
+        """Whether an optimum with this status is proven over the whole range."""
+        return self in (TrackStatus.TRACKED, TrackStatus.AT_BOUND, TrackStatus.FLAT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,21 +52,51 @@ class ActivePeak:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Basin:
+    """A local minimum of the highest peak over the parameter.
+
+    Attributes
+    ----------
+    at : float
+        The value of the parameter.
+    peak : float
+        The highest peak that was followed to there [m].
+    solved : bool
+        The place and the peak are solved for; otherwise they are read from cubics between solved places.
+    proven : bool
+        A sweep there found nothing higher. Otherwise the highest peak is at least as high as `peak`: the
+        basin is no better than that, but may be worse.
+    """
+
+    at: float
+    peak: float
+    solved: bool
+    proven: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LeastPeak:
     """Where the highest peak is least.
 
     Attributes
     ----------
     status : TrackStatus
-        TRACKED only if it is proven.
+        Proven only if `status.proven`: TRACKED, AT_BOUND or FLAT.
     at : float
         The value of the parameter (NaN without a response).
     peak : float
         The highest peak there [m].
     active : tuple of ActivePeak
         The peaks that are equally high there, highest first.
+    basins : tuple of Basin
+        The local minima of the highest peak that were met, best first; the optimum is the first of them.
+    branch : Branch or None
+        The frequency response at the optimum, from the sweep that proves it; None if there is none.
     sweeps : int
         Frequency responses computed.
+    work : float
+        Newton iterations of all sweeps and of following the peaks, divided by those of the sweep at the
+        optimum (of a mean sweep where there is none): the work in units of one frequency response.
     seconds : float
         Time in all.
     """
@@ -65,7 +105,10 @@ class LeastPeak:
     at: float
     peak: float
     active: tuple[ActivePeak, ...]
+    basins: tuple[Basin, ...]
+    branch: Branch | None
     sweeps: int
+    work: float
     seconds: float
 
     def to_json(self) -> dict[str, object]:

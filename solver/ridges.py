@@ -7,6 +7,7 @@ the highest peak from below everywhere; a sweep shows what no line has reached y
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
@@ -21,7 +22,7 @@ from solver.errors import SettingError
 from solver.fourier import Integer, Real
 from solver.kernels import track as kernel
 from solver.kernels.laws_columns import COULOMB
-from solver.kernels.summit import SIGN, Summit, new_summit, summit_numbers
+from solver.kernels.summit import SIGN, SPENT, Summit, new_summit, summit_numbers
 from solver.kernels.system import System, by_reference
 from solver.kernels.track import (
     COLUMNS,
@@ -36,6 +37,7 @@ from solver.kernels.track import (
     polish,
     track,
 )
+from solver.rivals import rivals
 from solver.savings import Effects
 from solver.scale import scale_of
 from solver.scene import Scene
@@ -44,8 +46,43 @@ SAME = (
     1e-3  # relative distance, in height and a fifth of it in frequency, within which two peaks are the same
 )
 _MOST_ROWS = 600
-_FIRST_STEP, _LARGEST_STEP, _SMALLEST_STEP = 0.02, 0.125, 1e-4  # shares of the range
-_HEIGHT_ERROR, _OMEGA_ERROR = 3e-3, 1e-3
+SUBDIVIDED = 6  # places between two rows at which the envelope is looked at
+EXACTLY = 1e-6  # relative distance within which a peak is one that was solved at the same place
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pace:
+    """How closely peaks are followed.
+
+    Attributes
+    ----------
+    first_step, largest_step, smallest_step : float
+        Shares of the range.
+    height_error, omega_error : float
+        Relative errors of the trapezoidal rule allowed in a step.
+    above : float
+        Where a line is higher than this times the least highest peak of a sweep so far, it only has to show
+        that it is; infinity: it is followed closely everywhere.
+    slack : float
+        Share of what it is higher by that its height may be wrong by then.
+    climb_from : float
+        Share of the range: step at which a peak that Newton's method does not find is looked for uphill.
+    """
+
+    first_step: float
+    largest_step: float
+    smallest_step: float
+    height_error: float
+    omega_error: float
+    above: float
+    slack: float
+    climb_from: float
+
+
+EVERYWHERE = Pace(
+    first_step=0.02, largest_step=0.125, smallest_step=1e-4, height_error=3e-3, omega_error=1e-3,
+    above=math.inf, slack=0.0, climb_from=math.inf,
+)  # fmt: skip
 
 
 class LineEnd(Enum):
@@ -137,6 +174,11 @@ class Look:
         """The highest peak [m]; −inf if there is none."""
         return self.branch.peaks[0].value if self.branch.peaks else -math.inf
 
+    @property
+    def seen(self) -> bool:
+        """Whether the whole band was seen."""
+        return self.branch.completed and bool(self.branch.peaks)
+
 
 def check_laws(scene: Scene) -> None:
     """Refuse contacts whose force has no exact second derivatives here.
@@ -159,22 +201,34 @@ class Tracker:
     """Sweeps and lines of one scene and parameter; the arrays of the compiled loops are its own."""
 
     def __init__(
-        self, scene: Scene, parameter: str, start: float, stop: float, harmonics: int, effects: Effects | None
-    ) -> None:
+        self, scene: Scene, parameter: str, start: float, stop: float, harmonics: int,
+        effects: Effects | None, pace: Pace = EVERYWHERE,
+    ) -> None:  # fmt: skip
         self.scale = scale_of(scene, parameter, start, stop)
         self.balance = build(
             scene, parameter, harmonics=harmonics, frequency_hz=scene.observe.band[0], effects=effects
         )
         check_laws(self.balance.scene)
-        self._effects = effects
+        self._effects, self._pace = effects, pace
         self.lines: list[Line] = []
         self.looks: list[Look] = []
         self._scene, self._harmonics = self.balance.scene, harmonics
         self._system: System = by_reference(self.balance.system)
         self._summit: Summit = new_summit(self._system)
 
-    def look(self, z: float, share: float) -> Look:
-        """Sweep at z, and follow every peak above `share` of the highest that is on no line yet."""
+    @property
+    def enough(self) -> float:
+        """The height from which a line only has to show that it is higher [m]."""
+        least = min((look.top for look in self.looks if look.seen), default=math.inf)
+        return least * self._pace.above
+
+    @property
+    def spent(self) -> int:
+        """Evaluations of the balance in following peaks so far."""
+        return int(summit_numbers(self._summit)[SPENT])
+
+    def look(self, z: float) -> Look:
+        """Sweep at z."""
         path = self.balance.parameter.path
         branch = sweep(
             self._scene.with_values({path: self.scale.outside(z)}), harmonics=self._harmonics,
@@ -184,15 +238,42 @@ class Tracker:
         higher = bool(self.lines) and top > float(self.envelope(np.array([z]))[0]) * (1.0 + SAME)
         look = Look(z=z, branch=branch, surprising=higher)
         self.looks.append(look)
-        for peak in branch.peaks:
-            if peak.value >= share * look.top and not self.known(z, peak):
-                self._follow(z, peak, branch.balance.system.ks)
         return look
 
-    def known(self, z: float, peak: Peak) -> bool:
+    def follow(self, look: Look, share: float, solved: Mapping[int, Real] | None = None) -> bool:
+        """Follow every peak of a sweep above `share` of the highest that is on no line yet.
+
+        Parameters
+        ----------
+        solved : rows of lines at the same place, which tell more exactly than their cubics what is on them.
+
+        Returns
+        -------
+        Whether there is a new line.
+        """
+        before, ks = len(self.lines), look.branch.balance.system.ks
+        for peak in look.branch.peaks:
+            if peak.value >= share * look.top and not self.known(look.z, peak, solved):
+                self._follow(look.z, peak, ks)
+        return len(self.lines) > before
+
+    def follow_rivals(self, look: Look, share: float) -> None:
+        """Follow the peaks of max x and of −min x that the other of the two hides in a sweep."""
+        for rival in rivals(look.branch):
+            if rival.value >= share * look.top:
+                u = self._fitted(rival.solution, look.branch.balance.system.ks)
+                self._draw(look.z, rival.omega, u, (rival.sign, math.nan), fixed=False)
+
+    def known(self, z: float, peak: Peak, solved: Mapping[int, Real] | None = None) -> bool:
         """Return whether a peak at z is on a line."""
         omega, here = 2.0 * math.pi * peak.at, np.array([z])
-        for line in self.lines:
+        for index, line in enumerate(self.lines):
+            if solved is not None and index in solved:
+                row = solved[index]
+                near = abs(row[OMEGA] - omega) <= 10.0 * EXACTLY * omega
+                if near and abs(row[HEIGHT] - peak.value) <= EXACTLY * peak.value:
+                    return True
+                continue
             near = abs(line.frequencies(here)[0] - omega) <= 0.2 * SAME * omega
             if near and abs(line.heights(here)[0] - peak.value) <= SAME * peak.value:
                 return True
@@ -230,8 +311,11 @@ class Tracker:
 
     def _draw(self, z: float, omega: float, u: Real, extremum: tuple[float, float], *, fixed: bool) -> None:
         """Add the line through a peak; `extremum` is its sign (0: the larger of the two) and place."""
-        up = self._track(z, self.scale.high, omega, u, extremum, fixed=fixed)
-        down = self._track(z, self.scale.low, omega, u, extremum, fixed=fixed)
+        low, high = self._wanted(z)
+        if low == high:
+            return
+        up = self._track(z, high, omega, u, extremum, fixed=fixed)
+        down = self._track(z, low, omega, u, extremum, fixed=fixed)
         if len(up[1]) == 0 or len(down[1]) == 0:
             return
         line = Line(
@@ -246,6 +330,26 @@ class Tracker:
                 self._draw(float(line.rows[row, Z]), edge, line.solutions[row].copy(), extremum, fixed=True)
         if fixed:
             self._enter(line)
+
+    def places(self) -> Real:
+        """Return where the envelope is looked at: the ends, all rows of all lines, and between them."""
+        ends = np.array([self.scale.low, self.scale.high])
+        nodes = np.unique(np.concatenate([ends, *(line.rows[:, Z] for line in self.lines)]))
+        share = np.arange(SUBDIVIDED) / SUBDIVIDED
+        between = nodes[:-1, None] + share * np.diff(nodes)[:, None]
+        return np.append(between.reshape(-1), nodes[-1])
+
+    def _wanted(self, z: float) -> tuple[float, float]:
+        """Return how far a line from z is wanted both ways: as far as the others are not high enough."""
+        enough = self.enough
+        if math.isinf(enough) or not self.lines:
+            return self.scale.low, self.scale.high
+        at = self.places()
+        short = np.flatnonzero(self.envelope(at) < enough)
+        if short.size == 0:
+            return z, z
+        first, last = max(int(short[0]) - 1, 0), min(int(short[-1]) + 1, at.size - 1)
+        return min(float(at[first]), z), max(float(at[last]), z)
 
     def _enter(self, line: Line) -> None:
         """Follow the peak that comes in at an end of the band: there the amplitude begins to fall outward."""
@@ -267,12 +371,13 @@ class Tracker:
         return 2.0 * math.pi * low, 2.0 * math.pi * high
 
     def _ridge(self, start: float, stop: float, *, fixed: bool) -> Ridge:
-        low, high = self._band
+        (low, high), pace, span = self._band, self._pace, self.scale.span
         return Ridge(
             start=start, stop=stop, logarithmic=self.scale.logarithmic, low=low, high=high, fixed=fixed,
-            first_step=_FIRST_STEP * self.scale.span, largest_step=_LARGEST_STEP * self.scale.span,
-            smallest_step=_SMALLEST_STEP * self.scale.span, height_error=_HEIGHT_ERROR,
-            omega_error=_OMEGA_ERROR,
+            first_step=pace.first_step * span, largest_step=pace.largest_step * span,
+            smallest_step=pace.smallest_step * span, height_error=pace.height_error,
+            omega_error=pace.omega_error, enough=self.enough, slack=pace.slack,
+            climb_from=pace.climb_from * span,
         )  # fmt: skip
 
     def _track(

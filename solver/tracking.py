@@ -1,8 +1,7 @@
-"""The highest peak of the frequency response over a parameter, and where it is least.
+"""The highest peak of the frequency response over a parameter.
 
 Peaks are followed by Newton's method on {r = 0, da/dω = 0} with exact second derivatives. The highest tracked
-peak bounds the highest peak from below everywhere, so a sweep at the least point of the bound that finds
-nothing higher proves the optimum over the whole range; otherwise what it found is followed too, and so on.
+peak bounds the highest peak from below everywhere; sweeps look for what nothing has followed.
 """
 
 from __future__ import annotations
@@ -17,57 +16,14 @@ import numpy as np
 from solver.errors import SettingError
 from solver.fourier import Real
 from solver.kernels.track import DHEIGHT, HEIGHT, OMEGA, Z
-from solver.lowest import Lowest, lowest
-from solver.peak_tracks import ActivePeak, CompetingPeak, LeastPeak, PeakTrack, TrackStatus
-from solver.ridges import Line, LineEnd, Look, Tracker
+from solver.least import COMPETES, EQUAL, MOST_LOOKS, prove
+from solver.peak_tracks import CompetingPeak, LeastPeak, PeakTrack, TrackStatus
+from solver.ridges import Line, LineEnd, Tracker
 from solver.savings import Effects
 from solver.scene import Scene
 
-COMPETES = 0.6  # share of the highest peak of a sweep from which a peak is followed
-CLOSE = 0.97  # the same when only the least highest peak is looked for
-HIGHER = 1e-7  # relative height by which a sweep must exceed the lines to count as higher
-EQUAL = 1e-7  # relative distance within which peaks count as equally high
-MOST_LOOKS = 40
 BESIDE = 5e-3  # share of the range: how far beyond the end of a line is looked
 NARROW = 1.0 / 64.0  # share of the range: sweeps closer than that are not halved further
-GAP = 2e-3  # share of the range below which a gap between lines is no gap
-
-
-def least_peak(
-    scene: Scene,
-    parameter: str,
-    low: float,
-    high: float,
-    *,
-    harmonics: int = 11,
-    first: float | None = None,
-    effects: Effects | None = None,
-) -> LeastPeak:
-    """Find the value of one parameter at which the highest peak over the scene's band is least.
-
-    Parameters
-    ----------
-    scene : what vibrates, with the values that stay fixed.
-    parameter : path of the parameter, for example ``shroud.N0``.
-    low, high : its bounds in user units.
-    harmonics : highest harmonic kept.
-    first : where the first sweep is made; the middle of the range if left out.
-    effects : what is paid for though the scene does not call for it.
-
-    Raises
-    ------
-    SettingError
-        A bad path, range or number of harmonics, or a first sweep outside the range.
-    """
-    begun = time.perf_counter()
-    tracker = Tracker(scene, parameter, low, high, harmonics, effects)
-    z = 0.5 * (tracker.scale.low + tracker.scale.high)
-    if first is not None:
-        z = tracker.scale.inside(tracker.balance.parameter.check("first", first))
-        if not tracker.scale.low <= z <= tracker.scale.high:
-            raise SettingError("first", first, f"must be from {min(low, high)} to {max(low, high)}")
-    tracker.look(z, COMPETES)
-    return _prove(tracker, CLOSE, begun)
 
 
 def track_peak(
@@ -113,15 +69,17 @@ def track_peak(
         if should_stop is not None and should_stop():
             stopped = True
             break
-        tracker.look(float(z), COMPETES)
+        tracker.follow(tracker.look(float(z)), COMPETES)
         if on_progress is not None:
             on_progress((done + 1.0) / (checks + 3.0), len(tracker.looks))
     if not stopped:
         _look_closer(tracker)
-    best = _prove(tracker, COMPETES, begun)
+    best = prove(tracker, COMPETES, begun, should_stop=should_stop)
     if on_progress is not None:
         on_progress(1.0, len(tracker.looks))
-    return _result(tracker, best, TrackStatus.STOPPED if stopped else best.status, start <= stop, begun)
+    # An optimum at an end, or everywhere, is proven like any other: the track is complete.
+    status = TrackStatus.TRACKED if best.status.proven else best.status
+    return _result(tracker, best, TrackStatus.STOPPED if stopped else status, start <= stop, begun)
 
 
 def _look_closer(tracker: Tracker) -> None:
@@ -130,7 +88,7 @@ def _look_closer(tracker: Tracker) -> None:
         place = _next_place(tracker)
         if place is None:
             return
-        tracker.look(place, COMPETES)
+        tracker.follow(tracker.look(place), COMPETES)
 
 
 def _next_place(tracker: Tracker) -> float | None:
@@ -147,75 +105,6 @@ def _next_place(tracker: Tracker) -> float | None:
         if (left.surprising or right.surprising) and right.z - left.z > NARROW * span:
             return 0.5 * (left.z + right.z)
     return None
-
-
-def _prove(tracker: Tracker, share: float, begun: float) -> LeastPeak:
-    """Sweep at the least point of the lines until nothing higher is found there, and where no line is."""
-    best, status = None, TrackStatus.UNPROVEN
-    for _ in range(MOST_LOOKS):
-        gap = _gap(tracker)
-        if gap is not None:
-            known = len(tracker.lines)
-            tracker.look(gap, share)
-            if len(tracker.lines) == known:
-                status = TrackStatus.GAPS
-                break
-            continue
-        best = lowest(tracker)
-        if best is None:
-            status = TrackStatus.GAPS
-            break
-        here = best.z
-        seen = next((look for look in tracker.looks if abs(look.z - here) <= 1e-9 * tracker.scale.span), None)
-        known = len(tracker.lines)
-        look = seen if seen is not None else tracker.look(here, share)
-        status = _judge(look, best)
-        if status is not TrackStatus.UNPROVEN or len(tracker.lines) == known:
-            break
-    if best is None and tracker.lines:
-        best = lowest(tracker)
-    if best is None:
-        status = status if tracker.lines else TrackStatus.NO_RESPONSE
-        return LeastPeak(
-            status=status, at=math.nan, peak=math.nan, active=(), sweeps=len(tracker.looks),
-            seconds=time.perf_counter() - begun,
-        )  # fmt: skip
-    active = tuple(
-        _active(tracker, row) for row in best.rows.values() if row[HEIGHT] >= best.height * (1.0 - EQUAL)
-    )
-    return LeastPeak(
-        status=status, at=tracker.scale.outside(best.z), peak=best.height, active=active,
-        sweeps=len(tracker.looks), seconds=time.perf_counter() - begun,
-    )  # fmt: skip
-
-
-def _judge(look: Look, best: Lowest) -> TrackStatus:
-    """Compare a sweep at the least point with the lines there."""
-    if not look.branch.completed or look.top > best.height * (1.0 + HIGHER):
-        return TrackStatus.UNPROVEN
-    if look.top < best.height * (1.0 - HIGHER):
-        return TrackStatus.OTHER_BRANCH
-    return TrackStatus.TRACKED
-
-
-def _gap(tracker: Tracker) -> float | None:
-    """Return the middle of the widest stretch that no line covers; None if there is none to speak of."""
-    widest, middle, reached = GAP * tracker.scale.span, None, tracker.scale.low
-    for low, high in sorted((line.low, line.high) for line in tracker.lines):
-        if low - reached > widest:
-            widest, middle = low - reached, 0.5 * (reached + low)
-        reached = max(reached, high)
-    if tracker.scale.high - reached > widest:
-        middle = 0.5 * (reached + tracker.scale.high)
-    return middle
-
-
-def _active(tracker: Tracker, row: Real) -> ActivePeak:
-    p = np.array([tracker.scale.outside(float(row[Z]))])
-    return ActivePeak(
-        frequency=float(row[OMEGA]) / (2.0 * math.pi), value=float(row[HEIGHT]),
-        slope=float(row[DHEIGHT] / tracker.scale.by_z(p)[0]),
-    )  # fmt: skip
 
 
 def _result(tracker: Tracker, best: LeastPeak, status: TrackStatus, forward: bool, begun: float) -> PeakTrack:

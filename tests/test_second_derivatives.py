@@ -151,7 +151,7 @@ class Response:
         numbers = summit_numbers(summit)
         for _ in range(20):
             norm = balance_at(system, u, omega, p, summit)
-            assert solve_responses(summit)
+            assert solve_responses(system, summit)
             if norm < 3e-14:
                 break
             u -= summit_step(summit)

@@ -7,46 +7,14 @@ from functools import cache
 
 import numpy as np
 import pytest
+from peak_cases import case_a, highest, scene_of
 
 import optim
 import solver
 from solver.errors import SettingError
+from solver.least import least_peak
 from solver.peak_tracks import TrackStatus
-from solver.scene import Scene
-from solver.tracking import least_peak, track_peak
-
-K1, K2 = 4.0 * math.pi**2, 2.0 * math.pi**2
-
-
-@cache
-def case_a() -> Scene:
-    """Two masses, each to ground and to the other; the friction damper at the second."""
-    springs = [
-        {"name": "coupling", "between": ["m1", "m2"], "k": K2, "c": 0.5},
-        {"name": "ground", "between": ["m1", "ground"], "k": K1, "c": 0.5},
-        {"between": ["m2", "ground"], "k": K1, "c": 0.5},
-    ]
-    return Scene.model_validate(
-        {
-            "name": "case-a",
-            "structure": {"kind": "lumped", "masses": {"m1": 1.0, "m2": 1.0}, "springs": springs},
-            "contacts": [{"name": "damper", "between": ["m2", "ground"], "kt": 30.0, "mu": 0.3, "N0": 100.0}],
-            "excitation": {"dof": "m1", "amplitude": 100.0},
-            "observe": {"dof": "m2", "band": [0.2, 2.5]},
-        }
-    )
-
-
-def scene_of(name: str) -> Scene:
-    return case_a() if name == "case-a" else solver.load_scene(name)
-
-
-def highest(scene: Scene, path: str, value: float) -> tuple[float, float]:
-    """Height and frequency of the highest peak by a sweep."""
-    branch = solver.sweep(scene.with_values({path: value}))
-    assert branch.completed
-    assert branch.peak is not None
-    return branch.peak.value, branch.peak.at
+from solver.tracking import track_peak
 
 
 @cache

@@ -24,6 +24,7 @@ from solver.kernels.stationary import (
     observe_at,
     slopes_at,
     solve_responses,
+    solve_step,
 )
 from solver.kernels.summit import (
     AMPLITUDE,
@@ -56,7 +57,7 @@ def all_at(system: System, u: Real, omega: float, p: float, tau: float, at: Summ
     """Evaluate balance, amplitude, slopes and curvatures at (u, ω, p); the extremum is near `tau`."""
     out_of_line()
     at.numbers[NORM] = balance_at(system, u, omega, p, at)
-    if not math.isfinite(at.numbers[NORM]) or not solve_responses(at):
+    if not math.isfinite(at.numbers[NORM]) or not solve_responses(system, at):
         return False
     observe_at(system, at)
     if at.numbers[SIGN] == 0.0:
@@ -73,9 +74,14 @@ def all_at(system: System, u: Real, omega: float, p: float, tau: float, at: Summ
 
 @compiled
 def find_summit(
-    system: System, u: Real, omega: float, p: float, tau: float, fixed: bool, at: Summit
+    system: System, u: Real, omega: float, p: float, tau: float, fixed: bool, sharp: float, at: Summit
 ) -> tuple[bool, int, float]:
     """Find the peak near (u, ω) by Newton's method, u in place; with `fixed` the solution at ω alone.
+
+    Parameters
+    ----------
+    sharp : relative error of the frequency that is good enough; `SHARP`, or more where a solution near the
+        peak will do.
 
     Returns
     -------
@@ -94,7 +100,7 @@ def find_summit(
                 return False, iteration, omega
             move = -(numbers[G] - inner(at.h, at.rhs[0])) / numbers[CURVE]
         off = abs(move) / omega
-        if numbers[NORM] <= TARGET and off <= SHARP:
+        if numbers[NORM] <= (TARGET if sharp <= SHARP else ACCEPTED) and off <= sharp:
             return True, iteration, omega
         if iteration > 4 and numbers[NORM] <= ACCEPTED and off <= 100.0 * SHARP:
             return True, iteration, omega
@@ -118,7 +124,7 @@ def settle(system: System, u: Real, omega: float, p: float, tau: float, at: Summ
         if norm <= TARGET or (norm <= ACCEPTED and norm > 0.5 * before):
             return all_at(system, u, omega, p, tau, at)
         before = norm
-        if not solve_responses(at):
+        if not solve_step(system, at):
             return False
         for i in range(u.size):
             u[i] -= at.rhs[0, i]

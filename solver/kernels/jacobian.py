@@ -19,7 +19,14 @@ import numpy as np
 
 from solver.fourier import Complex, Integer, Real, coefficient_count, cosine_position
 from solver.kernels.compiled import compiled, out_of_line
-from solver.kernels.linear import back_substitute, copy_to, fill_block, invert
+from solver.kernels.linear import (
+    back_substitute,
+    back_substitute_transposed,
+    copy_to,
+    fill,
+    fill_block,
+    invert,
+)
 from solver.kernels.linear import factorise as factorise_block
 from solver.kernels.system import Evaluation, Receptance, System
 
@@ -350,3 +357,38 @@ def step_back(system: System, point: Evaluation, x: Real) -> None:
         copy_to(x[point.free[a] * n : (point.free[a] + 1) * n], rhs[a * n : (a + 1) * n])
     for h in range(held):
         copy_to(x[point.held[h] * n : (point.held[h] + 1) * n], moved[h * n : (h + 1) * n])
+
+
+@compiled
+def step_back_transposed(system: System, point: Evaluation, x: Real) -> None:
+    """Solve with the transpose of what `factorise` factorised without a border, in place.
+
+    λ_f = (I + A' G)⁻ᵀ (b_f − Gᵀ Wᵀ b_h) and λ_h = D⁻ᵀ b_h − Vᵀ λ_f.
+
+    Parameters
+    ----------
+    x : (nt,) the right-hand side.
+    """
+    out_of_line()
+    n = coefficient_count(system.ks)
+    free, held = point.counts[FREE], point.counts[HELD]
+    size = point.counts[SIZE]
+    rhs, z, given, moved = point.work[0], point.work[1], point.work[2], point.work[3]
+    _gather(n, point.free, free, x, rhs)
+    if held > 0:
+        _gather(n, point.held, held, x, given)
+        fill(moved, 0.0)
+        _times(system, point.W, True, free, held, given, 1.0, moved)
+        _slopes_times(system, point, True, moved, z)
+        for i in range(size):
+            rhs[i] -= z[i]
+    if size > 0:
+        back_substitute_transposed(point.lu, size, point.pivots, rhs)
+    for a in range(free):
+        copy_to(x[point.free[a] * n : (point.free[a] + 1) * n], rhs[a * n : (a + 1) * n])
+    if held > 0:
+        fill(moved, 0.0)
+        _times(system, point.inverse, True, held, held, given, 1.0, moved)
+        _times(system, point.V, True, held, free, rhs, -1.0, moved)
+        for h in range(held):
+            copy_to(x[point.held[h] * n : (point.held[h] + 1) * n], moved[h * n : (h + 1) * n])

@@ -190,23 +190,19 @@ def back_substitute(a: Real, n: int, pivots: Index, x: Real) -> None:
 
 
 @compiled
-def solve(matrix: Real, rhs: Real) -> float:
-    """Solve ``matrix @ x = rhs[b]`` for every row b of `rhs`, in place.
-
-    Parameters
-    ----------
-    matrix : (n, n), row-major, destroyed.
-    rhs : (n_rhs, n), overwritten with the solutions.
-
-    Returns
-    -------
-    The sign of the determinant, 0.0 if the matrix is singular or not finite (then `rhs` is meaningless).
-    """
+def back_substitute_transposed(a: Real, n: int, pivots: Index, x: Real) -> None:
+    """Solve matrixᵀ @ x = rhs with the factors of `factorise`, in place: x = U⁻¹ L⁻¹ P rhs."""
     out_of_line()
-    n = matrix.shape[0]
-    pivots = np.empty(n, np.int32)
-    sign = factorise(matrix, n, pivots)
-    if sign != 0.0:
-        for b in range(rhs.shape[0]):
-            back_substitute(matrix, n, pivots, rhs[b])
-    return sign
+    for k in range(n):
+        other = pivots[k] - 1
+        if other != k:
+            x[k], x[other] = x[other], x[k]
+    for k in range(n):
+        value = x[k]
+        for i in range(k + 1, n):
+            x[i] -= a[k, i] * value
+    for k in range(n - 1, -1, -1):
+        x[k] /= a[k, k]
+        value = x[k]
+        for i in range(k):
+            x[i] -= a[k, i] * value

@@ -19,11 +19,11 @@ import numpy as np
 
 from solver.fourier import Real, coefficient_count, cosine_position
 from solver.kernels.compiled import compiled, out_of_line
-from solver.kernels.events import FAILED, piece_of
+from solver.kernels.events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED, piece_of
 from solver.kernels.force import contact_force
-from solver.kernels.jacobian import LOOSE
+from solver.kernels.jacobian import factorise, step_back, step_back_transposed
 from solver.kernels.jets import BY_BOTH, BY_OMEGA, BY_OMEGA_TWICE, BY_P, VALUE, fill_jets
-from solver.kernels.linear import copy_block, fill_block, solve
+from solver.kernels.linear import copy_block
 from solver.kernels.observe import extremes
 from solver.kernels.residual import contact_values, least_size
 from solver.kernels.second import inner, second_along
@@ -34,6 +34,7 @@ from solver.kernels.summit import (
     DG_DP,
     DTAU,
     SIGN,
+    SPENT,
     TAU,
     G,
     Summit,
@@ -45,9 +46,10 @@ _TURNS = 12
 
 @compiled
 def balance_at(system: System, u: Real, omega: float, p: float, at: Summit) -> float:
-    """Evaluate residual and Jacobian at (u, ω, p); return the relative residual (NaN if anything failed)."""
+    """Evaluate the residual and its slopes at (u, ω, p); return its relative size (NaN if that failed)."""
     out_of_line()
     nc, n = system.shift.size, coefficient_count(system.ks)
+    at.numbers[SPENT] += 1.0
     fill_jets(system, omega, p, at.jets)
     for i in range(system.ks.size):
         if not math.isfinite(at.jets.x_linear[0, i].real):
@@ -66,6 +68,11 @@ def balance_at(system: System, u: Real, omega: float, p: float, at: Summit) -> f
         at.states[c], at.counts[c], at.pieces[c] = state, count, piece_of(at.segments[c], count)
         if state == FAILED:
             return np.nan
+        at.point.slopes[c] = np.nan
+        if state == SEPARATED:
+            at.point.slopes[c] = 0.0
+        elif state == STUCK and at.segments[c, 0, BEGAN] == UNLOADED:
+            at.point.slopes[c] = table[c, KT]
         for i in range(n):
             total = slope[c, KT] * at.dF_dkt[c, i] + slope[c, MU] * at.dF_dmu[c, i]
             for j in range(LOAD_COEFFICIENTS):
@@ -77,11 +84,10 @@ def balance_at(system: System, u: Real, omega: float, p: float, at: Summit) -> f
 
 @compiled
 def _assemble(system: System, u: Real, least: float, at: Summit) -> float:
-    """Put r, dr/dω, dr/dp (rows of `rhs`) and dr/du together."""
+    """Put r, dr/dω and dr/dp (rows of `rhs`) together."""
     out_of_line()
     nc, n = system.shift.size, coefficient_count(system.ks)
-    jets, J, rhs = at.jets, at.jacobian, at.rhs
-    fill_block(J, 0.0)
+    jets, rhs = at.jets, at.rhs
     scale, largest = least, 0.0
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
@@ -97,49 +103,41 @@ def _assemble(system: System, u: Real, least: float, at: Summit) -> float:
                 response += a * force
                 by_omega += jets.A[BY_OMEGA, i, c, d] * force
                 by_p += jets.A[BY_P, i, c, d] * force + a * dforce
-                _add_rows(J, at.dF_dU[d], system.shift[d], row, d * n, here, a, has_sine)
             free = jets.u_linear[VALUE, i, c]
             scale = max(scale, abs(free))
             rest = response - free
             by_omega -= jets.u_linear[BY_OMEGA, i, c]
             by_p -= jets.u_linear[BY_P, i, c]
             rhs[0, row], rhs[1, row], rhs[2, row] = u[row] + rest.real, by_omega.real, by_p.real
-            J[row, row] += 1.0
             largest = max(largest, abs(rhs[0, row]))
             if has_sine:
                 scale = max(scale, abs(response), abs(u[row]))
                 rhs[0, row + 1] = u[row + 1] - rest.imag
                 rhs[1, row + 1], rhs[2, row + 1] = -by_omega.imag, -by_p.imag
-                J[row + 1, row + 1] += 1.0
                 largest = max(largest, abs(rhs[0, row + 1]))
-            elif system.shift[c] > 0.0:
-                J[row, row] += LOOSE
     return largest / scale if scale > 0.0 else largest
 
 
 @compiled
-def _add_rows(
-    J: Real, dF_dU: Real, shift: float, row: int, column: int, here: int, a: complex, has_sine: bool
-) -> None:
-    """Add A_k (∂F/∂U − shift) to the rows of harmonic k."""
-    real, imag = a.real, a.imag
-    for j in range(dF_dU.shape[0]):
-        cosine = dF_dU[here, j] - (shift if j == here else 0.0)
-        if has_sine:
-            sine = dF_dU[here + 1, j] - (shift if j == here + 1 else 0.0)
-            J[row, column + j] += real * cosine + imag * sine
-            J[row + 1, column + j] += real * sine - imag * cosine
-        else:
-            J[row, column + j] += real * cosine
+def solve_step(system: System, at: Summit) -> bool:
+    """Factorise dr/du and replace r by the Newton step J⁻¹ r."""
+    if at.rhs.shape[1] == 0:
+        return True
+    if factorise(system, at.linear, at.point, at.rhs[0], 0.0, 0.0) == 0.0:
+        return False
+    step_back(system, at.point, at.rhs[0])
+    return True
 
 
 @compiled
-def solve_responses(at: Summit) -> bool:
+def solve_responses(system: System, at: Summit) -> bool:
     """Replace r, dr/dω, dr/dp by the Newton step and the responses: J⁻¹ r, −du/dω, −du/dp."""
-    if at.jacobian.shape[0] == 0:
-        return True
-    copy_block(at.matrix, at.jacobian)
-    return solve(at.matrix, at.rhs) != 0.0
+    if not solve_step(system, at):
+        return False
+    if at.rhs.shape[1] > 0:
+        step_back(system, at.point, at.rhs[1])
+        step_back(system, at.point, at.rhs[2])
+    return True
 
 
 @compiled
@@ -225,12 +223,9 @@ def slopes_at(system: System, at: Summit) -> bool:
             total = -system.shift[d] * z[d, j]
             for i in range(n):
                 total += at.dF_dU[d, i, j] * z[d, i]
-            at.adjoint[0, d * n + j] = -total
-    for i in range(nc * n):
-        for j in range(nc * n):
-            at.matrix[i, j] = at.jacobian[j, i]
-    if nc > 0 and solve(at.matrix, at.adjoint) == 0.0:
-        return False
+            at.adjoint[d * n + j] = -total
+    if nc > 0:
+        step_back_transposed(system, at.point, at.adjoint)
     numbers[G] = _linear_part(system, at, BY_OMEGA)
     numbers[DA_DP] = _linear_part(system, at, BY_P)
     _linear_part(system, at, VALUE)
@@ -245,7 +240,7 @@ def _linear_part(system: System, at: Summit, order: int) -> float:
     """Fill z of one order, Aᵀλ − ξ Bᵀe(τ*), and return ξ e·x_linear − λ·ū of that order."""
     out_of_line()
     nc, n = system.shift.size, coefficient_count(system.ks)
-    jets, lam, total = at.jets, at.adjoint[0], 0.0
+    jets, lam, total = at.jets, at.adjoint, 0.0
     sign, tau = at.numbers[SIGN], at.numbers[TAU]
     for i in range(system.ks.size):
         here, k = cosine_position(system.ks, i), system.ks[i]

@@ -14,19 +14,29 @@ from solver.kernels.compiled import compiled
 from solver.kernels.events import SEGMENT_COLUMNS, segment_capacity
 from solver.kernels.jets import Jets, new_jets
 from solver.kernels.laws_columns import COLUMNS
-from solver.kernels.system import LOAD_COEFFICIENTS, System
+from solver.kernels.system import (
+    LOAD_COEFFICIENTS,
+    Evaluation,
+    Receptance,
+    System,
+    new_evaluation,
+    receptance_over,
+)
 
 # Entries of `Summit.numbers`.
 NORM, AMPLITUDE, G, DA_DP, CURVE, DG_DP, TAU, DTAU, SIGN, CORNER, DRIFT, RATE = range(12)
-NUMBERS = 12
+SPENT = 12  # evaluations of the balance since it was set to 0
+NUMBERS = 13
 
 
 class Summit(NamedTuple):
     """Everything at one (u, ω, p); nt unknowns, nc contacts, n coefficients each."""
 
     jets: Jets
+    linear: Receptance  # the first two orders of the jets
+    point: Evaluation  # what the factors of the condensed Jacobian are made of
     F: Real  # (nc, n) forces less shift · u
-    dF_dU: Real  # (nc, n, n) likewise
+    dF_dU: Real  # (nc, n, n) slopes of the forces themselves; those of `point`
     dF_dN: Real  # (nc, n, 3)
     dF_dkt: Real  # (nc, n)
     dF_dmu: Real  # (nc, n)
@@ -39,10 +49,8 @@ class Summit(NamedTuple):
     load: Real  # (nc, 3)
     slope: Real  # (nc, COLUMNS)
     dload: Real  # (nc, 3)
-    jacobian: Real  # (nt, nt)
-    matrix: Real  # (nt, nt) scratch
     rhs: Real  # (3, nt) the solutions of J x = r, dr/dω, dr/dp
-    adjoint: Real  # (1, nt) λ
+    adjoint: Real  # (nt,) λ
     h: Real  # (nt,) change of g by u
     x: Real  # (n,) observed motion
     dx: Real  # (n,) its derivative by ω along the response
@@ -71,13 +79,14 @@ def new_summit(system: System) -> Summit:
     nc, n = system.shift.size, coefficient_count(system.ks)
     nt, m = nc * n, LOAD_COEFFICIENTS
     capacity = segment_capacity(max(system.ks[-1], system.load_ks[-1]))
+    jets, point = new_jets(system), new_evaluation(system)
+    linear = receptance_over(jets.A, jets.u_linear, jets.B, jets.x_linear)
     return _new(
-        new_jets(system), np.zeros((nc, n)), np.zeros((nc, n, n)), np.zeros((nc, n, m)), np.zeros((nc, n)),
+        jets, linear, point, np.zeros((nc, n)), point.dF_dU, np.zeros((nc, n, m)), np.zeros((nc, n)),
         np.zeros((nc, n)), np.zeros((nc, n)), np.zeros(nc, np.int64), np.zeros(nc, np.int64),
         np.zeros(nc, np.int64), np.zeros((nc, capacity, SEGMENT_COLUMNS)), np.zeros((nc, COLUMNS)),
-        np.zeros((nc, m)), np.zeros((nc, COLUMNS)), np.zeros((nc, m)), np.zeros((nt, nt)), np.zeros((nt, nt)),
-        np.zeros((3, nt)), np.zeros((1, nt)), np.zeros(nt), np.zeros(n), np.zeros(n), np.zeros((nc, n)),
-        np.zeros((5, nc, n)), np.zeros(NUMBERS),
+        np.zeros((nc, m)), np.zeros((nc, COLUMNS)), np.zeros((nc, m)), np.zeros((3, nt)), np.zeros(nt),
+        np.zeros(nt), np.zeros(n), np.zeros(n), np.zeros((nc, n)), np.zeros((5, nc, n)), np.zeros(NUMBERS),
     )  # fmt: skip
 
 

@@ -182,6 +182,12 @@ def evaluation_by_value(point: Evaluation) -> Evaluation:
 
 
 @compiled
+def receptance_over(A: Complex, u_linear: Complex, B: Complex, x_linear: Complex) -> Receptance:
+    """Return a receptance that reads arrays of others, whose first index begins with value, derivative."""
+    return _receptance_of(A, u_linear, B, x_linear)
+
+
+@compiled
 def receptance_by_value(linear: Receptance) -> Receptance:
     """Return the arrays of a receptance as a tuple that Python can read (views, not copies)."""
     return Receptance(linear.A, linear.u_linear, linear.B, linear.x_linear)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.fourier import Real
-from solver.kernels.climb import MOST, climb, find_summit
+from solver.kernels.climb import MOST, SHARP, climb, find_summit, settle
 from solver.kernels.compiled import compiled, out_of_line
 from solver.kernels.linear import copy_to
 from solver.kernels.summit import AMPLITUDE, CORNER, CURVE, DRIFT, RATE, SIGN, TAU, G, Summit
@@ -20,6 +20,8 @@ from solver.kernels.system import System
 # Columns of a tracked peak.
 Z, P, OMEGA, HEIGHT, DHEIGHT, DOMEGA, PLACE, SLOPE, BEND, KINK = range(10)
 COLUMNS = 10
+_NEAR = 1e-4  # relative distance to a peak's frequency where only a high amplitude is wanted
+_MOST_SLACK = 0.5  # relative error of the height in a step at most
 # How a track ended.
 ARRIVED, VANISHED, LEFT_BAND, TOO_LONG, NOT_FOUND = range(5)
 
@@ -38,6 +40,9 @@ class Ridge(NamedTuple):
     smallest_step: float
     height_error: float  # relative error of the trapezoidal rule in a step
     omega_error: float
+    enough: float  # m, height from which a line only has to show that it is higher; infinity: it never is
+    slack: float  # share of what it is higher by that the height may be wrong by then
+    climb_from: float  # step at which a peak is looked for uphill where Newton's method fails
 
 
 @compiled
@@ -84,16 +89,27 @@ def between_rows(
 @compiled
 def _correct(
     system: System, ridge: Ridge, u: Real, omega: float, p: float, tau: float, corner: bool, reach: float,
-    at: Summit,
+    high_enough: bool, uphill: bool, at: Summit,
 ) -> tuple[bool, int, float]:  # fmt: skip
-    """Find the peak from a prediction: Newton's method, and at a corner or where it fails uphill."""
+    """Find the peak from a prediction: Newton's method, and at a corner or (`uphill`) where it fails uphill.
+
+    With `high_enough` any solution of enough amplitude will do: the highest peak is at least as high.
+    """
     iterations = 0
-    if not corner:
-        kept = u.copy()
-        good, iterations, found = find_summit(system, u, omega, p, tau, ridge.fixed, at)
+    if high_enough or not corner:
+        kept, sharp = u.copy(), _NEAR if high_enough else SHARP
+        good, iterations, found = find_summit(system, u, omega, p, tau, ridge.fixed, sharp, at)
         if good or ridge.fixed:
             return good, iterations, found
         copy_to(u, kept)
+        if high_enough:
+            good = settle(system, u, omega, p, tau, at) and at.numbers[AMPLITUDE] > ridge.enough
+            at.numbers[DRIFT] = 0.0
+            if good or not uphill:
+                return good, 0, omega
+            copy_to(u, kept)
+        if not uphill:
+            return False, iterations, found
     low, high = max(omega - reach, ridge.low), min(omega + reach, ridge.high)
     if not low < omega < high:
         return False, iterations, omega
@@ -140,7 +156,7 @@ def track(
     at.numbers[SIGN] = sign
     trial, guess = u.copy(), np.empty(n)
     p, _ = value_of(ridge.start, ridge.logarithmic)
-    good, _, omega = _correct(system, ridge, trial, omega, p, tau, False, 2e-3 * omega, at)
+    good, _, omega = _correct(system, ridge, trial, omega, p, tau, False, 2e-3 * omega, False, True, at)
     if not good:
         return NOT_FOUND, 0
     record(ridge, trial, omega, ridge.start, at, rows[0], solutions[0], tangents[0])
@@ -162,8 +178,9 @@ def track(
         good, iterations, omega = False, MOST, predicted
         if ridge.low <= predicted <= ridge.high:
             good, iterations, omega = _correct(
-                system, ridge, trial, predicted, p, here[PLACE], here[KINK] > 0.0, reach, at
-            )
+                system, ridge, trial, predicted, p, here[PLACE], here[KINK] > 0.0, reach,
+                here[HEIGHT] > ridge.enough, abs(length) <= ridge.climb_from, at,
+            )  # fmt: skip
         error = np.inf
         if good and ridge.low <= omega <= ridge.high:
             record(ridge, trial, omega, z, at, rows[count], solutions[count], tangents[count])
@@ -191,16 +208,19 @@ def step_error(ridge: Ridge, left: Real, right: Real) -> float:
     """Return how far two rows are from fitting together, 1 being the most allowed.
 
     The derivatives at both ends give each end from the other by the trapezoidal rule: another peak, or a step
-    too long for cubics to predict what lies between, does not fit.
+    too long for cubics to predict what lies between, does not fit. Where both are higher than enough a share
+    of that is the error allowed.
     """
     length = right[Z] - left[Z]
+    higher = min(left[HEIGHT], right[HEIGHT]) / ridge.enough - 1.0
+    looser = max(1.0, min(_MOST_SLACK, ridge.slack * higher) / ridge.height_error)
     height = abs(right[HEIGHT] - left[HEIGHT] - 0.5 * length * (left[DHEIGHT] + right[DHEIGHT]))
     height /= ridge.height_error * max(left[HEIGHT], right[HEIGHT])
     omega = abs(right[OMEGA] - left[OMEGA] - 0.5 * length * (left[DOMEGA] + right[DOMEGA]))
     omega /= ridge.omega_error * left[OMEGA]
     if not math.isfinite(height + omega):
         return np.inf
-    return max(height, omega)
+    return max(height, omega) / looser
 
 
 @compiled
@@ -225,7 +245,7 @@ def polish(
     p, _ = value_of(z, ridge.logarithmic)
     tau, corner = here[PLACE], here[KINK] > 0.0 and ahead[KINK] > 0.0
     reach = 3.0 * abs(ahead[OMEGA] - here[OMEGA]) + 1e-4 * omega
-    good, _, omega = _correct(system, ridge, u, omega, p, tau, corner, reach, at)
+    good, _, omega = _correct(system, ridge, u, omega, p, tau, corner, reach, False, True, at)
     if not good:
         return False
     record(ridge, u, omega, z, at, row, solution, tangent)

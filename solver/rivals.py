@@ -1,0 +1,57 @@
+"""Peaks of max x or of −min x that the larger of the two hides.
+
+Where a normal load varies the motion is lopsided, and max|x| is the larger of two curves over the frequency.
+A peak of the other one is no peak of max|x|, but a parameter may make it one: it is worth following, and a
+sweep shows it for nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.branch import Branch
+from solver.fourier import Real
+from solver.kernels.observe import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS
+
+_CURVES = ((HIGH, HIGH_SLOPE, 1.0), (LOW, LOW_SLOPE, -1.0))
+_HIDDEN = 1e-9  # relative distance below max|x| from which a curve is hidden
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rival:
+    """A hidden peak, as near as the points of the branch are.
+
+    Attributes
+    ----------
+    value : float
+        The higher of the two points it lies between [m].
+    omega : float
+        rad/s.
+    solution : (n_unknowns,) array
+        Slip motions there [m].
+    sign : float
+        1 for a peak of max x, −1 for one of −min x.
+    """
+
+    value: float
+    omega: float
+    solution: Real
+    sign: float
+
+
+def rivals(branch: Branch) -> list[Rival]:
+    """Return the hidden peaks of a branch over the frequency, highest first."""
+    measures, found = branch.measures, []
+    for value, slope, sign in _CURVES:
+        rising, falling = measures[:-1, slope], measures[1:, slope]
+        hidden = measures[:, value] < (1.0 - _HIDDEN) * measures[:, MAX_ABS]
+        for left in np.flatnonzero((rising > 0.0) & (falling <= 0.0) & hidden[:-1] & hidden[1:]):
+            share = rising[left] / (rising[left] - falling[left])
+            between = (1.0 - share) * branch.solutions[left] + share * branch.solutions[left + 1]
+            height = float(measures[left : left + 2, value].max())
+            found.append(
+                Rival(value=height, omega=float(between[-1]), solution=between[:-1].copy(), sign=sign)
+            )
+    return sorted(found, key=lambda rival: -rival.value)
