@@ -18,9 +18,10 @@ import numpy as np
 from solver.errors import SettingError
 from solver.fourier import Real
 from solver.kernels.track import DHEIGHT, HEIGHT, OMEGA, Z
+from solver.lines import Look, Pace
 from solver.lowest import DOUBT, Lowest, flat, minima
 from solver.peak_tracks import ActivePeak, Basin, LeastPeak, TrackStatus
-from solver.ridges import Look, Pace, Tracker
+from solver.ridges import Tracker
 from solver.savings import Effects
 from solver.scene import Scene
 
@@ -161,8 +162,8 @@ def _next_step(
         return (None if new else TrackStatus.GAPS), None
     found = minima(tracker, doubt)
     if not found[0].solved:
-        place = found[0].z
-        new = _seen(tracker, place) is None and tracker.follow(tracker.look(place), share)
+        at = found[0].z
+        new = _seen(tracker, at) is None and tracker.follow(tracker.look(at), share)
         return (None, None) if new else (TrackStatus.GAPS, found)
     for rank, one in enumerate(found[:basins]):
         if not one.solved or one.z in settled:

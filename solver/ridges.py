@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 
 from solver import fourier
 from solver.balance import build
-from solver.branch import Branch, Peak
+from solver.branch import Peak
 from solver.contact_rows import law_numbers
 from solver.continuation import sweep
 from solver.errors import SettingError
@@ -26,8 +24,6 @@ from solver.kernels.summit import SIGN, SPENT, Summit, new_summit, summit_number
 from solver.kernels.system import System, by_reference
 from solver.kernels.track import (
     COLUMNS,
-    DHEIGHT,
-    DOMEGA,
     HEIGHT,
     OMEGA,
     PLACE,
@@ -37,6 +33,7 @@ from solver.kernels.track import (
     polish,
     track,
 )
+from solver.lines import EVERYWHERE, Line, LineEnd, Look, Pace
 from solver.rivals import rivals
 from solver.savings import Effects
 from solver.scale import scale_of
@@ -50,51 +47,6 @@ SUBDIVIDED = 6  # places between two rows at which the envelope is looked at
 EXACTLY = 1e-6  # relative distance within which a peak is one that was solved at the same place
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pace:
-    """How closely peaks are followed.
-
-    Attributes
-    ----------
-    first_step, largest_step, smallest_step : float
-        Shares of the range.
-    height_error, omega_error : float
-        Relative errors of the trapezoidal rule allowed in a step.
-    above : float
-        Where a line is higher than this times the least highest peak of a sweep so far, it only has to show
-        that it is; infinity: it is followed closely everywhere.
-    slack : float
-        Share of what it is higher by that its height may be wrong by then.
-    climb_from : float
-        Share of the range: step at which a peak that Newton's method does not find is looked for uphill.
-    """
-
-    first_step: float
-    largest_step: float
-    smallest_step: float
-    height_error: float
-    omega_error: float
-    above: float
-    slack: float
-    climb_from: float
-
-
-EVERYWHERE = Pace(
-    first_step=0.02, largest_step=0.125, smallest_step=1e-4, height_error=3e-3, omega_error=1e-3,
-    above=math.inf, slack=0.0, climb_from=math.inf,
-)  # fmt: skip
-
-
-class LineEnd(Enum):
-    """Why a line ends where it does; the value is what a user reads."""
-
-    ARRIVED = "the end of the range"
-    VANISHED = "the peak vanishes"
-    LEFT_BAND = "the peak leaves the band"
-    TOO_LONG = "too many steps"
-    NOT_FOUND = "not found again"
-
-
 _ENDS = {
     kernel.ARRIVED: LineEnd.ARRIVED,
     kernel.VANISHED: LineEnd.VANISHED,
@@ -102,82 +54,6 @@ _ENDS = {
     kernel.TOO_LONG: LineEnd.TOO_LONG,
     kernel.NOT_FOUND: LineEnd.NOT_FOUND,
 }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
-    """One peak over the parameter, ascending in z (the parameter or its logarithm).
-
-    Attributes
-    ----------
-    rows : (P, COLUMNS) array
-        Columns named in `solver.kernels.track`; derivatives are by z.
-    solutions, tangents : (P, n_unknowns) array
-        Slip motions [m] and their derivatives by z.
-    sign : float
-        1 for a peak of max x, −1 for one of −min x.
-    fixed : bool
-        The amplitude at an end of the band, not a stationary peak.
-    ends : (LineEnd, LineEnd)
-        Why it ends below and above.
-    """
-
-    rows: Real
-    solutions: Real
-    tangents: Real
-    sign: float
-    fixed: bool
-    ends: tuple[LineEnd, LineEnd]
-
-    @property
-    def low(self) -> float:
-        """Smallest z it covers."""
-        return float(self.rows[0, Z])
-
-    @property
-    def high(self) -> float:
-        """Largest z it covers."""
-        return float(self.rows[-1, Z])
-
-    def heights(self, z: Real) -> Real:
-        """Return the height by cubics between the rows; −inf beyond the line."""
-        return self._cubic(z, HEIGHT, DHEIGHT)
-
-    def frequencies(self, z: Real) -> Real:
-        """Return ω likewise [rad/s]."""
-        return self._cubic(z, OMEGA, DOMEGA)
-
-    def _cubic(self, z: Real, value: int, slope: int) -> Real:
-        rows = self.rows
-        if len(rows) == 1:
-            return np.where(z == rows[0, Z], rows[0, value], -np.inf)
-        right = np.clip(np.searchsorted(rows[:, Z], z), 1, len(rows) - 1)
-        a, b = rows[right - 1], rows[right]
-        length = b[:, Z] - a[:, Z]
-        t = (z - a[:, Z]) / length
-        r = 1.0 - t
-        cubic = (1.0 + 2.0 * t) * r * r * a[:, value] + t * t * (3.0 - 2.0 * t) * b[:, value]
-        cubic += t * r * length * (r * a[:, slope] - t * b[:, slope])
-        return np.where((z >= self.low) & (z <= self.high), cubic, -np.inf)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Look:
-    """One sweep over the band at one z; surprising if it found what no line had reached."""
-
-    z: float
-    branch: Branch
-    surprising: bool
-
-    @property
-    def top(self) -> float:
-        """The highest peak [m]; −inf if there is none."""
-        return self.branch.peaks[0].value if self.branch.peaks else -math.inf
-
-    @property
-    def seen(self) -> bool:
-        """Whether the whole band was seen."""
-        return self.branch.completed and bool(self.branch.peaks)
 
 
 def check_laws(scene: Scene) -> None:

@@ -17,8 +17,9 @@ from solver.errors import SettingError
 from solver.fourier import Real
 from solver.kernels.track import DHEIGHT, HEIGHT, OMEGA, Z
 from solver.least import COMPETES, EQUAL, MOST_LOOKS, prove
+from solver.lines import Line, LineEnd
 from solver.peak_tracks import CompetingPeak, LeastPeak, PeakTrack, TrackStatus
-from solver.ridges import Line, LineEnd, Tracker
+from solver.ridges import Tracker
 from solver.savings import Effects
 from solver.scene import Scene
 

@@ -198,7 +198,7 @@ def test_stopped_before_the_first_sweep() -> None:
 
 def test_stopped_before_the_proof() -> None:
     """What was followed is told, but not as proven."""
-    asked = iter([False, False, True])
+    asked = iter([False])
     best = least_peak(case_a(), "damper.N0", 20.0, 3000.0, should_stop=lambda: next(asked, True))
     assert best.status is TrackStatus.STOPPED
     assert best.sweeps == 1
