@@ -1,7 +1,7 @@
 """Rows of what the contacts go through: friction work, and loads that must not fall to 0.
 
 The worst over a response is a maximum over the frequency, so its gradient is the one at that frequency
-(envelope theorem).
+(envelope theorem), or that of a corner of the response.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from optim.variables import Real, by_variables
 from solver.branch import Branch
 from solver.scene import AnyContact, ElasticNormalContact, FrictionContact
 from solver.wear import WearSensitivity
+from solver.wear_corners import worst_slopes
 from solver.wear_peaks import Measure, worst_wear
 
 
@@ -56,9 +57,7 @@ def _work(
             quantity=Quantity.FRICTION_WORK, case=case.name,
             what=f"friction work of {contact.name} at {worst.at:.6g} Hz", value=worst.value,
             gradient=_nothing(problem) if slopes is None
-            else by_variables(
-                problem.variables, slopes.at(worst.at, worst.solution).work(contact.name).gradient
-            ),
+            else by_variables(problem.variables, worst_slopes(slopes, worst, contact.name).gradient),
             at_hz=worst.at, weight=0.0, bound=bound,
         )
         for worst in worst_wear(branch, contact.name, Measure.FRICTION_WORK)
@@ -85,8 +84,8 @@ def _separation(
     for worst in worst_wear(branch, contact.name, Measure.LEAST_LOAD):
         slope = _nothing(problem)
         if slopes is not None:
-            load = slopes.at(worst.at, worst.solution).least_load(contact.name)
-            slope = slope if load is None else by_variables(problem.variables, -load.gradient)
+            load = worst_slopes(slopes, worst, contact.name, Measure.LEAST_LOAD)
+            slope = by_variables(problem.variables, -load.gradient)
         rows.append(
             Row(
                 quantity=Quantity.SEPARATION, case=case.name,

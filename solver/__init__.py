@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from solver.sensitivity import Gradient, Sensitivities
     from solver.tracking import track_peak
     from solver.wear import ContactWear, Measured, WearSensitivity, contact_wear
+    from solver.wear_corners import worst_slopes
     from solver.wear_peaks import Measure, WorstWear, worst_friction_work, worst_wear
 
 _HOME = {
@@ -58,7 +59,7 @@ _HOME = {
     "track_peak": "tracking", "Shares": "segments_of",
     "ContactWear": "wear", "Measured": "wear", "WearSensitivity": "wear", "contact_wear": "wear",
     "Measure": "wear_peaks", "WorstWear": "wear_peaks", "worst_friction_work": "wear_peaks",
-    "worst_wear": "wear_peaks",
+    "worst_wear": "wear_peaks", "worst_slopes": "wear_corners",
 }  # fmt: skip
 
 __all__ = [
@@ -130,6 +131,7 @@ __all__ = [
     "time_history",
     "track_peak",
     "worst_friction_work",
+    "worst_slopes",
     "worst_wear",
 ]
 

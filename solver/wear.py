@@ -126,6 +126,11 @@ class WearSensitivity:
         self._workspace = Workspace.of(balance)
         self._by_path = [for_parameter(balance, path, 1.0) for path in paths]
 
+    @property
+    def balance(self) -> Balance:
+        """The balance of the response."""
+        return self._workspace.balance
+
     def at(self, frequency_hz: float, u: Real) -> WearPoint:
         """Return the measures at a solution `u` (n_unknowns,) of the balance [m] at a frequency [Hz]."""
         workspace, omega = self._workspace, 2.0 * math.pi * frequency_hz

@@ -2,8 +2,8 @@
 
 At a maximum inside the range the slope along the branch is 0, and at an end the frequency does not move
 either, so the derivative of the worst value by a parameter is the one at that fixed frequency (envelope
-theorem): `WearSensitivity.at` the place found. At a corner of the response the place moves along one of
-its two sides only; the value there is found by bracketing.
+theorem). A maximum may also be a corner of the response, closed in by bracketing; its derivative takes both
+sides of it (`solver.wear_corners`).
 
 Two maxima may hide between two points of a branch: near the top it is made dense until cubics through its
 points predict the measure between them, as for the peaks of the amplitude (`solver.peaks`).
@@ -12,6 +12,7 @@ points predict the measure between them, as for the peaks of the amplitude (`sol
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -25,15 +26,17 @@ from solver.kernels.receptance import receptance
 from solver.kernels.refine import between
 from solver.kernels.residual import contact_values, evaluate
 from solver.kernels.system import evaluation_by_value
-from solver.peaks import FAR_BELOW, MOST_HALVINGS, NEAR_THE_TOP, PREDICTED, share_scales
+from solver.parameter import Kind
+from solver.peaks import MOST_HALVINGS, NEAR_THE_TOP, PREDICTED, share_scales
 from solver.wear import contact_index
 from solver.wear_measures import Change, Cycle, friction_work, least_load, slip_travel
 from solver.workspace import Workspace
 
 # Maxima below this share of the highest cannot lead within one step of an optimiser.
 COMPETES = 0.6
+_HALVINGS_BELOW = 2  # of an interval whose maximum could compete, but not lead
 _FLAT = 1e-11  # slope over the whole interval, relative to the value, at which a maximum is found
-_NARROW = 1e-13  # share of the interval at which a corner is found
+_NARROW = 1e-12  # share of the interval at which a corner is found
 _MOST_TRIALS = 100
 _MOST_ITERATIONS = 12
 
@@ -44,6 +47,13 @@ class Measure(Enum):
     FRICTION_WORK = "friction work"
     LEAST_LOAD = "least normal load"
     SLIP_TRAVEL = "slip travel"
+
+
+_MEASURES: dict[Measure, Callable[[Cycle, int, Sequence[Change]], tuple[float, Real] | None]] = {
+    Measure.FRICTION_WORK: friction_work,
+    Measure.LEAST_LOAD: least_load,
+    Measure.SLIP_TRAVEL: slip_travel,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,6 +126,9 @@ class _Search:
 
     def __init__(self, branch: Branch, e: int, measure: Measure) -> None:
         self._workspace = Workspace.of(branch.balance)
+        self._point = evaluation_by_value(self._workspace.point)  # views: they follow the workspace
+        frequency = branch.balance.parameter.kind is Kind.FREQUENCY
+        self._fixed = contact_values(branch.balance.system, 0.0, 0.0) if frequency else None
         self._e = e
         self._measure = measure
         self._sign = -1.0 if measure is Measure.LEAST_LOAD else 1.0
@@ -150,14 +163,15 @@ class _Search:
 
     def _halved(self, left: _Node, right: _Node, top: float, depth: int) -> list[_Node]:
         """Return the nodes to be inserted between two, until a cubic predicts what is between."""
-        if depth == 0 or max(left.value, right.value) < top - (1.0 - FAR_BELOW) * self._size:
+        below = top - (1.0 - COMPETES) * self._size
+        if depth == 0 or max(left.value, right.value) < below:
             return []
         by_share = share_scales(left, right)
         g_left, g_right = left.slope * by_share[0], right.slope * by_share[1]
         if g_left == 0.0 == g_right:
             return []  # a given load does not change with the frequency
         reach = max(left.value, right.value) + 0.25 * (max(g_left, 0.0) + max(-g_right, 0.0))
-        if reach < top - (1.0 - NEAR_THE_TOP) * self._size:
+        if reach < top - (1.0 - NEAR_THE_TOP) * self._size and depth <= MOST_HALVINGS - _HALVINGS_BELOW:
             return []
         middle = self._between(left, right, 0.5)
         if middle is None:
@@ -216,21 +230,24 @@ class _Search:
         # It leaves the workspace evaluated at the solution found.
         return self._node(found, tangent) if good else None
 
+    def _contacts(self, p: float) -> tuple[Real, Real, Real, Real]:
+        """Return the contacts at λ = `p`, see `contact_values`; the frequency does not change them."""
+        if self._fixed is not None:
+            return self._fixed
+        return contact_values(self._workspace.balance.system, p, 0.0)
+
     def _node(self, solution: Real, tangent: Real) -> _Node:
         """Measure the contact where the workspace was evaluated last."""
-        balance, p, dp = self._workspace.balance, float(solution[-1]), float(tangent[-1])
-        point = evaluation_by_value(self._workspace.point)
-        cycle = Cycle.of(balance, solution[:-1], p, point)
-        _, _, row, load = contact_values(balance.system, p, 0.0)
+        balance, point, dp = self._workspace.balance, self._point, float(tangent[-1])
+        table, load, dtable, dload = self._contacts(float(solution[-1]))
+        cycle = Cycle(
+            balance=balance, U=solution[:-1].reshape(point.F.shape), F=point.F, dF_dU=point.dF_dU,
+            table=table, load=load,
+        )  # fmt: skip
         along = Change(
-            dU=tangent[:-1].reshape(cycle.U.shape), dF=dp * point.dF_dp, row=dp * row, load=dp * load
+            dU=tangent[:-1].reshape(point.F.shape), dF=dp * point.dF_dp, row=dp * dtable, load=dp * dload
         )
-        measure = {
-            Measure.FRICTION_WORK: friction_work,
-            Measure.LEAST_LOAD: least_load,
-            Measure.SLIP_TRAVEL: slip_travel,
-        }[self._measure]
-        found = measure(cycle, self._e, [along])
+        found = _MEASURES[self._measure](cycle, self._e, [along])
         if found is None:
             name = balance.scene.contacts[self._e].name
             raise SettingError("contact", name, f"must be one whose law has a {self._measure.value}")

@@ -8,16 +8,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from random_scenes import random_scene
 from scene_cases import bladed_disk, mixed_disk, two_dof
 from test_law_scenes import CUBIC, GAP, PLANE, RUB, scene
 
 from solver import (
+    Branch,
     ContactWear,
     Measure,
     Measured,
     Scene,
     SettingError,
     WearSensitivity,
+    WorstWear,
     contact_wear,
     hysteresis_loop,
     march,
@@ -25,6 +28,7 @@ from solver import (
     solve,
     sweep,
     worst_friction_work,
+    worst_slopes,
     worst_wear,
 )
 from solver.fourier import derivative
@@ -271,6 +275,44 @@ def test_the_worst_moves_as_at_its_fixed_frequency(name: str) -> None:
     difference = (4.0 * fine - coarse) / 3.0
     scale = max(abs(difference), worst.value / here.value(path))
     assert abs(slope.gradient[0] - difference) <= 1e-6 * scale + 0.05 * abs(fine - coarse)
+
+
+@pytest.mark.parametrize(("seed", "contact", "key"), [(46, "c0", "N0"), (105, "c1", "kt"), (15, "c1", "kt")])
+def test_the_worst_at_a_corner_moves_with_the_corner(seed: int, contact: str, key: str) -> None:
+    """Where another contact changes its state the slope jumps over 0: one side alone is far off."""
+    here, _, harmonics = random_scene(seed)
+    path = f"{contact}.{key}"
+
+    def worst_of(moved: Scene) -> tuple[WorstWear, Branch]:
+        branch = sweep(moved, start=0.3, stop=3.0, harmonics=harmonics)
+        assert branch.completed
+        return worst_friction_work(branch, contact), branch
+
+    worst, branch = worst_of(here)
+    sensitivity = WearSensitivity(branch.balance, (path,))
+    one_side = sensitivity.at(worst.at, worst.solution).work(contact)
+    exact = worst_slopes(sensitivity, worst, contact)
+    assert abs(one_side.by_frequency) * worst.at > 0.1 * worst.value
+    value = here.value(path)
+    step = 3e-5 * value
+    high, low = (worst_of(here.with_values({path: value + way * step}))[0].value for way in (1.0, -1.0))
+    difference = (high - low) / (2.0 * step)
+    scale = max(abs(difference), worst.value / value)
+    assert abs(exact.gradient[0] - difference) <= 5e-6 * scale
+    assert abs(one_side.gradient[0] - difference) > 0.1 * scale
+
+
+def test_slopes_of_a_smooth_worst_and_of_an_end_are_those_at_their_frequency() -> None:
+    for stop in (900.0, 750.0):
+        branch = sweep(bladed_disk(), start=700.0, stop=stop)
+        worst = worst_friction_work(branch, "shroud")
+        sensitivity = WearSensitivity(branch.balance, ("shroud.N0",))
+        plain = sensitivity.at(worst.at, worst.solution).work("shroud")
+        np.testing.assert_array_equal(worst_slopes(sensitivity, worst, "shroud").gradient, plain.gradient)
+    gap = sweep(scene(GAP), start=0.1, stop=0.12, harmonics=3)
+    least = worst_friction_work(gap, "c0")
+    with pytest.raises(SettingError, match="least normal load"):
+        worst_slopes(WearSensitivity(gap.balance), least, "c0", Measure.LEAST_LOAD)
 
 
 def test_the_worst_at_an_end_of_the_range() -> None:
