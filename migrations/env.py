@@ -24,6 +24,8 @@ def run(connection: Connection) -> None:
         compare_type=True,
     )
     context.run_migrations()
+    if connection.dialect.name != "sqlite":
+        return  # others hold the keys all along
     broken = connection.exec_driver_sql("PRAGMA foreign_key_check").fetchall()
     if broken:
         raise RuntimeError(f"the migration would leave rows that refer to nothing: {broken[:5]}")

@@ -13,9 +13,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.arrays import decode
 from service.errors import NotFoundError
-from service.jobs import ContactValues
+from service.jobs import ContactValues, VariableValues
 from service.models import JobState
-from service.repository import JobRow, SweepRepository, SweepRow
+from service.repository import DesignRepository, DesignRow, JobRow, SweepRepository, SweepRow
 from service.scene_store import KnownScene
 
 if TYPE_CHECKING:
@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 _SAME = (
     *("id", "scene_hash", "parameter", "frequency_hz", "excitation_amplitude", "harmonics", "points"),
     *("limit", "band_hz", "newton_iterations", "rejected_steps", "seconds", "completed", "status", "created"),
+)
+_SAME_OF_DESIGNS = (
+    *("scene_hash", "method", "robust", "reached", "feasible", "status", "objective", "limit", "band_hz"),
+    *("harmonics", "evaluations", "work", "seconds", "created"),
 )
 
 
@@ -58,6 +62,14 @@ class JobAnswer(Answer):
     def of(cls, row: JobRow, live: tuple[float, int] | None = None) -> Self:
         """The answer for a row, with progress that is newer than the row if there is any."""
         progress, points = (row.progress, row.points) if live is None else live
+        source = row.result_of or row.id
+        links = {
+            "self": f"/v1/jobs/{row.id}",
+            "results": f"/v1/jobs/{row.id}/results",
+            "sweeps": f"/v1/sweeps?job={source}",
+        }
+        if row.kind == "design":
+            links["design"] = f"/v1/designs/{source}"
         return cls(
             id=row.id,
             kind=row.kind,
@@ -75,11 +87,7 @@ class JobAnswer(Answer):
             result_of=row.result_of,
             error=row.error,
             request=row.request,
-            links={
-                "self": f"/v1/jobs/{row.id}",
-                "results": f"/v1/jobs/{row.id}/results",
-                "sweeps": f"/v1/sweeps?job={row.result_of or row.id}",
-            },
+            links=links,
         )
 
 
@@ -201,6 +209,77 @@ class ResultsAnswer(Answer):
             result=results.result,
             sweeps=SweepAnswer.of_rows(results.sweeps, repository),
         )
+
+
+class VariableAnswer(Answer):
+    """A variable of a design: its best value, null if no design could be computed, and its bounds."""
+
+    value: float | None
+    low: float
+    high: float
+
+
+class DesignAnswer(Answer):
+    """A stored design; its id is that of its job."""
+
+    id: str
+    scene: str
+    scene_hash: str
+    method: str
+    robust: bool = Field(description="Whether it is the best in the worst case of uncertain parameters.")
+    reached: bool = Field(description="Whether the goal was reached.")
+    feasible: bool = Field(description="Whether it keeps every limit.")
+    status: str
+    objective: float | None
+    peak: Peak | None
+    limit: float | None
+    band_hz: float | None
+    harmonics: int
+    evaluations: int
+    work: float | None = Field(description="What the search cost, in frequency responses.")
+    seconds: float
+    created: datetime
+    variables: dict[str, VariableAnswer]
+    links: dict[str, str]
+
+    @classmethod
+    def values(cls, row: DesignRow, variables: Sequence[VariableValues]) -> dict[str, Any]:
+        """The fields of the answer for a row."""
+        peak = None
+        if row.peak is not None and row.peak_at is not None:
+            peak = Peak(value=row.peak, at=row.peak_at)
+        return {
+            **{name: getattr(row, name) for name in _SAME_OF_DESIGNS},
+            "id": row.job_id,
+            "scene": row.scene_name,
+            "peak": peak,
+            "variables": {v.name: VariableAnswer(value=v.value, low=v.low, high=v.high) for v in variables},
+            "links": {
+                "self": f"/v1/designs/{row.job_id}",
+                "job": f"/v1/jobs/{row.job_id}",
+                "sweeps": f"/v1/sweeps?job={row.job_id}",
+            },
+        }
+
+    @classmethod
+    def of_rows(cls, rows: Sequence[DesignRow], repository: DesignRepository) -> list[Self]:
+        """The answers for several rows."""
+        variables = repository.variables([row.job_id for row in rows])
+        return [cls(**cls.values(row, variables[row.job_id])) for row in rows]
+
+
+class DesignDetail(DesignAnswer):
+    """A stored design with its problem and the whole result of its job."""
+
+    problem: dict[str, Any] = Field(description="What was asked: the body of the request.")
+    result: dict[str, Any]
+
+
+class DesignPage(Answer):
+    """A page of designs."""
+
+    items: list[DesignAnswer]
+    next: str | None = Field(description="Link to the next page; null on the last one.")
 
 
 class FinishedJob(JobAnswer):

@@ -13,7 +13,7 @@ from service.core import SOLVER_VERSION, Service
 from service.http import HostCheck
 from service.jobs import Registry
 from service.kinds import SHIPPED
-from service.routes import health, jobs, plan, scenes, sweeps
+from service.routes import designs, health, jobs, plan, scenes, sweeps
 from service.settings import Settings, load_settings
 
 _DESCRIPTION = "Designs friction dampers: jobs, their results, and every frequency response computed."
@@ -51,7 +51,7 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
     app.state.service = service
     app.add_middleware(HostCheck, hosts=service.settings.hosts)
     problems.install(app)
-    for module in (jobs, sweeps, scenes, plan, health):
+    for module in (jobs, designs, sweeps, scenes, plan, health):
         app.include_router(module.router)
     openapi.install(app, registry)
     return app

@@ -9,7 +9,17 @@ from urllib.parse import quote
 
 import httpx
 
-from service.answers import JobAnswer, ResultsAnswer, SceneDetail, SweepAnswer, SweepDetail, SweepPage
+from service.answers import (
+    DesignAnswer,
+    DesignDetail,
+    DesignPage,
+    JobAnswer,
+    ResultsAnswer,
+    SceneDetail,
+    SweepAnswer,
+    SweepDetail,
+    SweepPage,
+)
 from service.errors import ServiceProblem
 
 _POLL_SECONDS = (0.02, 0.05, 0.1, 0.2, 0.5)
@@ -82,10 +92,7 @@ class Client:
 
     def sweeps(self, **filters: Any) -> Iterator[SweepAnswer]:
         """Every stored sweep that meets the filters of ``GET /v1/sweeps``, page after page."""
-        words = {
-            key: str(value).lower() if isinstance(value, bool) else value for key, value in filters.items()
-        }
-        page = SweepPage.model_validate(self._request("GET", "/v1/sweeps", params=words))
+        page = SweepPage.model_validate(self._request("GET", "/v1/sweeps", params=_words(filters)))
         yield from page.items
         while page.next is not None:
             page = SweepPage.model_validate(self._request("GET", page.next))
@@ -94,6 +101,18 @@ class Client:
     def sweep(self, sweep_id: str) -> SweepDetail:
         """A stored sweep with its arrays."""
         return SweepDetail.model_validate(self._request("GET", f"/v1/sweeps/{_segment(sweep_id)}"))
+
+    def designs(self, **filters: Any) -> Iterator[DesignAnswer]:
+        """Every stored design that meets the filters of ``GET /v1/designs``, page after page."""
+        page = DesignPage.model_validate(self._request("GET", "/v1/designs", params=_words(filters)))
+        yield from page.items
+        while page.next is not None:
+            page = DesignPage.model_validate(self._request("GET", page.next))
+            yield from page.items
+
+    def design(self, design_id: str) -> DesignDetail:
+        """A stored design with the whole result; its id is that of its job."""
+        return DesignDetail.model_validate(self._request("GET", f"/v1/designs/{_segment(design_id)}"))
 
     def store_scene(self, scene: Mapping[str, Any]) -> SceneDetail:
         """Store a scene under its name."""
@@ -112,6 +131,12 @@ class Client:
         except ValueError:
             problem = {"title": response.reason_phrase, "detail": response.text[:500]}
         raise ServiceProblem(response.status_code, problem if isinstance(problem, dict) else {})
+
+
+def _words(filters: Mapping[str, Any]) -> dict[str, Any]:
+    """Filters as a query: without those not given, true and false in lower case."""
+    given = {key: value for key, value in filters.items() if value is not None}
+    return {key: str(value).lower() if isinstance(value, bool) else value for key, value in given.items()}
 
 
 def _segment(name: str) -> str:

@@ -20,7 +20,16 @@ from service.jobs import Registry
 from service.kinds import SHIPPED
 from service.models import JobState
 from service.queue import JobQueue
-from service.repository import JobRepository, JobRow, NewJob, SceneRepository, SweepRepository, SweepRow
+from service.repository import (
+    DesignRepository,
+    DesignRow,
+    JobRepository,
+    JobRow,
+    NewJob,
+    SceneRepository,
+    SweepRepository,
+    SweepRow,
+)
 from service.scene_store import SceneStore
 from service.settings import Settings
 from service.strict_json import digest
@@ -46,6 +55,15 @@ class Results:
     sweeps: list[SweepRow]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WholeDesign:
+    """A stored design with the job that found it and the result of that job."""
+
+    row: DesignRow
+    job: JobRow
+    result: dict[str, Any]
+
+
 class Service:
     """Database, queue and workers of one service.
 
@@ -63,6 +81,7 @@ class Service:
         self.database = Database(settings.database)
         self.jobs = JobRepository(self.database)
         self.sweeps = SweepRepository(self.database)
+        self.designs = DesignRepository(self.database)
         self.scenes = SceneStore(SceneRepository(self.database))
         self.waiters = Waiters()
         executor = LocalExecutor(
@@ -210,6 +229,23 @@ class Service:
         if row.state is JobState.DISMISSED:
             raise ConflictError(f"job {job_id} was dismissed, it has no results")
         raise ConflictError(f"job {job_id} is {row.state.value}, it has no results yet")
+
+    def design(self, design_id: str) -> WholeDesign:
+        """A stored design; the id of a later job that asked for the same names it too.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of this id.
+        """
+        job = self.jobs.get(design_id)
+        if job is not None and job.result_of is not None:
+            job = self.jobs.get(job.result_of)
+        row = None if job is None else self.designs.get(job.id)
+        result = None if row is None else self.jobs.result(row.job_id)
+        if job is None or row is None or result is None:
+            raise NotFoundError(f"there is no design {design_id!r}")
+        return WholeDesign(row=row, job=job, result=result)
 
     def wait(
         self, job_id: str, timeout: float | None = None, on_progress: OnProgress | None = None

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Self
 
-from service.answers import JobAnswer, ResultsAnswer, SweepAnswer, SweepDetail
+from service.answers import DesignAnswer, DesignDetail, JobAnswer, ResultsAnswer, SweepAnswer, SweepDetail
 from service.core import OnProgress, Service
+from service.design_queries import DesignQuery, design_detail, design_page
 from service.jobs import Registry
 from service.kinds import SHIPPED
 from service.settings import Settings, load_settings
@@ -81,3 +82,12 @@ class EmbeddedService:
     def sweep(self, sweep_id: str) -> SweepDetail:
         """A stored sweep with its arrays (NotFoundError if there is none)."""
         return SweepDetail.load(sweep_id, self._service.sweeps)
+
+    def designs(self, **filters: Any) -> list[DesignAnswer]:
+        """Stored designs, newest first unless `sort` is given; the filters of ``GET /v1/designs``."""
+        asked = validated(DesignQuery, filters)
+        return design_page(self._service.designs, asked, self._service.settings).items
+
+    def design(self, design_id: str) -> DesignDetail:
+        """A stored design with the whole result (NotFoundError if there is none)."""
+        return design_detail(self._service.design(design_id), self._service.designs)

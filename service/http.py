@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import re
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from fastapi import Depends, Request
+from fastapi import Depends, Request, Response
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -93,6 +94,15 @@ def idempotency_key(headers: Mapping[str, str]) -> str | None:
         f"`Idempotency-Key` must be 1 to 200 printable ASCII characters without spaces, got {key[:80]!r}"
     )
     raise InvalidRequestError([Issue(pointer="/Idempotency-Key", message=message)], source="header")
+
+
+def tagged(request: Request, body: bytes) -> Response:
+    """A JSON body with its strong ETag (RFC 9110); 304 without it if the client has the same."""
+    tag = f'"{hashlib.sha256(body).hexdigest()}"'
+    known = {one.strip().removeprefix("W/") for one in request.headers.get("if-none-match", "").split(",")}
+    if tag in known or "*" in known:
+        return Response(status_code=304, headers={"ETag": tag})
+    return Response(body, media_type="application/json", headers={"ETag": tag})
 
 
 async def wait_for_end(service: Service, job_id: str, seconds: float) -> JobRow:

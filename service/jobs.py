@@ -111,6 +111,39 @@ class SweepRecord:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class VariableValues:
+    """A variable of a design: its best value (None if no design could be computed) and its bounds."""
+
+    name: str
+    value: float | None
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignRecord:
+    """A design as it is stored; the fields are the columns people filter by."""
+
+    scene_name: str
+    scene_hash: str
+    method: str
+    robust: bool
+    reached: bool
+    feasible: bool
+    status: str
+    objective: float | None
+    peak: float | None
+    peak_at: float | None
+    limit: float | None
+    band_hz: float | None
+    harmonics: int
+    evaluations: int
+    work: float | None
+    seconds: float
+    variables: tuple[VariableValues, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JobOutput:
     """What a run gives back.
 
@@ -120,6 +153,8 @@ class JobOutput:
         JSON, with the keys of the command's ``--json``.
     sweeps : tuple of SweepRecord
         Every branch computed on the way.
+    design : DesignRecord or None
+        The design, if the job was to find one.
     shortfall : str or None
         If the computation did not reach its goal: the status, a sentence that says what to try. The job
         then fails with it; result and sweeps are kept.
@@ -127,6 +162,7 @@ class JobOutput:
 
     result: dict[str, Any]
     sweeps: tuple[SweepRecord, ...] = ()
+    design: DesignRecord | None = None
     shortfall: str | None = None
 
 

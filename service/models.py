@@ -228,3 +228,63 @@ class SweepArray(Base):
     name: Mapped[str] = mapped_column(String(64), primary_key=True)
     sha256: Mapped[str] = mapped_column(String(64))
     data: Mapped[bytes] = mapped_column(LargeBinary())
+
+
+class Design(Base):
+    """What a design job found: what people filter by. Its id is its job's; the job's result is the whole."""
+
+    __tablename__ = "design"
+
+    job_id: Mapped[str] = mapped_column(
+        String(ID_LENGTH), ForeignKey("job.id", ondelete="CASCADE"), primary_key=True
+    )
+    scene_name: Mapped[str] = mapped_column(String(200))
+    scene_hash: Mapped[str] = mapped_column(String(64))
+    method: Mapped[str] = mapped_column(String(32))
+    robust: Mapped[bool]
+    reached: Mapped[bool]
+    feasible: Mapped[bool]
+    status: Mapped[str] = mapped_column(Text())
+    objective: Mapped[float | None]
+    peak: Mapped[float | None]
+    peak_at: Mapped[float | None]
+    limit: Mapped[float | None]
+    band_hz: Mapped[float | None]
+    harmonics: Mapped[int]
+    evaluations: Mapped[int]
+    work: Mapped[float | None]
+    seconds: Mapped[float]
+    created: Mapped[datetime]
+
+    __table_args__ = (
+        Index(None, "scene_name", "peak", "job_id"),
+        Index(None, "scene_name", "job_id"),
+        Index(None, "scene_hash", "job_id"),
+        Index(None, "method", "job_id"),
+        Index(None, "robust", "job_id"),
+        Index(None, "reached", "job_id"),
+        Index(None, "feasible", "job_id"),
+        Index(None, "objective", "job_id"),
+        Index(None, "peak", "job_id"),
+        Index(None, "peak_at", "job_id"),
+        Index(None, "band_hz", "job_id"),
+        Index(None, "work", "job_id"),
+        Index(None, "seconds", "job_id"),
+    )
+
+
+class DesignVariable(Base):
+    """A variable of a design with its bounds and its best value, NULL if no design could be computed."""
+
+    __tablename__ = "design_variable"
+
+    design_id: Mapped[str] = mapped_column(
+        String(ID_LENGTH), ForeignKey("design.job_id", ondelete="CASCADE"), primary_key=True
+    )
+    name: Mapped[str] = mapped_column(String(500), primary_key=True)
+    position: Mapped[int]
+    value: Mapped[float | None]
+    low: Mapped[float]
+    high: Mapped[float]
+
+    __table_args__ = (Index(None, "name", "value", "design_id"), Index(None, "value", "name", "design_id"))

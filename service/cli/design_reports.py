@@ -13,6 +13,7 @@ Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]
 
 _COUNTS = 1e-6  # multipliers below this hold nothing
+_ROUNDING = 1e-6  # relative excess over a limit up to which it is kept
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,13 +28,18 @@ class Table:
 
 def design(found: Json) -> None:
     """The best design: what it reaches, what holds it, what it must keep, and the other optima."""
-    kept = not found.get("broken")
     title = f"Best damper of {found['scene']}"
-    print_pairs(title if kept else f"{title}: not all limits can be kept", _pairs(found))
+    print_pairs(title if _kept(found) else f"{title}: not all limits can be kept", _pairs(found))
     for table in (_limits(found), _active(found), _basins(found)):
         if table is not None:
             say("")
             print_table(table.heading, table.columns, table.rows, right=table.right)
+
+
+def _kept(found: Json) -> bool:
+    """Whether every limit is kept, to the accuracy of the search."""
+    conditions = found.get("conditions")
+    return not found.get("broken") or (conditions is not None and conditions["violation"] <= _ROUNDING)
 
 
 def values(optimum: Json) -> Pairs:
@@ -81,11 +87,11 @@ def _limits(found: Json) -> Table | None:
             worst[key] = row
     if not worst:
         return None
-    several = len({row["case"] for row in worst.values()}) > 1
+    several, kept = len({row["case"] for row in worst.values()}) > 1, _kept(found)
     rows: list[tuple[str, ...]] = []
     for row in sorted(worst.values(), key=lambda row: row["bound"] - row["value"]):
         left, unit = row["bound"] - row["value"], row["unit"]
-        # A limit that holds the design is kept to the search's own accuracy.
+        left = max(left, 0.0) if kept else left
         holds = f"{amount(left, unit)} left" if left >= 0.0 else f"broken by {amount(-left, unit)}"
         what = f"{row['what']} ({row['case']})" if several else row["what"]
         rows.append((what, amount(row["bound"], unit), amount(row["value"], unit), holds))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli import inputs, options, problem_inputs, reports
+from service.cli import inputs, options, problem_inputs, reports, stored_designs
 from service.cli.failures import BAD_INPUT, FELL_SHORT, InputError, option_name
 from service.cli.output import print_json, print_table, say
 from service.cli.problem_options import ProblemFlags, takes_problem
@@ -107,7 +107,16 @@ def watch(job: options.Job, as_json: options.Json = False, url: options.Url = op
 
 
 def results(
-    job: options.Job,
+    job: Annotated[
+        str | None, typer.Argument(metavar="[JOB]", help="Id of a job; the stored designs if left out.")
+    ] = None,
+    scene: stored_designs.OfScene = None,
+    variable: stored_designs.OfVariable = None,
+    peak_max: stored_designs.PeakMax = None,
+    band_max: stored_designs.BandMax = None,
+    reached: stored_designs.Reached = None,
+    sort: stored_designs.Sort = None,
+    limit: stored_designs.Count = None,
     out: Annotated[
         str | None, typer.Option("--out", metavar="F", help="Also write the JSON object to a file.")
     ] = None,
@@ -115,18 +124,32 @@ def results(
     as_json: options.Json = False,
     url: options.Url = options.DEFAULT_URL,
 ) -> None:
-    """Print what a job computed."""
+    """Print what a job computed, or list the stored designs."""
     from service.plots import SUFFIXES
 
+    filters = {
+        "scene": scene, "variable": variable, "peak_max": peak_max, "band_max": band_max, "reached": reached,
+        "sort": sort, "limit": limit,
+    }  # fmt: skip
     file = inputs.output_path("--out", out)
     picture = inputs.output_path("--plot", plot, SUFFIXES)
+    if job is None:
+        if picture is not None:
+            raise InputError("`--plot` needs a JOB: a list is not drawn")
+        with _client(url) as client:
+            listed = stored_designs.listed(client, filters)
+        if file is not None:
+            _write(file, listed)
+        stored_designs.show(listed, as_json=as_json)
+        return
+    stored_designs.refuse_filters(filters)
     with _client(url) as client:
         ended = client.job(job)
         answer = client.results(job)
         if picture is not None:
             _draw(client, answer, picture)
     if file is not None:
-        _write(file, answer)
+        _write(file, answer.model_dump(mode="json"))
     _show(ended, answer, as_json=as_json)
     _end(ended)
 
@@ -213,11 +236,11 @@ def _draw(client: Client, answer: ResultsAnswer, picture: Path) -> None:
     save(response_figure(Response.of_stored(client.sweep(best.id))), picture)
 
 
-def _write(file: Path, answer: ResultsAnswer) -> None:
+def _write(file: Path, answer: Mapping[str, Any]) -> None:
     from service.files import whole
 
     with whole(file) as temporary:
-        temporary.write_text(json.dumps(answer.model_dump(mode="json"), allow_nan=False) + "\n", "utf-8")
+        temporary.write_text(json.dumps(answer, allow_nan=False) + "\n", "utf-8")
 
 
 def _end(job: JobAnswer) -> None:

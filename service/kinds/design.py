@@ -9,7 +9,7 @@ import optim
 from service.jobs import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
 from service.kinds.problem import ProblemRequest, arguments
 from service.kinds.problem_check import problem_issues
-from service.kinds.records import sweep_record
+from service.kinds.records import design_record, sweep_record
 from service.kinds.scenes import require, resolve_scene, resolved
 from solver.scene import Scene
 
@@ -48,6 +48,7 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     return JobOutput(
         result=found.to_json(),
         sweeps=tuple(sweep_record(branch) for branch in found.sweeps if len(branch.values)),
+        design=design_record(found),
         shortfall=None if found.reached else found.status.value,
     )
 

@@ -1,15 +1,17 @@
-"""From a branch of the solver to a sweep as it is stored."""
+"""From a branch of the solver and a design to a sweep and a design as they are stored."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from service.arrays import encode
-from service.jobs import ContactValues, SweepRecord
+from service.jobs import ContactValues, DesignRecord, SweepRecord, VariableValues
 from service.strict_json import digest
 from solver.scene import AnyContact, FrictionContact, Scene
 
 if TYPE_CHECKING:
+    from optim.result import DesignResult
     from solver import Branch
 
 _ARRAYS = ("amplitude", "half_peak_to_peak", "mean", "coefficients", "observed")
@@ -52,6 +54,44 @@ def sweep_record(branch: Branch, frequency_hz: float | None = None) -> SweepReco
         arrays={"parameter": encode(branch.values)}
         | {name: encode(getattr(branch, name)) for name in _ARRAYS},
     )
+
+
+def design_record(result: DesignResult) -> DesignRecord:
+    """The design with the columns people filter by."""
+    problem, evaluation, peak = result.problem, result.evaluation, result.peak
+    feasible = False
+    if evaluation is not None and evaluation.good:
+        # Loaded here: a service that only lists does not need it.
+        from optim.evaluation import natural_scales
+        from optim.local import KEPT
+
+        feasible = evaluation.violation(natural_scales(problem)) <= KEPT
+    return DesignRecord(
+        scene_name=result.scene,
+        scene_hash=digest(problem.scene.to_dict()),
+        method=result.method.value,
+        robust=False,
+        reached=result.reached,
+        feasible=feasible,
+        status=result.status.value,
+        objective=None if evaluation is None else _finite(evaluation.objective),
+        peak=None if peak is None else peak.value,
+        peak_at=None if peak is None else peak.at,
+        limit=result.limit,
+        band_hz=result.band_hz,
+        harmonics=problem.harmonics,
+        evaluations=result.evaluations,
+        work=_finite(result.work),
+        seconds=result.seconds,
+        variables=tuple(
+            VariableValues(name=v.name, value=result.optimum.get(v.name), low=v.low, high=v.high)
+            for v in problem.variables
+        ),
+    )
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def contact_values(scene: Scene, parameter: str) -> tuple[ContactValues, ...]:

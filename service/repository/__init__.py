@@ -1,12 +1,17 @@
 """All SQL of the service: each method is one transaction, each change of a job's state is guarded."""
 
+from service.repository.designs import DESIGN_SORTS, DesignFilter, DesignRepository, DesignRow
 from service.repository.jobs import Attempt, JobRepository, JobRow, NewJob, Recovered
 from service.repository.scenes import SceneRepository, SceneRow
 from service.repository.sweeps import SWEEP_SORTS, SweepFilter, SweepRepository, SweepRow
 
 __all__ = [
+    "DESIGN_SORTS",
     "SWEEP_SORTS",
     "Attempt",
+    "DesignFilter",
+    "DesignRepository",
+    "DesignRow",
     "JobRepository",
     "JobRow",
     "NewJob",

@@ -14,6 +14,7 @@ from service.errors import IdempotencyError, QueueFullError
 from service.ids import new_id
 from service.jobs import FailureKind, JobFailure, JobOutput
 from service.models import Job, JobResult, JobState
+from service.repository.designs import insert_design
 from service.repository.rows import Attempt, JobRow, NewJob, Recovered
 from service.repository.sweeps import insert_sweeps
 
@@ -289,6 +290,8 @@ class JobRepository:
     def _store(connection: Connection, job_id: str, output: JobOutput, created: datetime) -> None:
         connection.execute(insert(JobResult).values(job_id=job_id, body=output.result))
         insert_sweeps(connection, job_id, output.sweeps, created)
+        if output.design is not None:
+            insert_design(connection, job_id, output.design, created)
 
 
 def _recover(connection: Connection, condition: ColumnElement[bool], reason: str) -> Recovered:

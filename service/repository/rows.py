@@ -114,3 +114,27 @@ class SweepRow:
     completed: bool
     status: str
     created: datetime
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignRow:
+    """A stored design without its variables."""
+
+    job_id: str
+    scene_name: str
+    scene_hash: str
+    method: str
+    robust: bool
+    reached: bool
+    feasible: bool
+    status: str
+    objective: float | None
+    peak: float | None
+    peak_at: float | None
+    limit: float | None
+    band_hz: float | None
+    harmonics: int
+    evaluations: int
+    work: float | None
+    seconds: float
+    created: datetime

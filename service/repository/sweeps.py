@@ -6,21 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 
-from sqlalchemy import ColumnElement, Connection, Select, func, insert, literal, select, tuple_
+from sqlalchemy import ColumnElement, Connection, Select, insert, select
 from sqlalchemy.orm import InstrumentedAttribute
 
 from service.db import Database
 from service.ids import new_id
 from service.jobs import ContactValues, StoredArray, SweepRecord
 from service.models import Sweep, SweepArray, SweepContact
+from service.repository.listing import Condition, Position, Range, met, ordered, plain_conditions, within
 from service.repository.rows import SweepRow
 
 __all__ = ["SWEEP_SORTS", "SweepFilter", "SweepRepository", "SweepRow", "insert_sweeps"]
 
-Range = tuple[float | None, float | None]
-
 _COLUMNS = [getattr(Sweep, item.name) for item in fields(SweepRow)]
-_FEW = 2000
 _CHILD_FIELDS = ("contacts", "arrays")
 _CONTACT_COLUMNS: dict[str, InstrumentedAttribute[float | None]] = {
     "kt": SweepContact.kt,
@@ -67,23 +65,13 @@ class SweepFilter:
     descending: bool = True
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Condition:
-    """A condition on sweeps, in two forms: the ids that meet it, and whether a row does."""
-
-    ids: Select[str]
-    holds: ColumnElement[bool]
-
-
 class SweepRepository:
     """Sweeps of one database."""
 
     def __init__(self, database: Database) -> None:
         self._db = database
 
-    def page(
-        self, wanted: SweepFilter, limit: int, after: tuple[float | None, str] | None = None
-    ) -> list[SweepRow]:
+    def page(self, wanted: SweepFilter, limit: int, after: Position | None = None) -> list[SweepRow]:
         """A page of sweeps; `after` is the sort value and id of the last one of the page before."""
         with self._db.reading() as connection:
             query = _query(connection, wanted, after).limit(limit)
@@ -154,70 +142,30 @@ def insert_sweeps(
             connection.execute(insert(SweepArray), arrays)
 
 
-def _query(
-    connection: Connection, wanted: SweepFilter, after: tuple[float | None, str] | None
-) -> Select[tuple[object, ...]]:
-    """The query of a page, led by a condition that few sweeps meet if there is one.
-
-    SQLite does not know how many rows a condition leaves and would read the whole table in the order of
-    the ids for four sweeps with a low peak. So each condition with an index is counted up to `_FEW`
-    first, which its index answers in well under a millisecond.
-    """
+def _query(connection: Connection, wanted: SweepFilter, after: Position | None) -> Select[tuple[object, ...]]:
+    """The query of a page."""
     query: Select[tuple[object, ...]] = select(*_COLUMNS)
-    conditions = _conditions(wanted)
-    lead = next((few for few in conditions if _is_few(connection, few)), None)
-    for condition in conditions:
-        query = query.where(Sweep.id.in_(condition.ids) if condition is lead else condition.holds)
-    return _ordered(query, wanted, after)
+    query = met(connection, query, Sweep.id, _conditions(wanted))
+    column = SWEEP_SORTS.get(wanted.sort)
+    return ordered(query, Sweep.id, column, descending=wanted.descending, after=after)
 
 
-def _is_few(connection: Connection, condition: _Condition) -> bool:
-    bounded = condition.ids.limit(_FEW + 1).subquery()
-    return connection.execute(select(func.count()).select_from(bounded)).scalar_one() <= _FEW
-
-
-def _conditions(wanted: SweepFilter) -> list[_Condition]:
+def _conditions(wanted: SweepFilter) -> list[Condition]:
     found: list[ColumnElement[bool]] = []
     for name, value in wanted.equal.items():
         found.append(getattr(Sweep, name) == value)
     for name, bounds in wanted.ranges.items():
-        found.extend(_within(getattr(Sweep, name), bounds))
-    conditions = [_Condition(ids=select(Sweep.id).where(holds), holds=holds) for holds in found]
+        found.extend(within(getattr(Sweep, name), bounds))
+    conditions = plain_conditions(Sweep.id, found)
     if wanted.contact is not None or wanted.contact_ranges:
         conditions.append(_contact_condition(wanted))
     return conditions
 
 
-def _contact_condition(wanted: SweepFilter) -> _Condition:
+def _contact_condition(wanted: SweepFilter) -> Condition:
     """True for a sweep one of whose contacts has the name and all the values."""
     found = [] if wanted.contact is None else [SweepContact.name == wanted.contact]
     for name, bounds in wanted.contact_ranges.items():
-        found.extend(_within(_CONTACT_COLUMNS[name], bounds))
+        found.extend(within(_CONTACT_COLUMNS[name], bounds))
     ids = select(SweepContact.sweep_id).where(*found)
-    return _Condition(ids=ids, holds=ids.where(SweepContact.sweep_id == Sweep.id).correlate(Sweep).exists())
-
-
-def _within(column: InstrumentedAttribute[float | None], bounds: Range) -> list[ColumnElement[bool]]:
-    low, high = bounds
-    if low is not None and high is not None:
-        return [column.between(low, high)]
-    if low is not None:
-        return [column >= low]
-    return [] if high is None else [column <= high]
-
-
-def _ordered(
-    query: Select[tuple[object, ...]], wanted: SweepFilter, after: tuple[float | None, str] | None
-) -> Select[tuple[object, ...]]:
-    """Order by the sort value, then by id (which is the time), and go on behind `after`."""
-    column = SWEEP_SORTS.get(wanted.sort)
-    keys = [Sweep.id] if column is None else [column, Sweep.id]
-    query = query.order_by(*(key.desc() if wanted.descending else key.asc() for key in keys))
-    if column is not None:
-        query = query.where(column.is_not(None))
-    if after is None:
-        return query
-    value, sweep_id = after
-    here = tuple_(*keys)
-    there = tuple_(*(literal(item) for item in ((sweep_id,) if column is None else (value, sweep_id))))
-    return query.where(here < there if wanted.descending else here > there)
+    return Condition(ids=ids, holds=ids.where(SweepContact.sweep_id == Sweep.id).correlate(Sweep).exists())

@@ -261,7 +261,7 @@ def test_a_wrong_revision_is_refused_with_the_command(url: str) -> None:
 
 def test_an_older_revision_is_refused_with_the_command(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     revisions.upgrade(url)
-    monkeypatch.setattr(revisions, "head_revision", lambda: "0002")
+    monkeypatch.setattr(revisions, "head_revision", lambda: "9999")
     with pytest.raises(WrongRevisionError, match="run `stickslip db upgrade --database sqlite:///"):
         revisions.prepare(url)
 

@@ -1,0 +1,350 @@
+"""Stored designs are there to be queried."""
+
+from __future__ import annotations
+
+import json
+import random
+import sqlite3
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from alembic import command
+from service_helpers import is_problem
+
+import optim
+import solver
+from service import revisions
+from service.answers import DesignDetail
+from service.client import Client
+from service.db import Database, migration_engine
+from service.design_queries import DesignQuery, design_page
+from service.errors import InvalidRequestError
+from service.jobs import DesignRecord, VariableValues
+from service.kinds.records import design_record
+from service.repository import DesignRepository, JobRepository, NewJob
+from service.repository.designs import insert_design
+from service.repository.jobs import utc_now
+from service.settings import load_settings
+from service.validation import validated
+
+WAIT = {"Prefer": "wait=60"}
+ONE = DesignRecord(
+    scene_name="disk", scene_hash="0" * 64, method="minimax", robust=False, reached=True, feasible=True,
+    status="done", objective=1.0, peak=1.0, peak_at=750.0, limit=0.5, band_hz=30.0, harmonics=11,
+    evaluations=12, work=12.0, seconds=0.3,
+)  # fmt: skip
+NEW = NewJob(kind="design", request={}, spec={}, spec_hash="", request_hash="", max_attempts=1, fresh=True)
+
+
+def variable(name: str, value: float | None) -> VariableValues:
+    return VariableValues(name=name, value=value, low=0.0, high=1000.0)
+
+
+def random_design(generator: random.Random) -> DesignRecord:
+    names = generator.choice((("damper.N0",), ("shroud.N0", "root.kt"), ("shroud.N0,root.N0",)))
+    peak = generator.choice((generator.lognormvariate(0.0, 1.0), 1.0, None))
+    return replace(
+        ONE,
+        scene_name=generator.choice(("disk", "two", "three")),
+        method=generator.choice(("minimax", "ipopt", "tracked")),
+        robust=generator.random() < 0.1,
+        reached=generator.random() < 0.9,
+        feasible=generator.random() < 0.95,
+        peak=peak,
+        objective=peak,
+        band_hz=generator.choice((None, generator.uniform(0.0, 100.0))),
+        work=generator.uniform(2.0, 60.0),
+        seconds=generator.uniform(0.0, 1.0),
+        variables=tuple(variable(n, None if peak is None else generator.uniform(0.0, 1000.0)) for n in names),
+    )
+
+
+def fill(database: Database, records: list[DesignRecord]) -> list[str]:
+    jobs, ids = JobRepository(database), []
+    for record in records:
+        job, _ = jobs.submit(NEW, queue_limit=10**9)
+        with database.writing() as connection:
+            insert_design(connection, job.id, record, utc_now())
+        ids.append(job.id)
+    return ids
+
+
+Filled = tuple[Database, dict[str, DesignRecord]]
+
+
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Filled]:
+    url = f"sqlite:///{tmp_path_factory.mktemp('designs')}/jobs.db"
+    revisions.upgrade(url)
+    database = Database(url)
+    generator = random.Random(7)
+    records = [random_design(generator) for _ in range(400)]
+    yield database, dict(zip(fill(database, records), records, strict=True))
+    database.close()
+
+
+def meets(record: DesignRecord, query: dict[str, Any]) -> bool:
+    """The same conditions in plain Python."""
+    same = {"scene": "scene_name", "method": "method", "reached": "reached", "robust": "robust"}
+    ranges = {"peak": "peak", "band": "band_hz", "work": "work"}
+    values = [v.value for v in record.variables if query.get("variable") in (None, v.name)]
+    return (
+        all(getattr(record, column) == query[name] for name, column in same.items() if name in query)
+        and all(within(getattr(record, column), query, name) for name, column in ranges.items())
+        and any(within(value, query, "value") for value in values)
+    )
+
+
+def within(value: float | None, query: dict[str, Any], name: str) -> bool:
+    low, high = query.get(f"{name}_min"), query.get(f"{name}_max")
+    if low is None and high is None:
+        return True
+    return value is not None and (low is None or value >= low) and (high is None or value <= high)
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        {},
+        {"scene": "two", "reached": True},
+        {"scene": "nothing"},
+        {"scene": "disk", "peak_max": 0.5, "sort": "peak"},
+        {"variable": "damper.N0", "peak_max": 1.0, "sort": "-peak"},
+        {"variable": "damper.N0", "value_min": 100.0, "value_max": 200.0},
+        {"variable": "shroud.N0,root.N0", "sort": "created"},
+        {"variable": "nothing"},
+        {"value_min": 900.0, "sort": "work"},
+        {"band_max": 20.0, "sort": "band", "reached": False},
+        {"peak_min": 1.0, "peak_max": 1.0, "sort": "-seconds"},
+        {"method": "ipopt", "robust": True, "sort": "-objective"},
+        {"work_min": 50.0, "work_max": 51.0, "sort": "-work"},
+    ],
+)
+def test_filters_sorts_and_pages(filled: Filled, query: dict[str, Any]) -> None:
+    database, records = filled
+    repository, settings = DesignRepository(database), load_settings()
+    found: list[str] = []
+    asked = DesignQuery(**{"limit": 37, **query})
+    while True:
+        page = design_page(repository, asked, settings)
+        found += [item.id for item in page.items]
+        if page.next is None:
+            break
+        asked = asked.model_copy(update={"cursor": page.next.rpartition("cursor=")[2]})
+    sort = query.get("sort", "-created")
+    name, down = sort.removeprefix("-"), sort.startswith("-")
+    column = {"band": "band_hz"}.get(name, name)
+    wanted = [
+        design
+        for design, record in records.items()
+        if meets(record, query) and (name == "created" or getattr(record, column) is not None)
+    ]
+    key = (lambda i: (getattr(records[i], column), i)) if name != "created" else (lambda i: (0.0, i))
+    assert found == sorted(wanted, key=key, reverse=down)
+
+
+def test_a_design_is_answered_as_it_was_stored(filled: Filled) -> None:
+    database, records = filled
+    page = design_page(DesignRepository(database), DesignQuery(limit=50), load_settings())
+    for item in page.items:
+        record = records[item.id]
+        assert (item.scene, item.reached, item.band_hz) == (record.scene_name, record.reached, record.band_hz)
+        assert (item.peak is None) == (record.peak is None)
+        assert list(item.variables) == [v.name for v in record.variables]
+        assert [v.value for v in item.variables.values()] == [v.value for v in record.variables]
+
+
+@pytest.mark.parametrize("bad", [{"colour": "red"}, {"sort": "colour"}, {"limit": 0}, {"peak_max": "high"}])
+def test_an_unknown_filter_is_refused(bad: dict[str, Any]) -> None:
+    with pytest.raises(InvalidRequestError, match=next(iter(bad))):
+        validated(DesignQuery, bad)
+
+
+def test_a_cursor_that_is_none(filled: Filled) -> None:
+    with pytest.raises(InvalidRequestError, match="must come from the `next` link"):
+        design_page(DesignRepository(filled[0]), DesignQuery(cursor="W10"), load_settings())
+
+
+PROBLEM: dict[str, Any] = {
+    "scene": "two-dof",
+    "set": {"damper.mu": 0.28},
+    "variables": {"damper.N0": [20, 1000]},
+    "cases": [{"name": "all"}, {"name": "low", "band": [0.4, 1.6], "weight": 0.9}],
+    "limit": 2.0,
+    "max_band_hz": 0.3,
+    "contact_states": {"damper": "never-separates"},
+    "harmonics": 5,
+}
+
+
+@pytest.fixture(scope="module")
+def designed(shipped: httpx.Client) -> dict[str, Any]:
+    answer = shipped.post("/v1/designs", json=PROBLEM, headers=WAIT)
+    assert answer.status_code == 200, answer.text
+    return answer.json()
+
+
+def test_the_same_problem_has_the_same_optimum_in_python_rest_and_the_command(
+    designed: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from service.cli import main
+
+    (tmp_path / "problem.json").write_text(json.dumps(PROBLEM))
+    assert main(["design", "--problem", str(tmp_path / "problem.json"), "--json"]) == 0
+    by_command = json.loads(capsys.readouterr().out)
+    keys = {key: value for key, value in PROBLEM.items() if key not in ("scene", "set")}
+    by_python = optim.design(solver.load_scene("two-dof").with_values(PROBLEM["set"]), **keys)
+    assert by_python.reached
+    for answer in (by_command, designed["result"]):
+        assert answer["optimum"]["damper.N0"] == pytest.approx(by_python.optimum["damper.N0"], rel=1e-12)
+        assert answer["objective"] == pytest.approx(by_python.to_json()["objective"], rel=1e-12)
+        assert [row["case"] for row in answer["rows"] if row["quantity"] == "band"] == ["all", "low"]
+
+
+def test_a_finished_design_is_stored_whole(shipped: httpx.Client, designed: dict[str, Any]) -> None:
+    answer = shipped.get(designed["links"]["design"])
+    found, result = answer.json(), designed["result"]
+    assert found["result"] == result
+    assert found["problem"]["max_band_hz"] == PROBLEM["max_band_hz"]
+    assert (found["scene"], found["reached"], found["feasible"]) == ("two-dof", True, True)
+    assert found["peak"] == result["peak"]
+    assert found["objective"] == result["objective"]
+    assert found["work"] == result["work"]
+    optimum = result["optimum"]["damper.N0"]
+    assert found["variables"] == {"damper.N0": {"value": optimum, "low": 20.0, "high": 1000.0}}
+    tag = answer.headers["ETag"]
+    assert tag.startswith('"')
+    same = shipped.get(designed["links"]["design"], headers={"If-None-Match": f'"other", {tag}'})
+    assert (same.status_code, same.content, same.headers["ETag"]) == (304, b"", tag)
+    again = shipped.post("/v1/designs", json=PROBLEM).json()
+    assert shipped.get(f"/v1/designs/{again['id']}").json() == found, (
+        "the same asked again is the same design"
+    )
+
+
+def test_stored_designs_are_listed_over_http(shipped: httpx.Client, designed: dict[str, Any]) -> None:
+    query = {"scene": "two-dof", "variable": "damper.N0", "peak_max": 3, "band_max": 1, "reached": "true"}
+    items = shipped.get("/v1/designs", params={**query, "sort": "peak"}).json()["items"]
+    assert designed["id"] in [item["id"] for item in items]
+    assert shipped.get("/v1/designs", params={**query, "peak_max": 1e-3}).json() == {
+        "items": [],
+        "next": None,
+    }
+    with Client(str(shipped.base_url)) as client:
+        assert [one.id for one in client.designs(**query, limit=1)] == [item["id"] for item in items[::-1]]
+        assert isinstance(client.design(designed["id"]), DesignDetail)
+    problem = is_problem(shipped.get("/v1/designs", params={"colour": "red"}), 422)
+    assert problem["errors"][0]["pointer"] == "/colour"
+    is_problem(shipped.get("/v1/designs/nobody"), 404)
+    march = shipped.post(
+        "/v1/jobs", json={"kind": "solve", "scene": "two-dof", "frequency_hz": 1}, headers=WAIT
+    )
+    is_problem(shipped.get(f"/v1/designs/{march.json()['id']}"), 404)
+
+
+def test_a_design_that_breaks_its_limit_is_stored_as_that() -> None:
+    result = optim.design(
+        solver.load_scene("two-dof"), variables={"damper.N0": (90.0, 110.0)}, limit=1.0, max_band_hz=0.01,
+        harmonics=3,
+    )  # fmt: skip
+    record = design_record(result)
+    assert (record.reached, record.feasible) == (False, False)
+    assert record.variables[0].value == result.optimum["damper.N0"]
+
+
+OLD = {
+    "scene": "two-dof", "optimum": {"damper.N0": 104.5}, "peak": {"value": 2.35, "at": 1.04},
+    "peaks": [{"value": 2.35, "at": 1.04}], "band_hz": 0.2, "limit": 1.66, "evaluations": 9, "seconds": 0.4,
+    "active": ["peak at 1.04 Hz"], "multipliers": [1.0], "optimality": 1e-9, "reached": True,
+    "status": "The highest peak can not be lowered further within the bounds.",
+}  # fmt: skip
+
+
+def old_job(
+    path: str, name: str, kind: str, spec: dict[str, Any], body: dict[str, Any] | None, finished: str | None
+) -> None:
+    state = "successful" if body is not None else "dismissed"
+    connection = sqlite3.connect(path)
+    connection.execute(
+        "INSERT INTO job (id, kind, state, priority, scene_name, scene_hash, spec_hash, request_hash, "
+        "attempt, max_attempts, cancel_requested, progress, points, created, finished, request, spec) "
+        "VALUES (?, ?, ?, 0, 'two-dof', 'abc', '', '', 1, 3, 0, 1.0, 0, '2026-01-02 03:04:05.000000', ?, '{}', "
+        "?)",
+        (name, kind, state, finished, json.dumps(spec)),
+    )
+    if body is not None:
+        connection.execute("INSERT INTO job_result (job_id, body) VALUES (?, ?)", (name, json.dumps(body)))
+    connection.commit()
+    connection.close()
+
+
+def test_the_designs_of_an_old_file_are_filled_in_and_can_be_taken_back(tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path}/jobs.db"
+    path = url.removeprefix("sqlite:///")
+    revisions.upgrade(url, "0001")
+    spec = {"variables": {"damper.N0": [20.0, 1000.0]}, "limit": None, "max_band_hz": None, "harmonics": 7}
+    end = "2026-01-02 03:04:06.500000"
+    old_job(path, "a", "design", spec, OLD, end)
+    old_job(path, "b", "design", {**spec, "max_band_hz": 0.1}, {**OLD, "reached": False}, end)
+    old_job(path, "c", "design", spec, {**OLD, "optimum": {}, "peak": None, "reached": False}, end)
+    old_job(path, "d", "design", spec, None, end)
+    old_job(path, "e", "sweep", {}, {"points": 3}, end)
+    new = {**OLD, "method": "ipopt", "objective": 3.5, "work": 14.0, "conditions": {"violation": 0.0}}
+    old_job(path, "f", "design", {**spec, "max_band_hz": 0.1}, new, end)
+    for number in range(450):
+        old_job(path, f"g{number:03d}", "design", spec, OLD, None)
+    assert revisions.upgrade(url) == revisions.head_revision()
+    database = Database(url)
+    repository = DesignRepository(database)
+    rows = {row.job_id: row for row in repository.page(DesignQuery().to_filter(), 1000)}
+    variables = repository.variables(list(rows))
+    database.close()
+    assert len(rows) == 4 + 450
+    first = rows["a"]
+    assert (first.method, first.objective, first.peak, first.peak_at) == ("minimax", 2.35, 2.35, 1.04)
+    assert (first.harmonics, first.evaluations, first.scene_hash) == (7, 9, "abc")
+    assert first.created.isoformat() == "2026-01-02T03:04:06.500000+00:00"
+    assert rows["g449"].created.isoformat() == "2026-01-02T03:04:05+00:00"
+    assert variables["a"] == [VariableValues(name="damper.N0", value=104.5, low=20.0, high=1000.0)]
+    assert [rows[name].feasible for name in "abcf"] == [True, False, False, True]
+    assert (rows["c"].peak, variables["c"][0].value) == (None, None)
+    assert (rows["f"].method, rows["f"].objective, rows["f"].work) == ("ipopt", 3.5, 14.0)
+
+    engine = migration_engine(url)
+    config = revisions._config()
+    with engine.begin() as connection:
+        config.attributes["connection"] = connection
+        command.downgrade(config, "0001")
+    engine.dispose()
+    connection = sqlite3.connect(path)
+    tables = {row[0] for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+    assert not tables & {"design", "design_variable"}
+    assert connection.execute("SELECT count(*) FROM job_result").fetchone() == (455,)
+    connection.close()
+    assert revisions.upgrade(url) == revisions.head_revision()
+
+
+@pytest.mark.long
+def test_twenty_thousand_designs_are_listed_within_50_ms(tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path}/jobs.db"
+    revisions.upgrade(url)
+    database = Database(url)
+    generator = random.Random(1)
+    fill(database, [random_design(generator) for _ in range(20_000)])
+    repository, settings = DesignRepository(database), load_settings()
+    for query in (
+        {}, {"scene": "disk", "peak_max": 0.05}, {"variable": "damper.N0", "value_max": 1.0},
+        {"variable": "damper.N0", "sort": "peak"}, {"reached": False, "sort": "-work"}, {"peak_min": 1e9},
+    ):  # fmt: skip
+        times = []
+        for _ in range(5):
+            begin = time.perf_counter()
+            design_page(repository, DesignQuery(**query), settings)
+            times.append(time.perf_counter() - begin)
+        assert min(times) < 0.05, query
+    database.close()
