@@ -273,8 +273,8 @@ def old_job(
     connection.execute(
         "INSERT INTO job (id, kind, state, priority, scene_name, scene_hash, spec_hash, request_hash, "
         "attempt, max_attempts, cancel_requested, progress, points, created, finished, request, spec) "
-        "VALUES (?, ?, ?, 0, 'two-dof', 'abc', '', '', 1, 3, 0, 1.0, 0, '2026-01-02 03:04:05.000000', ?, '{}', "
-        "?)",
+        "VALUES (?, ?, ?, 0, 'two-dof', 'abc', '', '', 1, 3, 0, 1.0, 0, '2026-01-02 03:04:05.000000', ?, "
+        "'{}', ?)",
         (name, kind, state, finished, json.dumps(spec)),
     )
     if body is not None:

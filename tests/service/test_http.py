@@ -13,6 +13,7 @@ import pytest
 from service_helpers import is_problem, job_ids, until
 from starlette.requests import Request
 
+from service import revisions
 from service.client import Client
 from service.errors import QueueFullError, ServiceProblem
 from service.models import JobState
@@ -231,7 +232,7 @@ def test_health_and_description(http: httpx.Client) -> None:
     health = http.get("/health/ready").json()
     assert health["ready"]
     assert (health["workers"], health["workers_ready"]) == (1, 1)
-    assert health["revision"] == "0001"
+    assert health["revision"] == revisions.head_revision()
     assert health["database_version"].count(".") == 2
 
 
