@@ -10,12 +10,15 @@ if TYPE_CHECKING:
     from optim.crossings import CampbellDiagram, CampbellStatus
     from optim.errors import DesignError
     from optim.result import DesignResult, DesignStatus
+    from optim.robust import robust_design
+    from optim.robust_result import RobustResult, RobustStatus
     from optim.search import design
 
 _HOME = {
     "design": "search", "DesignResult": "result", "DesignStatus": "result", "DesignError": "errors",
     "CampbellDiagram": "crossings", "CampbellStatus": "crossings", "campbell_diagram": "campbell",
     "forbidden_hz": "campbell",
+    "robust_design": "robust", "RobustResult": "robust_result", "RobustStatus": "robust_result",
 }  # fmt: skip
 
 __all__ = [
@@ -24,9 +27,12 @@ __all__ = [
     "DesignError",
     "DesignResult",
     "DesignStatus",
+    "RobustResult",
+    "RobustStatus",
     "campbell_diagram",
     "design",
     "forbidden_hz",
+    "robust_design",
 ]
 
 

@@ -10,6 +10,7 @@ Reference: Conn, Gould, Toint, Trust-Region Methods (SIAM
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from optim.model import Model
 from optim.rows import Evaluation, Row, nearest
 from optim.subproblem import Step, solve_subproblem
 from optim.variables import Real, Variable, snapped, unscaled
+Subproblem = Callable[[Model, Real, float], Step | None]
 
 FIRST_RADIUS = 0.1
 LARGEST_RADIUS = 0.5
@@ -34,8 +36,9 @@ NOTHING = 1e-9  # multipliers below it are rounding of the conic solver
 
 
 def minimax_search(
-    evaluate: Evaluate, variables: tuple[Variable, ...], begin: Evaluation, model_of: ModelOf
-) -> Local:
+    evaluate: Evaluate, variables: tuple[Variable, ...], begin: Evaluation, model_of: ModelOf, *,
+    solve: Subproblem | None = None, norm: float = np.inf, remembered: int = REMEMBERED,
+) -> Local:  # fmt: skip
     """Improve a design until no first-order decrease is left.
 
     Parameters
@@ -44,14 +47,18 @@ def minimax_search(
     variables : the design variables.
     begin : a good evaluation to start from.
     model_of : the model of an evaluation.
+    solve : the convex subproblem; that of `optim.subproblem` if left out.
+    norm : in which its trust region is round.
+    remembered : designs whose rows are kept as cuts.
     """
+    solve = solve or solve_subproblem
     n = len(variables)
     here, model = begin, model_of(begin)
     hessian, radius = np.zeros((n, n)), FIRST_RADIUS
-    seen: deque[Model] = deque(maxlen=REMEMBERED)
+    seen: deque[Model] = deque(maxlen=remembered)
     for _ in range(MOST_STEPS):
         known = with_cuts(model, seen, CUTS_REACH * radius)
-        step = solve_subproblem(known, _root(hessian), radius)
+        step = solve(known, _root(hessian), radius)
         if step is None:
             break
         decrease = model.merit - step.predicted
@@ -67,7 +74,7 @@ def minimax_search(
         if fresh.smooth:
             hessian = _curvature(model, fresh, _pulls(known, step), hessian, accepted=ratio > ENOUGH)
             seen.append(model if ratio > ENOUGH else fresh)
-        size = float(np.abs(step.step).max())
+        size = float(np.linalg.norm(step.step, norm))
         if ratio > 0.75 and size > 0.9 * radius:
             radius = min(2.0 * radius, LARGEST_RADIUS)
         elif ratio < 0.25:

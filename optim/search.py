@@ -176,7 +176,7 @@ def solve_problem(
 
 def _search(search: Search, found: list[Local]) -> DesignStatus:
     """Run the coarse stage, then a local search from the best designs of it that lie in different basins."""
-    for values in _coarse(search.problem):
+    for values in coarse(search.problem):
         search(values)
     if len(search.variables) == 1:
         for values in _between(search):
@@ -210,7 +210,7 @@ def judge(best: Local) -> DesignStatus:
     return DesignStatus.OPTIMAL if best.settled else DesignStatus.KINK
 
 
-def _coarse(problem: Problem) -> list[dict[str, float]]:
+def coarse(problem: Problem) -> list[dict[str, float]]:
     """Return the designs of the coarse stage: even in scaled variables, the start first."""
     n = len(problem.variables)
     if n == 1:

@@ -1,0 +1,128 @@
+"""The master problem of a robust search: a second-order cone programme, built once with CVXPY.
+
+    minimise   Σ t_g + w + penalty · s
+    subject to aᵢ + gᵢᵀ d ≤ t_g(i)             every competing row i of every scenario, in groups g
+               bⱼ + hⱼᵀ d ≤ s, s ≥ least       every limited row j, as relative excess over its bound
+               ‖(√2 R d, w − 1)‖ ≤ w + 1       that is ½ |R d|² ≤ w
+               ‖d‖ ≤ 1                         trust region
+               low ≤ d ≤ high                  bounds
+
+d is the step in scaled variables, in units of the radius, and rows are in units of what they change by within
+it, counted from the largest (the conic solver's tolerances are absolute); RᵀR is the convex part of the
+Hessian of the Lagrangian. With the many scenarios of a
+mean every scenario is a group of its own; the number of rows in a group is padded, so that a problem is
+compiled once for each shape and kept for the whole process.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from functools import lru_cache
+
+import cvxpy
+import numpy as np
+
+from optim.model import PENALTY, Model
+from optim.subproblem import Step
+from optim.variables import Real
+
+_BLOCK = 4  # rows are padded to multiples of it
+_LEAST = 1e-200  # unit of rows that do not change at all
+_LOCK = threading.Lock()  # a problem keeps its numbers in itself
+
+
+def solve_cone(model: Model, root: Real, radius: float) -> Step | None:
+    """Solve the master problem of a model; None if the conic solver did not reach optimality.
+
+    Parameters
+    ----------
+    model : rows of the present design.
+    root : (n, n) R.
+    radius : of the trust region, in scaled variables.
+    """
+    groups = np.unique(model.groups)
+    most = max(int((model.groups == g).sum()) for g in groups)
+    with _LOCK:
+        cone = _cone(model.z.size, groups.size, _padded(most), _padded(model.excess.size))
+        return cone.solve(model, root, radius)
+
+
+def _padded(count: int) -> int:
+    return -(-count // _BLOCK) * _BLOCK
+
+
+@lru_cache(maxsize=32)
+def _cone(n: int, groups: int, rows: int, limited: int) -> _Cone:
+    return _Cone(n, groups, rows, limited)
+
+
+class _Cone:
+    """The parametrised problem for n variables, so many rows in each group, so many limited rows."""
+
+    def __init__(self, n: int, groups: int, rows: int, limited: int) -> None:
+        self._d, self._t, self._w = cvxpy.Variable(n), cvxpy.Variable(groups), cvxpy.Variable()
+        self._heights, self._slopes = cvxpy.Parameter(groups * rows), cvxpy.Parameter((groups * rows, n))
+        self._root, self._low, self._high = cvxpy.Parameter((n, n)), cvxpy.Parameter(n), cvxpy.Parameter(n)
+        self._rows_each, self._limited = rows, limited
+        owner = np.repeat(np.eye(groups), rows, axis=0)
+        self._row = self._heights + self._slopes @ self._d <= owner @ self._t
+        curved = cvxpy.hstack([math.sqrt(2.0) * (self._root @ self._d), self._w - 1.0])
+        constraints = [
+            self._row, cvxpy.SOC(self._w + 1.0, curved), cvxpy.SOC(cvxpy.Constant(1.0), self._d),
+            self._low <= self._d, self._d <= self._high,
+        ]  # fmt: skip
+        objective = cvxpy.sum(self._t) + self._w
+        if limited:
+            self._s, self._least = cvxpy.Variable(), cvxpy.Parameter()
+            self._excess, self._excess_slopes = cvxpy.Parameter(limited), cvxpy.Parameter((limited, n))
+            self._price = cvxpy.Parameter(nonneg=True)
+            self._limit_row = self._excess + self._excess_slopes @ self._d <= self._s
+            constraints += [self._limit_row, self._least <= self._s]
+            objective = objective + self._price * self._s
+        self._problem = cvxpy.Problem(cvxpy.Minimize(objective), constraints)
+
+    def solve(self, model: Model, root: Real, radius: float) -> Step | None:
+        """Solve with the numbers of a model."""
+        far = -3.0 * model.z.size  # a row that far below the largest can not reach it within the radius
+        unit = max(radius * float(np.abs(model.slopes).max(initial=0.0)), _LEAST)
+        places = [np.flatnonzero(model.groups == g) for g in np.unique(model.groups)]
+        spread = np.concatenate([np.resize(mine, self._rows_each) for mine in places])
+        tops = np.repeat([model.heights[mine].max() for mine in places], self._rows_each)
+        self._heights.value = np.maximum((model.heights[spread] - tops) / unit, far)
+        self._slopes.value = radius / unit * model.slopes[spread]
+        again = np.resize(np.arange(model.excess.size), self._limited)
+        limit_unit = max(radius * float(np.abs(model.excess_slopes).max(initial=0.0)), _LEAST)
+        if self._limited:
+            below = (model.excess[again] - model.violation) / limit_unit
+            self._excess.value = np.maximum(below, far)
+            self._excess_slopes.value = radius / limit_unit * model.excess_slopes[again]
+            self._least.value = max(-model.violation / limit_unit, 2.0 * far)
+            self._price.value = PENALTY * limit_unit / unit
+        self._root.value = radius / math.sqrt(unit) * root
+        low, high = np.maximum(-model.z / radius, -1.0), np.minimum((1.0 - model.z) / radius, 1.0)
+        self._low.value, self._high.value = low, high
+        if not self._solved():
+            return None
+        step = radius * np.clip(np.asarray(self._d.value, dtype=np.float64), low, high)
+        multipliers, limit_multipliers = np.zeros(model.heights.size), np.zeros(model.excess.size)
+        np.add.at(multipliers, spread, _dual(self._row))
+        if self._limited:
+            np.add.at(limit_multipliers, again, _dual(self._limit_row) * unit / limit_unit)
+        return Step(
+            step=step, predicted=model.predicted(step), multipliers=multipliers,
+            limit_multipliers=limit_multipliers,
+        )  # fmt: skip
+
+    def _solved(self) -> bool:
+        """Run the conic solver; return whether it reached optimality."""
+        try:
+            self._problem.solve(solver=cvxpy.CLARABEL, warm_start=False)
+        except cvxpy.SolverError:
+            return False
+        return self._problem.status in (cvxpy.OPTIMAL, cvxpy.OPTIMAL_INACCURATE) and self._d.value is not None
+
+
+def _dual(row: cvxpy.Constraint) -> Real:
+    """Return the multipliers of some rows; those below 0 are rounding."""
+    return np.maximum(np.asarray(row.dual_value, dtype=np.float64), 0.0)
