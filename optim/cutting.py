@@ -13,8 +13,9 @@ from optim.robust_result import Cut, RobustStatus
 from optim.robust_search import RobustSearch
 from optim.rows import Evaluation, Quantity
 from optim.scenarios import Outcome, number_of
-from optim.search import coarse
+from optim.search import SAME_PLACE, coarse
 from optim.uncertain import Scenario
+from optim.variables import scaled
 
 CLOSED = (
     1e-6  # relative excess of the worst scenario found over the master problem's, up to which it is solved
@@ -136,11 +137,9 @@ def _distinct(worse: Sequence[Outcome]) -> list[Outcome]:
     """Return the worst scenarios that differ: a climb ends in a cloud of them."""
     kept: list[Outcome] = []
     for found in worse:
-        near = [
-            other for other in kept
-            if other.scenario.disk == found.scenario.disk and math.dist(other.scenario.xi, found.scenario.xi) < CLOUD
-        ]  # fmt: skip
-        if len(kept) < AT_ONCE and not (near and found.scenario.xi):
+        here = found.scenario
+        same = [other.scenario for other in kept if here.xi and other.scenario.disk == here.disk]
+        if len(kept) < AT_ONCE and all(math.dist(other.xi, here.xi) >= CLOUD for other in same):
             kept.append(found)
     return kept
 
@@ -224,8 +223,15 @@ def _locals(
         if len(found) < STARTS and all(math.dist(z, other) > FAR_APART for other in places):
             places.append(z)
             local = search.improve(begin.values, scenarios)
-            found += [] if local is None else [local]
+            if local is not None and all(_apart(search, local, other) for other in found):
+                found.append(local)
     return found, None
+
+
+def _apart(search: RobustSearch, one: Local, other: Local) -> bool:
+    """Return whether two local optima are two."""
+    places = [scaled(search.variables, local.evaluation.values) for local in (one, other)]
+    return math.dist(*places) > SAME_PLACE
 
 
 def _ended(best: Local) -> RobustStatus:

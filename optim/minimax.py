@@ -21,6 +21,7 @@ from optim.model import Model
 from optim.rows import Evaluation, Row, nearest
 from optim.subproblem import Step, solve_subproblem
 from optim.variables import Real, Variable, snapped, unscaled
+
 Subproblem = Callable[[Model, Real, float], Step | None]
 
 FIRST_RADIUS = 0.1

@@ -45,8 +45,8 @@ class RobustStatus(Enum):
         "more harmonics, a narrower band, or a smaller uncertainty."
     )
     NOT_CLOSED = (
-        "The cuts did not close: worse scenarios than those the design was made for are left, the gap says by "
-        "how much; narrow the uncertainty or use more harmonics."
+        "The cuts did not close: worse scenarios than those the design was made for are left, the gap says "
+        "by how much; narrow the uncertainty or use more harmonics."
     )
     TOO_MANY = "The largest number of responses was used up before the search settled: allow more."
     STOPPED = "The search was stopped by the caller."

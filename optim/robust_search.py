@@ -106,8 +106,16 @@ class RobustSearch:
         begin = self.evaluation(values, scenarios)
         if not begin.good:
             return None
-        # Rows of a scenario that a quantile leaves out here must not come back as cuts.
-        remembered = 0 if self.aim is Aim.QUANTILE else REMEMBERED
+        found = self._searched(begin, scenarios, 0)
+        # Cuts help at kinks, but with many scenarios a row bent over a long step passes for one of its own;
+        # rows of scenarios that a quantile leaves out must not come back as cuts at all.
+        if not found.settled and self.aim is not Aim.QUANTILE:
+            again = self._searched(found.evaluation, scenarios, REMEMBERED)
+            found = min(found, again, key=lambda local: (local.merit, not local.settled))
+        return found
+
+    def _searched(self, begin: Evaluation, scenarios: Sequence[Scenario], remembered: int) -> Local:
+        """Return the end of the minimax search over scenarios that keeps so many designs' rows as cuts."""
         return minimax_search(
             lambda there: self.evaluation(there, scenarios), self.variables, begin,
             lambda evaluation: self.model(evaluation, len(scenarios)), solve=solve_cone, norm=EUCLIDEAN,

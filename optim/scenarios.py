@@ -82,7 +82,10 @@ def outcome(
             by_delta.append(chain.by_delta(row.gradient))
     n = len(scenario.settings)
     return Outcome(
-        scenario=scenario, rows=tuple(rows), by_delta=np.array(by_delta).reshape(len(rows), n), responses=responses
+        scenario=scenario,
+        rows=tuple(rows),
+        by_delta=np.array(by_delta).reshape(len(rows), n),
+        responses=responses,
     )
 
 
@@ -121,7 +124,7 @@ class _Chain:
         return list(evaluation.rows), len(evaluation.responses)
 
     def _members(self) -> Real:
-        """Return d path / d variable, (n_variables, n_paths): no number is uncertain by more than a factor."""
+        """Return d path / d variable, (n_variables, n_paths); its own derivatives are 0."""
         table = np.zeros((len(self._problem.variables), len(self._places)))
         for i, variable in enumerate(self._problem.variables):
             for path in variable.paths:
@@ -161,7 +164,7 @@ def _single(values: Mapping[str, float]) -> tuple[Variable, ...]:
 def _of_all_blades(
     problem: Problem, case: Case, values: Mapping[str, float], gradients: bool, should_stop: ShouldStop
 ) -> tuple[list[Row], int]:
-    """Return the rows of a mistuned disk: those of the observed DOF in every sector, from one response each."""
+    """Return the rows of a mistuned disk: those of the observed DOF in every sector, from one response."""
     here = case.scene.with_values(values)
     effects = effects_of(problem, here)
     sectors, dof = here.structure.sectors, here.observe.dof  # type: ignore[union-attr]

@@ -1,4 +1,4 @@
-"""A design over the uncertainty: nominal peak, worst peak and its scenario, mean and quantiles over samples."""
+"""A design over the uncertainty: nominal peak, worst peak with its scenario, mean and quantiles."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _worst(
 def _feasible(
     search: RobustSearch, values: Mapping[str, float], samples: Sequence[Outcome], known: Sequence[Scenario]
 ) -> bool:
-    """Return whether the limits are kept: in every scenario tried, with a quantile in its share of samples."""
+    """Return whether the limits are kept in every scenario tried, with a quantile in its share of samples."""
     excess = [_excess(search, found.rows) for found in samples]
     if search.aim is Aim.QUANTILE:
         return sorted(excess)[rank_of(search.quantile, len(excess)) - 1] <= KEPT

@@ -274,7 +274,7 @@ class UncertainSet:
         return Scenario(settings=settings, disk=disk, xi=tuple(float(x) for x in place))
 
     def corners(self, most: int) -> tuple[tuple[float, ...], ...]:
-        """Return the corners of the unit box, or the ends of the axes of the ball; none if more than `most`."""
+        """Return the corners of the box, or the ends of the axes of the ball; none if more than `most`."""
         n = len(self.coordinates)
         count = 2**n if self.shape is Shape.BOX else 2 * n
         if self.finite or count > most:

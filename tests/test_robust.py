@@ -1,0 +1,375 @@
+"""Robust design: worst case against brute force, mean and quantiles against sampling, statuses, bad input."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+
+import optim
+import solver
+from optim.pessimise import Aspect, UnknownScenarioError, pessimise
+from optim.problem import pose
+from optim.robust_result import RobustStatus
+from optim.rows import Quantity, Row
+from optim.scenarios import Outcome, outcome
+from optim.uncertain import Scenario, Shape, UncertainSet
+from optim.uncertainty import read_uncertain
+from solver.observations import observing
+
+N0 = {"damper.N0": (60.0, 300.0)}
+KT_AND_MU = {"damper.kt": {"deviation": 0.2}, "damper.mu": [0.2, 0.4]}
+TWO = solver.load_scene("two-dof")
+
+
+def peak_at(values: dict[str, float]) -> float:
+    """The highest peak with some values of the scene, by a sweep."""
+    branch = solver.sweep(TWO.with_values(values))
+    assert branch.peak is not None
+    return branch.peak.value
+
+
+@cache
+def worst_case() -> optim.RobustResult:
+    return optim.robust_design(TWO, uncertain=KT_AND_MU, variables=N0, samples=12)
+
+
+def test_the_worst_case_is_that_of_a_grid_over_the_intervals() -> None:
+    result = worst_case()
+    assert result.status is RobustStatus.OPTIMAL
+    assert result.robust is not None
+    grid = [
+        peak_at({"damper.N0": result.optimum["damper.N0"], "damper.kt": kt, "damper.mu": mu})
+        for kt, mu in itertools.product(np.linspace(24.0, 36.0, 7), np.linspace(0.2, 0.4, 7))
+    ]
+    assert result.robust.worst_peak == pytest.approx(max(grid), rel=1e-6)
+    assert result.objective == pytest.approx(result.robust.worst_peak, rel=1e-6)
+    assert 0.0 <= result.gap <= 1e-6
+
+
+def test_no_neighbour_has_a_lower_worst_case() -> None:
+    result = worst_case()
+    for factor in (0.8, 0.95, 0.99, 0.999, 1.001, 1.01, 1.05, 1.25):
+        corners = [
+            peak_at({"damper.N0": factor * result.optimum["damper.N0"], "damper.kt": kt, "damper.mu": mu})
+            for kt, mu in itertools.product((24.0, 36.0), (0.2, 0.4))
+        ]
+        assert max(corners) >= result.objective * (1.0 - 1e-8)
+
+
+def test_the_robust_optimum_stands_beside_the_nominal_one() -> None:
+    result = worst_case()
+    assert result.nominal is not None
+    assert result.robust is not None
+    assert result.nominal.peak < result.robust.peak < result.robust.worst_peak < result.nominal.worst_peak
+    assert result.gain == pytest.approx(1.0 - result.robust.worst_peak / result.nominal.worst_peak)
+    for side in (result.nominal, result.robust):
+        assert side.spread.mean <= side.spread.quantile(0.95) <= side.worst_peak
+        assert side.peak == pytest.approx(peak_at(dict(side.values)), rel=1e-9)
+    held = [cut for cut in result.cuts if cut.multiplier > 0.0]
+    assert sum(cut.multiplier for cut in held) == pytest.approx(1.0)
+    assert len(held) == 2, "two scenarios are equally bad at this optimum"
+
+
+def test_a_load_that_is_only_met_within_ten_per_cent() -> None:
+    result = optim.robust_design(TWO, uncertain={"damper.N0": {"deviation": 0.1}}, variables=N0, samples=4)
+    assert result.status is RobustStatus.OPTIMAL
+    ends = [peak_at({"damper.N0": result.optimum["damper.N0"] * share}) for share in np.linspace(0.9, 1.1, 9)]
+    assert result.objective == pytest.approx(max(ends), rel=1e-6)
+    for factor in (0.97, 0.995, 1.005, 1.03):
+        there = factor * result.optimum["damper.N0"]
+        assert max(peak_at({"damper.N0": s * there}) for s in (0.9, 1.1)) >= result.objective * (1.0 - 1e-8)
+
+
+def test_the_worst_of_an_ellipsoid_lies_on_its_edge() -> None:
+    half_axes = {"damper.kt": 0.2, "damper.mu": 0.3}
+    problem = pose(TWO, variables=N0)
+    over = read_uncertain(TWO, problem.variables, {"half_axes": half_axes, "relative": True})
+    values = {"damper.N0": 105.0}
+    aspect = Aspect(quantity=Quantity.PEAK, limited=False)
+    found = pessimise(lambda scenario: outcome(problem, values, scenario), over, aspect, ())
+    around = [
+        peak_at({"damper.N0": 105.0, "damper.kt": 30.0 * (1 + 0.2 * x), "damper.mu": 0.3 * (1 + 0.3 * y)})
+        for x, y in ((math.cos(t), math.sin(t)) for t in np.linspace(0.0, 2.0 * math.pi, 48))
+    ]
+    assert max(around) <= found.value <= max(around) * (1.0 + 1e-3)
+    assert np.linalg.norm(found.worst.scenario.xi) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_worst_of_samples_is_the_worst_of_them() -> None:
+    samples = [
+        {"damper.mu": mu, "damper.N0": {"deviation": d}} for mu, d in ((0.2, 0.1), (0.3, 0.0), (0.4, -0.1))
+    ]
+    result = optim.robust_design(TWO, uncertain=samples, variables=N0)
+    assert result.status is RobustStatus.OPTIMAL
+    each = [
+        peak_at({"damper.mu": mu, "damper.N0": result.optimum["damper.N0"] * (1.0 + d)})
+        for mu, d in ((0.2, 0.1), (0.3, 0.0), (0.4, -0.1))
+    ]
+    assert result.objective == pytest.approx(max(each), rel=1e-9)
+    assert result.robust is not None
+    assert result.robust.spread.peaks == pytest.approx(each, rel=1e-9)
+
+
+@pytest.mark.parametrize("aim", ["mean", "quantile"])
+def test_mean_and_quantile_are_those_of_the_samples_and_least(aim: str) -> None:
+    result = optim.robust_design(
+        TWO, uncertain=KT_AND_MU, variables=N0, aim=aim, quantile=0.75, samples=6, seed=3
+    )
+    assert result.status is RobustStatus.OPTIMAL
+    problem = pose(TWO, variables=N0)
+    drawn = read_uncertain(TWO, problem.variables, KT_AND_MU).draw(6, 3)
+
+    def direct(load: float) -> float:
+        peaks = []
+        for scenario in drawn:
+            (kt, by_kt), (mu, value) = scenario.settings
+            peaks.append(peak_at({"damper.N0": load, "damper.kt": 30.0 * (1.0 + by_kt), "damper.mu": value}))
+            assert (kt.name, mu.name) == ("damper.kt", "damper.mu")
+        return float(np.mean(peaks)) if aim == "mean" else sorted(peaks)[4]
+
+    best = direct(result.optimum["damper.N0"])
+    assert result.objective == pytest.approx(best, rel=1e-9)
+    assert all(
+        direct(f * result.optimum["damper.N0"]) >= best * (1.0 - 1e-9) for f in (0.98, 0.999, 1.001, 1.02)
+    )
+
+
+def test_slopes_by_design_and_by_uncertainty_are_those_of_differences() -> None:
+    variables = {"damper.N0": (60.0, 300.0), "structure.k2": (30.0, 50.0)}
+    problem = pose(TWO, variables=variables)
+    over = read_uncertain(
+        TWO, problem.variables,
+        {"damper.N0": {"deviation": 0.1}, "damper.mu": [0.2, 0.4],
+         "structure.k2": {"absolute_deviation": 2.0}, "excitation.amplitude": {"deviation": 0.2}},
+    )  # fmt: skip
+    xi, values = np.array([0.3, -0.4, 0.5, 0.2]), {"damper.N0": 140.0, "structure.k2": 39.0}
+    here = outcome(problem, values, over.scenario(xi))
+    by_xi = over.by_xi(here.by_delta[0])
+
+    def peak(values: dict[str, float], place: np.ndarray) -> float:
+        return outcome(problem, values, over.scenario(place), gradients=False).rows[0].value
+
+    for i in range(4):
+        unit = np.eye(4)[i]
+        central = difference(lambda h: peak(values, xi + h * unit), 2e-3)  # noqa: B023
+        assert by_xi[i] == pytest.approx(central, rel=1e-6)
+    for name, gradient in zip(variables, here.rows[0].gradient, strict=True):
+        central = difference(lambda h: peak({**values, name: values[name] + h}, xi), 1e-3 * values[name])  # noqa: B023
+        assert gradient == pytest.approx(central, rel=1e-6)
+
+
+def difference(f: Callable[[float], float], h: float) -> float:
+    """The derivative at 0 by central differences of fourth order."""
+    return (8.0 * (f(h) - f(-h)) - (f(2.0 * h) - f(-2.0 * h))) / (12.0 * h)
+
+
+def made_up(value: float, slope: np.ndarray, scenario: Scenario) -> Outcome:
+    row = Row(
+        quantity=Quantity.PEAK, case="a", what="peak", value=value, gradient=np.zeros(1), at_hz=1.0,
+        weight=1.0, bound=None,
+    )  # fmt: skip
+    return Outcome(scenario=scenario, rows=(row,), by_delta=slope[None, :], responses=1)
+
+
+@pytest.mark.parametrize("shape", [Shape.BOX, Shape.BALL])
+def test_a_worst_case_inside_the_set_is_found(shape: Shape) -> None:
+    given = {"damper.mu": [0.2, 0.4], "damper.kt": [20.0, 40.0]}
+    if shape is Shape.BALL:
+        given = {
+            "centre": {"damper.mu": 0.3, "damper.kt": 30.0},
+            "half_axes": {"damper.mu": 0.1, "damper.kt": 10.0},
+        }  # type: ignore[dict-item]
+    over = read_uncertain(TWO, (), given)
+    top, curved = np.array([0.31, 27.0]), np.array([100.0, 0.01])
+
+    def hill(scenario: Scenario) -> Outcome:
+        place = np.array([delta for _, delta in scenario.settings])
+        off = place - top
+        return made_up(5.0 - float(curved @ off**2), -2.0 * curved * off, scenario)
+
+    found = pessimise(hill, over, Aspect(quantity=Quantity.PEAK, limited=False), ())
+    assert found.value == pytest.approx(5.0, rel=1e-9)
+    assert [delta for _, delta in found.worst.scenario.settings] == pytest.approx(top, rel=1e-4)
+
+
+def test_a_scenario_without_response_is_never_a_value() -> None:
+    over = read_uncertain(TWO, (), {"damper.mu": [0.2, 0.4]})
+
+    def broken(scenario: Scenario) -> Outcome:
+        if scenario.xi == (1.0,):
+            return Outcome(scenario=scenario, rows=(), by_delta=np.zeros((0, 1)), responses=1)
+        return made_up(1.0, np.ones(1), scenario)
+
+    with pytest.raises(UnknownScenarioError, match=r"damper\.mu = 0\.4"):
+        pessimise(broken, over, Aspect(quantity=Quantity.PEAK, limited=False), ())
+
+
+def test_a_covariance_reaches_as_far_as_its_confidence_says() -> None:
+    over = read_uncertain(
+        TWO, (), {"centre": {"damper.mu": 0.3, "damper.kt": 30.0}, "covariance": [[1e-4, 0.0], [0.0, 1.0]]}
+    )
+    assert over.shape is Shape.NORMAL
+    assert over.reach() == pytest.approx(np.array([0.01, 1.0]) * math.sqrt(5.991464547))
+    drawn = np.array([[delta for _, delta in scenario.settings] for scenario in over.draw(2000, 1)])
+    assert drawn.mean(axis=0) == pytest.approx([0.3, 30.0], rel=1e-3)
+    assert np.cov(drawn.T)[[0, 1], [0, 1]] == pytest.approx([1e-4, 1.0], rel=0.05)
+    assert over.draw(5, 1) == over.draw(5, 1)
+
+
+def test_a_limit_is_kept_in_every_scenario() -> None:
+    result = optim.robust_design(
+        TWO, uncertain={"damper.mu": [0.25, 0.35]}, variables=N0, limit=1.5, max_band_hz=0.30, samples=4
+    )
+    assert result.status in (RobustStatus.OPTIMAL, RobustStatus.INFEASIBLE)
+    problem = pose(TWO, variables=N0, limit=1.5, max_band_hz=0.30)
+    bands = [
+        solver.sweep(TWO.with_values({**result.optimum, "damper.mu": mu}), limit=1.5).band.width  # type: ignore[union-attr]
+        for mu in np.linspace(0.25, 0.35, 11)
+    ]
+    assert problem.limits.band_hz == 0.30
+    assert (max(bands) <= 0.30 * (1.0 + 1e-5)) == (result.status is RobustStatus.OPTIMAL)
+
+
+def test_a_limit_that_no_design_keeps_says_so() -> None:
+    result = optim.robust_design(
+        TWO,
+        uncertain={"damper.mu": [0.25, 0.35]},
+        variables=N0,
+        limit=1.0,
+        max_band_hz=0.01,
+        samples=2,
+        harmonics=3,
+    )
+    assert result.status is RobustStatus.INFEASIBLE
+    assert result.robust is not None
+    assert not result.robust.feasible
+
+
+def test_without_friction_it_is_flat() -> None:
+    result = optim.robust_design(
+        TWO.with_values({"damper.mu": 0.0}), uncertain={"structure.k1": {"deviation": 0.1}}, variables=N0
+    )
+    assert result.status is RobustStatus.FLAT
+    assert not result.reached
+
+
+def test_it_can_be_stopped_at_any_time() -> None:
+    for after in (3, 60, 120):
+        asked = itertools.count()
+        result = optim.robust_design(
+            TWO, uncertain=KT_AND_MU, variables=N0, should_stop=lambda: next(asked) > after  # noqa: B023
+        )  # fmt: skip
+        assert result.status is RobustStatus.STOPPED
+        assert json.loads(json.dumps(result.to_json(), allow_nan=False))["reached"] is False
+
+
+def test_the_json_is_strict_and_progress_ends_at_one() -> None:
+    seen: list[float] = []
+    result = optim.robust_design(
+        TWO, uncertain=[{"damper.mu": 0.3}], variables=N0, on_progress=lambda share, _: seen.append(share)
+    )
+    assert seen[-1] == 1.0
+    assert seen == sorted(seen)
+    answer = json.loads(json.dumps(result.to_json(), allow_nan=False))
+    assert answer["robust"]["worst"]["peak"] == pytest.approx(answer["nominal"]["worst"]["peak"], rel=1e-6)
+    assert {"optimum", "nominal", "robust", "cuts", "gap", "status", "seconds", "responses"} <= set(answer)
+
+
+def small_disk() -> solver.Scene:
+    raw = solver.load_scene("bladed-disk").to_dict()
+    raw["structure"]["sectors"] = 3  # type: ignore[index]
+    raw["observe"]["band"] = [700.0, 820.0]  # type: ignore[index]
+    return solver.Scene.from_dict(raw)
+
+
+def test_the_worst_blade_of_a_mistuned_disk_counts() -> None:
+    scene, values = small_disk(), [1.0, 1.02, 0.97]
+    variables = {"shroud.N0": (100.0, 400.0)}
+    problem = pose(scene, variables=variables, harmonics=3)
+    over = read_uncertain(scene, problem.variables, {"mistuning": {"of": "tip", "values": [values]}})
+    found = outcome(problem, {"shroud.N0": 200.0}, over.all()[0])
+    written = solver.mistuned(scene, of="tip", values=values)
+    blades = solver.blade_peaks(written, dof="tip", harmonics=3)
+    for sector in range(3):
+        mine = [r.value for r in found.rows if r.quantity is Quantity.PEAK and f"tip@{sector}" in r.case]
+        assert max(mine) == pytest.approx(blades.value[sector], rel=1e-9)
+
+
+def test_another_blade_observed_on_a_branch_is_that_of_its_own_sweep() -> None:
+    written = solver.mistuned(small_disk(), of="tip", values=[1.0, 1.02, 0.97])
+    branch = solver.sweep(written, harmonics=3)
+    seen = observing(branch, "tip@2")
+    raw = written.to_dict()
+    raw["observe"]["dof"] = "tip@2"  # type: ignore[index]
+    own = solver.sweep(solver.Scene.from_dict(raw), harmonics=3)
+    assert [p.value for p in seen.peaks] == pytest.approx([p.value for p in own.peaks], rel=1e-9)
+    assert seen.amplitude == pytest.approx(own.amplitude, rel=1e-9)
+    assert seen.band is not None
+    assert own.band is not None
+    assert seen.band.width == pytest.approx(own.band.width, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("uncertain", "words"),
+    [
+        ({}, ["uncertain"]),
+        (3.0, ["uncertain", "3.0"]),
+        ({"damper.N0": [90.0, 110.0]}, ["damper.N0", "variable", "deviation"]),
+        ({"dumper.mu": [0.2, 0.4]}, ["dumper.mu", "damper.mu"]),
+        ({"frequency": [1.0, 2.0]}, ["frequency"]),
+        ({"damper.mu": [0.4, 0.2]}, ["uncertain.damper.mu", "low < high"]),
+        ({"damper.mu": [-0.1, 0.2]}, ["uncertain.damper.mu", ">= 0", "-0.1"]),
+        ({"damper.mu": {"deviation": -0.1}}, ["uncertain.damper.mu.deviation", "-0.1"]),
+        ({"damper.mu": {"spread": 0.1}}, ["uncertain.damper.mu", "spread"]),
+        ({"damper.mu": {"deviation": 1.5}}, ["uncertain.damper.mu", ">= 0"]),
+        ({"damper.N1": {"deviation": 0.1}}, ["damper.N1", "tied", "N1_ratio"]),
+        ({"damper.mu": [0.2, 0.4], "damper.mu,damper.kt": {"deviation": 0.1}}, ["damper.mu", "twice"]),
+        ({"half_axes": {"damper.mu": 0.0}}, ["half_axes", "> 0"]),
+        ({"half_axes": {"damper.mu": 0.1}, "shape": [[1.0]]}, ["half_axes", "covariance"]),
+        ({"covariance": [[1e-4]]}, ["uncertain.paths"]),
+        ({"paths": ["damper.mu"], "covariance": [[-1.0]]}, ["uncertain.covariance", "positive definite"]),
+        ({"paths": ["damper.mu"], "shape": [[1e-4, 0.0]]}, ["uncertain.shape", "symmetric"]),
+        (
+            {"paths": ["damper.mu"], "covariance": [[1e-4]], "confidence": 2.0},
+            ["uncertain.confidence", "2.0"],
+        ),
+        ({"mistuning": {"of": "m1", "spread": 0.1}}, ["two-dof", "cyclic"]),
+        ([{"damper.mu": 0.3}, 3.0], ["uncertain[1]", "3.0"]),
+        ([{"damper.mu": math.nan}], ["uncertain[0].damper.mu", "nan"]),
+        ([{"damper.N0": 100.0}], ["damper.N0", "deviation"]),
+    ],
+)
+def test_bad_uncertainty_is_named(uncertain: object, words: list[str]) -> None:
+    with pytest.raises((optim.DesignError, solver.SettingError)) as caught:
+        optim.robust_design(TWO, uncertain=uncertain, variables=N0)
+    for word in words:
+        assert word in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"aim": "luck"}, ["aim", "worst-case", "luck"]),
+        ({"quantile": 1.0}, ["quantile", "1.0"]),
+        ({"samples": 1}, ["samples", ">= 2"]),
+        ({"seed": -1}, ["seed", "-1"]),
+        ({"max_peak": -1.0}, ["max_peak", "-1.0"]),
+    ],
+)
+def test_bad_arguments_are_named(arguments: dict[str, object], words: list[str]) -> None:
+    with pytest.raises(optim.DesignError) as caught:
+        optim.robust_design(TWO, uncertain=KT_AND_MU, variables=N0, **arguments)  # type: ignore[arg-type]
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_the_set_without_numbers_has_one_scenario_for_each_disk() -> None:
+    over = UncertainSet(shape=Shape.BOX)
+    assert over.finite
+    assert over.all() == ()
