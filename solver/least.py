@@ -24,6 +24,7 @@ from solver.peak_tracks import ActivePeak, Basin, LeastPeak, TrackStatus
 from solver.ridges import Tracker
 from solver.savings import Effects
 from solver.scene import Scene
+from solver.tighten import tighten
 
 COMPETES = 0.6  # share of the highest peak of a sweep from which a peak is followed
 CLOSE = 0.97  # the same once the least highest peak is being closed in on
@@ -160,6 +161,8 @@ def _next_step(
         look = tracker.look(gap)
         new = tracker.follow(look, 1.0 if look.top > tracker.enough else share)
         return (None if new else TrackStatus.GAPS), None
+    if tighten(tracker, doubt):
+        return None, None
     found = minima(tracker, doubt)
     if not found[0].solved:
         at = found[0].z
@@ -172,8 +175,8 @@ def _next_step(
         verdict = _judge(look, one)
         if verdict is TrackStatus.UNPROVEN and tracker.follow(look, share, one.rows):
             return None, None
-        if rank == 0 and verdict is not TrackStatus.TRACKED:
-            return verdict, found
+        if rank == 0 and (verdict is not TrackStatus.TRACKED or not one.bracketed):
+            return TrackStatus.UNPROVEN if verdict is TrackStatus.TRACKED else verdict, found
         settled.append(one.z)
         place = _unseen(tracker, one.height * WIDE) if basins > 1 and rank == 0 else None
         if place is not None:

@@ -25,7 +25,8 @@ SHARP = 1e-12  # of the range, where the search ends
 DOUBT = 0.01  # relative error that is allowed for where cubics tell which minimum is lower
 EVEN = 1e-9  # relative change over the range up to which a peak does not depend on the parameter
 RISE = 1e-4  # relative height of what has to lie between two minima that are told apart
-_MOST = 40
+LEVEL = 1e-8  # relative change of the peak over the range that is none
+_MOST = 60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,11 +41,14 @@ class Lowest:
         The lines near the top there, solved, the highest first; empty if they are not solved.
     height : float
         The highest line there [m].
+    bracketed : bool
+        It falls towards there from both sides, as far as there is a range.
     """
 
     z: float
     rows: Mapping[int, Real]
     height: float
+    bracketed: bool
 
     @property
     def solved(self) -> bool:
@@ -74,7 +78,8 @@ def minima(tracker: Tracker, doubt: float = DOUBT) -> list[Lowest]:
         rows = _solve(tracker, list(range(len(tracker.lines))), tracker.looks[0].z)
         if rows:
             top = next(iter(rows.values()))
-            return [Lowest(z=tracker.looks[0].z, rows=rows, height=float(top[HEIGHT]))]
+            height = float(top[HEIGHT])
+            return [Lowest(z=tracker.looks[0].z, rows=rows, height=height, bracketed=True)]
     z = tracker.places()
     heights = tracker.envelope(z)
     heights[~np.isfinite(heights)] = np.inf
@@ -92,7 +97,7 @@ def minima(tracker: Tracker, doubt: float = DOUBT) -> list[Lowest]:
     found = [
         _solved(tracker, z, heights, index)
         if heights[index] <= limit
-        else Lowest(z=float(z[index]), rows={}, height=float(heights[index]))
+        else Lowest(z=float(z[index]), rows={}, height=float(heights[index]), bracketed=False)
         for index in kept
     ]
     return sorted(found, key=lambda one: one.height)
@@ -112,27 +117,36 @@ def _solved(tracker: Tracker, z: Real, heights: Real, index: int) -> Lowest:
         for number, line in enumerate(tracker.lines)
         if np.any(line.heights(z[[index]]) >= NEAR_THE_TOP * heights[index])
     ]
-    rows = _search(tracker, near, float(z[index]), low, high)
+    rows, bracketed = _search(tracker, near, float(z[index]), low, high)
     if not rows:
-        return Lowest(z=float(z[index]), rows={}, height=float(heights[index]))
+        return Lowest(z=float(z[index]), rows={}, height=float(heights[index]), bracketed=False)
     top = next(iter(rows.values()))
     if top[HEIGHT] < tracker.envelope(top[[Z]])[0] * (1.0 - RISE):
         # A line that is higher ends there: what is low lies beyond its end.
         rows = _solve(tracker, near, float(z[index]))
-        return Lowest(z=float(z[index]), rows=rows, height=float(heights[index]))
-    return Lowest(z=float(top[Z]), rows=rows, height=float(top[HEIGHT]))
+        top, bracketed = next(iter(rows.values()), top), False
+    return Lowest(z=float(top[Z]), rows=rows, height=float(top[HEIGHT]), bracketed=bracketed)
 
 
-def _search(tracker: Tracker, near: list[int], best: float, low: float, high: float) -> Mapping[int, Real]:
-    """Close the bracket [low, high] on the least maximum of the lines `near`; return the rows there."""
+def _search(
+    tracker: Tracker, near: list[int], best: float, low: float, high: float
+) -> tuple[dict[int, Real], bool]:
+    """Close the bracket [low, high] on the least maximum of the lines `near`.
+
+    Returns
+    -------
+    The rows there, and whether the highest line falls towards it from both sides.
+    """
     left, right = (_solve(tracker, near, place) for place in (low, high))
     if not left or not right:
-        return _solve(tracker, near, best)
+        return _solve(tracker, near, best), False
+    left, right = _widened(tracker, near, left, right)
     before = math.inf
-    for _ in range(_MOST):
-        z = _least(left, right)
+    for turn in range(_MOST):
+        z = _least(left, right) if turn % 4 < 3 else 0.5 * (_place(left) + _place(right))
         if abs(z - before) <= SHARP * tracker.scale.span or not _place(left) < z < _place(right):
-            return min((left, right), key=lambda side: abs(_place(side) - z))
+            nearer = min((left, right), key=lambda side: abs(_place(side) - z))
+            return nearer, _falls(tracker, left, 1.0) and _falls(tracker, right, -1.0)
         rows = _solve(tracker, near, z)
         if not rows:
             break
@@ -141,7 +155,37 @@ def _search(tracker: Tracker, near: list[int], best: float, low: float, high: fl
         else:
             left = rows
         before = z
-    return min((left, right), key=lambda side: next(iter(side.values()))[HEIGHT])
+    return min((left, right), key=lambda side: next(iter(side.values()))[HEIGHT]), False
+
+
+def _falls(tracker: Tracker, rows: dict[int, Real], way: float) -> bool:
+    """Return whether the highest line falls (or is level) one way (1: upward), or the range ends."""
+    end = tracker.scale.low if way > 0.0 else tracker.scale.high
+    top = next(iter(rows.values()))
+    return bool(top[Z] == end or way * top[DHEIGHT] * tracker.scale.span <= LEVEL * top[HEIGHT])
+
+
+def _widened(
+    tracker: Tracker, near: list[int], left: dict[int, Real], right: dict[int, Real]
+) -> tuple[dict[int, Real], dict[int, Real]]:
+    """Move a bracket downhill until both ends rise outward, or the lines end."""
+    for _ in range(_MOST):
+        width = _place(right) - _place(left)
+        if next(iter(right.values()))[DHEIGHT] < 0.0:
+            beyond = min(_place(right) + 2.0 * width, max(tracker.lines[index].high for index in right))
+            rows = _solve(tracker, near, beyond) if beyond > _place(right) else {}
+            if not rows:
+                break
+            left, right = right, rows
+        elif next(iter(left.values()))[DHEIGHT] > 0.0:
+            beyond = max(_place(left) - 2.0 * width, min(tracker.lines[index].low for index in left))
+            rows = _solve(tracker, near, beyond) if beyond < _place(left) else {}
+            if not rows:
+                break
+            left, right = rows, left
+        else:
+            break
+    return left, right
 
 
 def _place(rows: Mapping[int, Real]) -> float:
@@ -151,7 +195,7 @@ def _place(rows: Mapping[int, Real]) -> float:
 
 def _solve(tracker: Tracker, near: list[int], z: float) -> dict[int, Real]:
     """Return the solved rows at z of the lines that reach it, the highest first."""
-    rows = {index: tracker.exact(tracker.lines[index], z) for index in near}
+    rows = {index: tracker.exact(tracker.lines[index], z, fitting=False) for index in near}
     found = [(index, row) for index, row in rows.items() if row is not None]
     return dict(sorted(found, key=lambda item: -float(item[1][HEIGHT])))
 

@@ -42,8 +42,10 @@ from solver.scene import Scene
 SAME = (
     1e-3  # relative distance, in height and a fifth of it in frequency, within which two peaks are the same
 )
+Place = tuple[Real, Real, Real]  # row (COLUMNS,), solution and tangent (n_unknowns,) of a line at one z
 _MOST_ROWS = 600
 SUBDIVIDED = 6  # places between two rows at which the envelope is looked at
+CAREFUL = 3e-4  # share of the range: first step where lines are close
 EXACTLY = 1e-6  # relative distance within which a peak is one that was solved at the same place
 
 
@@ -85,9 +87,10 @@ class Tracker:
             scene, parameter, harmonics=harmonics, frequency_hz=scene.observe.band[0], effects=effects
         )
         check_laws(self.balance.scene)
-        self._effects, self._pace = effects, pace
+        self._effects, self._pace, self._first_step = effects, pace, pace.first_step
         self.lines: list[Line] = []
         self.looks: list[Look] = []
+        self.exact_between: set[tuple[float, float, float]] = set()  # z, z and height of rows: cubics hold
         self._scene, self._harmonics = self.balance.scene, harmonics
         self._system: System = by_reference(self.balance.system)
         self._summit: Summit = new_summit(self._system)
@@ -128,6 +131,8 @@ class Tracker:
         Whether there is a new line.
         """
         before, ks = len(self.lines), look.branch.balance.system.ks
+        # A peak that the lines there do not know may have one of them close beside it.
+        self._first_step = min(self._pace.first_step, math.inf if solved is None else CAREFUL)
         for peak in look.branch.peaks:
             if peak.value >= share * look.top and not self.known(look.z, peak, solved):
                 self._follow(look.z, peak, ks)
@@ -160,21 +165,33 @@ class Tracker:
         heights = [line.heights(z) for line in self.lines]
         return np.max(heights, axis=0) if heights else np.full(z.size, -np.inf)
 
-    def exact(self, line: Line, z: float) -> Real | None:
-        """Return the row of a line at z, solved; None if it is not found there."""
+    def exact(self, line: Line, z: float, *, fitting: bool = True) -> Real | None:
+        """Return the row of a line at z, solved; None if it is not found there; see `solved`."""
         same = np.flatnonzero(line.rows[:, Z] == z)
         if same.size:
             exact_row: Real = line.rows[same[0]]
             return exact_row
         if not line.low < z < line.high:
             return None
+        place = self.solved(line, z, fitting=fitting)
+        return None if place is None else place[0]
+
+    def solved(self, line: Line, z: float, *, fitting: bool = True) -> Place | None:
+        """Return row, solution and tangent of a line between two of its rows; None if it is not found.
+
+        Parameters
+        ----------
+        fitting : whether it has to fit the rows beside it; what is found is attained in any case.
+        """
         left = int(np.searchsorted(line.rows[:, Z], z)) - 1
         row, nt = np.zeros(COLUMNS), self.balance.n_unknowns
+        solution, tangent = np.zeros(nt), np.zeros(nt)
         good = polish(
             self._system, self._ridge(line.low, line.high, fixed=line.fixed), left, z, line.sign,
-            self._summit, line.rows, line.solutions, line.tangents, row, np.zeros(nt), np.zeros(nt),
+            self._summit, line.rows, line.solutions, line.tangents, row, solution, tangent,
         )  # fmt: skip
-        return row if good else None
+        found = good or (not fitting and row[OMEGA] > 0.0)
+        return (row, solution, tangent) if found else None
 
     def _follow(self, z: float, peak: Peak, ks: Integer) -> None:
         """Follow a peak from z to both ends of the range."""
@@ -250,15 +267,16 @@ class Tracker:
         (low, high), pace, span = self._band, self._pace, self.scale.span
         return Ridge(
             start=start, stop=stop, logarithmic=self.scale.logarithmic, low=low, high=high, fixed=fixed,
-            first_step=pace.first_step * span, largest_step=pace.largest_step * span,
+            first_step=self._first_step * span, largest_step=pace.largest_step * span,
             smallest_step=pace.smallest_step * span, height_error=pace.height_error,
             omega_error=pace.omega_error, enough=self.enough, slack=pace.slack,
             climb_from=pace.climb_from * span,
         )  # fmt: skip
 
     def _track(
-        self, start: float, stop: float, omega: float, u: Real, extremum: tuple[float, float], *, fixed: bool
-    ) -> tuple[LineEnd, Real, Real, Real, float]:
+        self, start: float, stop: float, omega: float, u: Real, extremum: tuple[float, float],
+        *, fixed: bool,
+    ) -> tuple[LineEnd, Real, Real, Real, float]:  # fmt: skip
         """Follow a peak one way; return why it ended, its rows, solutions, tangents and its sign."""
         nt = self.balance.n_unknowns
         rows = np.zeros((_MOST_ROWS, COLUMNS))
