@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from optim.campbell import campbell_diagram, forbidden_hz
     from optim.crossings import CampbellDiagram, CampbellStatus
+    from optim.elasticities import SensitivityResult, SensitivityStatus, sensitivities
     from optim.errors import DesignError
     from optim.result import DesignResult, DesignStatus
     from optim.robust import robust_design
@@ -18,6 +19,8 @@ _HOME = {
     "design": "search", "DesignResult": "result", "DesignStatus": "result", "DesignError": "errors",
     "CampbellDiagram": "crossings", "CampbellStatus": "crossings", "campbell_diagram": "campbell",
     "forbidden_hz": "campbell",
+    "sensitivities": "elasticities", "SensitivityResult": "elasticities",
+    "SensitivityStatus": "elasticities",
     "robust_design": "robust", "RobustResult": "robust_result", "RobustStatus": "robust_result",
 }  # fmt: skip
 
@@ -29,10 +32,13 @@ __all__ = [
     "DesignStatus",
     "RobustResult",
     "RobustStatus",
+    "SensitivityResult",
+    "SensitivityStatus",
     "campbell_diagram",
     "design",
     "forbidden_hz",
     "robust_design",
+    "sensitivities",
 ]
 
 
