@@ -263,6 +263,20 @@ def test_an_option_replaces_the_key_of_the_file(run: Run, tmp_path: Path) -> Non
     assert json.loads(out)["limit"] == 1.5
 
 
+def test_a_robust_design_shows_both_optima_side_by_side(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "problem.toml").write_text(
+        "samples = 4\nharmonics = 3\n[variables]\n'damper.N0' = [60, 200]\n"
+        "[uncertain]\n'damper.mu' = [0.25, 0.35]\n"
+    )
+    status, out, err = run("design two-dof --problem problem.toml --plot picture.png")
+    assert (status, err) == (0, "")
+    for word in ("nominal optimum", "robust optimum", "worst peak", "damper.mu from 0.25 to 0.35", "below"):
+        assert word in out
+    assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
+    (tmp_path / "bad.toml").write_text("samples = 4\n[uncertain]\n'damper.mu' = [0.4, 0.3]")
+    assert "bad.toml: /uncertain/damper.mu" in run("design two-dof --problem bad.toml")[2]
+
+
 def test_an_infeasible_design_says_what_to_relax_and_by_how_much(run: Run) -> None:
     status, out, err = run(
         "design two-dof --variable damper.N0 90 110 --limit 2 --max-peak 2.3 --harmonics 3"

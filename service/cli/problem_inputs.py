@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,8 @@ from solver.errors import Issue, SceneError, SettingError
 if TYPE_CHECKING:
     from service.kinds.problem import ProblemRequest
     from solver.scene import Scene
+
+IssuesOf = Callable[["Scene", Mapping[str, Any]], list[Issue]]
 
 SCENE_FILES = (".toml", ".json")
 NEVER_SEPARATES = "never-separates"
@@ -81,8 +83,16 @@ def description(scene: str | None, flags: ProblemFlags, kind: str) -> Descriptio
     return Description(body=body, options={key: _OPTIONS[key] for key in given}, file=file)
 
 
-def posed(told: Description, model: type[ProblemRequest]) -> tuple[Scene, dict[str, Any]]:
+def posed(
+    told: Description, model: type[ProblemRequest], issues_of: IssuesOf
+) -> tuple[Scene, dict[str, Any]]:
     """The scene and the arguments of the design layer, checked as the service checks them.
+
+    Parameters
+    ----------
+    told : what was given.
+    model : its types and ranges.
+    issues_of : what is wrong with the arguments for the scene.
 
     Raises
     ------
@@ -90,12 +100,11 @@ def posed(told: Description, model: type[ProblemRequest]) -> tuple[Scene, dict[s
         What is wrong, by the option or the key that has to change.
     """
     from service.kinds.problem import arguments
-    from service.kinds.problem_check import problem_issues
 
     request = checked(told, model)
     scene = _with_values(told, _scene(told), request)
     given = arguments(request)
-    issues = problem_issues(scene, given)
+    issues = issues_of(scene, given)
     if issues:
         raise told.refusal(issues)
     return scene, given

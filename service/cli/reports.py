@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from service import units
-from service.cli import design_reports
+from service.cli import design_reports, robust_reports
 from service.cli.output import print_pairs, print_table, say
 
 if TYPE_CHECKING:
@@ -126,10 +126,18 @@ def march(found: Json) -> None:
     print_pairs("Time march", pairs)
 
 
+def design(found: Json) -> None:
+    """A design, of what is known or in spite of what is not."""
+    if "nominal" in found:
+        robust_reports.robust(found)
+    else:
+        design_reports.design(found)
+
+
 BY_KIND: Mapping[str, Callable[[Json], None]] = {
     "solve": solution,
     "sweep": branch,
-    "design": design_reports.design,
+    "design": design,
     "march": march,
 }
 

@@ -229,7 +229,8 @@ def _draw(client: Client, answer: ResultsAnswer, picture: Path) -> None:
     from service.plots.responses import response_figure
     from service.plots.style import save
 
-    peak = answer.result.get("peak")
+    # Of a robust design, the sweeps are those of the search without uncertainty.
+    peak = answer.result.get("peak") or (answer.result.get("nominal") or {}).get("peak")
     if not answer.sweeps or peak is None:
         raise InputError(f"`--plot`: job {answer.job} stored no sweep to draw")
     best = min(answer.sweeps, key=lambda s: abs(s.peak.value - peak["value"]) if s.peak else float("inf"))

@@ -13,7 +13,6 @@ from solver.errors import Issue, SceneError, SettingError
 from solver.scene import Scene
 
 _REFUSALS = (DesignError, SettingError, SceneError)
-_PLACE = re.compile(r"(?P<key>\w+)(?:\[(?P<index>\d+)\])?(?:\.(?P<rest>.*?))?(?: \((?:low|high)\))?")
 # Refused without a limit, whatever they are; which limit does not matter to them.
 _NEED_LIMIT = ("forbidden_hz", "speeds_rpm")
 _NEED_VARIABLES = ("scaling", "start")
@@ -32,6 +31,19 @@ def problem_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
 
     whole = _refused(partial(pose, scene, **given), partial(_issues, given=given))
     return (_variable_issues(scene, given) + _key_issues(scene, given) or whole) if whole else []
+
+
+def uncertainty_issues(scene: Scene, given: Mapping[str, Any], uncertain: object) -> list[Issue]:
+    """What is wrong with the key `uncertain`; nothing if the variables are wrong, which it depends on."""
+    from optim.uncertainty import read_uncertain
+    from optim.variables import check_variables
+
+    if _variable_issues(scene, given):
+        return []
+    variables = check_variables(scene, given.get("variables"))
+    return _refused(
+        partial(read_uncertain, scene, variables, uncertain), partial(_in_uncertain, uncertain=uncertain)
+    )
 
 
 def _variable_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
@@ -88,24 +100,27 @@ def _issues(error: Exception, given: Mapping[str, Any]) -> list[Issue]:
         return list(error.issues)
     if not isinstance(error, (DesignError, SettingError)):
         raise error
-    found = _PLACE.fullmatch(error.name)
-    if found is None:
-        return _at(error, "")
-    key, index, rest = found["key"], found["index"], found["rest"]
-    parts: list[object] = [key]
-    if index is not None:
-        parts.append(int(index))
-    if rest is not None:
-        parts.append(rest)
-    elif isinstance(error.value, str):
-        parts.append(error.value)
-    if len(parts) == 2 and index is None and parts[1] not in _keys(given.get(key)):
-        parts.pop()  # what is missing has no place of its own
-    return _at(error, pointer(*parts))
+    key = re.split(r"[.\[ ]", error.name, maxsplit=1)[0]
+    parts = _place(given.get(key), error.name[len(key) :])
+    if not parts and isinstance(given.get(key), Mapping) and isinstance(error.value, str):
+        # The name is that of the table, the value the member that does not fit.
+        parts = [error.value] if error.value in given[key] else []
+    return _at(error, pointer(key, *parts))
 
 
-def _keys(value: object) -> tuple[object, ...]:
-    return tuple(value) if isinstance(value, Mapping) else ()
+def _place(value: object, rest: str) -> list[object]:
+    """The members of nested tables and lists that a name such as ``[0].set.damper.mu`` goes through.
+
+    Keys may have dots in them, so the longest key that fits is taken; what is missing has no place.
+    """
+    if isinstance(value, list) and (index := re.match(r"\[(\d+)\]", rest)):
+        number = int(index[1])
+        return [number, *_place(value[number], rest[index.end() :])]
+    if isinstance(value, Mapping) and rest.startswith("."):
+        fitting = [key for key in value if re.match(re.escape(key) + r"(?=[.\[ ]|$)", rest[1:])]
+        key = max(fitting, key=len, default=None)
+        return [] if key is None else [key, *_place(value[key], rest[1 + len(key) :])]
+    return []
 
 
 def _in_case(error: Exception, index: int, case: Mapping[str, Any]) -> list[Issue]:
@@ -121,6 +136,20 @@ def _in_case(error: Exception, index: int, case: Mapping[str, Any]) -> list[Issu
     message = str(error).replace("`cases[0]", f"`cases[{index}]", 1)
     where = pointer("cases", index, key) if key in case else pointer("cases", index)
     return [Issue(pointer=where, message=message)]
+
+
+def _in_uncertain(error: Exception, uncertain: object) -> list[Issue]:
+    """The refusal of an uncertain parameter or of a mistuned disk."""
+    names = list(uncertain) if isinstance(uncertain, Mapping) else []
+    disk = pointer("uncertain", *[name for name in names if name == "mistuning"])
+    if isinstance(error, SceneError):
+        return [Issue(pointer=disk, message=issue.message) for issue in error.issues]
+    if isinstance(error, SettingError) and error.name == "scene":
+        return _at(error, disk)
+    if isinstance(error, SettingError) and not error.name.startswith("uncertain"):
+        found = [name for name in names if str(error.value) in [part.strip() for part in name.split(",")]]
+        return _at(error, pointer("uncertain", *found[:1]))
+    return _issues(error, {"uncertain": uncertain})
 
 
 def _of_scene(issue: Issue, index: int, case: Mapping[str, Any]) -> Issue:

@@ -12,6 +12,7 @@ from solver.scene import AnyContact, FrictionContact, Scene
 
 if TYPE_CHECKING:
     from optim.result import DesignResult
+    from optim.robust_result import RobustResult
     from solver import Branch
 
 _ARRAYS = ("amplitude", "half_peak_to_peak", "mean", "coefficients", "observed")
@@ -82,6 +83,37 @@ def design_record(result: DesignResult) -> DesignRecord:
         harmonics=problem.harmonics,
         evaluations=result.evaluations,
         work=_finite(result.work),
+        seconds=result.seconds,
+        variables=tuple(
+            VariableValues(name=v.name, value=result.optimum.get(v.name), low=v.low, high=v.high)
+            for v in problem.variables
+        ),
+    )
+
+
+def robust_record(result: RobustResult) -> DesignRecord:
+    """The robust design with the columns people filter by; its peak is the worst over the uncertainty."""
+    problem, side = result.problem, result.robust
+    worst = None if side is None or side.worst is None else side.worst
+    rows = () if worst is None else worst.rows
+    peak = max((r for r in rows if r.quantity.value == "peak"), key=lambda row: row.value, default=None)
+    bands = [row.value for row in rows if row.quantity.value == "band"]
+    return DesignRecord(
+        scene_name=problem.scene.name,
+        scene_hash=digest(problem.scene.to_dict()),
+        method=result.aim.value,
+        robust=True,
+        reached=result.reached,
+        feasible=side is not None and side.feasible,
+        status=result.status.value,
+        objective=_finite(result.objective),
+        peak=None if peak is None else peak.value,
+        peak_at=None if peak is None else _finite(peak.at_hz),
+        limit=problem.limit,
+        band_hz=max(bands, default=None),
+        harmonics=problem.harmonics,
+        evaluations=result.designs,
+        work=float(result.responses),
         seconds=result.seconds,
         variables=tuple(
             VariableValues(name=v.name, value=result.optimum.get(v.name), low=v.low, high=v.high)

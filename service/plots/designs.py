@@ -1,16 +1,20 @@
-"""The response of a design: what it must keep out of is shaded."""
+"""Pictures of designs: the response with what it must keep, and both optima over an uncertainty."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 from matplotlib.figure import Figure
 
+from service import units
+from service.plots import style
 from service.plots.curves import Response
 from service.plots.responses import Demands, response_figure
 
 if TYPE_CHECKING:
     from optim.result import DesignResult
+    from optim.robust_result import RobustResult, Side
 
 
 def design_figure(result: DesignResult) -> Figure:
@@ -35,3 +39,37 @@ def design_figure(result: DesignResult) -> Figure:
     several = len(result.problem.cases) > 1 and case is not None
     title = f"{result.scene}, {case}" if several and case != result.scene else None
     return response_figure(Response.of_branch(branch), asked=asked, title=title)
+
+
+def robust_figure(result: RobustResult) -> Figure:
+    """The highest peak of both optima over the samples of the uncertainty, sorted, with the worst of all.
+
+    Parameters
+    ----------
+    result : a robust design whose nominal optimum is known.
+    """
+    sides: list[tuple[str, Side, str]] = []
+    if result.nominal is not None:
+        sides.append(("nominal optimum", result.nominal, style.BLUE))
+    if result.robust is not None:
+        sides.append(("robust optimum", result.robust, style.VERMILION))
+    known = [peak for _, side, _ in sides for peak in side.spread.peaks if np.isfinite(peak)]
+    unit = units.length_unit(max(known, default=1.0))
+    with style.styled():
+        page, (axes,) = style.figure(6.0, 3.4)
+        for name, side, color in sides:
+            peaks = np.sort([peak for peak in side.spread.peaks if np.isfinite(peak)]) * unit.per_metre
+            shares = 100.0 * (np.arange(peaks.size) + 1.0) / max(peaks.size, 1)
+            axes.plot(shares, peaks, color=color, marker="o", markersize=3.0, label=name)
+            if np.isfinite(side.worst_peak):
+                worst = side.worst_peak * unit.per_metre
+                axes.axhline(worst, color=color, linewidth=0.9, linestyle=(0, (5.0, 2.5)))
+                axes.annotate(
+                    f"worst {unit.show(side.worst_peak)}", (0.02, worst), xycoords=("axes fraction", "data"),
+                    xytext=(0, 3), textcoords="offset points", va="bottom", color=color,
+                )  # fmt: skip
+        style.label(axes, "share of the samples [%]", f"highest peak at most [{unit.name}]")
+        axes.margins(y=0.14)
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        axes.set_title(f"{result.problem.scene.name}, {result.aim.value}")
+    return page

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from typing import Any
 
@@ -9,6 +10,7 @@ import httpx
 import pytest
 from service_helpers import is_problem, job_ids
 
+import optim
 import solver
 from optim.problem import Method, pose
 from service.errors import InvalidRequestError
@@ -58,7 +60,7 @@ def pointers(change: dict[str, Any]) -> list[str]:
 
 def test_every_key_of_the_design_layer_is_one_of_the_body_and_arrives() -> None:
     keys = set(pose.__kwdefaults__)
-    assert keys == set(EVERY_KEY) - {"scene", "set"}
+    assert keys == set(EVERY_KEY) - {"scene", "set"}, "a key of the design layer that the service lacks"
     assert keys <= set(DesignRequest.model_fields)
     assert DesignRequest.model_json_schema()["examples"]
     spec = resolve(validated(DesignRequest, EVERY_KEY), Shipped()).spec
@@ -167,6 +169,62 @@ def test_a_scene_without_friction_has_nothing_to_choose_by_itself() -> None:
     raw = solver.load_scene("two-dof").to_dict()
     raw["contacts"] = []
     assert pointers({"scene": raw, "variables": None}) == ["/variables"]
+
+
+UNCERTAIN = {"damper.mu": [0.25, 0.35], "damper.kt": {"deviation": 0.1}}
+
+
+@pytest.mark.parametrize(
+    ("change", "where"),
+    [
+        ({"uncertain": {}}, ["/uncertain"]),
+        ({"uncertain": 5}, ["/uncertain"]),
+        ({"uncertain": {"damper.mu": [0.4, 0.3]}}, ["/uncertain/damper.mu"]),
+        ({"uncertain": {"damper.mu": 0.3}}, ["/uncertain/damper.mu"]),
+        ({"uncertain": {"damper.mu": {"deviation": -1}}}, ["/uncertain/damper.mu/deviation"]),
+        ({"uncertain": {"bumper.mu": [0.1, 0.2]}}, ["/uncertain/bumper.mu"]),
+        ({"uncertain": {"damper.N0": [50, 60]}}, ["/uncertain/damper.N0"]),
+        ({"uncertain": {"damper.mu": [-0.1, 0.2]}}, ["/uncertain/damper.mu"]),
+        ({"uncertain": [{"damper.mu": 0.3}, {"damper.mu": "much"}]}, ["/uncertain/1/damper.mu"]),
+        ({"uncertain": {"mistuning": {"of": "tip", "spread": 0.01}}}, ["/uncertain/mistuning"]),
+        ({"uncertain": {"mistuning": {"of": 5}}}, ["/uncertain"]),
+        ({"uncertain": {"half_axes": {"damper.mu": 0}, "relative": True}}, ["/uncertain/half_axes"]),
+        ({"uncertain": UNCERTAIN, "aim": "best"}, ["/aim"]),
+        ({"uncertain": UNCERTAIN, "quantile": 1}, ["/quantile"]),
+        ({"uncertain": UNCERTAIN, "samples": 1}, ["/samples"]),
+        ({"uncertain": UNCERTAIN, "seed": -1}, ["/seed"]),
+        ({"aim": "mean", "samples": 5}, ["/aim", "/samples"]),
+        ({"uncertain": {"damper.mu": 1}, "method": "x"}, ["/method"]),
+        ({"uncertain": {"damper.mu": 1}, "max_friction_work": {"x": 1}},
+         ["/max_friction_work/x", "/uncertain/damper.mu"]),
+        ({"uncertain": [{"damper.mu": 0.1}] * 3000}, ["/uncertain"]),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_an_uncertainty(change: dict[str, Any], where: list[str]) -> None:
+    assert pointers(change) == where
+
+
+def test_every_argument_of_a_robust_design_is_a_key() -> None:
+    keys = set(inspect.signature(optim.robust_design).parameters) - {"scene", "on_progress", "should_stop"}
+    assert keys <= set(DesignRequest.model_fields)
+
+
+def test_a_robust_design_over_rest_is_that_of_python_and_is_stored(shipped: httpx.Client) -> None:
+    keys = {
+        "variables": {"damper.N0": [60, 200]}, "uncertain": {"damper.mu": [0.25, 0.35]}, "samples": 4,
+        "harmonics": 3,
+    }  # fmt: skip
+    answer = shipped.post("/v1/designs", json={"scene": "two-dof", **keys}, headers={"Prefer": "wait=60"})
+    job = answer.json()
+    assert (answer.status_code, job["status"]) == (200, "successful"), job
+    found = optim.robust_design(solver.load_scene("two-dof"), **keys)
+    assert job["result"]["optimum"]["damper.N0"] == pytest.approx(found.optimum["damper.N0"], rel=1e-12)
+    stored = shipped.get(job["links"]["design"]).json()
+    assert stored["robust"]
+    assert stored["feasible"]
+    assert stored["peak"]["value"] == pytest.approx(found.robust.worst_peak, rel=1e-12)
+    assert stored["variables"]["damper.N0"]["value"] == job["result"]["optimum"]["damper.N0"]
+    assert stored["id"] in [one["id"] for one in shipped.get("/v1/designs?robust=true").json()["items"]]
 
 
 def test_over_http_nothing_is_written_of_what_is_refused(shipped: httpx.Client) -> None:
