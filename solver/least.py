@@ -40,7 +40,7 @@ COARSE = 0.08  # share of the range: sweeps closer than that do not look for oth
 _STARTS = (0.5, 0.25, 0.75, 0.0, 1.0)  # shares of the range where the first sweep is tried
 _PACE = Pace(
     first_step=0.02, largest_step=0.25, smallest_step=1e-3, height_error=6e-3, omega_error=2e-3, above=1.005,
-    slack=0.5, climb_from=4e-3,
+    slack=0.2, climb_from=4e-3,
 )  # fmt: skip
 
 
@@ -160,6 +160,7 @@ def _next_step(
     if gap is not None:
         look = tracker.look(gap)
         new = tracker.follow(look, 1.0 if look.top > tracker.enough else share)
+        new = new or tracker.follow(look, COMPETES)
         return (None if new else TrackStatus.GAPS), None
     if tighten(tracker, doubt):
         return None, None

@@ -45,6 +45,8 @@ SAME = (
 Place = tuple[Real, Real, Real]  # row (COLUMNS,), solution and tangent (n_unknowns,) of a line at one z
 _MOST_ROWS = 600
 SUBDIVIDED = 6  # places between two rows at which the envelope is looked at
+ROUNDING = 1e-12
+ABOUT = 0.01  # relative height that a row that does not fit may lack
 CAREFUL = 3e-4  # share of the range: first step where lines are close
 EXACTLY = 1e-6  # relative distance within which a peak is one that was solved at the same place
 
@@ -181,7 +183,8 @@ class Tracker:
 
         Parameters
         ----------
-        fitting : whether it has to fit the rows beside it; what is found is attained in any case.
+        fitting : whether it has to fit the rows beside it; otherwise about as high, or higher, will do,
+            because a kink may lie between: what is found is attained in any case.
         """
         left = int(np.searchsorted(line.rows[:, Z], z)) - 1
         row, nt = np.zeros(COLUMNS), self.balance.n_unknowns
@@ -190,7 +193,10 @@ class Tracker:
             self._system, self._ridge(line.low, line.high, fixed=line.fixed), left, z, line.sign,
             self._summit, line.rows, line.solutions, line.tangents, row, solution, tangent,
         )  # fmt: skip
-        found = good or (not fitting and row[OMEGA] > 0.0)
+        found = good
+        if not good and not fitting and row[OMEGA] > 0.0:
+            cubic = float(line.heights(np.array([z]))[0])
+            found = bool(row[HEIGHT] >= (1.0 - ABOUT) * cubic)
         return (row, solution, tangent) if found else None
 
     def _follow(self, z: float, peak: Peak, ks: Integer) -> None:
@@ -217,7 +223,7 @@ class Tracker:
         )  # fmt: skip
         self.lines.append(line)
         for end, row in zip(line.ends, (0, -1), strict=True):
-            if end is LineEnd.LEFT_BAND:
+            if end is LineEnd.LEFT_BAND and not fixed:
                 edge = min(self._band, key=lambda omega: abs(omega - line.rows[row, OMEGA]))
                 extremum = line.sign, float(line.rows[row, PLACE])
                 self._draw(float(line.rows[row, Z]), edge, line.solutions[row].copy(), extremum, fixed=True)
@@ -265,6 +271,8 @@ class Tracker:
 
     def _ridge(self, start: float, stop: float, *, fixed: bool) -> Ridge:
         (low, high), pace, span = self._band, self._pace, self.scale.span
+        if fixed:  # the end of the band itself, and rounding of it, is inside
+            low, high = low * (1.0 - ROUNDING), high * (1.0 + ROUNDING)
         return Ridge(
             start=start, stop=stop, logarithmic=self.scale.logarithmic, low=low, high=high, fixed=fixed,
             first_step=self._first_step * span, largest_step=pace.largest_step * span,
