@@ -3,7 +3,7 @@
     minimise   Σ t_g
     subject to t_g(i) − aᵢ(z) ≥ 0    every competing row i of what is minimised, in groups g
                bⱼ(z) ≤ 0             every limited row j, as relative excess over its bound
-               0 ≤ z ≤ 1             scaled variables
+               0 ≤ z ≤ 1             scaled variables, near the start
 
 A programme has a fixed number of smooth rows, a response any number of peaks: every row keeps its place by
 quantity, case and frequency, the places follow their peaks from one design to the next, a peak without a
@@ -15,7 +15,7 @@ doi:10.1007/s10107-004-0559-y.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,11 +27,16 @@ from optim.model import Model
 from optim.rows import Evaluation, Row, nearest
 from optim.variables import SNAP, Real, Variable, snapped, unscaled
 
-ROUNDS = 4  # programmes, each from where the last one ended
-MOST_ITERATIONS = 60
+Second = Callable[[], Real | None]
+
+ROUNDS = 8  # programmes, each from where the last one ended
+REGION = 0.2  # scaled distance from its start that a programme covers: far away other peaks compete
+MOST_ITERATIONS = 25
 TOLERANCE = 1e-9
 NEGLIGIBLE = 1e-10  # relative gain from one programme to the next below which the search ends
-EMPTY = -1.0  # relative height of a place without a peak, and excess of a place without a row
+NOTHING = 1e-12  # multipliers below it do not count
+VANISHED = 0.9  # share of the highest row at which a place without one stands
+EMPTY = -1.0  # excess of a limited place without a row
 _OPTIONS: dict[str, Any] = {
     "print_time": False, "error_on_fail": False, "calc_lam_p": False,
     "ipopt": {
@@ -71,10 +76,20 @@ def ipopt_search(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Values:
-    """Heights and excesses of all places with their derivatives by z."""
+    """Heights and excesses of all places with their derivatives by z; the second ones when asked for."""
 
     numbers: Real
     slopes: Real
+    seconds: list[Second]
+
+    def lagrangian(self, multipliers: Real) -> Real:
+        """Return Σ multiplier · second derivatives; a row at a corner of the response has none: 0."""
+        total = np.zeros((self.slopes.shape[1],) * 2)
+        for multiplier, second in zip(multipliers, self.seconds, strict=True):
+            found = second() if abs(multiplier) > NOTHING else None
+            if found is not None:
+                total += multiplier * found
+        return total
 
 
 class _Rows:
@@ -115,27 +130,54 @@ class _Rows:
                 self._known[key] = self._values(model)
             else:
                 shape = (self.count, z.size)
-                self._known[key] = _Values(numbers=np.full(shape[0], np.nan), slopes=np.full(shape, np.nan))
+                self._known[key] = _unknown(*shape)
         return self._known[key]
 
     def _values(self, model: Model) -> _Values:
         m, n = len(self._places), model.z.size
         numbers, slopes = np.full(self.count, EMPTY), np.zeros((self.count, n))
-        _fill(self._places, model.rows, model.heights, model.slopes, numbers[:m], slopes[:m])
-        _fill(self._limited, model.limited, model.excess, model.excess_slopes, numbers[m:], slopes[m:])
-        return _Values(numbers=numbers, slopes=slopes)
+        rows = _fill(self._places, model.rows, model.heights, model.slopes, numbers[:m], slopes[:m])
+        limits = _fill(
+            self._limited, model.limited, model.excess, model.excess_slopes, numbers[m:], slopes[m:]
+        )
+        seconds = [_second(model.second, i) for i in rows] + [
+            _second(model.limited_second, j) for j in limits
+        ]
+        for i, group in enumerate(self.groups):
+            if rows[i] is None:
+                # An interior-point method needs a slack that does not jump: a vanished peak is a low one.
+                numbers[i] = VANISHED * model.heights[model.groups == group].max()
+        return _Values(numbers=numbers, slopes=slopes, seconds=seconds)
+
+
+def _second(of: Callable[[int], Real | None], index: int | None) -> Second:
+    return lambda: None if index is None else of(index)
+
+
+def _unknown(count: int, n: int) -> _Values:
+    """Return the values of a design that cannot be evaluated."""
+    return _Values(
+        numbers=np.full(count, np.nan), slopes=np.full((count, n), np.nan), seconds=[lambda: None] * count
+    )
 
 
 def _fill(
     places: list[Row], rows: Sequence[Row], values: Real, by_z: Real, numbers: Real, slopes: Real
-) -> None:
-    """Put each row in its place: the nearest in frequency of the same quantity and case; the largest wins."""
+) -> list[int | None]:
+    """Put each row in its place: the nearest in frequency of the same quantity and case; the largest wins.
+
+    Returns
+    -------
+    Which row is in each place.
+    """
     fresh = list(places)
-    for row, value, slope in zip(rows, values, by_z, strict=True):
+    taken: list[int | None] = [None] * len(places)
+    for i, (row, value, slope) in enumerate(zip(rows, values, by_z, strict=True)):
         place = nearest(row, places)
         if place is not None and value > numbers[place]:
-            numbers[place], slopes[place], fresh[place] = value, slope, row
+            numbers[place], slopes[place], fresh[place], taken[place] = value, slope, row, i
     places[:] = fresh
+    return taken
 
 
 class _Callback(casadi.Callback):
@@ -160,15 +202,14 @@ class _Callback(casadi.Callback):
     def get_sparsity_out(self, _: int) -> casadi.Sparsity:
         return casadi.Sparsity.dense(self._rows.count, 1)
 
-    def values(self, z: casadi.DM) -> _Values:
+    def values(self, z: casadi.DM | Real) -> _Values:
         """Return the numbers; what stops the search is kept, for IPOPT would swallow it."""
         try:
             if self.failure is None:
                 return self._rows.at(np.array(z, dtype=np.float64).reshape(-1))
         except Exception as failure:  # noqa: BLE001 — raised again by `_run` once IPOPT has let go
             self.failure = failure
-        shape = (self._rows.count, self._n)
-        return _Values(numbers=np.full(shape[0], np.nan), slopes=np.full(shape, np.nan))
+        return _unknown(self._rows.count, self._n)
 
     def eval(self, arguments: Any) -> list[Real]:
         return [self.values(arguments[0]).numbers]
@@ -208,6 +249,34 @@ class _Jacobian(casadi.Callback):
         return [self._owner.values(arguments[0]).slopes]
 
 
+class _Hessian(casadi.Callback):
+    """x = (z, t) and the multipliers to the upper triangle of the Hessian of the Lagrangian."""
+
+    def __init__(self, owner: _Callback, n: int, tops: int, count: int) -> None:
+        casadi.Callback.__init__(self)
+        self._owner, self._n, self._tops, self._count = owner, n, tops, count
+        self.construct("hess_lag", {})
+
+    def get_n_in(self) -> int:
+        return 4
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_sparsity_in(self, which: int) -> casadi.Sparsity:
+        return casadi.Sparsity.dense((self._n + self._tops, 0, 1, self._count)[which], 1)
+
+    def get_sparsity_out(self, _: int) -> casadi.Sparsity:
+        return casadi.Sparsity.upper(self._n + self._tops)
+
+    def eval(self, arguments: Any) -> list[casadi.DM]:
+        x, multipliers = (np.array(arguments[i], dtype=np.float64).reshape(-1) for i in (0, 3))
+        whole = np.zeros((self._n + self._tops,) * 2)
+        # Every row stands in the programme with a minus sign.
+        whole[: self._n, : self._n] = self._owner.values(x[: self._n]).lagrangian(-multipliers)
+        return [casadi.DM(self.get_sparsity_out(0), casadi.DM(whole)[self.get_sparsity_out(0)].nonzeros())]
+
+
 def _run(rows: _Rows, model: Model) -> None:
     """Solve one programme from a model; the designs tried are kept by `rows`."""
     n, m, groups = model.z.size, model.heights.size, rows.unique
@@ -217,11 +286,17 @@ def _run(rows: _Rows, model: Model) -> None:
     which = [int(np.flatnonzero(groups == g)[0]) for g in model.groups]
     constraints = casadi.vertcat(casadi.vertcat(*[t[i] for i in which]) - numbers[:m], -numbers[m:])
     programme: dict[str, Any] = {"x": casadi.vertcat(z, t), "f": casadi.sum1(t), "g": constraints}
-    solver = casadi.nlpsol("design", "ipopt", programme, _OPTIONS)
+    options, exact = _OPTIONS, all(row.second is not None for row in (*model.rows, *model.limited))
+    if exact:
+        hessian = _Hessian(callback, n, len(groups), rows.count)
+        ipopt = {**_OPTIONS["ipopt"], "hessian_approximation": "exact"}
+        options = {**_OPTIONS, "ipopt": ipopt, "hess_lag": hessian}
+    solver = casadi.nlpsol("design", "ipopt", programme, options)
     tops = [model.heights[model.groups == g].max() for g in groups]
     solver(
-        x0=np.concatenate([model.z, tops]), lbx=np.append(np.zeros(n), np.full(len(groups), -np.inf)),
-        ubx=np.append(np.ones(n), np.full(len(groups), np.inf)), lbg=0.0, ubg=np.inf,
+        x0=np.concatenate([model.z, tops]),
+        lbx=np.append(np.maximum(model.z - REGION, 0.0), np.full(len(groups), -np.inf)),
+        ubx=np.append(np.minimum(model.z + REGION, 1.0), np.full(len(groups), np.inf)), lbg=0.0, ubg=np.inf,
     )  # fmt: skip
     if callback.failure is not None:
         raise callback.failure
