@@ -14,6 +14,7 @@ from optim.criteria import Sensitivity
 from optim.problem import Problem
 from optim.rows import Evaluation, Quantity, Response, Row
 from optim.variables import Real, by_variables, by_variables_twice, parameter_values
+from optim.watch import ShouldStop
 from solver.branch import Branch, Peak
 from solver.continuation import sweep
 from solver.peaks import HALF_POWER
@@ -22,8 +23,6 @@ from solver.scene import FrictionContact, Scene
 
 # Peaks below this share of the highest are not handed to the optimiser: within one step they cannot lead.
 COMPETES = 0.6
-
-ShouldStop = Callable[[], bool] | None
 
 
 def evaluate(
@@ -59,7 +58,7 @@ def _case(
     """Compute the responses and rows of one case."""
     here = case.scene.with_values(parameter_values(problem.variables, values))
     effects = effects_of(problem, here)
-    judge = Judge(problem=problem, case=case, scene=here, gradients=gradients)
+    judge = Judge(problem=problem, case=case, gradients=gradients)
     branch = sweep(
         here, harmonics=problem.harmonics, limit=problem.limit, effects=effects, should_stop=should_stop
     )
@@ -85,13 +84,11 @@ class Judge:
     Attributes
     ----------
     problem, case : what is judged.
-    scene : the case's scene with the design's values.
     gradients : compute them (otherwise they are NaN).
     """
 
     problem: Problem
     case: Case
-    scene: Scene
     gradients: bool
 
     def _sensitivity(self, branch: Branch) -> Sensitivity | None:

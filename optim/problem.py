@@ -12,9 +12,10 @@ from optim.errors import DesignError
 from optim.rows import Quantity
 from optim.variables import Variable, check_variables
 from solver.balance import check_harmonics
-from solver.scene import FrictionContact, Scene
+from solver.scene import Contact, FrictionContact, Scene
 
 Ranges = tuple[tuple[float, float], ...]
+MOST_BASINS = 20
 NEVER_SEPARATES = "never-separates"
 
 
@@ -82,6 +83,8 @@ class Problem:
         A design to start from, variable name to value.
     method : Method
         How it is searched.
+    basins : int
+        How many local optima are looked for.
     """
 
     scene: Scene
@@ -93,6 +96,7 @@ class Problem:
     harmonics: int
     start: Mapping[str, float] | None
     method: Method
+    basins: int
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -103,6 +107,18 @@ class Problem:
     def plain(self) -> bool:
         """Whether it asks for nothing but the least peak of one case."""
         return len(self.cases) == 1 and not self.limits.any and self.weights[Quantity.BAND] == 0.0
+
+    @property
+    def why_not_tracked(self) -> str | None:
+        """Why this is no problem for the method of the tracked peak; None if it is one."""
+        if not self.plain:
+            return "it minimises the highest peak of one case alone, without limits"
+        if len(self.paths) != 1:
+            return "it takes one variable with one parameter path"
+        others = [contact.name for contact in self.scene.contacts if not isinstance(contact, Contact)]
+        if others:
+            return f"it knows the law coulomb alone, not that of {', '.join(others)}"
+        return None
 
 
 def pose(
@@ -122,6 +138,7 @@ def pose(
     harmonics: int = 11,
     start: Mapping[str, float] | None = None,
     method: str | Method = Method.AUTO,
+    basins: int = 2,
 ) -> Problem:
     """Check a design problem and put it together; the arguments are those of `optim.design`.
 
@@ -141,10 +158,16 @@ def pose(
     )  # fmt: skip
     if limits.forbidden_hz and limit is None:
         raise DesignError("limit", None, "must be given with forbidden ranges: the amplitude allowed there")
-    return Problem(
+    if isinstance(basins, bool) or not isinstance(basins, int) or not 1 <= basins <= MOST_BASINS:
+        raise DesignError("basins", basins, f"must be a whole number from 1 to {MOST_BASINS}")
+    problem = Problem(
         scene=scene, variables=chosen, cases=read, limit=limit, weights=_weights(weights), limits=limits,
         harmonics=check_harmonics(harmonics), start=_start(chosen, start), method=_method(method),
+        basins=basins,
     )  # fmt: skip
+    if problem.method is Method.TRACKED and problem.why_not_tracked is not None:
+        raise DesignError("method", method, f"must be another one: {problem.why_not_tracked}")
+    return problem
 
 
 def _positive(name: str, value: object) -> float:

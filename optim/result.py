@@ -19,7 +19,11 @@ AT_LIMIT = 1e-4  # relative distance from a bound within which a limited row hol
 class DesignStatus(Enum):
     """How a search ended; the value is a sentence a user can act on."""
 
-    OPTIMAL = "The highest peak can not be lowered further within the bounds."
+    OPTIMAL = "What is minimised can not be lowered further."
+    AT_BOUND = (
+        "What is minimised can not be lowered further within the bounds, and a variable lies on a bound that "
+        "holds the design: wider bounds would do better."
+    )
     KINK = (
         "The search could not improve the design, but the first-order conditions do not hold there: the "
         "response has a kink at this design, or more harmonics are needed."
@@ -36,9 +40,9 @@ class DesignStatus(Enum):
         "The frequency response could not be computed over the whole band for any design tried: "
         "use more harmonics or a narrower band."
     )
-    NOT_SETTLED = (
-        "The solver of the nonlinear programme did not converge; the best design it saw is given: use the "
-        "method minimax, or start from that design."
+    NOT_TRACKED = (
+        "The peaks could not be followed over the whole range; the best design seen is given: use the method "
+        "minimax, or a narrower range."
     )
     TOO_MANY = "The largest number of responses was used up before the search settled: allow more."
     STOPPED = "The search was stopped by the caller."
@@ -94,9 +98,11 @@ class DesignResult:
     basins : tuple of Basin
         Every local optimum found, best first.
     history : tuple of Evaluation
-        Every design evaluated, in order; the optimum is among them.
+        Every design evaluated, in order; the optimum is among them (of a tracked peak the optimum alone).
+    evaluations : int
+        Frequency responses computed.
     work : float
-        What the search cost, in frequency responses.
+        What the search cost in all, in frequency responses.
     seconds : float
         Time in all.
     """
@@ -108,6 +114,7 @@ class DesignResult:
     conditions: Conditions | None
     basins: tuple[Basin, ...]
     history: tuple[Evaluation, ...]
+    evaluations: int
     work: float
     seconds: float
 
@@ -124,7 +131,7 @@ class DesignResult:
     @property
     def reached(self) -> bool:
         """Whether the goal was reached."""
-        return self.status is DesignStatus.OPTIMAL
+        return self.status in (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)
 
     @property
     def peak(self) -> DesignPeak | None:
@@ -146,11 +153,6 @@ class DesignResult:
             return None
         branches = [r.branch for r in self.evaluation.responses if r.case == self.evaluation.band.case]
         return None if branches[0].band is None else branches[0].band.limit
-
-    @property
-    def evaluations(self) -> int:
-        """Designs evaluated."""
-        return len(self.history)
 
     @property
     def optimality(self) -> float:

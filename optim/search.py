@@ -4,96 +4,21 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
-from scipy.stats import qmc
-
-from optim.evaluation import evaluate, natural_scales
+from optim.coarse import begins, between, coarse
+from optim.evaluation import natural_scales
+from optim.evaluator import Search, StoppedError
 from optim.local import Local, LocalSearch, is_flat
-from optim.model import Model, model_of
+from optim.model import Conditions, conditions, model_of
 from optim.problem import Method, Problem, pose
 from optim.result import Basin, DesignResult, DesignStatus
-from optim.rows import Evaluation
-from optim.variables import Variable, unscaled
+from optim.tracked import Tracked, tracked_optimum
+from optim.watch import OnProgress, ShouldStop
 from solver.scene import Scene
 
-COARSE_ONE = 9  # designs of the coarse stage with one variable
-COARSE_EACH = 6  # and for each variable with more
-WORTH_A_LOOK = 1.15  # relative height up to which an interval of the coarse stage is halved
-BASINS = 2  # of the coarse stage that are searched to the end
 SAME_PLACE = 1e-3  # scaled distance within which two optima are one
-MOST_EVALUATIONS = 400
-
-
-class StoppedError(Exception):
-    """The caller asked to stop, or the evaluations are used up."""
-
-    def __init__(self, status: DesignStatus) -> None:
-        self.status = status
-        super().__init__(status.value)
-
-
-class Search:
-    """Evaluates designs, keeps all of them, reports progress and looks whether to stop."""
-
-    def __init__(
-        self, problem: Problem, on_progress: Callable[[float, int], None] | None = None,
-        should_stop: Callable[[], bool] | None = None, most: int = MOST_EVALUATIONS,
-    ) -> None:  # fmt: skip
-        self.problem = problem
-        self.history: list[Evaluation] = []
-        self.scales = natural_scales(problem)
-        self.should_stop = should_stop
-        self.on_progress = on_progress
-        self._most = most
-        self._scale: float | None = None
-
-    def __call__(self, values: Mapping[str, float]) -> Evaluation:
-        """Evaluate one design with gradients.
-
-        Raises
-        ------
-        StoppedError
-            The caller asked to stop, or the evaluations are used up.
-        """
-        self.check()
-        if len(self.history) >= self._most:
-            raise StoppedError(DesignStatus.TOO_MANY)
-        evaluation = evaluate(self.problem, values, should_stop=self.should_stop)
-        self.keep(evaluation)
-        return evaluation
-
-    def check(self) -> None:
-        """Raise StoppedError if the caller asked to stop."""
-        if self.should_stop is not None and self.should_stop():
-            raise StoppedError(DesignStatus.STOPPED)
-
-    def keep(self, evaluation: Evaluation) -> None:
-        """Add an evaluation to the history and report it."""
-        self.history.append(evaluation)
-        if self._scale is None and evaluation.good:
-            self._scale = evaluation.objective or 1.0
-        if self.on_progress is not None:
-            # The number of evaluations is not known beforehand: the share approaches 1 from below.
-            done = len(self.history)
-            self.on_progress(done / (done + 12.0), done)
-
-    @property
-    def variables(self) -> tuple[Variable, ...]:
-        """What may be chosen."""
-        return self.problem.variables
-
-    def good(self) -> list[Evaluation]:
-        """Return every design whose numbers are known."""
-        return [evaluation for evaluation in self.history if evaluation.good]
-
-    def model(self, evaluation: Evaluation) -> Model:
-        """Return the model of a good evaluation, relative to the first one."""
-        return model_of(evaluation, self.variables, self._scale or 1.0, self.scales)
-
-    def merit(self, evaluation: Evaluation) -> float:
-        """Return what the search decreases."""
-        return self.model(evaluation).merit
+HELD = 1e-7  # multiplier of a bound, relative objective per scaled variable, from which it holds the design
 
 
 def design(
@@ -113,8 +38,9 @@ def design(
     harmonics: int = 11,
     start: Mapping[str, float] | None = None,
     method: str | Method = Method.AUTO,
-    on_progress: Callable[[float, int], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    basins: int = 2,
+    on_progress: OnProgress = None,
+    should_stop: ShouldStop = None,
 ) -> DesignResult:
     """Choose parameters within bounds so that the highest peak over the scene's band is least.
 
@@ -135,7 +61,8 @@ def design(
     contact_states : contact to ``never-separates``.
     harmonics : highest harmonic kept.
     start : a design to start from, variable to value; it is tried along with those of the coarse stage.
-    method : ``auto``, ``tracked``, ``minimax`` or ``ipopt``.
+    method : ``auto``, ``tracked``, ``minimax`` or ``ipopt``; ``auto`` tracks the peak where that is enough.
+    basins : how many local optima are looked for.
     on_progress : called with (share done, evaluations so far).
     should_stop : asked between responses and within them.
 
@@ -152,17 +79,21 @@ def design(
         scene, variables=variables, scaling=scaling, cases=cases, limit=limit, weights=weights,
         max_peak=max_peak, max_band_hz=max_band_hz, forbidden_hz=forbidden_hz, speeds_rpm=speeds_rpm,
         max_friction_work=max_friction_work, contact_states=contact_states, harmonics=harmonics, start=start,
-        method=method,
+        method=method, basins=basins,
     )  # fmt: skip
     return solve_problem(problem, on_progress=on_progress, should_stop=should_stop)
 
 
 def solve_problem(
-    problem: Problem, *, on_progress: Callable[[float, int], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-) -> DesignResult:  # fmt: skip
+    problem: Problem, *, on_progress: OnProgress = None, should_stop: ShouldStop = None
+) -> DesignResult:
     """Search the best design of a problem; see `design`."""
     begun = time.perf_counter()
+    trackable = problem.method in (Method.AUTO, Method.TRACKED) and problem.why_not_tracked is None
+    if trackable:
+        tracked = tracked_optimum(problem, on_progress=on_progress, should_stop=should_stop)
+        if problem.method is Method.TRACKED or tracked.status is not DesignStatus.NOT_TRACKED:
+            return _of_tracked(problem, tracked, time.perf_counter() - begun)
     search = Search(problem, on_progress, should_stop)
     found: list[Local] = []
     try:
@@ -179,7 +110,7 @@ def _search(search: Search, found: list[Local]) -> DesignStatus:
     for values in coarse(search.problem):
         search(values)
     if len(search.variables) == 1:
-        for values in _between(search):
+        for values in between(search):
             search(values)
     good = search.good()
     if not good:
@@ -187,7 +118,7 @@ def _search(search: Search, found: list[Local]) -> DesignStatus:
     if all(is_flat(search.model(evaluation)) for evaluation in good):
         return DesignStatus.FLAT
     local_search = local_search_of(search.problem.method)
-    for begin in _basins(search, good):
+    for begin in begins(search, good):
         found.append(local_search(search, search.variables, begin, search.model))
     return judge(min(found, key=lambda local: local.merit))
 
@@ -207,44 +138,15 @@ def judge(best: Local) -> DesignStatus:
     """Return how a search ended from the best end of its local searches."""
     if not best.feasible:
         return DesignStatus.INFEASIBLE
-    return DesignStatus.OPTIMAL if best.settled else DesignStatus.KINK
+    if not best.settled:
+        return DesignStatus.KINK
+    return settled_status(best.conditions)
 
 
-def coarse(problem: Problem) -> list[dict[str, float]]:
-    """Return the designs of the coarse stage: even in scaled variables, the start first."""
-    n = len(problem.variables)
-    if n == 1:
-        points = [[i / (COARSE_ONE - 1.0)] for i in range(COARSE_ONE)]
-    else:
-        points = qmc.Sobol(n, scramble=False).random(2 ** math.ceil(math.log2(COARSE_EACH * n))).tolist()
-    designs = [unscaled(problem.variables, point) for point in points]
-    start = None if problem.start is None else dict(problem.start)
-    return [start, *designs] if start is not None and start not in designs else designs
-
-
-def _between(search: Search) -> list[dict[str, float]]:
-    """Return the middles of those coarse intervals in which a design may beat the best one so far."""
-    variable = search.variables[0]
-    good = sorted(search.good(), key=lambda evaluation: evaluation.values[variable.name])
-    merits = [search.merit(evaluation) for evaluation in good]
-    places = [variable.inside(evaluation.values[variable.name]) for evaluation in good]
-    return [
-        {variable.name: variable.outside(0.5 * (places[i] + places[i + 1]))}
-        for i in range(len(good) - 1)
-        if min(merits[i], merits[i + 1]) <= WORTH_A_LOOK * min(merits)
-    ]
-
-
-def _basins(search: Search, good: list[Evaluation]) -> list[Evaluation]:
-    """Return the best designs of the coarse stage; with one variable the best of its local minima."""
-    ranked = sorted(good, key=search.merit)
-    if len(search.variables) > 1:
-        return ranked[:BASINS]
-    name = search.variables[0].name
-    along = sorted(good, key=lambda evaluation: evaluation.values[name])
-    merits = [math.inf, *(search.merit(evaluation) for evaluation in along), math.inf]
-    minima = [e for i, e in enumerate(along) if merits[i] >= merits[i + 1] <= merits[i + 2]]
-    return sorted(minima, key=search.merit)[:BASINS]
+def settled_status(found: Conditions) -> DesignStatus:
+    """Return whether a settled design is held by the bound of a variable."""
+    held = any(multiplier > HELD for _, _, multiplier in found.bounds)
+    return DesignStatus.AT_BOUND if held else DesignStatus.OPTIMAL
 
 
 def basins_of(search: Search, found: list[Local]) -> tuple[Basin, ...]:
@@ -269,9 +171,25 @@ def _result(search: Search, found: list[Local], status: DesignStatus, seconds: f
     """Put the result together; after a stop the best design so far stands in it."""
     best = min(found, key=lambda local: local.merit, default=None)
     evaluation = best.evaluation if best else min(search.good(), key=search.merit, default=None)
+    method = Method.IPOPT if search.problem.method is Method.IPOPT else Method.MINIMAX
+    responses = sum(len(e.responses) for e in search.history)
     return DesignResult(
-        problem=search.problem, method=Method.MINIMAX, status=status, evaluation=evaluation,
+        problem=search.problem, method=method, status=status, evaluation=evaluation,
         conditions=None if best is None else best.conditions, basins=basins_of(search, found),
-        history=tuple(search.history), work=float(sum(len(e.responses) for e in search.history)),
-        seconds=seconds,
+        history=tuple(search.history), evaluations=responses, work=float(responses), seconds=seconds,
+    )  # fmt: skip
+
+
+def _of_tracked(problem: Problem, tracked: Tracked, seconds: float) -> DesignResult:
+    """Put the result of the tracked peak together; its optimum is judged like that of any method."""
+    evaluation, status, found = tracked.evaluation, tracked.status, None
+    if evaluation is not None and evaluation.good:
+        model = model_of(evaluation, problem.variables, evaluation.objective, natural_scales(problem))
+        found = conditions(model, problem.variables)
+        if status is DesignStatus.OPTIMAL:
+            status = settled_status(found)
+    return DesignResult(
+        problem=problem, method=Method.TRACKED, status=status, evaluation=evaluation, conditions=found,
+        basins=tracked.basins, history=() if evaluation is None else (evaluation,),
+        evaluations=tracked.sweeps, work=tracked.work, seconds=seconds,
     )  # fmt: skip
