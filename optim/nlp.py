@@ -30,10 +30,10 @@ from optim.variables import SNAP, Real, Variable, snapped, unscaled
 Second = Callable[[], Real | None]
 
 ROUNDS = 8  # programmes, each from where the last one ended
-REGION = 0.2  # scaled distance from its start that a programme covers: far away other peaks compete
+REGION = 0.1  # scaled distance from its start that a programme covers: far away other peaks compete
 MOST_ITERATIONS = 25
 TOLERANCE = 1e-9
-NEGLIGIBLE = 1e-10  # relative gain from one programme to the next below which the search ends
+NEGLIGIBLE = 1e-10  # relative gain of a programme below which the next one covers less
 NOTHING = 1e-12  # multipliers below it do not count
 VANISHED = 0.9  # share of the highest row at which a place without one stands
 EMPTY = -1.0  # excess of a limited place without a row
@@ -54,12 +54,12 @@ def ipopt_search(
 
     A design whose response cannot be computed is NaN to IPOPT, which then takes a shorter step.
     """
-    best, model = begin, model_of(begin)
+    best, model, region = begin, model_of(begin), REGION
     for _ in range(ROUNDS):
         rows = _Rows(evaluate, variables, model, model_of)
         rows.seen(best, model)
         before = model.merit
-        _run(rows, model)
+        _run(rows, model, region)
         best, model = rows.best, model_of(rows.best)
         on_bounds = snapped(model.z)
         if np.any(on_bounds != model.z):
@@ -70,7 +70,7 @@ def ipopt_search(
         if local.settled and local.conditions.residual <= 1e-2 * KKT_TOLERANCE:
             break
         if before - model.merit <= NEGLIGIBLE * abs(before):
-            break
+            region *= 0.2
     return ended(best, model, variables)
 
 
@@ -277,7 +277,7 @@ class _Hessian(casadi.Callback):
         return [casadi.DM(self.get_sparsity_out(0), casadi.DM(whole)[self.get_sparsity_out(0)].nonzeros())]
 
 
-def _run(rows: _Rows, model: Model) -> None:
+def _run(rows: _Rows, model: Model, region: float) -> None:
     """Solve one programme from a model; the designs tried are kept by `rows`."""
     n, m, groups = model.z.size, model.heights.size, rows.unique
     callback = _Callback(rows, n)
@@ -295,8 +295,8 @@ def _run(rows: _Rows, model: Model) -> None:
     tops = [model.heights[model.groups == g].max() for g in groups]
     solver(
         x0=np.concatenate([model.z, tops]),
-        lbx=np.append(np.maximum(model.z - REGION, 0.0), np.full(len(groups), -np.inf)),
-        ubx=np.append(np.minimum(model.z + REGION, 1.0), np.full(len(groups), np.inf)), lbg=0.0, ubg=np.inf,
+        lbx=np.append(np.maximum(model.z - region, 0.0), np.full(len(groups), -np.inf)),
+        ubx=np.append(np.minimum(model.z + region, 1.0), np.full(len(groups), np.inf)), lbg=0.0, ubg=np.inf,
     )  # fmt: skip
     if callback.failure is not None:
         raise callback.failure

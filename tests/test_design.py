@@ -98,7 +98,8 @@ def test_several_variables_beat_one() -> None:
         scene,
         variables={"damper.N0": (20.0, 500.0), "damper.kt": (10.0, 60.0), "damper.N1_ratio": (0.0, 0.5)},
     )
-    assert result.status is DesignStatus.OPTIMAL
+    assert result.status is DesignStatus.AT_BOUND
+    assert result.reached
     assert result.peak.value < best("two-dof", "damper.N0", None).peak.value  # type: ignore[union-attr]
     assert any("upper bound of damper.kt" in what for what in result.active)
 
@@ -106,7 +107,7 @@ def test_several_variables_beat_one() -> None:
 def test_springs_of_the_structure_can_be_designed() -> None:
     scene = solver.load_scene("two-dof")
     result = optim.design(scene, variables={"structure.k2": (35.0, 45.0)})
-    assert result.status is DesignStatus.OPTIMAL
+    assert result.reached
     for k2 in (35.0, 38.0, 40.0, 42.0, 45.0):
         there = peak_of(scene, {"structure.k2": k2})
         assert there >= result.peak.value * (1.0 - 1e-9)  # type: ignore[union-attr]
@@ -135,7 +136,7 @@ def test_a_search_can_be_stopped_and_keeps_the_best_so_far() -> None:
         count += 1
         return count > 12
 
-    result = optim.design(solver.load_scene("two-dof"), should_stop=stop)
+    result = optim.design(solver.load_scene("two-dof"), method="minimax", should_stop=stop)
     assert result.status is DesignStatus.STOPPED
     assert not result.reached
     assert result.optimum
@@ -144,7 +145,9 @@ def test_a_search_can_be_stopped_and_keeps_the_best_so_far() -> None:
 def test_progress_rises_to_one_and_the_sweeps_end_with_the_optimum() -> None:
     seen: list[tuple[float, int]] = []
     result = optim.design(
-        solver.load_scene("two-dof"), on_progress=lambda share, count: seen.append((share, count))
+        solver.load_scene("two-dof"),
+        method="minimax",
+        on_progress=lambda share, count: seen.append((share, count)),
     )
     shares = [share for share, _ in seen]
     assert shares == sorted(shares)
