@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from optim.coarse import coarse
 from optim.local import Local, is_flat
 from optim.pessimise import Aspect, Finding, pessimise
 from optim.result import DesignResult
@@ -13,7 +14,7 @@ from optim.robust_result import Cut, RobustStatus
 from optim.robust_search import RobustSearch
 from optim.rows import Evaluation, Quantity
 from optim.scenarios import Outcome, number_of
-from optim.search import SAME_PLACE, coarse
+from optim.search import SAME_PLACE
 from optim.uncertain import Scenario
 from optim.variables import scaled
 

@@ -20,12 +20,13 @@ from dataclasses import dataclass, field, replace
 from optim.aims import Aim
 from optim.cutting import Progress, cutting_sets, sampled
 from optim.errors import DesignError
+from optim.evaluator import StoppedError
 from optim.pessimise import UnknownScenarioError
 from optim.problem import Method, pose
 from optim.result import DesignResult, DesignStatus
 from optim.robust_result import RobustResult, RobustStatus, Side
 from optim.robust_search import RobustSearch
-from optim.search import StoppedError, solve_problem
+from optim.search import solve_problem
 from optim.sides import side_of
 from optim.uncertain import Scenario, is_number
 from optim.uncertainty import check_settings, read_uncertain

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from optim.aims import Aim, aim_model
 from optim.cone import solve_cone
 from optim.evaluation import natural_scales
+from optim.evaluator import StoppedError
 from optim.local import Local
 from optim.minimax import REMEMBERED, minimax_search
 from optim.model import Model
@@ -15,7 +16,6 @@ from optim.problem import Problem
 from optim.result import DesignStatus
 from optim.rows import Evaluation, Quantity
 from optim.scenarios import Outcome, outcome, together
-from optim.search import StoppedError
 from optim.uncertain import Scenario, UncertainSet
 from optim.variables import Variable
 

@@ -180,7 +180,7 @@ def _of_all_blades(
         for j in range(sectors):
             name = f"{case.name}, {dof}@{j}"
             seen = branch if j == 0 else observing(branch, f"{dof}@{j}", limit=problem.limit, effects=effects)
-            judge = Judge(problem=problem, case=replace(case, name=name), scene=here, gradients=gradients)
+            judge = Judge(problem=problem, case=replace(case, name=name), gradients=gradients)
             found = judge.response(seen) if low is None or high is None else judge.forbidden(seen, low, high)
             blades = (Quantity.PEAK, Quantity.BAND, Quantity.FORBIDDEN)
             rows += [row for row in found if j == 0 or row.quantity in blades]
