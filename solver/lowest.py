@@ -117,14 +117,17 @@ def _solved(tracker: Tracker, z: Real, heights: Real, index: int) -> Lowest:
         for number, line in enumerate(tracker.lines)
         if np.any(line.heights(z[[index]]) >= NEAR_THE_TOP * heights[index])
     ]
+    unsolved = Lowest(z=float(z[index]), rows={}, height=float(heights[index]), bracketed=False)
     rows, bracketed = _search(tracker, near, float(z[index]), low, high)
     if not rows:
-        return Lowest(z=float(z[index]), rows={}, height=float(heights[index]), bracketed=False)
+        return unsolved
     top = next(iter(rows.values()))
     if top[HEIGHT] < tracker.envelope(top[[Z]])[0] * (1.0 - RISE):
         # A line that is higher ends there: what is low lies beyond its end.
         rows = _solve(tracker, near, float(z[index]))
-        top, bracketed = next(iter(rows.values()), top), False
+        if not rows:
+            return unsolved
+        top, bracketed = next(iter(rows.values())), False
     return Lowest(z=float(top[Z]), rows=rows, height=float(top[HEIGHT]), bracketed=bracketed)
 
 
