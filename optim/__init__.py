@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from optim.crossings import CampbellDiagram, CampbellStatus
     from optim.elasticities import SensitivityResult, SensitivityStatus, sensitivities
     from optim.errors import DesignError
+    from optim.pareto import pareto_front
+    from optim.pareto_result import ParetoResult, ParetoStatus
     from optim.result import DesignResult, DesignStatus
     from optim.robust import robust_design
     from optim.robust_result import RobustResult, RobustStatus
@@ -21,6 +23,7 @@ _HOME = {
     "forbidden_hz": "campbell",
     "sensitivities": "elasticities", "SensitivityResult": "elasticities",
     "SensitivityStatus": "elasticities",
+    "pareto_front": "pareto", "ParetoResult": "pareto_result", "ParetoStatus": "pareto_result",
     "robust_design": "robust", "RobustResult": "robust_result", "RobustStatus": "robust_result",
 }  # fmt: skip
 
@@ -30,6 +33,8 @@ __all__ = [
     "DesignError",
     "DesignResult",
     "DesignStatus",
+    "ParetoResult",
+    "ParetoStatus",
     "RobustResult",
     "RobustStatus",
     "SensitivityResult",
@@ -37,6 +42,7 @@ __all__ = [
     "campbell_diagram",
     "design",
     "forbidden_hz",
+    "pareto_front",
     "robust_design",
     "sensitivities",
 ]

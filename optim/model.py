@@ -181,11 +181,11 @@ def conditions(model: Model, variables: Sequence[Variable], *, feasibility: bool
             for row, slope, excess in zip(model.limited, model.excess_slopes, model.excess, strict=True)
             if abs(excess) <= ACTIVE
         ]
-    held = _held(model.z, variables)
+    held = bounds_held(model.z, variables)
     return _multipliers(kept, held, model)
 
 
-def _held(z: Real, variables: Sequence[Variable]) -> list[tuple[str, str, Real]]:
+def bounds_held(z: Real, variables: Sequence[Variable]) -> list[tuple[str, str, Real]]:
     """Return the variables on a bound with the outward direction."""
     held = []
     for i, variable in enumerate(variables):
