@@ -18,13 +18,14 @@ import numpy as np
 from scipy.optimize import linprog
 
 from optim.errors import DesignError
+from optim.evaluator import Search, StoppedError
 from optim.local import Local
 from optim.model import ACTIVE, Model, bounds_held
 from optim.pareto_result import ParetoPoint, ParetoResult, ParetoStatus, front_of
 from optim.problem import Method, Problem, pose
 from optim.result import DesignResult, DesignStatus
 from optim.rows import Evaluation, Quantity
-from optim.search import Search, StoppedError, judge, local_search_of, solve_problem
+from optim.search import judge, local_search_of, solve_problem
 from optim.variables import Variable, scaled, unscaled
 from solver.scene import Scene
 
@@ -33,6 +34,7 @@ FEWEST = 3
 FAR_APART = 0.02  # scaled distance from which the optima of two neighbours are both searched from
 NOTHING_TO_TRADE = 1e-6  # relative width of the front below which the two optima are one
 MOST_EVALUATIONS = 5000
+FOUND = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK)
 
 
 def pareto_front(
@@ -120,7 +122,7 @@ class _Front:
             self._keep(end.history)
             if end.status is DesignStatus.STOPPED:
                 return ParetoStatus.STOPPED
-            if end.status not in (DesignStatus.OPTIMAL, DesignStatus.KINK) or end.band_hz is None:
+            if end.status not in FOUND or end.band_hz is None:
                 return ParetoStatus.NO_END
             self.found.append(ParetoPoint.of(end, math.nan if self.found else 0.0))
             if end.band_hz == 0.0 and len(self.found) == 1:
@@ -192,9 +194,9 @@ class _Front:
             self.missed.append(width)
             return
         result = DesignResult(
-            problem=limited, method=self.ends[0].method, status=judge(local), evaluation=local.evaluation,
-            conditions=local.conditions, basins=(), history=tuple(search.history[1:]),
-            work=float(len(search.history) - 1), seconds=0.0,
+            problem=limited, method=_used(self.problem.method), status=judge(local),
+            evaluation=local.evaluation, conditions=local.conditions, basins=(),
+            history=tuple(search.history[1:]), evaluations=len(search.history) - 1, work=float(len(search.history) - 1), seconds=0.0,
         )  # fmt: skip
         self.found.append(ParetoPoint.of(result, _slope(search, local, width)))
 
@@ -215,6 +217,11 @@ class _Front:
         local_search = local_search_of(search.problem.method)
         ends = [local_search(search, search.variables, evaluation, search.model) for evaluation in begin]
         return min(ends, key=lambda local: local.merit)
+
+
+def _used(method: Method) -> Method:
+    """Return the method that a search with a limit uses."""
+    return method if method is Method.IPOPT else Method.MINIMAX
 
 
 def _at_limit(evaluation: Evaluation, width: float) -> Evaluation:
