@@ -196,7 +196,8 @@ class _Front:
         result = DesignResult(
             problem=limited, method=_used(self.problem.method), status=judge(local),
             evaluation=local.evaluation, conditions=local.conditions, basins=(),
-            history=tuple(search.history[1:]), evaluations=len(search.history) - 1, work=float(len(search.history) - 1), seconds=0.0,
+            history=tuple(search.history[1:]),
+            evaluations=len(search.history) - 1, work=float(len(search.history) - 1), seconds=0.0,
         )  # fmt: skip
         self.found.append(ParetoPoint.of(result, _slope(search, local, width)))
 
