@@ -107,7 +107,7 @@ class _Cone:
         step = radius * np.clip(np.asarray(self._d.value, dtype=np.float64), low, high)
         multipliers, limit_multipliers = np.zeros(model.heights.size), np.zeros(model.excess.size)
         np.add.at(multipliers, spread, _dual(self._row))
-        if self._limited:
+        if self._limited and limit_unit > _LEAST:  # rows that do not change hold nothing
             np.add.at(limit_multipliers, again, _dual(self._limit_row) * unit / limit_unit)
         return Step(
             step=step, predicted=model.predicted(step), multipliers=multipliers,

@@ -23,7 +23,7 @@ from optim.model import PENALTY, Model
 from optim.variables import Real
 
 _BLOCK = 12  # rows are padded to multiples of it
-_LEAST = 1e-200  # unit of rows that do not change at all
+_LEAST = 1e-14  # unit of rows that do not change, relative to their size
 _LOCK = threading.Lock()  # a problem keeps its numbers in itself
 
 
@@ -90,7 +90,8 @@ class _Subproblem:
             for i, (a, g) in enumerate(zip(self._heights, self._slopes, strict=True))
         ]
         constraints = [*self._rows, self._low <= self._d, self._d <= self._high]
-        objective = cvxpy.sum(self._t) + 0.5 * cvxpy.sum_squares(self._root @ self._d)
+        self._share = cvxpy.Parameter(nonneg=True)
+        objective = self._share * cvxpy.sum(self._t) + 0.5 * cvxpy.sum_squares(self._root @ self._d)
         self._limited = limited
         if limited:
             self._s, self._least = cvxpy.Variable(), cvxpy.Parameter()
@@ -117,8 +118,13 @@ class _Subproblem:
             self._excess.value = np.maximum(below, far)
             self._excess_slopes.value = radius / limit_unit * model.excess_slopes[again]
             self._least.value = max(-model.violation / limit_unit, 2.0 * far)
-            self._price.value = PENALTY * limit_unit / unit
-        self._root.value = radius / math.sqrt(unit) * root
+        else:
+            limit_unit = _LEAST
+        # The larger of what the objective and the penalty change by counts as 1.
+        whole = max(unit, PENALTY * limit_unit)
+        self._share.value, self._root.value = unit / whole, radius / math.sqrt(whole) * root
+        if self._limited:
+            self._price.value = PENALTY * limit_unit / whole
         self._low.value = np.maximum(-model.z / radius, -1.0)
         self._high.value = np.minimum((1.0 - model.z) / radius, 1.0)
         if not self._solved():
@@ -128,10 +134,14 @@ class _Subproblem:
         )
         multipliers, limit_multipliers = np.zeros(model.heights.size), np.zeros(model.excess.size)
         for some, row in zip(spread, self._rows, strict=True):
-            np.add.at(multipliers, some, np.maximum(np.asarray(row.dual_value, dtype=np.float64), 0.0))
-        if self._limited:
+            np.add.at(
+                multipliers,
+                some,
+                np.maximum(np.asarray(row.dual_value, dtype=np.float64), 0.0) * whole / unit,
+            )
+        if self._limited and limit_unit > _LEAST:  # rows that do not change hold nothing
             duals = np.maximum(np.asarray(self._limit_row.dual_value, dtype=np.float64), 0.0)
-            np.add.at(limit_multipliers, again, duals * unit / limit_unit)
+            np.add.at(limit_multipliers, again, duals * whole / limit_unit)
         return Step(
             step=step, predicted=model.predicted(step), multipliers=multipliers,
             limit_multipliers=limit_multipliers,
