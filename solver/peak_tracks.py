@@ -19,7 +19,10 @@ class TrackStatus(Enum):
     )
     FLAT = "The highest peak does not depend on the parameter: every value in the range is as good."
     GAPS = "Somewhere in the range no peak could be tracked: use a shorter range or more harmonics."
-    UNPROVEN = "The sweeps went on finding higher peaks: use a shorter range, or compare sweeps of your own."
+    UNPROVEN = (
+        "The sweeps went on finding higher peaks, or the peaks could not be followed to both sides of their "
+        "least height: use a shorter range, or compare sweeps of your own."
+    )
     OTHER_BRANCH = (
         "The highest tracked peak is on a response that a sweep does not reach: compare sweeps of your own."
     )
