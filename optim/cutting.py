@@ -221,7 +221,7 @@ def _locals(
     found: list[Local] = []
     for begin in starts:
         z = [variable.inside(begin.values[variable.name]) for variable in search.variables]
-        if len(found) < STARTS and all(math.dist(z, other) > FAR_APART for other in places):
+        if len(places) < STARTS and all(math.dist(z, other) > FAR_APART for other in places):
             places.append(z)
             local = search.improve(begin.values, scenarios)
             if local is not None and all(_apart(search, local, other) for other in found):

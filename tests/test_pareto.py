@@ -15,6 +15,7 @@ import pytest
 import optim
 import solver
 from optim.pareto_result import ParetoStatus, front_of
+from service.plots.pareto import pareto_figure
 
 LIMIT = 0.08e-3
 DISK = solver.load_scene("bladed-disk")
@@ -156,3 +157,17 @@ def test_bad_input_is_named(arguments: dict[str, object], words: list[str]) -> N
         optim.pareto_front(TWO, **arguments)  # type: ignore[arg-type]
     for word in words:
         assert word in str(caught.value)
+
+
+def test_the_picture_shows_the_front_the_knee_and_the_frequencies_at_risk() -> None:
+    page = pareto_figure(front().to_json())
+    risk = page.axes[1]
+    words = "\n".join(text.get_text() for text in page.findobj(lambda artist: hasattr(artist, "get_text")))
+    assert "knee: shroud.N0" in words
+    assert "Hz wider" in words
+    drawn = [
+        line for axes in page.axes[:1] for line in axes.lines if len(line.get_xdata()) == len(front().points)
+    ]
+    assert sorted(drawn[0].get_xdata()) == pytest.approx(sorted(p.band_hz for p in front().points))
+    bars = sum(len(p.intervals) for p in front().points)
+    assert len(risk.lines) == bars + len(front().points)

@@ -12,6 +12,7 @@ import pytest
 import optim
 import solver
 from optim.elasticities import ParameterSensitivity, SensitivityStatus
+from service.plots.shares import sensitivities_figure
 
 DESIGNS = {"two-dof": {"damper.N0": 140.0}, "bladed-disk": {"shroud.N0": 150.0}}
 BAND_LIMIT = {"two-dof": 1.8, "bladed-disk": 0.08e-3}
@@ -129,3 +130,14 @@ def test_bad_input_is_named(arguments: dict[str, object], words: list[str]) -> N
         optim.sensitivities(solver.load_scene("two-dof"), **arguments)  # type: ignore[arg-type]
     for word in words:
         assert word in str(caught.value)
+
+
+def test_the_picture_has_a_bar_for_every_parameter_that_matters() -> None:
+    result = found("bladed-disk")
+    peaks, bands = sensitivities_figure(result.to_json()).axes
+    names = [text.get_text() for text in peaks.get_yticklabels()]
+    assert names[-1] == result.rows[0].path, "what matters most is on top"
+    widths = [bar.get_width() for bar in peaks.patches]
+    mine = rows(result)
+    assert widths == pytest.approx([result.peak_elasticities(mine[name])[0] for name in names])
+    assert len(bands.patches) == len(names)

@@ -64,9 +64,11 @@ def robust_figure(result: RobustResult) -> Figure:
             if np.isfinite(side.worst_peak):
                 worst = side.worst_peak * unit.per_metre
                 axes.axhline(worst, color=color, linewidth=0.9, linestyle=(0, (5.0, 2.5)))
+                above = all(not other.worst_peak > side.worst_peak for _, other, _ in sides)
                 axes.annotate(
                     f"worst {unit.show(side.worst_peak)}", (0.02, worst), xycoords=("axes fraction", "data"),
-                    xytext=(0, 3), textcoords="offset points", va="bottom", color=color,
+                    xytext=(0, 3 if above else -3), textcoords="offset points",
+                    va="bottom" if above else "top", color=color,
                 )  # fmt: skip
         style.label(axes, "share of the samples [%]", f"highest peak at most [{unit.name}]")
         axes.margins(y=0.14)
