@@ -32,7 +32,7 @@ from solver.scene import Scene
 POINTS = 9
 FEWEST = 3
 FAR_APART = 0.02  # scaled distance from which the optima of two neighbours are both searched from
-STEEP = 0.1  # share of the band beside the narrowest that the next point is searched at
+JUMP = 0.01  # share of the band's range within which two neighbours need no point between them
 NOTHING_TO_TRADE = 1e-6  # relative width of the front below which the two optima are one
 MOST_EVALUATIONS = 5000
 FOUND = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK)
@@ -173,15 +173,15 @@ class _Front:
             one, other = pair
             missed = sum(other.band_hz < width < one.band_hz for width in self.missed)
             across = (one.band_hz - other.band_hz) / wide
-            return math.hypot(across, (one.peak - other.peak) / tall) / 4.0**missed
+            # Two basins may lie on either side of a jump, with nothing on the front between them.
+            up = (one.peak - other.peak) / tall if across > JUMP else 0.0
+            return math.hypot(across, up) / 4.0**missed
 
         one, other = max(pairwise(ordered), key=length)
         between = [one.band_hz, *(w for w in self.missed if other.band_hz < w < one.band_hz), other.band_hz]
         gaps = list(pairwise(between))
         high, low = max(sorted(gaps, reverse=True), key=lambda gap: abs(gap[0] - gap[1]))
-        # The front ends like a parabola on its side: a tenth of the band is a third of the peak.
-        share = STEEP if other is ordered[-1] and low == other.band_hz else 0.5
-        return one, other, low + share * (high - low)
+        return one, other, 0.5 * (high + low)
 
     def _add(self, one: ParetoPoint, other: ParetoPoint, width: float) -> None:
         """Search the least peak with the band at most so wide."""
