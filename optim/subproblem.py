@@ -24,6 +24,7 @@ from optim.variables import Real
 
 _BLOCK = 12  # rows are padded to multiples of it
 _LEAST = 1e-14  # unit of rows that do not change, relative to their size
+_STEEP = 1e6  # times the change of the objective, the most a penalty may change by in the cone programme
 _LOCK = threading.Lock()  # a problem keeps its numbers in itself
 
 
@@ -120,8 +121,8 @@ class _Subproblem:
             self._least.value = max(-model.violation / limit_unit, 2.0 * far)
         else:
             limit_unit = _LEAST
-        # The larger of what the objective and the penalty change by counts as 1.
-        whole = max(unit, PENALTY * limit_unit)
+        # What the objective changes by counts as 1, unless the penalty changes by far more.
+        whole = max(unit, PENALTY * limit_unit / _STEEP)
         self._share.value, self._root.value = unit / whole, radius / math.sqrt(whole) * root
         if self._limited:
             self._price.value = PENALTY * limit_unit / whole
