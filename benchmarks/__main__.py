@@ -12,7 +12,7 @@ GROUPS = {"chains": ("chain-8", "chain-32", "one-slider")}
 
 
 def _cases() -> dict[str, Callable[[], None]]:
-    from benchmarks import against_peers, beam, disk, large, responses, robustness, savings
+    from benchmarks import against_peers, beam, designing, disk, large, responses, robustness, savings
 
     return {
         "responses": responses.responses,
@@ -24,6 +24,9 @@ def _cases() -> dict[str, Callable[[], None]]:
         "chain-32": against_peers.chain_of_32,
         "one-slider": against_peers.one_slider,
         "optimum": against_peers.optimum,
+        "one-variable": designing.one_variable,
+        "five-variables": designing.five_variables,
+        "robust": designing.robust,
         "disk": disk.disk_response,
         "map": disk.disk_map,
         "beam": beam.beams,

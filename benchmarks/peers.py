@@ -11,6 +11,7 @@ import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from benchmarks.harness import WrongResultError
 from solver import Scene
@@ -101,13 +102,41 @@ def pyharm(
     WrongResultError
         pyHarm did not end within `LONGEST` seconds, or ended with an error.
     """
-    python = interpreter()
-    if python is None:
-        return None
+    task = _task(scene, step, harmonics, band, runs, warm_up)
+    answer = _asked(task)
+    return None if answer is None else PeerRun(**answer)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PeerOptimum:
+    """The best load by another code: time, responses and points it took, the load [N] and its peak [m]."""
+
+    seconds: float
+    cpu_seconds: float
+    responses: int
+    points: int
+    failed: int
+    at: float
+    peak: float
+
+
+def pyharm_optimum(
+    scene: Scene, low: float, high: float, *, step: float, accuracy: float
+) -> PeerOptimum | None:
+    """Let SciPy's bounded search choose the load by pyHarm's responses, to `accuracy` [N]; None without it."""
+    task = _task(scene, step, 11, None, 1, 1)
+    answer = _asked({**task, "loads": [low, high], "accuracy": accuracy})
+    return None if answer is None else PeerOptimum(**answer)
+
+
+def _task(
+    scene: Scene, step: float, harmonics: int, band: tuple[float, float] | None, runs: int, warm_up: int
+) -> dict[str, Any]:
+    """Return the problem of the runner."""
     model = linear_model(scene)
     index = {dof: i for i, dof in enumerate(scene.structure.dofs)}
     contact, force = scene.contacts[0], scene.excitation[0]
-    task = {
+    return {
         "M": model.M.tolist(), "C": model.C0.tolist(), "K": model.K0.tolist(),
         "kt": contact.kt, "mu": contact.mu, "N0": contact.N0,
         "sliders": [index[end.dof] for one in scene.contacts for end in one.ends if end.dof is not None],
@@ -115,6 +144,13 @@ def pyharm(
         "observed": index[scene.observe.dof], "band": list(band or scene.observe.band), "step": step,
         "harmonics": harmonics, "samples": 256, "runs": runs, "warm_up": warm_up,
     }  # fmt: skip
+
+
+def _asked(task: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the runner's answer; None without pyHarm."""
+    python = interpreter()
+    if python is None:
+        return None
     # pyHarm leaves a folder where it runs.
     with tempfile.TemporaryDirectory() as folder:
         done = subprocess.run(
@@ -123,7 +159,7 @@ def pyharm(
         )  # fmt: skip
     if done.returncode != 0:
         raise WrongResultError(f"pyHarm ended with an error: {done.stderr.strip().splitlines()[-1:]}")
-    answer = json.loads(done.stdout)
+    answer: dict[str, Any] = json.loads(done.stdout)
     if not answer.pop("last_hz") >= (1.0 - 1e-9) * task["band"][1] or not math.isfinite(answer["peak"]):
         raise WrongResultError("pyHarm did not reach the end of the band")
-    return PeerRun(**answer)
+    return answer

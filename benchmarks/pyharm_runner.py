@@ -75,10 +75,35 @@ def run(task: dict) -> dict:
     }  # fmt: skip
 
 
+def optimum(task: dict) -> dict:
+    """Choose the load of least peak by SciPy's bounded search over whole responses."""
+    from scipy.optimize import minimize_scalar
+
+    low, high = task["loads"]
+    answers = []
+
+    def height(load: float) -> float:
+        answers.append(run({**task, "N0": load}))
+        return answers[-1]["peak"]
+
+    begun, cpu = time.perf_counter(), time.process_time()
+    found = minimize_scalar(height, bounds=(low, high), method="bounded", options={"xatol": task["accuracy"]})
+    return {
+        "seconds": time.perf_counter() - begun, "cpu_seconds": time.process_time() - cpu,
+        "points": sum(answer["points"] for answer in answers),
+        "failed": sum(answer["failed"] for answer in answers), "peak": float(found.fun), "at": float(found.x),
+        "responses": len(answers), "last_hz": min(answer["last_hz"] for answer in answers),
+    }  # fmt: skip
+
+
 def main() -> None:
     """Run the task once to warm up where it is short, then as often as asked; print the fastest."""
     logging.disable(logging.CRITICAL)
     task = json.load(sys.stdin)
+    if "loads" in task:
+        run(task)
+        print(json.dumps(optimum(task)))
+        return
     answers = [run(task) for _ in range(task["warm_up"] + task["runs"])][task["warm_up"] :]
     print(json.dumps(min(answers, key=lambda answer: answer["cpu_seconds"])))
 
