@@ -26,20 +26,20 @@ FIVE = {
             "shroud.N0": (50.0, 2000.0), "shroud.kt": (4e6, 8e6), "shroud.mu": (0.2, 0.4),
             "shroud.N1_ratio": (0.1, 0.5), "root.N0": (3000.0, 8000.0),
         },
-        {"limit": 0.8e-4, "max_band_hz": 40.0, "max_friction_work": {"shroud": 0.02}},
+        {"limit": 0.8e-4, "max_band_hz": 40.0, "max_friction_work": {"shroud": 0.04}},
     ),
     "two-dof": (
         {
             "damper.N0": (20.0, 500.0), "damper.kt": (20.0, 40.0), "damper.mu": (0.2, 0.4),
             "damper.N1_ratio": (0.0, 0.5), "structure.k2": (35.0, 45.0),
         },
-        {"limit": 1.5, "max_band_hz": 0.5, "max_friction_work": {"damper": 140.0}},
+        {"limit": 1.5, "max_band_hz": 0.3, "max_friction_work": {"damper": 101.8}},
     ),
 }  # fmt: skip
 
 
 def one_variable() -> None:
-    """The best normal load by every method, beside a grid with SciPy's search over the same solver's sweeps."""
+    """The best normal load by every method, beside a grid and SciPy's search over the same sweeps."""
     rows = []
     for name, path, low, high, at, peak, wanted in _ONE:
         scene = case_a() if name == "case A" else solver.load_scene(name)
@@ -154,9 +154,11 @@ def robust() -> None:
     expect(f"robust: {result.status.value}", result.reached)
     answer = result.to_json()
     rows = [
-        (which, f"{answer[which]['values']['shroud.N0']:.3f}", f"{answer[which]['peak']:.6g}",
+        (which, f"{answer[which]['values']['shroud.N0']:.3f}", f"{answer[which]['peak']['value']:.6g}",
          f"{answer[which]['worst']['peak']:.6g}")
         for which in ("nominal", "robust")
     ]  # fmt: skip
-    table("Robust design of bladed-disk, kt and mu in intervals", ("optimum", "N0 N", "peak m", "worst m"), rows)
+    table(
+        "Robust design of bladed-disk, kt and mu in intervals", ("optimum", "N0 N", "peak m", "worst m"), rows
+    )
     print(f"{spent.cpu:.2f} s of the process, {spent.least:.2f} s on the wall, wanted 5 s")

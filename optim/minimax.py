@@ -24,7 +24,7 @@ from optim.variables import Real, Variable, snapped, unscaled
 
 Subproblem = Callable[[Model, Real, float], Step | None]
 
-FIRST_RADIUS = 0.1
+FIRST_RADIUS = 0.2
 LARGEST_RADIUS = 0.5
 SMALLEST_RADIUS = 1e-9
 STATIONARY = 1e-11  # predicted relative decrease below which a design is optimal

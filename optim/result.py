@@ -214,6 +214,7 @@ class DesignResult:
             "peaks": [{"value": p.value, "at": p.at_hz, "case": p.case} for p in peaks],
             "band_hz": self.band_hz,
             "limit": self.limit,
+            "bands": [] if evaluation is None else _bands(evaluation),
             "objective": None if evaluation is None or not evaluation.rows else evaluation.objective,
             "rows": [] if evaluation is None else [_row(row) for row in evaluation.rows],
             "evaluations": self.evaluations,
@@ -264,6 +265,21 @@ def _highest(evaluation: Evaluation) -> list[Row]:
         top = max((row.weight * row.value for row in rows), default=0.0)
         found += [row for row in rows if row.weight * row.value >= top * (1.0 - SAME_HEIGHT)]
     return found
+
+
+def _bands(evaluation: Evaluation) -> list[dict[str, object]]:
+    """Return where the resonance band of each case lies; the first response of a case is that of its band."""
+    first: dict[str, Branch] = {}
+    for response in evaluation.responses:
+        first.setdefault(response.case, response.branch)
+    return [
+        {
+            "case": case, "limit": branch.band.limit, "width_hz": branch.band.width,
+            "intervals_hz": [list(interval) for interval in branch.band.intervals],
+        }
+        for case, branch in first.items()
+        if branch.band is not None
+    ]  # fmt: skip
 
 
 def _row(row: Row) -> dict[str, object]:
