@@ -196,6 +196,8 @@ def test_bad_scenes_are_named(run: Run, tmp_path: Path, command: str, case: str)
         ("design", ["SCENE", "--problem"]),
         ("design two-dof --problem nowhere.toml", ["--problem", "nowhere.toml"]),
         ("design two-dof --problem file", ["--problem", ".toml", "file"]),
+        ("sensitivities two-dof --limit 0", ["--limit", "0.0"]),
+        ("sensitivities two-dof --set bumper.N0=1", ["--set", "bumper.N0"]),
         ("submit design two-dof --max-band nan", ["--max-band", "nan"]),
         ("march two-dof --frequency 1 --steps 3", ["--steps", "3"]),
         ("march two-dof --frequency 1 --max-periods 0", ["--max-periods", "0"]),
@@ -275,6 +277,22 @@ def test_a_robust_design_shows_both_optima_side_by_side(run: Run, tmp_path: Path
     assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
     (tmp_path / "bad.toml").write_text("samples = 4\n[uncertain]\n'damper.mu' = [0.4, 0.3]")
     assert "bad.toml: /uncertain/damper.mu" in run("design two-dof --problem bad.toml")[2]
+
+
+def test_sensitivities_are_those_of_the_design_layer(run: Run, tmp_path: Path) -> None:
+    status, out, err = run(
+        "sensitivities two-dof --set damper.N0=150 --harmonics 5 --plot picture.png --json"
+    )
+    assert (status, err) == (0, "")
+    answer = json.loads(out)
+    direct = optim.sensitivities(solver.load_scene("two-dof"), values={"damper.N0": 150.0}, harmonics=5)
+    assert answer["rows"] == direct.to_json()["rows"]
+    assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
+    status, out, _ = run("sensitivities two-dof --set damper.N0=150 --harmonics 5")
+    share = next(row["peak_percent"] for row in answer["rows"] if row["path"] == "structure.k1")
+    row = next(line.split() for line in out.splitlines() if line.startswith("structure.k1"))
+    assert float(row[3]) == pytest.approx(share, abs=1e-4)
+    assert "left out" not in out
 
 
 def test_an_infeasible_design_says_what_to_relax_and_by_how_much(run: Run) -> None:

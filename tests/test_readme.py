@@ -17,6 +17,10 @@ from scipy.io import mmwrite
 import solver
 from service.cli import main
 from service.cli.app import app
+from service.cli.problem_inputs import OPTIONS
+from service.kinds.design import DesignRequest, design_issues
+from service.kinds.problem import arguments
+from service.validation import validated
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -68,6 +72,9 @@ def test_commands_run(
     if words[1] == "submit":
         monkeypatch.setenv("STICKSLIP_URL", request.getfixturevalue("server"))
     given = matrix_files(tmp_path) if words[1] == "import" else set()
+    if "--problem" in words:
+        (tmp_path / "docs").symlink_to(ROOT / "docs")
+        given = {"docs"}
     assert main(words[1:]) == 0
     written = {word for word, before in zip(words[1:], words, strict=False) if before in ("--plot", "--out")}
     assert {file.name for file in tmp_path.iterdir()} == given | written
@@ -89,6 +96,22 @@ def test_scenes_work(text: str, tmp_path: Path) -> None:
     assert branch.completed
     assert branch.peak is not None
     assert branch.peak.interior
+
+
+def test_the_problem_of_the_readme_is_one() -> None:
+    """The one shown and the one of the file are read by the service too."""
+    (shown,) = [text for text in blocks("toml") if text.startswith("scene =")]
+    for text in (shown, (ROOT / "docs" / "problem.toml").read_text(encoding="utf-8")):
+        body = tomllib.loads(text)
+        request = validated(DesignRequest, body)
+        assert design_issues(solver.load_scene(body["scene"]), arguments(request)) == []
+
+
+def test_the_page_knows_every_key_and_option_of_a_problem() -> None:
+    table = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
+    keys = set(DesignRequest.model_fields) - {"fresh", "priority"}
+    assert [key for key in keys if f"`{key}`" not in table] == []
+    assert [option for option in OPTIONS.values() if f"`{option}" not in table] == []
 
 
 def test_parts_of_scenes_are_read() -> None:

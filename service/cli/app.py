@@ -12,6 +12,7 @@ from service.cli import (
     campbell_command,
     design_commands,
     import_command,
+    sensitivity_command,
     service_commands,
     solver_commands,
     submit_commands,
@@ -34,8 +35,8 @@ _submit = typer.Typer(help="Hand a job to a running service.", no_args_is_help=T
 _ALONE: tuple[Callable[..., None], ...] = (
     solver_commands.scenes, solver_commands.plan, solver_commands.solve, solver_commands.sweep,
     solver_commands.accuracy,
-    design_commands.design, solver_commands.march, service_commands.demo, service_commands.serve,
-    service_commands.worker, submit_commands.watch, submit_commands.results,
+    design_commands.design, sensitivity_command.sensitivities, solver_commands.march, service_commands.demo,
+    service_commands.serve, service_commands.worker, submit_commands.watch, submit_commands.results,
 )  # fmt: skip
 _SUBMITTED: tuple[Callable[..., None], ...] = (
     submit_commands.design, submit_commands.sweep, submit_commands.solve, submit_commands.march,

@@ -70,10 +70,12 @@ def _pairs(found: Json) -> Pairs:
     residual = found.get("optimality")
     if residual is not None:
         pairs.append(("KKT residual", f"{residual:.1e}"))
-    work = found.get("work") or found["evaluations"]
-    effort = f"{found['evaluations']} designs, {units.number(work, 3)} frequency responses"
+    effort = f"{found['evaluations']} frequency responses in {units.duration(found['seconds'])}"
+    work = found.get("work")
+    if work is not None and abs(work - found["evaluations"]) >= 0.5:
+        effort += f", the work of {units.number(work, 3)}"
     by = f", method {found['method']}" if "method" in found else ""
-    return [*pairs, ("effort", f"{effort} in {units.duration(found['seconds'])}{by}")]
+    return [*pairs, ("effort", effort + by)]
 
 
 def _limits(found: Json) -> Table | None:
@@ -94,7 +96,11 @@ def _limits(found: Json) -> Table | None:
         left = max(left, 0.0) if kept else left
         holds = f"{amount(left, unit)} left" if left >= 0.0 else f"broken by {amount(-left, unit)}"
         what = f"{row['what']} ({row['case']})" if several else row["what"]
-        rows.append((what, amount(row["bound"], unit), amount(row["value"], unit), holds))
+        asked, reached = f"≤ {amount(row['bound'], unit)}", amount(row["value"], unit)
+        if row["quantity"] == "separation":  # a row is kept from above: the least load has its sign turned
+            what = what.removeprefix("-")
+            asked, reached = f"≥ {amount(0.0 - row['bound'], unit)}", amount(0.0 - row["value"], unit)
+        rows.append((what, asked, reached, holds))
     return Table(heading="Limits", columns=("limit", "asked", "reached", ""), rows=rows, right="12")
 
 

@@ -51,18 +51,19 @@ class Description:
         if self.file is not None and key not in self.options:
             message = issue.message.replace("`path`", f"`{issue.pointer.rpartition('/')[2]}`", 1)
             return f"{self.file}: {issue.pointer}: {message}"
-        option = self.options.get(key, _OPTIONS.get(key, key))
+        option = self.options.get(key, OPTIONS.get(key, key))
         for name in (key, "path"):
             if f"`{name}`" in issue.message:
                 return issue.message.replace(f"`{name}`", f"`{option}`", 1)
         return f"`{option}`: {issue.message}"
 
 
-_OPTIONS = {
+OPTIONS = {
     "variables": "--variable", "scaling": "--scaling", "limit": "--limit", "weights": "--weight",
     "max_peak": "--max-peak", "max_band_hz": "--max-band", "forbidden_hz": "--forbidden",
     "speeds_rpm": "--speeds", "max_friction_work": "--max-work", "contact_states": "--never-separates",
-    "start": "--start", "method": "--method", "set": "--set", "harmonics": "--harmonics", "scene": "SCENE",
+    "start": "--start", "method": "--method", "basins": "--basins",
+    "set": "--set", "harmonics": "--harmonics", "scene": "SCENE",
 }  # fmt: skip
 
 
@@ -80,7 +81,7 @@ def description(scene: str | None, flags: ProblemFlags, kind: str) -> Descriptio
     body |= given
     if "scene" not in body:
         raise InputError("`SCENE` is missing: name a scene, or a --problem file with the key `scene`")
-    return Description(body=body, options={key: _OPTIONS[key] for key in given}, file=file)
+    return Description(body=body, options={key: OPTIONS[key] for key in given}, file=file)
 
 
 def posed(
@@ -180,6 +181,7 @@ def _of_flags(flags: ProblemFlags) -> dict[str, Any]:
         "contact_states": dict.fromkeys(flags.never_separates or (), NEVER_SEPARATES) or None,
         "start": _numbers("--start", flags.start, "shroud.N0=150"),
         "method": flags.method,
+        "basins": flags.basins,
         "set": inputs.settings(flags.values) or None,
         "harmonics": flags.harmonics,
     }  # fmt: skip

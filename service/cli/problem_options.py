@@ -24,7 +24,8 @@ File = Annotated[
         "--problem", metavar="FILE",
         help="The problem in a file (.toml, .json), with the keys of the REST body: scene, set, variables, "
         "scaling, cases, limit, weights, max_peak, max_band_hz, forbidden_hz, speeds_rpm, max_friction_work, "
-        "contact_states, harmonics, start, method. An option beside it replaces the key it stands for.",
+        "contact_states, harmonics, start, method, basins, uncertain. An option beside it replaces the key "
+        "it stands for.",
     ),
 ]  # fmt: skip
 Variables = Annotated[
@@ -89,6 +90,10 @@ NeverSeparates = Annotated[
 Method = Annotated[
     str | None, typer.Option("--method", metavar="M", help="auto, tracked, minimax or ipopt; auto.")
 ]
+Basins = Annotated[
+    int | None,
+    typer.Option("--basins", metavar="N", parser=whole_number, help="Local optima looked for; 2."),
+]
 Start = Annotated[
     list[str] | None,
     typer.Option("--start", metavar="PATH=VALUE", help="A design to start from; repeatable."),
@@ -122,6 +127,7 @@ class ProblemFlags:
     never_separates: NeverSeparates = None
     start: Start = None
     method: Method = None
+    basins: Basins = None
     values: Values = None
     harmonics: Harmonics = None
 

@@ -19,6 +19,7 @@ from solver.errors import Issue
 from solver.scene import Scene
 
 UNCERTAIN = "uncertain"
+_NOT_ROBUST = ("basins",)
 ROBUST = (UNCERTAIN, "aim", "quantile", "samples", "seed")
 
 
@@ -69,6 +70,13 @@ def design_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
     known = {key: value for key, value in given.items() if key not in ROBUST}
     issues = problem_issues(scene, known)
     if UNCERTAIN in given:
+        issues += [
+            refusal(
+                pointer(key), f"`{key}` is for a design without `uncertain` parameters, got {given[key]!r}"
+            )
+            for key in _NOT_ROBUST
+            if key in given
+        ]
         return issues + uncertainty_issues(scene, known, given[UNCERTAIN])
     alone = [key for key in ROBUST if key in given]
     return issues + [

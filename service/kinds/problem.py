@@ -150,6 +150,8 @@ class ProblemRequest(HarmonicRequest):
         A design to start from, variable to value.
     method : str
         ``auto``, ``tracked``, ``minimax`` or ``ipopt``.
+    basins : int or None
+        How many local optima are looked for.
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
@@ -207,6 +209,9 @@ class ProblemRequest(HarmonicRequest):
     )
     method: Literal["auto", "tracked", "minimax", "ipopt"] = Field(
         default="auto", description="How the optimum is searched."
+    )
+    basins: Annotated[int, Field(strict=True, ge=1, le=20)] | None = Field(
+        default=None, description="How many local optima are looked for; 2."
     )
 
 

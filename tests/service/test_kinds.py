@@ -172,7 +172,7 @@ def test_the_plan_refuses_what_the_jobs_refuse(shipped: httpx.Client) -> None:
 
 
 def test_a_design_keeps_every_response_it_computed(shipped: httpx.Client) -> None:
-    body = {"scene": "two-dof", "variables": {"damper.N0": [20, 1000]}, "harmonics": 5}
+    body = {"scene": "two-dof", "variables": {"damper.N0": [20, 1000]}, "harmonics": 5, "method": "minimax"}
     accepted = shipped.post("/v1/designs", json={**body, "limit": None, "max_band_hz": None}, headers=WAIT)
     assert accepted.status_code == 200, accepted.text
     job = accepted.json()

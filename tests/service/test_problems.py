@@ -40,6 +40,7 @@ EVERY_KEY: dict[str, Any] = {
     "harmonics": 5,
     "start": {"shroud.N0,root.N0": 200, "shroud.kt": 5e6},
     "method": "minimax",
+    "basins": 3,
 }
 
 
@@ -149,6 +150,9 @@ BAD = [
     ({"start": {}}, ["/start"]),
     ({"start": {"damper.N0": 30, "damper.kt": 1}}, ["/start/damper.kt"]),
     ({"method": "guess"}, ["/method"]),
+    ({"method": "tracked", "max_peak": 1}, ["/method"]),
+    ({"basins": 0}, ["/basins"]),
+    ({"basins": 21}, ["/basins"]),
     ({"colour": "red"}, ["/colour"]),
     (
         {
@@ -193,6 +197,7 @@ UNCERTAIN = {"damper.mu": [0.25, 0.35], "damper.kt": {"deviation": 0.1}}
         ({"uncertain": UNCERTAIN, "quantile": 1}, ["/quantile"]),
         ({"uncertain": UNCERTAIN, "samples": 1}, ["/samples"]),
         ({"uncertain": UNCERTAIN, "seed": -1}, ["/seed"]),
+        ({"uncertain": UNCERTAIN, "basins": 3}, ["/basins"]),
         ({"aim": "mean", "samples": 5}, ["/aim", "/samples"]),
         ({"uncertain": {"damper.mu": 1}, "method": "x"}, ["/method"]),
         ({"uncertain": {"damper.mu": 1}, "max_friction_work": {"x": 1}},
