@@ -196,6 +196,9 @@ def test_bad_scenes_are_named(run: Run, tmp_path: Path, command: str, case: str)
         ("design", ["SCENE", "--problem"]),
         ("design two-dof --problem nowhere.toml", ["--problem", "nowhere.toml"]),
         ("design two-dof --problem file", ["--problem", ".toml", "file"]),
+        ("pareto two-dof --points 2", ["--points", "2"]),
+        ("pareto two-dof --max-band 2", ["--max-band"]),
+        ("pareto two-dof --variable damper.N0 20", ["--variable", "LO HI"]),
         ("sensitivities two-dof --limit 0", ["--limit", "0.0"]),
         ("sensitivities two-dof --set bumper.N0=1", ["--set", "bumper.N0"]),
         ("submit design two-dof --max-band nan", ["--max-band", "nan"]),
@@ -277,6 +280,18 @@ def test_a_robust_design_shows_both_optima_side_by_side(run: Run, tmp_path: Path
     assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
     (tmp_path / "bad.toml").write_text("samples = 4\n[uncertain]\n'damper.mu' = [0.4, 0.3]")
     assert "bad.toml: /uncertain/damper.mu" in run("design two-dof --problem bad.toml")[2]
+
+
+def test_a_front_is_that_of_the_design_layer(run: Run, tmp_path: Path) -> None:
+    arguments = "pareto two-dof --variable damper.N0 20 1000 --limit 1.5 --points 4 --harmonics 3"
+    status, out, _ = run(f"{arguments} --plot picture.svg --json")
+    keys = {"variables": {"damper.N0": (20.0, 1000.0)}, "limit": 1.5, "points": 4, "harmonics": 3}
+    direct = optim.pareto_front(solver.load_scene("two-dof"), **keys)  # type: ignore[arg-type]
+    assert status == (0 if direct.reached else 1)
+    assert json.loads(out)["points"] == direct.to_json()["points"]
+    assert (tmp_path / "picture.svg").read_bytes().startswith(b"<?xml")
+    out = run(arguments)[1]
+    assert sum("damper.N0" in line or " Hz" in line for line in out.splitlines()) > len(direct.points)
 
 
 def test_sensitivities_are_those_of_the_design_layer(run: Run, tmp_path: Path) -> None:

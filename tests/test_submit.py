@@ -53,6 +53,43 @@ def test_a_design_from_submission_to_picture(run: Run, tmp_path: Path) -> None:
     assert answer["sweeps"][0]["id"] in out
 
 
+def test_a_problem_file_goes_with_the_job_and_the_design_is_listed(run: Run, tmp_path: Path) -> None:
+    scene = solver.load_scene("two-dof").with_values({"damper.N0": 70.0}).to_dict()
+    (tmp_path / "mine.json").write_text(json.dumps({**scene, "name": "mine"}))
+    problem = {
+        "scene": "mine.json",
+        "variables": {"damper.N0": [90, 120]},
+        "harmonics": 3,
+        "method": "minimax",
+    }
+    (tmp_path / "problem.json").write_text(json.dumps(problem))
+    status, out, err = run("submit design --problem problem.json --limit 2 --max-band 1 --wait --json")
+    assert (status, err) == (0, "")
+    answer = json.loads(out)
+    status, out, err = run(
+        "results --scene mine --variable damper.N0 --peak-max 3 --band-max 1 --reached --json"
+    )
+    assert (status, err) == (0, "")
+    (item,) = json.loads(out)["items"]
+    assert item["id"] == answer["job"]
+    assert item["peak"] == answer["result"]["peak"]
+    assert "damper.N0 = " in run("results --scene mine")[1]
+    assert json.loads(run("results --scene mine --missed --json")[1]) == {"items": []}
+    assert "--scene" in run(f"results {answer['job']} --scene mine")[2]
+    assert "/sort" in run("results --sort colour")[2]
+
+
+def test_a_front_is_submitted_and_drawn(run: Run, tmp_path: Path) -> None:
+    status, out, _ = run("submit pareto two-dof --limit 1.5 --points 3 --harmonics 3 --wait --json")
+    assert status == 0
+    answer = json.loads(out)
+    assert len(answer["result"]["points"]) >= 2
+    status, out, err = run(f"results {answer['job']} --plot front.png")
+    assert (status, err) == (0, "")
+    assert "peak for 1 Hz less band" in out
+    assert (tmp_path / "front.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_a_scene_file_goes_with_the_job(run: Run, tmp_path: Path) -> None:
     scene = solver.load_scene("two-dof").with_values({"damper.N0": 70.0})
     (tmp_path / "mine.json").write_text(json.dumps(scene.to_dict()))

@@ -34,12 +34,13 @@ _submit = typer.Typer(help="Hand a job to a running service.", no_args_is_help=T
 
 _ALONE: tuple[Callable[..., None], ...] = (
     solver_commands.scenes, solver_commands.plan, solver_commands.solve, solver_commands.sweep,
-    solver_commands.accuracy,
-    design_commands.design, sensitivity_command.sensitivities, solver_commands.march, service_commands.demo,
-    service_commands.serve, service_commands.worker, submit_commands.watch, submit_commands.results,
+    solver_commands.accuracy, design_commands.design, design_commands.pareto,
+    sensitivity_command.sensitivities, solver_commands.march, service_commands.demo, service_commands.serve,
+    service_commands.worker, submit_commands.watch, submit_commands.results,
 )  # fmt: skip
 _SUBMITTED: tuple[Callable[..., None], ...] = (
-    submit_commands.design, submit_commands.sweep, submit_commands.solve, submit_commands.march,
+    submit_commands.design, submit_commands.pareto, submit_commands.sweep, submit_commands.solve,
+    submit_commands.march,
 )  # fmt: skip
 
 for _command in _ALONE:

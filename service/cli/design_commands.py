@@ -1,8 +1,9 @@
-"""The commands that choose parameters: design."""
+"""The commands that choose parameters: design and pareto."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ import typer
 from service.cli import design_reports, inputs, options, problem_inputs, robust_reports
 from service.cli.failures import FELL_SHORT
 from service.cli.output import print_json
-from service.cli.problem_options import ProblemFlags, takes_problem
+from service.cli.problem_options import NOT_OF_A_FRONT, ProblemFlags, takes_problem
 from service.cli.progress import bar
 from service.plots import SUFFIXES
 
@@ -53,6 +54,40 @@ def design(
     else:
         design_reports.design(result.to_json())
     end(result.reached, result.status.value)
+
+
+@partial(takes_problem, without=NOT_OF_A_FRONT)
+def pareto(
+    flags: ProblemFlags,
+    name: options.AnyScene = None,
+    points: options.Points = None,
+    plot: options.Plot = None,
+    as_json: options.Json = False,
+) -> None:
+    """Find the front of peak against resonance band.
+
+    Designs of which none has both a lower peak and a narrower band than another, with what a narrower band
+    costs. The problem is described as for `design`, without weights and a limit on the band.
+    """
+    from service.kinds.pareto import ParetoRequest, pareto_issues
+
+    picture = inputs.output_path("--plot", plot, SUFFIXES)
+    told = problem_inputs.description(name, flags, "pareto", points=("--points", points))
+    scene, given = problem_inputs.posed(told, ParetoRequest, pareto_issues)
+    with bar("pareto", "designs") as on_progress:
+        import optim
+
+        found = optim.pareto_front(scene, **given, on_progress=on_progress)
+    if picture is not None and found.points:
+        from service.plots.fronts import Front, front_figure
+        from service.plots.style import save
+
+        save(front_figure(Front.of_json(found.to_json())), picture)
+    if as_json:
+        print_json(found.to_json())
+    else:
+        design_reports.front(found.to_json())
+    end(found.reached, found.status.value)
 
 
 def _robust(scene: Scene, given: Mapping[str, Any], picture: Path | None, *, as_json: bool) -> None:

@@ -42,6 +42,30 @@ def _kept(found: Json) -> bool:
     return not found.get("broken") or (conditions is not None and conditions["violation"] <= _ROUNDING)
 
 
+def front(found: Json) -> None:
+    """The points of a front of peak against band, its knee marked."""
+    points: Sequence[Json] = found["points"]
+    names = tuple(points[0]["values"]) if points else ()
+    rows: list[tuple[str, ...]] = [
+        (
+            *(units.parameter(name, point["values"][name]) for name in names),
+            units.length(point["peak"]),
+            f"{units.number(point['band_hz'])} Hz",
+            "" if point["slope"] is None else f"{units.length(-point['slope'])}",
+            "" if point["hz_per_metre"] is None else f"{units.number(1e-6 * point['hz_per_metre'])} Hz",
+            "knee" if index == found["knee"] else "",
+        )
+        for index, point in enumerate(points)
+    ]
+    columns = (*names, "peak", "band", "peak for 1 Hz less band", "band for 1 µm less peak", "")
+    right = "".join(str(i) for i in range(min(len(columns) - 1, 10)))
+    print_table(f"Front of {found['scene']}: peak against band", columns, rows, right=right)
+    pairs = [("not found", f"band of {units.number(width)} Hz") for width in found["missed"]]
+    pairs += [("end", end["status"]) for end in found["ends"] if not end["reached"]]
+    effort = f"{found['evaluations']} designs in {units.duration(found['seconds'])}"
+    print_pairs("", [*pairs, ("effort", effort)])
+
+
 def values(optimum: Json) -> Pairs:
     """The variables with their units."""
     return [(path, units.parameter(path, value)) for path, value in optimum.items()]

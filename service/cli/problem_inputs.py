@@ -67,8 +67,15 @@ OPTIONS = {
 }  # fmt: skip
 
 
-def description(scene: str | None, flags: ProblemFlags, kind: str) -> Description:
+def description(scene: str | None, flags: ProblemFlags, kind: str, **further: tuple[str, Any]) -> Description:
     """Put the file and the options together.
+
+    Parameters
+    ----------
+    scene : the argument of the command.
+    flags : the options that all kinds of problem have.
+    kind : of the problem; a file may say it too.
+    further : key to the option that this command has besides, and its value.
 
     Raises
     ------
@@ -78,10 +85,12 @@ def description(scene: str | None, flags: ProblemFlags, kind: str) -> Descriptio
     file = None if flags.problem is None else Path(flags.problem)
     body = {} if file is None else _read(file, kind)
     given = _of_flags(flags) | ({} if scene is None else {"scene": scene})
+    given |= {key: value for key, (_, value) in further.items() if value is not None}
+    options = OPTIONS | {key: option for key, (option, _) in further.items()}
     body |= given
     if "scene" not in body:
         raise InputError("`SCENE` is missing: name a scene, or a --problem file with the key `scene`")
-    return Description(body=body, options={key: OPTIONS[key] for key in given}, file=file)
+    return Description(body=body, options={key: options[key] for key in given}, file=file)
 
 
 def posed(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import Annotated, Any, get_type_hints
 
@@ -24,8 +24,8 @@ File = Annotated[
         "--problem", metavar="FILE",
         help="The problem in a file (.toml, .json), with the keys of the REST body: scene, set, variables, "
         "scaling, cases, limit, weights, max_peak, max_band_hz, forbidden_hz, speeds_rpm, max_friction_work, "
-        "contact_states, harmonics, start, method, basins, uncertain. An option beside it replaces the key "
-        "it stands for.",
+        "contact_states, harmonics, start, method, basins, uncertain, points. An option beside it replaces "
+        "the key it stands for.",
     ),
 ]  # fmt: skip
 Variables = Annotated[
@@ -132,14 +132,19 @@ class ProblemFlags:
     harmonics: Harmonics = None
 
 
-def takes_problem(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of a design problem in place of its parameter `flags`."""
+Command = Callable[..., None]
+NOT_OF_A_FRONT = ("weights", "max_band", "basins")
+
+
+def takes_problem(command: Command, without: Sequence[str] = ()) -> Command:
+    """Give a command the options of a design problem (but those `without`) in place of its `flags`."""
     hints = get_type_hints(ProblemFlags, include_extras=True)
     options = [
         inspect.Parameter(
             field.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=hints[field.name]
         )
         for field in fields(ProblemFlags)
+        if field.name not in without
     ]
 
     @functools.wraps(command)

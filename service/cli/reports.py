@@ -138,6 +138,7 @@ BY_KIND: Mapping[str, Callable[[Json], None]] = {
     "solve": solution,
     "sweep": branch,
     "design": design,
+    "pareto": design_reports.front,
     "march": march,
 }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,7 +14,7 @@ import typer
 from service.cli import inputs, options, problem_inputs, reports, stored_designs
 from service.cli.failures import BAD_INPUT, FELL_SHORT, InputError, option_name
 from service.cli.output import print_json, print_table, say
-from service.cli.problem_options import ProblemFlags, takes_problem
+from service.cli.problem_options import NOT_OF_A_FRONT, ProblemFlags, takes_problem
 from service.cli.progress import bar
 
 if TYPE_CHECKING:
@@ -40,6 +41,24 @@ def design(
     told = problem_inputs.description(name, flags, "design")
     problem_inputs.checked(told, DesignRequest)
     body = {"kind": "design", **problem_inputs.body_to_submit(told)}
+    _submit(url, body, wait=wait, as_json=as_json)
+
+
+@partial(takes_problem, without=NOT_OF_A_FRONT)
+def pareto(
+    flags: ProblemFlags,
+    name: options.AnyScene = None,
+    points: options.Points = None,
+    wait: options.Wait = False,
+    as_json: options.Json = False,
+    url: options.Url = options.DEFAULT_URL,
+) -> None:
+    """Submit a front of peak against resonance band."""
+    from service.kinds.pareto import ParetoRequest
+
+    told = problem_inputs.description(name, flags, "pareto", points=("--points", points))
+    problem_inputs.checked(told, ParetoRequest)
+    body = {"kind": "pareto", **problem_inputs.body_to_submit(told)}
     _submit(url, body, wait=wait, as_json=as_json)
 
 
@@ -229,6 +248,11 @@ def _draw(client: Client, answer: ResultsAnswer, picture: Path) -> None:
     from service.plots.responses import response_figure
     from service.plots.style import save
 
+    if "points" in answer.result:
+        from service.plots.fronts import Front, front_figure
+
+        save(front_figure(Front.of_json(answer.result)), picture)
+        return
     # Of a robust design, the sweeps are those of the search without uncertainty.
     peak = answer.result.get("peak") or (answer.result.get("nominal") or {}).get("peak")
     if not answer.sweeps or peak is None:

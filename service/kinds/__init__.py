@@ -7,6 +7,7 @@ import solver
 from service.jobs import Registry
 from service.kinds.design import DESIGN
 from service.kinds.march import MARCH
+from service.kinds.pareto import PARETO
 from service.kinds.solve import SOLVE
 from service.kinds.sweep import SWEEP
 
@@ -19,4 +20,4 @@ def warm_up() -> None:
     optim.design(scene, harmonics=3)
 
 
-SHIPPED = Registry([SWEEP, DESIGN, SOLVE, MARCH], warm_up)
+SHIPPED = Registry([SWEEP, DESIGN, PARETO, SOLVE, MARCH], warm_up)

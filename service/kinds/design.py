@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 import optim
 from service.jobs import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
-from service.kinds.problem import ProblemRequest, arguments
+from service.kinds.problem import ProblemRequest, Weight, arguments, default_variables, problem_of
 from service.kinds.problem_check import problem_issues, uncertainty_issues
 from service.kinds.records import design_record, robust_record, sweep_record
-from service.kinds.scenes import refusal, require, resolve_scene, resolved
+from service.kinds.scenes import FrequencyHz, refusal, require, resolve_scene, resolved
 from service.kinds.uncertain import Uncertain
 from service.strict_json import pointer
 from solver.errors import Issue
@@ -23,11 +23,29 @@ _NOT_ROBUST = ("basins",)
 ROBUST = (UNCERTAIN, "aim", "quantile", "samples", "seed")
 
 
+_EXAMPLE: dict[str, Any] = {
+    "scene": "bladed-disk",
+    "variables": {"shroud.N0": [20, 3000], "root.kt": [1e6, 1e8]},
+    "cases": [{"name": "first bending"}, {"name": "twice the force", "set": {"excitation.amplitude": 100}}],
+    "limit": 8e-5,
+    "max_band_hz": 60,
+    "forbidden_hz": [[520, 560]],
+    "contact_states": {"shroud": "never-separates"},
+    "method": "auto",
+}
+
+
 class DesignRequest(ProblemRequest):
     """A design problem, in the words of `optim.design`, or with `uncertain` of `optim.robust_design`.
 
     Attributes
     ----------
+    weights : dict or None
+        Of ``peak`` [1/m] and ``band`` [1/Hz] in what is minimised.
+    max_band_hz : float or None
+        Largest width of the resonance band allowed [Hz].
+    basins : int or None
+        How many local optima are looked for.
     uncertain : dict, list or None
         What is not known.
     aim : str or None
@@ -38,6 +56,19 @@ class DesignRequest(ProblemRequest):
         How many scenarios are drawn, and the seed of the random numbers.
     """
 
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+
+    weights: dict[Literal["peak", "band"], Weight] | None = Field(
+        default=None,
+        description="What is minimised: peak [1/m] and band [1/Hz], each times its weight; the peak alone.",
+        examples=[{"peak": 1, "band": 1e-6}],
+    )
+    max_band_hz: FrequencyHz | None = Field(
+        default=None, description="Largest width of the resonance band allowed [Hz]."
+    )
+    basins: Annotated[int, Field(strict=True, ge=1, le=20)] | None = Field(
+        default=None, description="How many local optima are looked for; 2."
+    )
     uncertain: Uncertain | None = Field(
         default=None,
         description="What is not known: a table of intervals, a table of an ellipsoid, or a list of samples.",
@@ -83,21 +114,6 @@ def design_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
         refusal(pointer(key), f"`{key}` is for a design with `uncertain` parameters, got {given[key]!r}")
         for key in alone
     ]
-
-
-def default_variables(scene: Scene, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The variables that stand for none, so that a spec says what is chosen."""
-    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
-    from optim.variables import check_variables
-
-    if "variables" in given:
-        return {}
-    return {"variables": {v.name: [v.low, v.high] for v in check_variables(scene, None)}}
-
-
-def problem_of(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """The arguments of the design layer in a spec; those of an older version name what was not given too."""
-    return {key: value for key, value in spec.items() if key != "scene" and value is not None}
 
 
 def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:

@@ -6,18 +6,19 @@ piece by piece, so that everything wrong with it is told at once, each with the 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 
 from service.kinds.scenes import (
     LARGEST,
-    FrequencyHz,
     HarmonicRequest,
     Number,
     ParameterPath,
     PositiveNumber,
 )
+from solver.scene import Scene
 
 MAX_VARIABLES = 50
 MAX_CASES = 50
@@ -111,20 +112,8 @@ class CaseRequest(BaseModel):
     )
 
 
-_EXAMPLE: dict[str, Any] = {
-    "scene": "bladed-disk",
-    "variables": {"shroud.N0": [20, 3000], "root.kt": [1e6, 1e8]},
-    "cases": [{"name": "first bending"}, {"name": "twice the force", "set": {"excitation.amplitude": 100}}],
-    "limit": 8e-5,
-    "max_band_hz": 60,
-    "forbidden_hz": [[520, 560]],
-    "contact_states": {"shroud": "never-separates"},
-    "method": "auto",
-}
-
-
 class ProblemRequest(HarmonicRequest):
-    """A design problem, in the words of `optim.design`.
+    """What the design problems of all kinds have in common, in the words of `optim.design`.
 
     Attributes
     ----------
@@ -136,10 +125,8 @@ class ProblemRequest(HarmonicRequest):
         The responses that count.
     limit : float or None
         Amplitude [m] above which the resonance band is measured.
-    weights : dict or None
-        Of ``peak`` [1/m] and ``band`` [1/Hz] in what is minimised.
-    max_peak, max_band_hz : float or None
-        Largest amplitude [m] and largest width of the resonance band [Hz] allowed.
+    max_peak : float or None
+        Largest amplitude allowed [m].
     forbidden_hz, speeds_rpm : list or None
         Ranges of frequency [Hz] and of running speed [1/min] in which the amplitude stays below `limit`.
     max_friction_work : float, dict or None
@@ -150,11 +137,7 @@ class ProblemRequest(HarmonicRequest):
         A design to start from, variable to value.
     method : str
         ``auto``, ``tracked``, ``minimax`` or ``ipopt``.
-    basins : int or None
-        How many local optima are looked for.
     """
-
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
 
     variables: Annotated[dict[VariableName, Pair], Field(min_length=1, max_length=MAX_VARIABLES)] | None = (
         Field(
@@ -176,15 +159,7 @@ class ProblemRequest(HarmonicRequest):
         default=None,
         description="Amplitude [m] above which the resonance band is measured; half power of the peak.",
     )
-    weights: dict[Literal["peak", "band"], Weight] | None = Field(
-        default=None,
-        description="What is minimised: peak [1/m] and band [1/Hz], each times its weight; the peak alone.",
-        examples=[{"peak": 1, "band": 1e-6}],
-    )
     max_peak: PositiveNumber | None = Field(default=None, description="Largest amplitude allowed [m].")
-    max_band_hz: FrequencyHz | None = Field(
-        default=None, description="Largest width of the resonance band allowed [Hz]."
-    )
     forbidden_hz: Ranges | None = Field(
         default=None,
         description="Ranges [Hz] in which the amplitude stays below `limit`.",
@@ -210,9 +185,6 @@ class ProblemRequest(HarmonicRequest):
     method: Literal["auto", "tracked", "minimax", "ipopt"] = Field(
         default="auto", description="How the optimum is searched."
     )
-    basins: Annotated[int, Field(strict=True, ge=1, le=20)] | None = Field(
-        default=None, description="How many local optima are looked for; 2."
-    )
 
 
 ABOUT_THE_SCENE = ("scene", "set")
@@ -228,3 +200,18 @@ def arguments(request: ProblemRequest) -> dict[str, Any]:
         given["cases"] = [case.model_dump(mode="json", exclude_unset=True) for case in request.cases]
         given["cases"] = [{k: v for k, v in case.items() if v is not None} for case in given["cases"]]
     return given
+
+
+def default_variables(scene: Scene, given: Mapping[str, Any]) -> dict[str, Any]:
+    """The variables that stand for none, so that a spec says what is chosen."""
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from optim.variables import check_variables
+
+    if "variables" in given:
+        return {}
+    return {"variables": {v.name: [v.low, v.high] for v in check_variables(scene, None)}}
+
+
+def problem_of(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments of the design layer in a spec; those of an older version name what was not given too."""
+    return {key: value for key, value in spec.items() if key != "scene" and value is not None}

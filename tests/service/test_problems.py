@@ -14,8 +14,10 @@ import optim
 import solver
 from optim.problem import Method, pose
 from service.errors import InvalidRequestError
-from service.kinds.design import DesignRequest, problem_of, resolve
-from service.kinds.problem import arguments
+from service.kinds.design import DesignRequest, resolve
+from service.kinds.pareto import ParetoRequest
+from service.kinds.pareto import resolve as resolve_front
+from service.kinds.problem import arguments, problem_of
 from service.validation import validated
 
 VARIABLES = {"damper.N0": [20, 1000]}
@@ -173,6 +175,34 @@ def test_a_scene_without_friction_has_nothing_to_choose_by_itself() -> None:
     raw = solver.load_scene("two-dof").to_dict()
     raw["contacts"] = []
     assert pointers({"scene": raw, "variables": None}) == ["/variables"]
+
+
+def test_a_front_has_the_keys_of_a_design_but_its_own() -> None:
+    theirs = set(inspect.signature(optim.pareto_front).parameters) - {"scene", "on_progress", "should_stop"}
+    keys = set(ParetoRequest.model_fields)
+    assert theirs == keys - {"scene", "set", "fresh", "priority"}
+    body = {**EVERY_KEY, "points": 5}
+    for key in ("weights", "max_band_hz", "basins"):
+        with pytest.raises(InvalidRequestError, match="is not a known key") as caught:
+            validated(ParetoRequest, body)
+        assert f"/{key}" in [issue.pointer for issue in caught.value.issues]
+        del body[key]
+    spec = resolve_front(validated(ParetoRequest, body), Shipped()).spec
+    assert theirs == {key for key in spec if key != "scene"}
+
+
+def test_a_front_over_rest_is_that_of_python(shipped: httpx.Client) -> None:
+    keys = {"variables": {"damper.N0": [20, 1000]}, "limit": 1.5, "points": 4, "harmonics": 3}
+    body = {"kind": "pareto", "scene": "two-dof", **keys}
+    job = shipped.post("/v1/jobs", json=body, headers={"Prefer": "wait=60"}).json()
+    found = optim.pareto_front(solver.load_scene("two-dof"), **keys)
+    assert (job["status"] == "successful") == found.reached, job["error"]
+    assert len(job["result"]["points"]) == len(found.points) >= 2
+    for there, here in zip(job["result"]["points"], found.points, strict=True):
+        assert (there["peak"], there["band_hz"]) == pytest.approx((here.peak, here.band_hz), rel=1e-9)
+    assert len(job["sweeps"]) == len(found.points)
+    problem = is_problem(shipped.post("/v1/jobs", json={**body, "points": 2, "max_band_hz": 1}), 422)
+    assert {entry["pointer"] for entry in problem["errors"]} == {"/points", "/max_band_hz"}
 
 
 UNCERTAIN = {"damper.mu": [0.25, 0.35], "damper.kt": {"deviation": 0.1}}
