@@ -123,7 +123,7 @@ class PeerOptimum:
 def pyharm_optimum(
     scene: Scene, low: float, high: float, *, step: float, accuracy: float
 ) -> PeerOptimum | None:
-    """Let SciPy's bounded search choose the load by pyHarm's responses, to `accuracy` [N]; None without it."""
+    """Let SciPy's bounded search choose the load by pyHarm's responses, to `accuracy` [N]."""
     task = _task(scene, step, 11, None, 1, 1)
     answer = _asked({**task, "loads": [low, high], "accuracy": accuracy})
     return None if answer is None else PeerOptimum(**answer)

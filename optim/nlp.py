@@ -284,7 +284,8 @@ def _run(rows: _Rows, model: Model, region: float) -> None:
     z, t = casadi.MX.sym("z", n), casadi.MX.sym("t", len(groups))
     numbers = callback(z)
     which = [int(np.flatnonzero(groups == g)[0]) for g in model.groups]
-    constraints = casadi.vertcat(casadi.vertcat(*[t[i] for i in which]) - numbers[:m], -numbers[m:])
+    parts = [t[g] - numbers[i] for i, g in enumerate(which)] + [-numbers[j] for j in range(m, rows.count)]
+    constraints = casadi.vertcat(*parts)
     programme: dict[str, Any] = {"x": casadi.vertcat(z, t), "f": casadi.sum1(t), "g": constraints}
     options, exact = _OPTIONS, all(row.second is not None for row in (*model.rows, *model.limited))
     if exact:

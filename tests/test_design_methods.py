@@ -134,6 +134,18 @@ def test_minimax_and_ipopt_agree_with_a_limit_on_the_band() -> None:
     assert found[0].band_hz == pytest.approx(40.0, rel=1e-9)
 
 
+@pytest.mark.parametrize("method", ["minimax", "ipopt"])
+def test_a_response_with_one_peak_alone(method: str) -> None:
+    found = optim.design(
+        solver.load_scene("two-dof"),
+        variables={"damper.N0": (20.0, 500.0)},
+        cases=[{"band": [0.6, 1.6]}],
+        method=method,
+    )
+    assert found.reached
+    assert found.peak.value == pytest.approx(best("two-dof", "tracked").peak.value, rel=1e-9)  # type: ignore[union-attr]
+
+
 def test_minimax_and_ipopt_agree_with_several_variables() -> None:
     scene = solver.load_scene("two-dof")
     variables = {"damper.N0": (20.0, 500.0), "damper.kt": (20.0, 40.0), "damper.N1_ratio": (0.0, 0.5)}
