@@ -86,7 +86,7 @@ def test_a_front_is_submitted_and_drawn(run: Run, tmp_path: Path) -> None:
     assert len(answer["result"]["points"]) >= 2
     status, out, err = run(f"results {answer['job']} --plot front.png")
     assert (status, err) == (0, "")
-    assert "peak for 1 Hz less band" in out
+    assert "peak for 0.01 Hz less band" in out
     assert (tmp_path / "front.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -79,10 +79,10 @@ def pareto(
 
         found = optim.pareto_front(scene, **given, on_progress=on_progress)
     if picture is not None and found.points:
-        from service.plots.fronts import Front, front_figure
+        from service.plots.pareto import pareto_figure
         from service.plots.style import save
 
-        save(front_figure(Front.of_json(found.to_json())), picture)
+        save(pareto_figure(found.to_json()), picture)
     if as_json:
         print_json(found.to_json())
     else:

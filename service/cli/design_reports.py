@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +13,7 @@ from service.cli.output import print_pairs, print_table, say
 Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]
 
+_PRICED = 0.02  # share of a size, rounded down to a power of ten
 _COUNTS = 1e-6  # multipliers below this hold nothing
 _ROUNDING = 1e-6  # relative excess over a limit up to which it is kept
 
@@ -43,27 +45,35 @@ def _kept(found: Json) -> bool:
 
 
 def front(found: Json) -> None:
-    """The points of a front of peak against band, its knee marked."""
+    """The points of a front of peak against band with what each costs in terms of the other."""
     points: Sequence[Json] = found["points"]
     names = tuple(points[0]["values"]) if points else ()
+    hertz = _price(max((point["band_hz"] for point in points), default=1.0))
+    metres = _price(min((point["peak"] for point in points), default=1.0))
     rows: list[tuple[str, ...]] = [
         (
             *(units.parameter(name, point["values"][name]) for name in names),
             units.length(point["peak"]),
             f"{units.number(point['band_hz'])} Hz",
-            "" if point["slope"] is None else f"{units.length(-point['slope'])}",
-            "" if point["hz_per_metre"] is None else f"{units.number(1e-6 * point['hz_per_metre'])} Hz",
+            "" if point["slope"] is None else units.length(abs(point["slope"]) * hertz),
+            "" if point["hz_per_metre"] is None else f"{units.number(metres * point['hz_per_metre'])} Hz",
             "knee" if index == found["knee"] else "",
         )
         for index, point in enumerate(points)
     ]
-    columns = (*names, "peak", "band", "peak for 1 Hz less band", "band for 1 µm less peak", "")
+    costs = (f"peak for {hertz:g} Hz less band", f"band for {units.length(metres)} less peak")
+    columns = (*names, "peak", "band", *costs, "")
     right = "".join(str(i) for i in range(min(len(columns) - 1, 10)))
     print_table(f"Front of {found['scene']}: peak against band", columns, rows, right=right)
     pairs = [("not found", f"band of {units.number(width)} Hz") for width in found["missed"]]
     pairs += [("end", end["status"]) for end in found["ends"] if not end["reached"]]
     effort = f"{found['evaluations']} designs in {units.duration(found['seconds'])}"
     print_pairs("", [*pairs, ("effort", effort)])
+
+
+def _price(size: float) -> float:
+    """A round number, a hundredth of a size or so, in which a change of it is told."""
+    return 10.0 ** math.floor(math.log10(_PRICED * size)) if size > 0.0 else 1.0
 
 
 def values(optimum: Json) -> Pairs:

@@ -31,15 +31,16 @@ def sensitivities(
         import optim
 
         found = optim.sensitivities(scene, limit=limit, harmonics=harmonics)
-    if picture is not None and found.rows:
-        from service.plots.sensitivities import sensitivity_figure
+    answer: Mapping[str, Any] = found.to_json()
+    if picture is not None and any(row["peak_percent"] is not None for row in answer["rows"]):
+        from service.plots.shares import sensitivities_figure
         from service.plots.style import save
 
-        save(sensitivity_figure(found), picture)
+        save(sensitivities_figure(answer), picture)
     if as_json:
-        print_json(found.to_json())
+        print_json(answer)
     else:
-        _show(found.to_json())
+        _show(answer)
     end(found.reached, found.status.value)
 
 

@@ -248,10 +248,10 @@ def _draw(client: Client, answer: ResultsAnswer, picture: Path) -> None:
     from service.plots.responses import response_figure
     from service.plots.style import save
 
-    if "points" in answer.result:
-        from service.plots.fronts import Front, front_figure
+    if answer.result.get("points") and "knee" in answer.result:
+        from service.plots.pareto import pareto_figure
 
-        save(front_figure(Front.of_json(answer.result)), picture)
+        save(pareto_figure(answer.result), picture)
         return
     # Of a robust design, the sweeps are those of the search without uncertainty.
     peak = answer.result.get("peak") or (answer.result.get("nominal") or {}).get("peak")
