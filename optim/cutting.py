@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from optim.coarse import coarse
 from optim.local import Local, is_flat
-from optim.pessimise import Aspect, Finding, pessimise
+from optim.pessimise import Aspect, Finding, UnknownScenarioError, pessimise
 from optim.result import DesignResult
 from optim.robust_result import Cut, RobustStatus
 from optim.robust_search import RobustSearch
@@ -204,6 +204,10 @@ def _starts(search: RobustSearch, nominal: DesignResult, scenarios: Sequence[Sce
     if nominal.optimum:
         given.insert(0, dict(nominal.optimum))
     seen = [search.evaluation(values, scenarios) for values in given]
+    if nominal.optimum and not any(evaluation.good for evaluation in seen):
+        for scenario in scenarios:
+            if not search.outcome(nominal.optimum, scenario).good:
+                raise UnknownScenarioError(scenario)
     return sorted(
         (e for e in seen if e.good), key=lambda evaluation: search.model(evaluation, len(scenarios)).merit
     )
