@@ -25,7 +25,6 @@ MOST_CUTS = 40
 AT_ONCE = 2  # scenarios that join the master problem for one aspect
 CLOUD = 0.05  # distance of ξ within which two scenarios are one place
 FAR_APART = 1e-2  # scaled distance from which two starts are two
-STARTS = 2  # designs the master problem is searched from
 FEW = 8  # samples that the starts of a sampled search are judged by
 CHECKED = 4  # of the drawn scenarios, the worst, that a worst case is checked against
 
@@ -225,7 +224,7 @@ def _locals(
     found: list[Local] = []
     for begin in starts:
         z = [variable.inside(begin.values[variable.name]) for variable in search.variables]
-        if len(places) < STARTS and all(math.dist(z, other) > FAR_APART for other in places):
+        if len(places) < search.problem.basins and all(math.dist(z, other) > FAR_APART for other in places):
             places.append(z)
             local = search.improve(begin.values, scenarios)
             if local is not None and all(_apart(search, local, other) for other in found):

@@ -58,6 +58,7 @@ def robust_design(
     harmonics: int = 11,
     start: Mapping[str, float] | None = None,
     method: str | Method = Method.AUTO,
+    basins: int = 2,
     on_progress: Callable[[float, int], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> RobustResult:
@@ -76,6 +77,7 @@ def robust_design(
     on_progress : called with (share done, responses so far).
     should_stop : asked between responses and within them.
     method : of the search without uncertainty; the robust one is always the cone programme.
+    basins : how many local optima are looked for, without and with uncertainty.
 
     All other arguments are those of `optim.design`.
 
@@ -93,7 +95,7 @@ def robust_design(
         scene, variables=variables, scaling=scaling, cases=cases, limit=limit, weights=weights,
         max_peak=max_peak, max_band_hz=max_band_hz, forbidden_hz=forbidden_hz, speeds_rpm=speeds_rpm,
         max_friction_work=max_friction_work, contact_states=contact_states, harmonics=harmonics, start=start,
-        method=method,
+        method=method, basins=basins,
     )  # fmt: skip
     over = read_uncertain(scene, problem.variables, uncertain)
     search = RobustSearch(problem, over, _aim(aim), _quantile(quantile), on_progress, should_stop)

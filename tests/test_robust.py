@@ -358,3 +358,26 @@ def test_bad_arguments_are_named(arguments: dict[str, object], words: list[str])
         optim.robust_design(TWO, uncertain=KT_AND_MU, variables=N0, **arguments)  # type: ignore[arg-type]
     for word in words:
         assert word in str(caught.value)
+
+
+@pytest.mark.long
+def test_the_worst_case_of_the_bladed_disk_is_that_of_a_grid_over_design_and_uncertainty() -> None:
+    scene = solver.load_scene("bladed-disk")
+    uncertain = {"shroud.kt": {"deviation": 0.2}, "shroud.mu": [0.2, 0.4]}
+    result = optim.robust_design(scene, uncertain=uncertain, variables={"shroud.N0": (20.0, 3000.0)})
+    assert result.status is RobustStatus.OPTIMAL
+
+    def worst(load: float) -> float:
+        grid = itertools.product(5.53e6 * np.linspace(0.8, 1.2, 5), np.linspace(0.2, 0.4, 9))
+        branches = [
+            solver.sweep(scene.with_values({"shroud.N0": load, "shroud.kt": kt, "shroud.mu": mu}))
+            for kt, mu in grid
+        ]
+        return max(branch.peaks[0].value for branch in branches)
+
+    here = worst(result.optimum["shroud.N0"])
+    assert here <= result.objective * (1.0 + 1e-6)
+    assert here == pytest.approx(result.objective, rel=2e-3)
+    # Between 183 and 185 N the worst case does not depend on the load: it is a peak over mu N0.
+    for load in (100.0, 150.0, 175.0, 182.0, 187.0, 200.0, 300.0, 600.0, 1500.0):
+        assert worst(load) > result.objective
