@@ -198,7 +198,7 @@ def _first(search: RobustSearch, nominal: DesignResult) -> dict[str, float]:
 
 
 def _starts(search: RobustSearch, nominal: DesignResult, scenarios: Sequence[Scenario]) -> list[Evaluation]:
-    """Return the designs that are good starts over some scenarios, best first: a coarse stage of its own."""
+    """Return designs over the whole range, evaluated over some scenarios: a coarse stage of its own."""
     given = [dict(basin.values) for basin in nominal.basins] + coarse(search.problem)
     if nominal.optimum:
         given.insert(0, dict(nominal.optimum))
@@ -207,9 +207,19 @@ def _starts(search: RobustSearch, nominal: DesignResult, scenarios: Sequence[Sce
         for scenario in scenarios:
             if not search.outcome(nominal.optimum, scenario).good:
                 raise UnknownScenarioError(scenario)
-    return sorted(
-        (e for e in seen if e.good), key=lambda evaluation: search.model(evaluation, len(scenarios)).merit
-    )
+    return [evaluation for evaluation in seen if evaluation.good]
+
+
+def _valleys(search: RobustSearch, seen: Sequence[Evaluation], count: int) -> list[Evaluation]:
+    """Return the designs to search from, best first; with one variable only the lowest of each valley."""
+    merits = {id(evaluation): search.model(evaluation, count).merit for evaluation in seen}
+    kept = list(seen)
+    if len(search.variables) == 1:
+        # From the sides of a valley the same optimum would be found again.
+        kept.sort(key=lambda evaluation: evaluation.values[search.variables[0].name])
+        line = [math.inf, *(merits[id(e)] for e in kept), math.inf]
+        kept = [e for i, e in enumerate(kept) if line[i] >= line[i + 1] <= line[i + 2]]
+    return sorted(kept, key=lambda evaluation: merits[id(evaluation)])
 
 
 def _locals(
@@ -222,7 +232,7 @@ def _locals(
         return [], RobustStatus.FLAT
     places: list[list[float]] = []
     found: list[Local] = []
-    for begin in starts:
+    for begin in _valleys(search, starts, len(scenarios)):
         z = [variable.inside(begin.values[variable.name]) for variable in search.variables]
         if len(places) < search.problem.basins and all(math.dist(z, other) > FAR_APART for other in places):
             places.append(z)

@@ -287,6 +287,13 @@ def test_a_search_that_runs_out_says_how_far_it_came(monkeypatch: pytest.MonkeyP
     assert not spent.reached
 
 
+def test_a_single_nominal_scenario_gives_the_nominal_optimum() -> None:
+    result = optim.robust_design(TWO, uncertain=[{"damper.mu": 0.3}], variables=N0)
+    assert result.status is RobustStatus.OPTIMAL
+    assert result.optimum["damper.N0"] == pytest.approx(result.design.optimum["damper.N0"], rel=1e-5)
+    assert result.gain == pytest.approx(0.0, abs=1e-9)
+
+
 def test_it_can_be_stopped_at_any_time() -> None:
     for after in (3, 60, 120):
         asked = itertools.count()
