@@ -20,6 +20,7 @@ from scipy.optimize import linprog
 from optim.errors import DesignError
 from optim.evaluator import Search, StoppedError
 from optim.local import Local
+from optim.minimax import minimax_search
 from optim.model import ACTIVE, Model, bounds_held
 from optim.pareto_result import ParetoPoint, ParetoResult, ParetoStatus, front_of
 from optim.problem import Method, Problem, pose
@@ -33,6 +34,7 @@ POINTS = 9
 FEWEST = 3
 FAR_APART = 0.02  # scaled distance from which the optima of two neighbours are both searched from
 JUMP = 0.01  # share of the band's range within which two neighbours need no point between them
+RESIDUAL = 1e-6  # of the first-order conditions, relative objective per scaled variable
 NOTHING_TO_TRADE = 1e-6  # relative width of the front below which the two optima are one
 MOST_EVALUATIONS = 5000
 FOUND = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK)
@@ -220,7 +222,11 @@ class _Front:
                 begin.append(evaluation)
         local_search = local_search_of(search.problem.method)
         ends = [local_search(search, search.variables, evaluation, search.model) for evaluation in begin]
-        return min(ends, key=lambda local: local.merit)
+        best = min(ends, key=lambda local: local.merit)
+        if not best.settled and search.problem.method is not Method.IPOPT:
+            # Rows kept of other designs may hold a search back; without them it goes on.
+            ends.append(minimax_search(search, search.variables, best.evaluation, search.model, remembered=0))
+        return min(ends, key=lambda local: (local.merit, not local.settled))
 
 
 def _used(method: Method) -> Method:
@@ -250,8 +256,12 @@ def steepest(model: Model, variables: Sequence[Variable]) -> float:
     sums[:count] = 1.0
     price = np.zeros(columns.shape[1])
     price[count : count + limits] = -1.0
-    target = np.append(np.zeros(model.z.size), 1.0)
-    found = linprog(price, A_eq=np.vstack([columns, sums]), b_eq=target, bounds=(0.0, None))
+    # The optimum is known to a residual: its conditions hold within that, not exactly.
+    both = np.vstack([columns, -columns])
+    found = linprog(
+        price, A_ub=both, b_ub=np.full(len(both), RESIDUAL), A_eq=sums[None, :], b_eq=[1.0],
+        bounds=(0.0, None),
+    )  # fmt: skip
     return -float(found.fun) if found.success else math.nan
 
 
