@@ -106,8 +106,8 @@ def _brute_force(
 def _beside_pyharm() -> None:
     """Print the same optimum of case A by pyHarm's responses under SciPy's bounded search.
 
-    The search is given a narrow bracket: from 20 to 3000 N it ends at 2999.5 N, where the contact is stuck and
-    the peak flat.
+    The search is given a narrow bracket: from 20 to 3000 N it ends at 2999.5 N, where the contact sticks and
+    the peak is flat.
     """
     scene, (_, path, low, high, _, peak, _) = case_a(), _ONE[2]
     other = pyharm_optimum(scene, *_BRACKET, step=0.3, accuracy=1.0)
@@ -118,7 +118,8 @@ def _beside_pyharm() -> None:
     rows = [
         (f"stickslip, {low:g} to {high:g} N", f"{ours.optimum[path]:.4f}", f"{ours.peak.value:.6f}", str(ours.evaluations),
          f"{spent.cpu:.4f}", "1"),
-        (f"pyHarm and SciPy, {_BRACKET[0]:g} to {_BRACKET[1]:g} N, to 1 N", f"{other.at:.4f}", f"{other.peak:.6f}", str(other.responses),
+        (f"pyHarm and SciPy, {_BRACKET[0]:g} to {_BRACKET[1]:g} N, to 1 N",
+         f"{other.at:.4f}", f"{other.peak:.6f}", str(other.responses),
          f"{other.cpu_seconds:.2f}", f"{other.cpu_seconds / spent.cpu:.0f}"),
     ]  # fmt: skip
     expect("pyHarm finds the same optimum to 1e-3", abs(other.peak / peak - 1.0) < 1e-3)

@@ -7,11 +7,10 @@
                ‖d‖ ≤ 1                         trust region
                low ≤ d ≤ high                  bounds
 
-d is the step in scaled variables, in units of the radius, and rows are in units of what they change by within
-it, counted from the largest (the conic solver's tolerances are absolute); RᵀR is the convex part of the
-Hessian of the Lagrangian. With the many scenarios of a
-mean every scenario is a group of its own; the number of rows in a group is padded, so that a problem is
-compiled once for each shape and kept for the whole process.
+d is the step in scaled variables, in units of the radius, and rows are in the units of `optim.conic`; RᵀR is
+the convex part of the Hessian of the Lagrangian. With the many scenarios of a mean every scenario is a group
+of its own; the number of rows in a group is padded, so that a problem is compiled once for each shape and
+kept for the whole process.
 """
 
 from __future__ import annotations
@@ -23,12 +22,11 @@ from functools import lru_cache
 import cvxpy
 import numpy as np
 
-from optim.model import PENALTY, Model
-from optim.subproblem import Step
+from optim.conic import Step, duals_of, numbers_of, solved
+from optim.model import Model
 from optim.variables import Real
 
 _BLOCK = 4  # rows are padded to multiples of it
-_LEAST = 1e-200  # unit of rows that do not change at all
 _LOCK = threading.Lock()  # a problem keeps its numbers in itself
 
 
@@ -72,7 +70,8 @@ class _Cone:
             self._row, cvxpy.SOC(self._w + 1.0, curved), cvxpy.SOC(cvxpy.Constant(1.0), self._d),
             self._low <= self._d, self._d <= self._high,
         ]  # fmt: skip
-        objective = cvxpy.sum(self._t) + self._w
+        self._share = cvxpy.Parameter(nonneg=True)
+        objective = self._share * cvxpy.sum(self._t) + self._w
         if limited:
             self._s, self._least = cvxpy.Variable(), cvxpy.Parameter()
             self._excess, self._excess_slopes = cvxpy.Parameter(limited), cvxpy.Parameter((limited, n))
@@ -84,45 +83,22 @@ class _Cone:
 
     def solve(self, model: Model, root: Real, radius: float) -> Step | None:
         """Solve with the numbers of a model."""
-        far = -3.0 * model.z.size  # a row that far below the largest can not reach it within the radius
-        unit = max(radius * float(np.abs(model.slopes).max(initial=0.0)), _LEAST)
+        numbers = numbers_of(model, root, radius)
         places = [np.flatnonzero(model.groups == g) for g in np.unique(model.groups)]
         spread = np.concatenate([np.resize(mine, self._rows_each) for mine in places])
-        tops = np.repeat([model.heights[mine].max() for mine in places], self._rows_each)
-        self._heights.value = np.maximum((model.heights[spread] - tops) / unit, far)
-        self._slopes.value = radius / unit * model.slopes[spread]
+        self._heights.value, self._slopes.value = numbers.heights[spread], numbers.slopes[spread]
         again = np.resize(np.arange(model.excess.size), self._limited)
-        limit_unit = max(radius * float(np.abs(model.excess_slopes).max(initial=0.0)), _LEAST)
         if self._limited:
-            below = (model.excess[again] - model.violation) / limit_unit
-            self._excess.value = np.maximum(below, far)
-            self._excess_slopes.value = radius / limit_unit * model.excess_slopes[again]
-            self._least.value = max(-model.violation / limit_unit, 2.0 * far)
-            self._price.value = PENALTY * limit_unit / unit
-        self._root.value = radius / math.sqrt(unit) * root
-        low, high = np.maximum(-model.z / radius, -1.0), np.minimum((1.0 - model.z) / radius, 1.0)
-        self._low.value, self._high.value = low, high
-        if not self._solved():
+            self._excess.value, self._excess_slopes.value = (
+                numbers.excess[again],
+                numbers.excess_slopes[again],
+            )
+            self._least.value, self._price.value = numbers.least, numbers.price
+        self._share.value, self._root.value = numbers.share, numbers.root
+        self._low.value, self._high.value = numbers.low, numbers.high
+        if not solved(self._problem, self._d):
             return None
-        step = radius * np.clip(np.asarray(self._d.value, dtype=np.float64), low, high)
-        multipliers, limit_multipliers = np.zeros(model.heights.size), np.zeros(model.excess.size)
-        np.add.at(multipliers, spread, _dual(self._row))
-        if self._limited and limit_unit > _LEAST:  # rows that do not change hold nothing
-            np.add.at(limit_multipliers, again, _dual(self._limit_row) * unit / limit_unit)
-        return Step(
-            step=step, predicted=model.predicted(step), multipliers=multipliers,
-            limit_multipliers=limit_multipliers,
+        return numbers.step(
+            np.asarray(self._d.value, dtype=np.float64), duals_of(self._row), spread,
+            duals_of(self._limit_row) if self._limited else np.zeros(0), again,
         )  # fmt: skip
-
-    def _solved(self) -> bool:
-        """Run the conic solver; return whether it reached optimality."""
-        try:
-            self._problem.solve(solver=cvxpy.CLARABEL, warm_start=False)
-        except cvxpy.SolverError:
-            return False
-        return self._problem.status in (cvxpy.OPTIMAL, cvxpy.OPTIMAL_INACCURATE) and self._d.value is not None
-
-
-def _dual(row: cvxpy.Constraint) -> Real:
-    """Return the multipliers of some rows; those below 0 are rounding."""
-    return np.maximum(np.asarray(row.dual_value, dtype=np.float64), 0.0)

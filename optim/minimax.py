@@ -15,11 +15,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from optim.conic import Step
 from optim.cuts import with_cuts
 from optim.local import Evaluate, Local, ModelOf, ended
 from optim.model import Model
 from optim.rows import Evaluation, Row, nearest
-from optim.subproblem import Step, solve_subproblem
+from optim.subproblem import solve_subproblem
 from optim.variables import Real, Variable, snapped, unscaled
 
 Subproblem = Callable[[Model, Real, float], Step | None]

@@ -5,49 +5,24 @@
                bⱼ + hⱼᵀ d ≤ s, s ≥ 0    every limited row j, as relative excess over its bound
                low ≤ d ≤ high           bounds and trust region
 
-d is the step in scaled variables, RᵀR is a quasi-Newton matrix of the Lagrangian. The rows are padded to a
-fixed number, so that the problem is compiled once for each shape and kept for the whole process.
+d is the step in scaled variables, RᵀR the convex part of the Hessian of the Lagrangian. The rows are padded to
+a fixed number, so that the problem is compiled once for each shape and kept for the whole process.
 """
 
 from __future__ import annotations
 
-import math
 import threading
-from dataclasses import dataclass
 from functools import lru_cache
 
 import cvxpy
 import numpy as np
 
-from optim.model import PENALTY, Model
+from optim.conic import Step, duals_of, numbers_of, solved
+from optim.model import Model
 from optim.variables import Real
 
 _BLOCK = 12  # rows are padded to multiples of it
-_LEAST = 1e-14  # unit of rows that do not change, relative to their size
-_STEEP = 1e6  # times the change of the objective, the most a penalty may change by in the cone programme
 _LOCK = threading.Lock()  # a problem keeps its numbers in itself
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
-    """A solved subproblem.
-
-    Attributes
-    ----------
-    step : (n,) array
-        In scaled variables.
-    predicted : float
-        Merit of the linear model at the step.
-    multipliers : (m,) array
-        Of the objective rows; those of a group sum to 1.
-    limit_multipliers : (c,) array
-        Of the limited rows.
-    """
-
-    step: Real
-    predicted: float
-    multipliers: Real
-    limit_multipliers: Real
 
 
 def solve_subproblem(model: Model, root: Real, radius: float) -> Step | None:
@@ -75,11 +50,7 @@ def _subproblem(n: int, shape: tuple[int, ...], limited: int) -> _Subproblem:
 
 
 class _Subproblem:
-    """The parametrised problem for n variables, so many rows in each group, so many limited rows.
-
-    Steps are in units of the radius and rows in units of what they change by within it, counted from the
-    largest: the conic solver's tolerances are absolute, and steps become as small as 1e-9.
-    """
+    """The parametrised problem for n variables, so many rows in each group, so many limited rows."""
 
     def __init__(self, n: int, shape: tuple[int, ...], limited: int) -> None:
         self._d, self._t = cvxpy.Variable(n), cvxpy.Variable(len(shape))
@@ -105,53 +76,24 @@ class _Subproblem:
 
     def solve(self, model: Model, root: Real, radius: float) -> Step | None:
         """Solve with the numbers of a model."""
-        far = -3.0 * model.z.size  # a row that far below the largest can not reach it within the radius
-        unit = max(radius * float(np.abs(model.slopes).max(initial=0.0)), _LEAST)
+        numbers = numbers_of(model, root, radius)
         places = [np.flatnonzero(model.groups == g) for g in np.unique(model.groups)]
         spread = [np.resize(mine, a.size) for mine, a in zip(places, self._heights, strict=True)]
         for some, a, g in zip(spread, self._heights, self._slopes, strict=True):
-            below = (model.heights[some] - model.heights[some].max()) / unit
-            a.value, g.value = np.maximum(below, far), radius / unit * model.slopes[some]
+            a.value, g.value = numbers.heights[some], numbers.slopes[some]
         again = np.resize(np.arange(model.excess.size), self._limited)
         if self._limited:
-            limit_unit = max(radius * float(np.abs(model.excess_slopes).max(initial=0.0)), _LEAST)
-            below = (model.excess[again] - model.violation) / limit_unit
-            self._excess.value = np.maximum(below, far)
-            self._excess_slopes.value = radius / limit_unit * model.excess_slopes[again]
-            self._least.value = max(-model.violation / limit_unit, 2.0 * far)
-        else:
-            limit_unit = _LEAST
-        # What the objective changes by counts as 1, unless the penalty changes by far more.
-        whole = max(unit, PENALTY * limit_unit / _STEEP)
-        self._share.value, self._root.value = unit / whole, radius / math.sqrt(whole) * root
-        if self._limited:
-            self._price.value = PENALTY * limit_unit / whole
-        self._low.value = np.maximum(-model.z / radius, -1.0)
-        self._high.value = np.minimum((1.0 - model.z) / radius, 1.0)
-        if not self._solved():
-            return None
-        step = radius * np.clip(
-            np.asarray(self._d.value, dtype=np.float64), self._low.value, self._high.value
-        )
-        multipliers, limit_multipliers = np.zeros(model.heights.size), np.zeros(model.excess.size)
-        for some, row in zip(spread, self._rows, strict=True):
-            np.add.at(
-                multipliers,
-                some,
-                np.maximum(np.asarray(row.dual_value, dtype=np.float64), 0.0) * whole / unit,
+            self._excess.value, self._excess_slopes.value = (
+                numbers.excess[again],
+                numbers.excess_slopes[again],
             )
-        if self._limited and limit_unit > _LEAST:  # rows that do not change hold nothing
-            duals = np.maximum(np.asarray(self._limit_row.dual_value, dtype=np.float64), 0.0)
-            np.add.at(limit_multipliers, again, duals * whole / limit_unit)
-        return Step(
-            step=step, predicted=model.predicted(step), multipliers=multipliers,
-            limit_multipliers=limit_multipliers,
+            self._least.value, self._price.value = numbers.least, numbers.price
+        self._share.value, self._root.value = numbers.share, numbers.root
+        self._low.value, self._high.value = numbers.low, numbers.high
+        if not solved(self._problem, self._d):
+            return None
+        return numbers.step(
+            np.asarray(self._d.value, dtype=np.float64),
+            np.concatenate([duals_of(row) for row in self._rows]), np.concatenate(spread),
+            duals_of(self._limit_row) if self._limited else np.zeros(0), again,
         )  # fmt: skip
-
-    def _solved(self) -> bool:
-        """Run the conic solver; return whether it reached optimality."""
-        try:
-            self._problem.solve(solver=cvxpy.CLARABEL, warm_start=False)
-        except cvxpy.SolverError:
-            return False
-        return self._problem.status in (cvxpy.OPTIMAL, cvxpy.OPTIMAL_INACCURATE) and self._d.value is not None
