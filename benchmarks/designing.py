@@ -116,7 +116,8 @@ def _beside_pyharm() -> None:
         return
     ours, spent = timed(lambda: optim.design(scene, variables={path: (low, high)}), runs=7)
     rows = [
-        (f"stickslip, {low:g} to {high:g} N", f"{ours.optimum[path]:.4f}", f"{ours.peak.value:.6f}", str(ours.evaluations),
+        (f"stickslip, {low:g} to {high:g} N", f"{ours.optimum[path]:.4f}", f"{ours.peak.value:.6f}",
+         str(ours.evaluations),
          f"{spent.cpu:.4f}", "1"),
         (f"pyHarm and SciPy, {_BRACKET[0]:g} to {_BRACKET[1]:g} N, to 1 N",
          f"{other.at:.4f}", f"{other.peak:.6f}", str(other.responses),

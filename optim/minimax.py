@@ -86,6 +86,20 @@ def minimax_search(
     return ended(here, with_cuts(model, seen, SAME_DESIGN), variables)
 
 
+def thorough_search(
+    evaluate: Evaluate, variables: tuple[Variable, ...], begin: Evaluation, model_of: ModelOf
+) -> Local:
+    """Improve a design with cuts, and go on without them where that does not settle.
+
+    A row bent over a long step may pass for a new one and hold a search where nothing is.
+    """
+    found = minimax_search(evaluate, variables, begin, model_of)
+    if found.settled:
+        return found
+    again = minimax_search(evaluate, variables, found.evaluation, model_of, remembered=0)
+    return min(found, again, key=lambda local: (local.merit, not local.settled))
+
+
 def _curvature(
     model: Model, fresh: Model, pulls: list[tuple[Row, float]], hessian: Real, *, accepted: bool
 ) -> Real:

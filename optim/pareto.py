@@ -20,7 +20,6 @@ from scipy.optimize import linprog
 from optim.errors import DesignError
 from optim.evaluator import Search, StoppedError
 from optim.local import Local
-from optim.minimax import minimax_search
 from optim.model import ACTIVE, Model, bounds_held
 from optim.pareto_result import ParetoPoint, ParetoResult, ParetoStatus, front_of
 from optim.problem import Method, Problem, pose
@@ -222,10 +221,6 @@ class _Front:
                 begin.append(evaluation)
         local_search = local_search_of(search.problem.method)
         ends = [local_search(search, search.variables, evaluation, search.model) for evaluation in begin]
-        best = min(ends, key=lambda local: local.merit)
-        if not best.settled and search.problem.method is not Method.IPOPT:
-            # Rows kept of other designs may hold a search back; without them it goes on.
-            ends.append(minimax_search(search, search.variables, best.evaluation, search.model, remembered=0))
         return min(ends, key=lambda local: (local.merit, not local.settled))
 
 

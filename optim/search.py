@@ -129,9 +129,9 @@ def local_search_of(method: Method) -> LocalSearch:
         from optim.nlp import ipopt_search
 
         return ipopt_search
-    from optim.minimax import minimax_search
+    from optim.minimax import thorough_search
 
-    return minimax_search
+    return thorough_search
 
 
 def judge(best: Local) -> DesignStatus:

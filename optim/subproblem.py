@@ -5,8 +5,8 @@
                bⱼ + hⱼᵀ d ≤ s, s ≥ 0    every limited row j, as relative excess over its bound
                low ≤ d ≤ high           bounds and trust region
 
-d is the step in scaled variables, RᵀR the convex part of the Hessian of the Lagrangian. The rows are padded to
-a fixed number, so that the problem is compiled once for each shape and kept for the whole process.
+d is the step in scaled variables, RᵀR the convex part of the Hessian of the Lagrangian. The rows are padded
+to a fixed number, so that the problem is compiled once for each shape and kept for the whole process.
 """
 
 from __future__ import annotations
