@@ -17,6 +17,7 @@ import numpy as np
 
 from solver.errors import SettingError
 from solver.fourier import Real
+from solver.further import NEAR, with_further
 from solver.kernels.track import DHEIGHT, HEIGHT, OMEGA, Z
 from solver.lines import Look, Pace
 from solver.lowest import DOUBT, Lowest, flat, minima
@@ -35,7 +36,7 @@ MOST_LOOKS = 40
 GAP = 2e-3  # share of the range below which a gap between lines is no gap
 SAME_PLACE = 1e-9  # likewise of two places
 LEVEL = 1e-6  # relative change of the peak over the range below which it does not fall at an end
-WIDE = 1.3  # times the best peak: how high other basins may be that are asked for
+WIDE = 1.3  # times the best peak: how high other basins may be that are looked for thoroughly
 COARSE = 0.08  # share of the range: sweeps closer than that do not look for other basins between them
 _STARTS = (0.5, 0.25, 0.75, 0.0, 1.0)  # shares of the range where the first sweep is tried
 _PACE = Pace(
@@ -53,6 +54,7 @@ def least_peak(
     harmonics: int = 11,
     first: float | None = None,
     basins: int = 1,
+    thorough: bool = False,
     effects: Effects | None = None,
     on_progress: Callable[[float, int], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
@@ -66,11 +68,16 @@ def least_peak(
     low, high : its bounds in user units.
     harmonics : highest harmonic kept.
     first : where the first sweep is made; the middle of the range if left out.
-    basins : how many local minima are checked by sweeps. With more than one, sweeps in steps over the range
-        look for them first, wherever no line is known to be 1.3 times as high as the optimum.
+    basins : how many local minima are looked for. With more than one, a coarse stage follows the proof of the
+        optimum, which stays as it is: a response with half the harmonics in the middle of every stretch that
+        no sweep was made in and that the lines leave lower than 1.05 times the optimum (three at most), and
+        one at a further basin that nothing was looked at near. Further basins are the minima of the lines
+        met, solved for; only where a sweep happened to be made are they proven, and there may be others.
+    thorough : look for further basins by sweeps in steps over the range, wherever no line is known to be 1.3
+        times as high as the optimum, and check as many of them as are asked for by a sweep each.
     effects : what is paid for though the scene does not call for it.
     on_progress : called after every sweep with (share done, as far as that is known; sweeps so far).
-    should_stop : asked before every sweep.
+    should_stop : asked before every sweep; once the optimum is proven it only ends the coarse stage.
 
     Raises
     ------
@@ -80,7 +87,7 @@ def least_peak(
     begun = time.perf_counter()
     if isinstance(basins, bool) or not isinstance(basins, int) or basins < 1:
         raise SettingError("basins", basins, "must be a whole number >= 1")
-    pace = _PACE if basins == 1 else replace(_PACE, above=WIDE)
+    pace = replace(_PACE, above=WIDE) if thorough and basins > 1 else _PACE
     tracker = Tracker(scene, parameter, low, high, harmonics, effects, pace)
     scale = tracker.scale
     places = [scale.low + share * scale.span for share in _STARTS]
@@ -97,9 +104,12 @@ def least_peak(
         tracker.follow_rivals(look, RIVAL)
         if on_progress is not None:
             on_progress(_share_done(tracker), len(tracker.looks))
-    best = prove(tracker, CLOSE, begun, basins=basins, on_progress=on_progress, should_stop=should_stop)
+    best = prove(
+        tracker, CLOSE, begun, basins=basins, thorough=thorough, on_progress=on_progress,
+        should_stop=should_stop,
+    )  # fmt: skip
     if on_progress is not None:
-        on_progress(1.0, len(tracker.looks))
+        on_progress(1.0, best.sweeps)
     return best
 
 
@@ -109,6 +119,7 @@ def prove(
     begun: float,
     *,
     basins: int = 1,
+    thorough: bool = False,
     on_progress: Callable[[float, int], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> LeastPeak:
@@ -119,9 +130,10 @@ def prove(
     tracker : with what is followed already.
     share : of the highest peak of a sweep from which another peak of it is followed.
     begun : when the work began, for the time it took.
-    basins, on_progress, should_stop : as for `least_peak`.
+    basins, thorough, on_progress, should_stop : as for `least_peak`.
     """
-    doubt = DOUBT if basins == 1 else WIDE - 1.0
+    doubt = WIDE - 1.0 if thorough and basins > 1 else DOUBT
+    checked = basins if thorough else 1
     status: TrackStatus | None = None
     found: list[Lowest] | None = None
     settled: list[float] = []
@@ -134,10 +146,14 @@ def prove(
         elif len(tracker.looks) >= MOST_LOOKS:
             status = TrackStatus.UNPROVEN
         else:
-            before = len(tracker.looks)
-            status, found = _next_step(tracker, share, basins, doubt, settled)
-            if on_progress is not None and len(tracker.looks) > before:
-                on_progress(_share_done(tracker), len(tracker.looks))
+            before = _sweeps(tracker)
+            status, found = _next_step(tracker, share, checked, doubt, settled)
+            if status is TrackStatus.TRACKED and found and basins > checked:
+                found, standing = with_further(tracker, found, basins, should_stop)
+                if not standing:
+                    status, doubt = None, NEAR - 1.0
+            if on_progress is not None and _sweeps(tracker) > before:
+                on_progress(_share_done(tracker), _sweeps(tracker))
     if found is None:
         found = minima(tracker, doubt)
     return _least(tracker, found, status, begun)
@@ -198,8 +214,13 @@ def _unseen(tracker: Tracker, height: float) -> float | None:
 
 def _share_done(tracker: Tracker) -> float:
     """Return a guess of the share done: how many sweeps are to come is not known."""
-    looks = len(tracker.looks)
-    return looks / (looks + 1.0)
+    sweeps = _sweeps(tracker)
+    return sweeps / (sweeps + 1.0)
+
+
+def _sweeps(tracker: Tracker) -> int:
+    """Return how many responses were computed, those with fewer harmonics included."""
+    return len(tracker.looks) + len(tracker.glances)
 
 
 def _seen(tracker: Tracker, z: float) -> Look | None:
@@ -234,7 +255,7 @@ def _least(tracker: Tracker, found: list[Lowest], status: TrackStatus, begun: fl
     if not found:
         return LeastPeak(
             status=status, at=math.nan, peak=math.nan, active=(), basins=(), branch=None,
-            sweeps=len(tracker.looks), work=_work(tracker, None), seconds=time.perf_counter() - begun,
+            sweeps=_sweeps(tracker), work=_work(tracker, None), seconds=time.perf_counter() - begun,
         )  # fmt: skip
     best, look = found[0], _seen(tracker, found[0].z)
     active = tuple(_active(tracker, row) for row in _highest(best.rows))
@@ -243,7 +264,7 @@ def _least(tracker: Tracker, found: list[Lowest], status: TrackStatus, begun: fl
     return LeastPeak(
         status=status, at=tracker.scale.outside(best.z), peak=best.height, active=active,
         basins=tuple(_basin(tracker, one) for one in found), branch=None if look is None else look.branch,
-        sweeps=len(tracker.looks), work=_work(tracker, look), seconds=time.perf_counter() - begun,
+        sweeps=_sweeps(tracker), work=_work(tracker, look), seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
 
@@ -278,7 +299,8 @@ def _work(tracker: Tracker, look: Look | None) -> float:
         return 0.0
     swept = sum(one.branch.newton_iterations for one in tracker.looks)
     unit = swept / len(tracker.looks) if look is None else look.branch.newton_iterations
-    return (swept + tracker.spent) / max(unit, 1)
+    glanced = sum(one.iterations for one in tracker.glances)
+    return (swept + glanced + tracker.spent) / max(unit, 1)
 
 
 def _active(tracker: Tracker, row: Real) -> ActivePeak:

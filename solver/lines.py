@@ -11,9 +11,15 @@ from enum import Enum
 
 import numpy as np
 
+from solver.balance import build
 from solver.branch import Branch
-from solver.fourier import Real
+from solver.continuation import ContinuationSettings, walk
+from solver.fourier import Integer, Real
 from solver.kernels.track import DHEIGHT, DOMEGA, HEIGHT, OMEGA, Z
+from solver.rivals import Rival, crests
+from solver.savings import Effects
+from solver.scene import Scene
+from solver.workspace import Workspace
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,6 +122,51 @@ class Line:
         cubic = (1.0 + 2.0 * t) * r * r * a[:, value] + t * t * (3.0 - 2.0 * t) * b[:, value]
         cubic += t * r * length * (r * a[:, slope] - t * b[:, slope])
         return np.where((z >= self.low) & (z <= self.high), cubic, -np.inf)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Glance:
+    """One walk over the band at one z with fewer harmonics, its peaks as near as its points are.
+
+    Attributes
+    ----------
+    z : float
+        Where.
+    crests : tuple of Rival
+        Peaks of max|x|, highest first.
+    ks : array of int
+        The harmonics kept.
+    iterations : int
+        Newton iterations spent.
+    """
+
+    z: float
+    crests: tuple[Rival, ...]
+    ks: Integer
+    iterations: int
+
+
+def glance_at(z: float, scene: Scene, harmonics: int, effects: Effects | None) -> Glance:
+    """Walk over the band of a scene; of a walk that does not reach its end the peaks met are returned.
+
+    Parameters
+    ----------
+    z : what the scene stands for.
+    """
+    balance = build(scene, "frequency", harmonics=harmonics, frequency_hz=None, effects=effects)
+    low, high = scene.observe.band
+    stretches = list(walk(Workspace.of(balance), low, high, ContinuationSettings()))
+    return Glance(
+        z=z,
+        crests=tuple(
+            crests(
+                np.concatenate([stretch.solutions for stretch in stretches]),
+                np.concatenate([stretch.measures for stretch in stretches]),
+            )
+        ),
+        ks=balance.system.ks,
+        iterations=stretches[-1].newton_iterations,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

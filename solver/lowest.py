@@ -62,7 +62,7 @@ def flat(tracker: Tracker) -> bool:
     return bool(np.isfinite(heights).all() and np.ptp(heights) <= EVEN * heights.max())
 
 
-def minima(tracker: Tracker, doubt: float = DOUBT) -> list[Lowest]:
+def minima(tracker: Tracker, doubt: float = DOUBT, most: int | None = None) -> list[Lowest]:
     """Return the minima of the highest line over the range, lowest first; the low ones are solved.
 
     Empty where no line is. Minima with no rise between them count as one; of a peak that does not depend on
@@ -71,6 +71,7 @@ def minima(tracker: Tracker, doubt: float = DOUBT) -> list[Lowest]:
     Parameters
     ----------
     doubt : relative height above the lowest up to which a minimum is solved for.
+    most : how many are solved for at most; all of those if left out.
     """
     if not tracker.lines:
         return []
@@ -96,9 +97,9 @@ def minima(tracker: Tracker, doubt: float = DOUBT) -> list[Lowest]:
     limit = heights[kept[0]] * (1.0 + doubt)
     found = [
         _solved(tracker, z, heights, index)
-        if heights[index] <= limit
+        if heights[index] <= limit and (most is None or rank < most)
         else Lowest(z=float(z[index]), rows={}, height=float(heights[index]), bracketed=False)
-        for index in kept
+        for rank, index in enumerate(kept)
     ]
     return sorted(found, key=lambda one: one.height)
 

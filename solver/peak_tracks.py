@@ -68,7 +68,7 @@ class Basin:
         The place and the peak are solved for; otherwise they are read from cubics between solved places.
     proven : bool
         A sweep there found nothing higher. Otherwise the highest peak is at least as high as `peak`: the
-        basin is no better than that, but may be worse.
+        basin is no better than that, but may be worse. What the coarse stage finds is seldom proven.
     """
 
     at: float
@@ -96,9 +96,9 @@ class LeastPeak:
     branch : Branch or None
         The frequency response at the optimum, from the sweep that proves it; None if there is none.
     sweeps : int
-        Frequency responses computed.
+        Frequency responses computed, those with half the harmonics that look for further basins included.
     work : float
-        Newton iterations of all sweeps and of following the peaks, divided by those of the sweep at the
+        Newton iterations of all of those and of following the peaks, divided by those of the sweep at the
         optimum (of a mean sweep where there is none): the work in units of one frequency response.
     seconds : float
         Time in all.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -33,8 +34,8 @@ from solver.kernels.track import (
     polish,
     track,
 )
-from solver.lines import EVERYWHERE, Line, LineEnd, Look, Pace
-from solver.rivals import rivals
+from solver.lines import EVERYWHERE, Glance, Line, LineEnd, Look, Pace, glance_at
+from solver.rivals import Rival, rivals
 from solver.savings import Effects
 from solver.scale import scale_of
 from solver.scene import Scene
@@ -46,6 +47,7 @@ Place = tuple[Real, Real, Real]  # row (COLUMNS,), solution and tangent (n_unkno
 _MOST_ROWS = 600
 SUBDIVIDED = 6  # places between two rows at which the envelope is looked at
 ROUNDING = 1e-12
+FEWEST = 3  # harmonics of a glance
 ABOUT = 0.01  # relative height that a row that does not fit may lack
 CAREFUL = 3e-4  # share of the range: first step where lines are close
 EXACTLY = 1e-6  # relative distance within which a peak is one that was solved at the same place
@@ -92,6 +94,7 @@ class Tracker:
         self._effects, self._pace, self._first_step = effects, pace, pace.first_step
         self.lines: list[Line] = []
         self.looks: list[Look] = []
+        self.glances: list[Glance] = []
         self.exact_between: set[tuple[float, float, float]] = set()  # z, z and height of rows: cubics hold
         self._scene, self._harmonics = self.balance.scene, harmonics
         self._system: System = by_reference(self.balance.system)
@@ -102,6 +105,10 @@ class Tracker:
         """The height from which a line only has to show that it is higher [m]."""
         least = min((look.top for look in self.looks if look.seen), default=math.inf)
         return least * self._pace.above
+
+    def follow_up_to(self, above: float) -> None:
+        """Set `Pace.above` for the lines to come, and for what counts as a minimum of those there are."""
+        self._pace = replace(self._pace, above=above)
 
     @property
     def spent(self) -> int:
@@ -146,6 +153,48 @@ class Tracker:
             if rival.value >= share * look.top:
                 u = self._fitted(rival.solution, look.branch.balance.system.ks)
                 self._draw(look.z, rival.omega, u, (rival.sign, math.nan), fixed=False)
+
+    def glance(self, z: float) -> Glance:
+        """Look at z with fewer harmonics, in which peaks lie nearly where they are."""
+        path, fewer = self.balance.parameter.path, max(FEWEST, self._harmonics // 2)
+        scene = self._scene.with_values({path: self.scale.outside(z)})
+        glance = glance_at(z, scene, min(fewer, self._harmonics), self._effects)
+        self.glances.append(glance)
+        return glance
+
+    def follow_guess(self, glance: Glance, guess: Rival, within: tuple[float, float], share: float) -> bool:
+        """Solve for a peak of a glance and follow it if it is high and on no line yet.
+
+        Parameters
+        ----------
+        within : z as far as which it is followed at most.
+        share : of the highest line there that it has to reach.
+
+        Returns
+        -------
+        Whether there is a new line.
+        """
+        before, u, z = len(self.lines), self._fitted(guess.solution, glance.ks), glance.z
+        self._first_step = self._pace.first_step
+        start = (guess.sign, math.nan)
+        _, rows, solutions, _, sign = self._track(z, z, guess.omega, u, start, fixed=False)
+        if len(rows) == 0 or rows[0, HEIGHT] < share * self.envelope(np.array([z]))[0]:
+            return False
+        if not self._met(rows[0]):
+            extremum = sign, float(rows[0, PLACE])
+            self._draw(z, float(rows[0, OMEGA]), solutions[0], extremum, fixed=False, within=within)
+        return len(self.lines) > before
+
+    def _met(self, row: Real) -> bool:
+        """Return whether a solved peak is on a line, by solving for those that are near."""
+        z = float(row[Z])
+        for line in self.lines:
+            at = line.frequencies(row[[Z]])[0], line.heights(row[[Z]])[0]
+            if abs(at[0] / row[OMEGA] - 1.0) <= ABOUT and abs(at[1] / row[HEIGHT] - 1.0) <= ABOUT:
+                exact = self.exact(line, z, fitting=False)
+                if exact is not None and abs(exact[HEIGHT] / row[HEIGHT] - 1.0) <= EXACTLY:
+                    return True
+        return False
 
     def known(self, z: float, peak: Peak, solved: Mapping[int, Real] | None = None) -> bool:
         """Return whether a peak at z is on a line."""
@@ -208,9 +257,13 @@ class Tracker:
         u = self._fitted(peak.solution, ks)
         self._draw(z, 2.0 * math.pi * peak.at, u, (0.0, 0.0), fixed=not peak.interior)
 
-    def _draw(self, z: float, omega: float, u: Real, extremum: tuple[float, float], *, fixed: bool) -> None:
+    def _draw(
+        self, z: float, omega: float, u: Real, extremum: tuple[float, float], *, fixed: bool,
+        within: tuple[float, float] = (-math.inf, math.inf),
+    ) -> None:  # fmt: skip
         """Add the line through a peak; `extremum` is its sign (0: the larger of the two) and place."""
         low, high = self._wanted(z)
+        low, high = max(low, within[0]), min(high, within[1])
         if low == high:
             return
         up = self._track(z, high, omega, u, extremum, fixed=fixed)

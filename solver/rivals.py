@@ -1,4 +1,4 @@
-"""Peaks of max x or of −min x that the larger of the two hides.
+"""Peaks of a sweep as near as its points are: those of max|x|, and those that it hides.
 
 Where a normal load varies the motion is lopsided, and max|x| is the larger of two curves over the frequency.
 A peak of the other one is no peak of max|x|, but a parameter may make it one: it is worth following, and a
@@ -21,7 +21,7 @@ _HIDDEN = 1e-9  # relative distance below max|x| from which a curve is hidden
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rival:
-    """A hidden peak, as near as the points of the branch are.
+    """A peak, as near as the points of the branch are.
 
     Attributes
     ----------
@@ -43,13 +43,29 @@ class Rival:
 
 def rivals(branch: Branch) -> list[Rival]:
     """Return the hidden peaks of a branch over the frequency, highest first."""
-    measures, found = branch.measures, []
+    return _crests(branch.solutions, branch.measures, hidden=True)
+
+
+def crests(solutions: Real, measures: Real) -> list[Rival]:
+    """Return the peaks of max|x| between points of a walk over the frequency, highest first.
+
+    Parameters
+    ----------
+    solutions : (P, n_unknowns + 1) slip motions [m] and ω [rad/s].
+    measures : (P, MEASURES) columns named in `solver.kernels.observe`.
+    """
+    return _crests(solutions, measures, hidden=False)
+
+
+def _crests(solutions: Real, measures: Real, *, hidden: bool) -> list[Rival]:
+    """Return the peaks of max x and of −min x that the larger of the two hides, or those it does not."""
+    found = []
     for value, slope, sign in _CURVES:
         rising, falling = measures[:-1, slope], measures[1:, slope]
-        hidden = measures[:, value] < (1.0 - _HIDDEN) * measures[:, MAX_ABS]
-        for left in np.flatnonzero((rising > 0.0) & (falling <= 0.0) & hidden[:-1] & hidden[1:]):
+        wanted = (measures[:, value] < (1.0 - _HIDDEN) * measures[:, MAX_ABS]) == hidden
+        for left in np.flatnonzero((rising > 0.0) & (falling <= 0.0) & wanted[:-1] & wanted[1:]):
             share = rising[left] / (rising[left] - falling[left])
-            between = (1.0 - share) * branch.solutions[left] + share * branch.solutions[left + 1]
+            between = (1.0 - share) * solutions[left] + share * solutions[left + 1]
             height = float(measures[left : left + 2, value].max())
             found.append(
                 Rival(value=height, omega=float(between[-1]), solution=between[:-1].copy(), sign=sign)
