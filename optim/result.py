@@ -69,7 +69,8 @@ class Basin:
     objective : float
         What is minimised.
     settled, feasible : bool
-        Whether the first-order conditions hold and the limits are kept there.
+        Whether the first-order conditions hold and the limits are kept there. Of the tracked peak:
+        settled if a sweep there found nothing higher than the peaks followed to there.
     """
 
     values: Mapping[str, float]

