@@ -112,12 +112,12 @@ class Problem:
     def why_not_tracked(self) -> str | None:
         """Why this is no problem for the method of the tracked peak; None if it is one."""
         if not self.plain:
-            return "it minimises the highest peak of one case alone, without limits"
+            return "tracked is for the highest peak of one case alone, without limits"
         if len(self.paths) != 1:
-            return "it takes one variable with one parameter path"
+            return "tracked takes one variable with one parameter path"
         others = [contact.name for contact in self.scene.contacts if not isinstance(contact, Contact)]
         if others:
-            return f"it knows the law coulomb alone, not that of {', '.join(others)}"
+            return f"tracked knows the law coulomb alone, not that of {', '.join(others)}"
         return None
 
 
