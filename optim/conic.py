@@ -14,7 +14,7 @@ import cvxpy
 import numpy as np
 from numpy.typing import NDArray
 
-from optim.model import PENALTY, Model
+from optim.model import Model
 from optim.variables import Real
 
 Index = NDArray[np.intp]
@@ -92,7 +92,7 @@ class Numbers:
         multipliers, limit_multipliers = np.zeros(model.heights.size), np.zeros(model.excess.size)
         np.add.at(multipliers, rows, np.maximum(duals, 0.0) / self.share)
         if self.price > 0.0:
-            np.add.at(limit_multipliers, limited, PENALTY * np.maximum(limit_duals, 0.0) / self.price)
+            np.add.at(limit_multipliers, limited, model.penalty * np.maximum(limit_duals, 0.0) / self.price)
         return Step(
             step=step, predicted=model.predicted(step), multipliers=multipliers,
             limit_multipliers=limit_multipliers,
@@ -108,13 +108,13 @@ def numbers_of(model: Model, root: Real, radius: float) -> Numbers:
     # What the objective changes by counts as 1, unless the penalty changes by far more. Limits that do not
     # change hold nothing.
     changing = limit_unit > _LEAST
-    whole = max(unit, PENALTY * limit_unit / _STEEP) if changing else unit
+    whole = max(unit, model.penalty * limit_unit / _STEEP) if changing else unit
     return Numbers(
         model=model, radius=radius, heights=np.maximum((model.heights - tops) / unit, far),
         slopes=radius / unit * model.slopes,
         excess=np.maximum((model.excess - model.violation) / limit_unit, far),
         excess_slopes=radius / limit_unit * model.excess_slopes, share=unit / whole,
-        price=PENALTY * limit_unit / whole if changing else 0.0,
+        price=model.penalty * limit_unit / whole if changing else 0.0,
         least=max(-model.violation / limit_unit, 2.0 * far), root=radius / math.sqrt(whole) * root,
         low=np.maximum(-model.z / radius, -1.0), high=np.minimum((1.0 - model.z) / radius, 1.0),
     )  # fmt: skip

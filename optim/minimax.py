@@ -17,8 +17,8 @@ import numpy as np
 
 from optim.conic import Step
 from optim.cuts import with_cuts
-from optim.local import Evaluate, Local, ModelOf, ended
-from optim.model import Model
+from optim.local import KEPT, Evaluate, Local, ModelOf, ended
+from optim.model import PENALTY, Model
 from optim.rows import Evaluation, Row, nearest
 from optim.subproblem import solve_subproblem
 from optim.variables import Real, Variable, snapped, unscaled
@@ -30,6 +30,8 @@ LARGEST_RADIUS = 0.5
 SMALLEST_RADIUS = 1e-9
 STATIONARY = 1e-11  # predicted relative decrease below which a design is optimal
 MOST_STEPS = 40
+FIRST_PENALTY = 1.0  # times the objective: far above the multipliers, it makes limits that bend too steep
+STRONGER = 10.0  # factor of a penalty that leaves limits broken
 ENOUGH = 1e-4  # share of the predicted decrease from which a step is taken
 REMEMBERED = 8  # designs whose rows are kept as cuts
 CUTS_REACH = 4.0  # times the radius, as far as cuts reach
@@ -56,6 +58,7 @@ def minimax_search(
     solve = solve or solve_subproblem
     n = len(variables)
     here, model = begin, model_of(begin)
+    model = replace(model, penalty=min(FIRST_PENALTY * abs(model.objective) or PENALTY, PENALTY))
     hessian, radius = np.zeros((n, n)), FIRST_RADIUS
     seen: deque[Model] = deque(maxlen=remembered)
     for _ in range(MOST_STEPS):
@@ -63,6 +66,9 @@ def minimax_search(
         step = solve(known, _root(hessian), radius)
         if step is None:
             break
+        if _too_weak(model, step):
+            model = replace(model, penalty=min(STRONGER * model.penalty, PENALTY))
+            continue
         decrease = model.merit - step.predicted
         if decrease <= STATIONARY * model.merit or radius <= SMALLEST_RADIUS:
             break
@@ -70,7 +76,7 @@ def minimax_search(
         if not trial.good:
             radius *= 0.25
             continue
-        fresh = model_of(trial)
+        fresh = replace(model_of(trial), penalty=model.penalty)
         moved = fresh.z - model.z
         ratio = (model.merit - fresh.merit) / max(decrease - 0.5 * float(moved @ hessian @ moved), 1e-300)
         if fresh.smooth:
@@ -83,7 +89,14 @@ def minimax_search(
             radius = 0.5 * size if ratio > 0.0 else 0.25 * size
         if ratio > ENOUGH and fresh.smooth:
             here, model = trial, fresh
-    return ended(here, with_cuts(model, seen, SAME_DESIGN), variables)
+    return ended(here, replace(with_cuts(model, seen, SAME_DESIGN), penalty=PENALTY), variables)
+
+
+def _too_weak(model: Model, step: Step) -> bool:
+    """Return whether the penalty is what leaves limits broken: they pull as hard as it lets them."""
+    pull = float(step.limit_multipliers.sum())
+    left = float((model.excess + model.excess_slopes @ step.step).max(initial=0.0))
+    return left > KEPT and pull >= 0.99 * model.penalty and model.penalty < PENALTY
 
 
 def thorough_search(

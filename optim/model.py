@@ -44,6 +44,8 @@ class Model:
         The objective that counts as 1.
     units : (c,) array
         What each excess is relative to.
+    penalty : float
+        On the largest excess, in what a search decreases.
     """
 
     z: Real
@@ -58,6 +60,7 @@ class Model:
     bends: Real
     unit: float
     units: Real
+    penalty: float = PENALTY
 
     def second(self, i: int) -> Real | None:
         """Return the second derivatives of objective row `i` by z, (n, n); None where they do not exist."""
@@ -88,13 +91,13 @@ class Model:
     @property
     def merit(self) -> float:
         """What a search decreases: the objective with the exact penalty on the limits."""
-        return self.objective + PENALTY * self.violation
+        return self.objective + self.penalty * self.violation
 
     def predicted(self, step: Real) -> float:
         """Return the merit after a step (n,) if every row were linear."""
         heights, excess = self.heights + self.slopes @ step, self.excess + self.excess_slopes @ step
         objective = sum(float(heights[self.groups == g].max()) for g in np.unique(self.groups))
-        return objective + PENALTY * max(float(excess.max(initial=0.0)), 0.0)
+        return objective + self.penalty * max(float(excess.max(initial=0.0)), 0.0)
 
     @property
     def smooth(self) -> bool:
