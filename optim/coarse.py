@@ -1,18 +1,27 @@
-"""The coarse stage: designs over the whole range, from the best of which the local searches begin."""
+"""The coarse stage: designs over the whole range, from the best of which the local searches begin.
+
+With several variables it is made with half the harmonics: it only has to rank designs, and none of its
+numbers is kept.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
+import numpy as np
 from scipy.stats import qmc
 
 from optim.evaluator import Search
+from optim.local import is_flat
 from optim.problem import Problem
 from optim.rows import Evaluation
-from optim.variables import unscaled
+from optim.variables import scaled, unscaled
 
 COARSE_ONE = 9  # designs of the coarse stage with one variable
 COARSE_EACH = 6  # and for each variable with more
+FEWEST = 3  # harmonics of a coarse stage with several variables, at least
+APART = 0.15  # scaled distance of the designs that several local searches begin from
 WORTH_A_LOOK = 1.15  # relative height up to which an interval of the coarse stage is halved
 
 
@@ -41,11 +50,62 @@ def between(search: Search) -> list[dict[str, float]]:
     ]
 
 
-def begins(search: Search, good: list[Evaluation]) -> list[Evaluation]:
-    """Return the best designs of the coarse stage; with one variable the best of its local minima."""
-    ranked = sorted(good, key=search.merit)
-    if len(search.variables) > 1:
-        return ranked[: search.problem.basins]
+def first_designs(search: Search) -> tuple[list[Evaluation], bool]:
+    """Run the coarse stage.
+
+    Returns
+    -------
+    The designs to begin local searches from, the best first, and whether nothing depends on any variable.
+    """
+    if len(search.variables) == 1:
+        for values in coarse(search.problem):
+            search(values)
+        for values in between(search):
+            search(values)
+        good = search.good()
+        return _minima(search, good), _flat(search, good)
+    found = _scouted(search)
+    if found is None:
+        for values in coarse(search.problem):
+            search(values)
+        found = _apart(search, search.good()), _flat(search, search.good())
+    return found
+
+
+def _scouted(search: Search) -> tuple[list[Evaluation], bool] | None:
+    """Run the coarse stage with half the harmonics; None if that leads to no design that can be evaluated."""
+    few = max(FEWEST, (search.problem.harmonics + 1) // 2)
+    if few >= search.problem.harmonics:
+        return None
+    scout = search.scout(few)
+    try:
+        for values in coarse(search.problem):
+            scout(values)
+    finally:
+        search.scouting_done(scout)
+    chosen = [search(evaluation.values) for evaluation in _apart(scout, scout.good())]
+    good = [evaluation for evaluation in chosen if evaluation.good]
+    return (good, _flat(scout, scout.good()) and _flat(search, good)) if good else None
+
+
+def _flat(search: Search, good: Sequence[Evaluation]) -> bool:
+    """Return whether no design depends on any variable."""
+    return bool(good) and all(is_flat(search.model(evaluation)) for evaluation in good)
+
+
+def _apart(search: Search, good: Sequence[Evaluation]) -> list[Evaluation]:
+    """Return the best designs, each some way from those before it."""
+    chosen: list[Evaluation] = []
+    for evaluation in sorted(good, key=search.merit):
+        z = scaled(search.variables, evaluation.values)
+        near = [np.abs(z - scaled(search.variables, other.values)).max() for other in chosen]
+        if len(chosen) < search.problem.basins and min(near, default=np.inf) >= APART:
+            chosen.append(evaluation)
+    return chosen
+
+
+def _minima(search: Search, good: Sequence[Evaluation]) -> list[Evaluation]:
+    """Return the local minima along one variable, the best first."""
     name = search.variables[0].name
     along = sorted(good, key=lambda evaluation: evaluation.values[name])
     merits = [math.inf, *(search.merit(evaluation) for evaluation in along), math.inf]

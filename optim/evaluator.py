@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from optim.evaluation import evaluate, natural_scales
 from optim.model import Model, model_of
@@ -35,6 +36,8 @@ class Search:
         self.scales = natural_scales(problem)
         self.should_stop = should_stop
         self.on_progress = on_progress
+        self.scouted = 0  # responses of a coarse stage with fewer harmonics
+        self._before = 0
         self._most = most
         self._scale: float | None = None
 
@@ -53,6 +56,20 @@ class Search:
         self.keep(evaluation)
         return evaluation
 
+    @property
+    def count(self) -> int:
+        """Designs looked at so far."""
+        return self._before + len(self.history)
+
+    def scout(self, harmonics: int) -> Search:
+        """Return a search of the same problem with fewer harmonics, to be handed to `scouting_done`."""
+        return Search(replace(self.problem, harmonics=harmonics), self.on_progress, self.should_stop)
+
+    def scouting_done(self, scout: Search) -> None:
+        """Count what a scout looked at; its numbers are not exact enough to be kept."""
+        self._before += len(scout.history)
+        self.scouted += sum(len(evaluation.responses) for evaluation in scout.history)
+
     def check(self) -> None:
         """Raise StoppedError if the caller asked to stop."""
         if self.should_stop is not None and self.should_stop():
@@ -65,7 +82,7 @@ class Search:
             self._scale = evaluation.objective or 1.0
         if self.on_progress is not None:
             # The number of evaluations is not known beforehand: the share approaches 1 from below.
-            done = len(self.history)
+            done = self.count
             self.on_progress(done / (done + 12.0), done)
 
     @property

@@ -34,7 +34,7 @@ FIRST_PENALTY = 1.0  # times the objective: far above the multipliers, it makes 
 STRONGER = 10.0  # factor of a penalty that leaves limits broken
 ENOUGH = 1e-4  # share of the predicted decrease from which a step is taken
 REMEMBERED = 8  # designs whose rows are kept as cuts
-CUTS_REACH = 4.0  # times the radius, as far as cuts reach
+CUTS_REACH = 10.0  # times the radius, as far as cuts reach
 SAME_DESIGN = 1e-5  # scaled distance within which the rows of another design tell of the optimum
 NOTHING = 1e-9  # multipliers below it are rounding of the conic solver
 

@@ -6,10 +6,10 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 
-from optim.coarse import begins, between, coarse
+from optim.coarse import first_designs
 from optim.evaluation import natural_scales
 from optim.evaluator import Search, StoppedError
-from optim.local import Local, LocalSearch, is_flat
+from optim.local import Local, LocalSearch
 from optim.model import Conditions, conditions, model_of
 from optim.problem import Method, Problem, pose
 from optim.result import Basin, DesignResult, DesignStatus
@@ -101,24 +101,19 @@ def solve_problem(
     except StoppedError as stop:
         status = stop.status
     if on_progress is not None and found:
-        on_progress(1.0, len(search.history))
+        on_progress(1.0, search.count)
     return _result(search, found, status, time.perf_counter() - begun)
 
 
 def _search(search: Search, found: list[Local]) -> DesignStatus:
     """Run the coarse stage, then a local search from the best designs of it that lie in different basins."""
-    for values in coarse(search.problem):
-        search(values)
-    if len(search.variables) == 1:
-        for values in between(search):
-            search(values)
-    good = search.good()
-    if not good:
+    begins, flat = first_designs(search)
+    if not begins:
         return DesignStatus.NO_RESPONSE
-    if all(is_flat(search.model(evaluation)) for evaluation in good):
+    if flat:
         return DesignStatus.FLAT
     local_search = local_search_of(search.problem.method)
-    for begin in begins(search, good):
+    for begin in begins:
         found.append(local_search(search, search.variables, begin, search.model))
     return judge(min(found, key=lambda local: local.merit))
 
@@ -172,7 +167,7 @@ def _result(search: Search, found: list[Local], status: DesignStatus, seconds: f
     best = min(found, key=lambda local: local.merit, default=None)
     evaluation = best.evaluation if best else min(search.good(), key=search.merit, default=None)
     method = Method.IPOPT if search.problem.method is Method.IPOPT else Method.MINIMAX
-    responses = sum(len(e.responses) for e in search.history)
+    responses = search.scouted + sum(len(e.responses) for e in search.history)
     return DesignResult(
         problem=search.problem, method=method, status=status, evaluation=evaluation,
         conditions=None if best is None else best.conditions, basins=basins_of(search, found),
