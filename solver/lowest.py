@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
 from solver.fourier import Real
 from solver.kernels.track import DHEIGHT, HEIGHT, Z
@@ -206,33 +207,29 @@ def _solve(tracker: Tracker, near: list[int], z: float) -> dict[int, Real]:
 
 def _least(left: Mapping[int, Real], right: Mapping[int, Real]) -> float:
     """Return where the highest of the cubics between two sets of rows is least."""
-    cubics = [(left[index], right[index]) for index in left if index in right]
+    both = [(left[index], right[index]) for index in left if index in right]
     low, high = _place(left), _place(right)
-    if not cubics:
+    if not both:
         return 0.5 * (low + high)
     length = high - low
-    begin, end = 0.0, 1.0
-    for _ in range(60):
-        t = 0.5 * (begin + end)
-        if _top_slope(cubics, t, length) > 0.0:
-            end = t
-        else:
-            begin = t
-    if end < 1e-15:
+    cubics = [
+        (float(a[HEIGHT]), length * float(a[DHEIGHT]), float(b[HEIGHT]), length * float(b[DHEIGHT]))
+        for a, b in both
+    ]
+    if _top_slope(0.0, cubics) >= 0.0:
         return low
-    if begin > 1.0 - 1e-15:
+    if _top_slope(1.0, cubics) <= 0.0:
         return high
-    return low + 0.5 * (begin + end) * length
+    # The slope jumps where lines cross: a bracketing method finds that as well as a root.
+    return low + float(brentq(_top_slope, 0.0, 1.0, args=(cubics,), xtol=1e-16)) * length
 
 
-def _top_slope(cubics: list[tuple[Real, Real]], t: float, length: float) -> float:
-    """Return the slope of the highest cubic at the share t."""
-    top, slope, r = -np.inf, 0.0, 1.0 - t
-    for a, b in cubics:
-        value = (1.0 + 2.0 * t) * r * r * a[HEIGHT] + t * t * (3.0 - 2.0 * t) * b[HEIGHT]
-        value += t * r * length * (r * a[DHEIGHT] - t * b[DHEIGHT])
+def _top_slope(t: float, cubics: list[tuple[float, float, float, float]]) -> float:
+    """Return the slope of the highest cubic at the share t; heights and slopes by the share at both ends."""
+    top, slope, r = -math.inf, 0.0, 1.0 - t
+    for a, da, b, db in cubics:
+        value = (1.0 + 2.0 * t) * r * r * a + t * t * (3.0 - 2.0 * t) * b + t * r * (r * da - t * db)
         if value > top:
             top = value
-            slope = 6.0 * t * r * (b[HEIGHT] - a[HEIGHT])
-            slope += length * (r * (1.0 - 3.0 * t) * a[DHEIGHT] + t * (3.0 * t - 2.0) * b[DHEIGHT])
-    return float(slope)
+            slope = 6.0 * t * r * (b - a) + r * (1.0 - 3.0 * t) * da + t * (3.0 * t - 2.0) * db
+    return slope
