@@ -92,7 +92,7 @@ def pareto_front(
     front = _Front(problem, points, on_progress, should_stop)
     status = front.run()
     if on_progress is not None:
-        on_progress(1.0, front.evaluations)
+        on_progress(1.0, max(front.reported, front.evaluations))
     kept, dominated = front_of(front.found)
     return ParetoResult(
         problem=problem, status=status, ends=tuple(front.ends), points=kept, dominated=dominated,
@@ -111,7 +111,7 @@ class _Front:
         self.ends: list[DesignResult] = []
         self.found: list[ParetoPoint] = []
         self.missed: list[float] = []
-        self.evaluations = 0
+        self.evaluations = self.reported = 0
         self._pool: list[Evaluation] = []
         self._on_progress, self._should_stop = on_progress, should_stop
 
@@ -150,7 +150,9 @@ class _Front:
     def _report(self, _share: float, _count: int) -> None:
         if self._on_progress is not None:
             done = len(self.ends) + max(len(self.found) - 2, 0) + len(self.missed)
-            self._on_progress(min(done / self.points, 0.99), self.evaluations + _count)
+            # A tracked end reports its responses, of which one is a design: the count must not fall back.
+            self.reported = max(self.reported, self.evaluations + _count)
+            self._on_progress(min(done / self.points, 0.99), self.reported)
 
     def _keep(self, history: Sequence[Evaluation]) -> None:
         """Add evaluated designs to the pool of starts; what they are judged by is the same at every limit."""
