@@ -11,7 +11,7 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import Engine, inspect
 from sqlalchemy.exc import DBAPIError
 
-from service.db import database_path, migration_engine
+from service.db import database_path, migration_engine, read_engine
 from service.errors import DatabaseError, WrongRevisionError
 from service.lock import FileLock
 
@@ -43,6 +43,21 @@ def _current(engine: Engine) -> tuple[str | None, bool]:
             return revision, not inspect(connection).get_table_names()
     except DBAPIError as error:
         raise DatabaseError(f"{engine.url.database} cannot be used: {error.orig}") from error
+
+
+def current_revision(url: str) -> str:
+    """The revision of an existing database; ``none`` if it has never had one.
+
+    Raises
+    ------
+    DatabaseError
+        If the file cannot be used.
+    """
+    engine = read_engine(url)
+    try:
+        return _current(engine)[0] or "none"
+    finally:
+        engine.dispose()
 
 
 def _migrate(engine: Engine, target: str) -> None:

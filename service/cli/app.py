@@ -10,6 +10,7 @@ import typer
 
 from service.cli import (
     campbell_command,
+    database_commands,
     design_commands,
     import_command,
     sensitivity_command,
@@ -51,6 +52,8 @@ app.command()(campbell_command.campbell)
 for _command in _SUBMITTED:
     _submit.command()(_command)
 _database.command()(service_commands.upgrade)
+_database.command()(database_commands.backup)
+_database.command()(database_commands.check)
 app.command("import")(import_command.import_scene)
 app.add_typer(_submit, name="submit")
 app.add_typer(_database, name="db")

@@ -27,7 +27,7 @@ def serve(
     """Serve the REST API and work off its queue."""
     from service.server import serve as run
 
-    run(_settings(host=host, port=port, database=database, workers=workers))
+    run(settings_of(host=host, port=port, database=database, workers=workers))
 
 
 def worker(
@@ -43,14 +43,14 @@ def worker(
     """
     from service.server import work
 
-    work(_settings(database=database, workers=workers), until_empty=until_empty)
+    work(settings_of(database=database, workers=workers), until_empty=until_empty)
 
 
 def upgrade(database: options.Database = None) -> None:
     """Bring a database to this version's revision."""
     from service.revisions import upgrade as bring_up
 
-    url = _settings(database=database).database
+    url = settings_of(database=database).database
     say(f"{url} is at revision {bring_up(url)}")
 
 
@@ -71,7 +71,8 @@ def demo(
     run(folder)
 
 
-def _settings(**values: object) -> Settings:
+def settings_of(**values: object) -> Settings:
+    """Return the settings with the options given, the environment for the others."""
     from service.settings import load_settings
 
     return load_settings(**{name: value for name, value in values.items() if value is not None})

@@ -1,0 +1,53 @@
+"""The commands that look after a database without changing it: db backup, db check."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from service.cli import options
+from service.cli.failures import FELL_SHORT
+from service.cli.output import print_json, print_pairs, say
+from service.cli.service_commands import settings_of
+
+
+def backup(
+    target: Annotated[str, typer.Argument(metavar="FILE", help="The copy; it must not exist.")],
+    database: options.Database = None,
+) -> None:
+    """Copy a database to a file, also while a service uses it."""
+    from service.db import backup as copy
+
+    url = settings_of(database=database).database
+    copy(url, Path(target))
+    say(f"{url} is copied to {target}")
+
+
+def check(database: options.Database = None, as_json: options.Json = False) -> None:
+    """Read a database from end to end and say what is wrong with it.
+
+    The file and its references, the states of jobs against their results, the checksum of every array.
+    """
+    from service.integrity import check as look
+
+    url = settings_of(database=database).database
+    found = look(url)
+    if as_json:
+        print_json(found.to_json())
+    else:
+        jobs = ", ".join(f"{count} {state}" for state, count in found.contents.jobs.items()) or "none"
+        pairs = [
+            ("revision", found.revision),
+            ("jobs", jobs),
+            ("sweeps", str(found.contents.sweeps)),
+            ("arrays", str(found.contents.arrays)),
+            ("sound", "yes" if found.sound else "no"),
+        ]
+        print_pairs(url, [*pairs, *(("trouble", words) for words in found.trouble)])
+    if not found.sound:
+        typer.echo(
+            "stickslip: the database is damaged: restore a backup, or export what can be read", err=True
+        )
+        raise typer.Exit(FELL_SHORT)
