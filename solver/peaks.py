@@ -244,15 +244,12 @@ def _slope(node: _Node) -> float:
 def share_scales(left: OnBranch, right: OnBranch) -> tuple[float, float]:
     """Return the factors that turn both tangents into derivatives by the share of the chord between them."""
     chord = right.solution - left.solution
-    weights = np.full(chord.size, 1.0 / max(float(np.abs(left.solution[:-1]).max(initial=0.0)) ** 2, 1e-300))
-    weights[-1] = 1.0 / max(float(chord[-1]) ** 2, 1e-300)
-    weighted = weights * chord
+    moved, size = float(chord[-1]), float(np.abs(left.solution[:-1]).max(initial=0.0))
+    weighted = chord / max(size**2, 1e-300)
+    weighted[-1] = moved / max(moved**2, 1e-300)
     length = float(weighted @ chord)
-    factors = []
-    for node in (left, right):
-        along = float(weighted @ node.tangent)
-        factors.append(length / along if along != 0.0 else 0.0)
-    return factors[0], factors[1]
+    at_left, at_right = float(weighted @ left.tangent), float(weighted @ right.tangent)
+    return length / at_left if at_left != 0.0 else 0.0, length / at_right if at_right != 0.0 else 0.0
 
 
 def _distinct(nodes: list[_Node]) -> list[_Node]:

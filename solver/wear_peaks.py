@@ -145,6 +145,8 @@ class _Search:
         """Return all local maxima, highest first."""
         found = []
         for left, right in zip(self._nodes[:-1], self._nodes[1:], strict=True):
+            if (left.slope > 0.0) == (right.slope > 0.0):
+                continue  # both tangents point along the branch: the measure rises, or falls, all the way
             by_share = share_scales(left, right)
             g_left, g_right = left.slope * by_share[0], right.slope * by_share[1]
             if g_left > 0.0 >= g_right:
