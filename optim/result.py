@@ -69,8 +69,10 @@ class Basin:
     objective : float
         What is minimised.
     settled, feasible : bool
-        Whether the first-order conditions hold and the limits are kept there. Of the tracked peak:
-        settled if a sweep there found nothing higher than the peaks followed to there.
+        Whether the first-order conditions hold and the limits are kept there.
+    proven : bool
+        Whether a response there was computed, so that no peak is higher than `peak`. A further basin of the
+        tracked peak is solved for along the peaks that were followed: it is at least that high.
     """
 
     values: Mapping[str, float]
@@ -78,6 +80,7 @@ class Basin:
     objective: float
     settled: bool
     feasible: bool
+    proven: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -293,7 +296,7 @@ def _row(row: Row) -> dict[str, object]:
 def _basin(basin: Basin) -> dict[str, object]:
     return {
         "values": dict(basin.values), "peak": basin.peak, "objective": basin.objective,
-        "settled": basin.settled, "feasible": basin.feasible,
+        "settled": basin.settled, "feasible": basin.feasible, "proven": basin.proven,
     }  # fmt: skip
 
 

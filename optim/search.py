@@ -157,6 +157,7 @@ def basins_of(search: Search, found: list[Local]) -> tuple[Basin, ...]:
             Basin(
                 values=dict(local.evaluation.values), peak=local.evaluation.peaks[0].value,
                 objective=local.evaluation.objective, settled=local.settled, feasible=local.feasible,
+                proven=True,
             )
         )  # fmt: skip
     return tuple(basins)

@@ -70,7 +70,8 @@ def tracked_optimum(
     basins = tuple(
         Basin(
             values={variable.name: basin.at}, peak=basin.peak,
-            objective=basin.peak * problem.weights[Quantity.PEAK] * case.weight, settled=basin.proven,
+            objective=basin.peak * problem.weights[Quantity.PEAK] * case.weight, settled=basin.solved,
+            proven=basin.proven,
             feasible=True,
         )
         for basin in found.basins

@@ -167,10 +167,11 @@ def _basins(found: Json) -> Table | None:
             *(units.parameter(name, basin["values"][name]) for name in names),
             units.length(basin["peak"]),
             "yes" if basin["settled"] else "no",
+            "yes" if basin.get("proven", True) else "no",
             "yes" if basin["feasible"] else "no",
         )
         for basin in basins
     ]
-    columns = (*names, "peak", "settled", "keeps the limits")
+    columns = (*names, "peak", "settled", "proven", "keeps the limits")
     right = "".join(str(i) for i in range(min(len(names) + 1, 10)))
     return Table(heading="Local optima", columns=columns, rows=rows, right=right)
