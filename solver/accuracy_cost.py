@@ -6,11 +6,13 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
 
 from solver.accuracy import truncation_error
 from solver.balance import Balance, build, check_frequency, check_harmonics
+from solver.branch import Branch
 from solver.continuation import sweep
 from solver.errors import SettingError
 from solver.fourier import Real
@@ -25,9 +27,16 @@ SAMPLES = (64, 256, 1024, 8192)
 LEAST_REFERENCE = 101  # harmonics
 _BEYOND = 3  # reference harmonics over the most studied
 _AWAY = 1e-3  # relative distance in frequency of the neighbour that Newton's method starts from
-_REPEATS = 15
+REPEATS = 15
 # Fewest samples for the shortest wave kept: below, the harmonics are aliased.
 _PER_WAVE = 4
+
+
+class AccuracyStatus(Enum):
+    """How a study ended; the value is a sentence a user can act on."""
+
+    COMPLETED = "Every way that converges was measured."
+    STOPPED = "The study was stopped by the caller: it has no rows, none was timed to the end."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,6 +88,10 @@ class AccuracyStudy:
         Its estimated error [m]; errors below it are not known.
     rows : tuple of AccuracyRow
         Closed form first, then by samples; ways that did not converge are not in it.
+    branch : Branch or None
+        The sweep that found the highest peak; None if the frequency was given.
+    status : AccuracyStatus
+        How it ended.
     """
 
     scene: str
@@ -87,6 +100,13 @@ class AccuracyStudy:
     reference_harmonics: int
     reference_error: float
     rows: tuple[AccuracyRow, ...]
+    branch: Branch | None
+    status: AccuracyStatus
+
+    @property
+    def completed(self) -> bool:
+        """Whether no way was left out."""
+        return self.status is AccuracyStatus.COMPLETED
 
     def to_json(self) -> dict[str, object]:
         """Return the study as one JSON object."""
@@ -105,6 +125,8 @@ class AccuracyStudy:
                 }
                 for row in self.rows
             ],
+            "completed": self.completed,
+            "status": self.status.value,
         }  # fmt: skip
 
 
@@ -114,8 +136,9 @@ def accuracy_study(
     *,
     harmonics: Sequence[int] = HARMONICS,
     samples: Sequence[int] = SAMPLES,
-    repeats: int = _REPEATS,
+    repeats: int = REPEATS,
     on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
 ) -> AccuracyStudy:
     """Measure error and time of one point for several numbers of harmonics and both evaluators.
 
@@ -128,23 +151,20 @@ def accuracy_study(
         left out.
     repeats : of each timing.
     on_progress : called with (share done, rows so far).
+    should_stop : asked between ways and between turns of the timing.
 
     Raises
     ------
     SettingError
         A bad frequency, number of harmonics or of samples, or no solution at the frequency to compare with.
     """
-    for count in harmonics:
-        check_harmonics(count)
-    for count in samples:
-        check_samples(count)
-    if not harmonics or repeats < 1:
-        raise SettingError("harmonics", list(harmonics), "needs one number at least, and one repetition")
+    _check_ways(harmonics, samples, repeats)
+    branch = None
     if frequency_hz is None:
-        peak = sweep(scene).peak
-        if peak is None:
+        branch = sweep(scene, should_stop=should_stop)
+        if branch.peak is None:
             raise SettingError("frequency_hz", None, "is needed: the scene's band gave no response")
-        frequency_hz = peak.at
+        frequency_hz = branch.peak.at
     p = 2.0 * math.pi * check_frequency("frequency_hz", frequency_hz)
     reference = _reference(scene, p, max(LEAST_REFERENCE, _BEYOND * max(harmonics)))
     if reference is None:
@@ -153,19 +173,33 @@ def accuracy_study(
     ways = [(h, 0) for h in harmonics]
     ways += [(h, n) for n in samples for h in harmonics if n >= _PER_WAVE * max(h, 1)]
     prepared: list[tuple[AccuracyRow, Callable[[], object]]] = []
+    asked = should_stop or (lambda: False)
     for done, (highest, count) in enumerate(ways):
+        if asked():
+            break
         way = _prepared(scene, p, highest, count, exact)
         if way is not None:
             prepared.append(way)
         if on_progress is not None:
             on_progress((done + 1) / len(ways), len(prepared))
-    rows = _timed(prepared, repeats)
+    rows = _timed(prepared, repeats, asked)
+    stopped = asked()
     return AccuracyStudy(
         scene=scene.name, frequency_hz=frequency_hz, reference=exact,
         reference_harmonics=workspace.balance.n_harmonics,
         reference_error=truncation_error(workspace, u, p).max_abs,
-        rows=tuple(replace(row, pareto=_leads(row, rows)) for row in rows),
+        rows=() if stopped else tuple(replace(row, pareto=_leads(row, rows)) for row in rows),
+        branch=branch, status=AccuracyStatus.STOPPED if stopped else AccuracyStatus.COMPLETED,
     )  # fmt: skip
+
+
+def _check_ways(harmonics: Sequence[int], samples: Sequence[int], repeats: int) -> None:
+    for count in harmonics:
+        check_harmonics(count)
+    for count in samples:
+        check_samples(count)
+    if not harmonics or repeats < 1:
+        raise SettingError("harmonics", list(harmonics), "needs one number at least, and one repetition")
 
 
 def check_samples(samples: int) -> int:
@@ -229,10 +263,14 @@ def _prepared(
     return row, lambda: workspace.solve(p, neighbour.u)
 
 
-def _timed(prepared: list[tuple[AccuracyRow, Callable[[], object]]], repeats: int) -> list[AccuracyRow]:
+def _timed(
+    prepared: list[tuple[AccuracyRow, Callable[[], object]]], repeats: int, asked: Callable[[], bool]
+) -> list[AccuracyRow]:
     """Return the rows with their times, all measured in turn: a busy moment slows every one of them."""
     seconds = np.zeros((repeats, len(prepared)))
     for turn in range(repeats):
+        if asked():
+            return []
         for i, (_, work) in enumerate(prepared):
             work()  # the one before may have filled the caches
             begun = time.thread_time()  # other programs do not count

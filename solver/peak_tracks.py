@@ -159,6 +159,8 @@ class PeakTrack:
         Every peak that was followed.
     exchanges : tuple of (float, float)
         Values of the parameter where another peak becomes the highest, and the height there.
+    branches : tuple of Branch
+        The sweeps that were made on the way, in the order they were made.
     status : TrackStatus
         How it ended.
     """
@@ -173,6 +175,7 @@ class PeakTrack:
     optimum: LeastPeak
     competing: tuple[CompetingPeak, ...]
     exchanges: tuple[tuple[float, float], ...]
+    branches: tuple[Branch, ...]
     n_harmonics: int
     sweeps: int
     status: TrackStatus

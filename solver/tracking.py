@@ -119,7 +119,8 @@ def _result(tracker: Tracker, best: LeastPeak, status: TrackStatus, forward: boo
         scene=balance.scene.name, parameter_path=balance.parameter.path, unit=balance.parameter.unit,
         parameter=parameter, peak=peak, frequency=frequency, slope=slope, optimum=best,
         competing=tuple(_competing(tracker, line, forward) for line in tracker.lines), exchanges=exchanges,
-        n_harmonics=balance.n_harmonics, sweeps=len(tracker.looks), status=status,
+        branches=tuple(look.branch for look in tracker.looks), n_harmonics=balance.n_harmonics,
+        sweeps=len(tracker.looks), status=status,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
 

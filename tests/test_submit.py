@@ -106,6 +106,9 @@ def test_a_scene_file_goes_with_the_job(run: Run, tmp_path: Path) -> None:
         "sweep two-dof --parameter damper.N0 --from 50 --to 60 --frequency 1.2",
         "solve two-dof --frequency 1.2",
         "march two-dof --frequency 1.2",
+        "map two-dof --parameter damper.N0 --from 60 --to 90 --steps 4 --frequencies 9 --harmonics 3",
+        "campbell two-dof --speeds 60 100 --order 2 --order 1 --harmonics 3 --band 0.5 2.5",
+        "peaks two-dof --parameter damper.N0 --from 60 --to 90 --checks 1 --harmonics 3 --set damper.mu=0.35",
     ],
 )
 def test_waiting_prints_what_the_command_prints(run: Run, arguments: str) -> None:
@@ -118,6 +121,17 @@ def test_waiting_prints_what_the_command_prints(run: Run, arguments: str) -> Non
 def _without_time(report: str) -> list[str]:
     lines = [line.rstrip() for line in report.splitlines()]
     return [line for line in lines if line and not line.startswith("time")]
+
+
+def test_a_study_of_accuracy_is_submitted_and_drawn(run: Run, tmp_path: Path) -> None:
+    status, out, err = run("submit accuracy two-dof --frequency 1.2 --wait --json")
+    assert (status, err) == (0, "")
+    answer = json.loads(out)
+    assert answer["result"]["frequency_hz"] == 1.2
+    status, out, err = run(f"results {answer['job']} --plot cost.png")
+    assert (status, err) == (0, "")
+    assert "closed form" in out
+    assert (tmp_path / "cost.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_submitted_jobs_can_be_read_by_programs(run: Run) -> None:
@@ -137,6 +151,9 @@ def test_submitted_jobs_can_be_read_by_programs(run: Run) -> None:
         ("submit sweep two-dof --from 1 --to 1", ["/to", "1.0"]),
         ("submit design two-dof --variable bumper.N0 1 2", ["bumper.N0"]),
         ("submit solve two-dof --frequency 1 --set damper.mu=-1", ["damper.mu", "-1"]),
+        ("submit peaks two-dof --parameter damper.N9 --from 1 --to 2", ["/parameter", "N9"]),
+        ("submit campbell two-dof --speeds 100 60", ["/speeds_rpm/0", "60"]),
+        ("submit map two-dof --parameter damper.N0 --from 1 --to 2 --steps 1", ["/steps", "1"]),
         ("watch nobody", ["nobody"]),
         ("results nobody", ["nobody"]),
     ],

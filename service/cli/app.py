@@ -17,6 +17,7 @@ from service.cli import (
     service_commands,
     solver_commands,
     submit_commands,
+    submit_studies,
     track_commands,
 )
 from service.cli.failures import REPORTED, report
@@ -41,7 +42,8 @@ _ALONE: tuple[Callable[..., None], ...] = (
 )  # fmt: skip
 _SUBMITTED: tuple[Callable[..., None], ...] = (
     submit_commands.design, submit_commands.pareto, submit_commands.sweep, submit_commands.solve,
-    submit_commands.march,
+    submit_commands.march, submit_studies.peaks, submit_studies.accuracy,
+    submit_studies.campbell,
 )  # fmt: skip
 
 for _command in _ALONE:
@@ -51,6 +53,7 @@ app.command(name="map")(track_commands.response_map)
 app.command()(campbell_command.campbell)
 for _command in _SUBMITTED:
     _submit.command()(_command)
+_submit.command(name="map")(submit_studies.response_map)
 _database.command()(service_commands.upgrade)
 _database.command()(database_commands.backup)
 _database.command()(database_commands.check)

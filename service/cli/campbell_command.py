@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from service import units
-from service.cli import inputs, options
+from service.cli import campbell_reports, inputs, options
 from service.cli.failures import FELL_SHORT
 from service.cli.inputs import whole_number
-from service.cli.output import print_json, print_pairs, print_table
+from service.cli.output import print_json
 from service.cli.progress import bar
 from service.plots import SUFFIXES
 
@@ -75,45 +73,7 @@ def campbell(
     if as_json:
         print_json(diagram.to_json())
     else:
-        _show(diagram.to_json())
+        campbell_reports.diagram(diagram.to_json())
     if not diagram.completed:
         typer.echo(f"stickslip: {diagram.status.value}", err=True)
         raise typer.Exit(FELL_SHORT)
-
-
-def _show(found: Mapping[str, Any]) -> None:
-    """The crossings, and what every order does at running speeds."""
-    low, high = found["speeds_rpm"][0]
-    title = f"{found['scene']}, {low:g} to {high:g} rpm, {found['n_harmonics']} harmonics"
-    rows = [
-        (
-            str(order["order"]), f"{crossing['speed_rpm']:.6g}", f"{crossing['frequency_hz']:.6g}",
-            units.length(crossing["amplitude"]),
-            "running speed" if crossing["inside"] else f"{100.0 * crossing['margin']:.3g} % away",
-        )
-        for order in found["orders"]
-        for crossing in order["crossings"]
-    ]  # fmt: skip
-    print_table(title, ("order", "crossing [rpm]", "peak [Hz]", "amplitude", ""), rows, right="0123")
-    pairs = []
-    for order in found["orders"]:
-        pairs.append((f"order {order['order']}", _running(order)))
-        for what, name in (("stuck_hz", "all stuck"), ("open_hz", "all open")):
-            pairs.append((f"  {name}", ", ".join(f"{value:.5g}" for value in order[what]) + " Hz"))
-    words = {True: "no", False: "yes", None: "unknown"}[found["clear"]]
-    what = "a peak" if found["limit"] is None else f"more than {units.length(found['limit'])}"
-    pairs.append((f"{what} at a running speed", words))
-    pairs.append(("time", units.duration(found["seconds"])))
-    print_pairs("", pairs)
-
-
-def _running(order: Mapping[str, Any]) -> str:
-    """What one order does at running speeds, in words."""
-    highest = order["highest_running"]
-    text = "no response at running speeds"
-    if highest is not None:
-        text = f"at most {units.length(highest['amplitude'])}, at {highest['speed_rpm']:.6g} rpm"
-    over = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in order["exceeded_running_rpm"])
-    if over:
-        text += f"; above {units.length(order['limit'])} from {over} rpm"
-    return text

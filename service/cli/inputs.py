@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _VARIABLE = "--variable"
 # Repeatable options of several words each, which Typer does not have, and the commands that have them.
 _WORDS = {_VARIABLE: 3, "--forbidden": 2, "--speeds": 2}
-_WITH_WORDS = ("design", "pareto", "submit")
+_WITH_WORDS = ("design", "pareto")
 
 
 def number(text: str) -> float:
@@ -39,7 +39,8 @@ def whole_number(text: str) -> int:
 
 def join_words(arguments: Sequence[str]) -> list[str]:
     """Make one argument of the words that follow ``--variable``, ``--forbidden`` and ``--speeds``."""
-    if not arguments or arguments[0] not in _WITH_WORDS:
+    command = arguments[1:2] if arguments[:1] == ["submit"] else arguments[:1]
+    if not command or command[0] not in _WITH_WORDS:
         return list(arguments)
     joined: list[str] = []
     waiting, first = 0, False

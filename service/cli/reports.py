@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from service import units
-from service.cli import design_reports, robust_reports
+from service.cli import campbell_reports, design_reports, robust_reports, track_reports
 from service.cli.output import print_pairs, print_table, say
 
 if TYPE_CHECKING:
@@ -140,6 +140,10 @@ BY_KIND: Mapping[str, Callable[[Json], None]] = {
     "design": design,
     "pareto": design_reports.front,
     "march": march,
+    "map": track_reports.response_map,
+    "peaks": track_reports.track,
+    "accuracy": accuracy,
+    "campbell": campbell_reports.diagram,
 }
 
 

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from service.client import Client
 
 _INPUT_FAILURES = ("scene", "setting")
+# What their pictures show beyond numbers is not part of a result.
+_NOT_DRAWN = ("map", "peaks", "campbell")
 
 
 @takes_problem
@@ -41,7 +43,7 @@ def design(
     told = problem_inputs.description(name, flags, "design")
     problem_inputs.checked(told, DesignRequest)
     body = {"kind": "design", **problem_inputs.body_to_submit(told)}
-    _submit(url, body, wait=wait, as_json=as_json)
+    hand_in(url, body, wait=wait, as_json=as_json)
 
 
 @partial(takes_problem, without=NOT_OF_A_FRONT)
@@ -59,7 +61,7 @@ def pareto(
     told = problem_inputs.description(name, flags, "pareto", points=("--points", points))
     problem_inputs.checked(told, ParetoRequest)
     body = {"kind": "pareto", **problem_inputs.body_to_submit(told)}
-    _submit(url, body, wait=wait, as_json=as_json)
+    hand_in(url, body, wait=wait, as_json=as_json)
 
 
 def sweep(
@@ -76,11 +78,11 @@ def sweep(
     url: options.Url = options.DEFAULT_URL,
 ) -> None:
     """Submit a sweep."""
-    body = _body("sweep", name, values, harmonics=harmonics, limit=limit, frequency_hz=frequency, to=stop)
+    body = body_of("sweep", name, values, harmonics=harmonics, limit=limit, frequency_hz=frequency, to=stop)
     body["parameter"] = parameter
     if start is not None:
         body["from"] = start
-    _submit(url, body, wait=wait, as_json=as_json)
+    hand_in(url, body, wait=wait, as_json=as_json)
 
 
 def solve(
@@ -93,8 +95,8 @@ def solve(
     url: options.Url = options.DEFAULT_URL,
 ) -> None:
     """Submit a single response."""
-    body = _body("solve", name, values, harmonics=harmonics, frequency_hz=frequency)
-    _submit(url, body, wait=wait, as_json=as_json)
+    body = body_of("solve", name, values, harmonics=harmonics, frequency_hz=frequency)
+    hand_in(url, body, wait=wait, as_json=as_json)
 
 
 def march(
@@ -108,10 +110,10 @@ def march(
     url: options.Url = options.DEFAULT_URL,
 ) -> None:
     """Submit a time march."""
-    body = _body(
+    body = body_of(
         "march", name, values, frequency_hz=frequency, steps_per_period=steps, max_periods=max_periods
     )
-    _submit(url, body, wait=wait, as_json=as_json)
+    hand_in(url, body, wait=wait, as_json=as_json)
 
 
 def watch(job: options.Job, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL) -> None:
@@ -166,14 +168,14 @@ def results(
         ended = client.job(job)
         answer = client.results(job)
         if picture is not None:
-            _draw(client, answer, picture)
+            _draw(client, ended.kind, answer, picture)
     if file is not None:
         _write(file, answer.model_dump(mode="json"))
     _show(ended, answer, as_json=as_json)
     _end(ended)
 
 
-def _body(kind: str, name: str, values: list[str] | None, **fields: Any) -> dict[str, Any]:
+def body_of(kind: str, name: str, values: list[str] | None, **fields: Any) -> dict[str, Any]:
     """The body of ``POST /v1/jobs``; a scene file goes with it, a name is looked up by the service."""
     scene: Any = name
     if name.endswith(problem_inputs.SCENE_FILES):
@@ -187,7 +189,8 @@ def _body(kind: str, name: str, values: list[str] | None, **fields: Any) -> dict
     return {"kind": kind, "scene": scene, "set": inputs.settings(values), **given}
 
 
-def _submit(url: str, body: Mapping[str, Any], *, wait: bool, as_json: bool) -> None:
+def hand_in(url: str, body: Mapping[str, Any], *, wait: bool, as_json: bool) -> None:
+    """Submit a job; print its id, or wait for its end and print what came out."""
     with _client(url) as client:
         job = client.submit(body)
         if not wait:
@@ -242,16 +245,23 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
         print_table("Stored sweeps", ("id", "parameter", "points", "peak [m]"), rows, right="23")
 
 
-def _draw(client: Client, answer: ResultsAnswer, picture: Path) -> None:
-    """Draw the sweep with the peak of the result (a design stores many)."""
+def _draw(client: Client, kind: str, answer: ResultsAnswer, picture: Path) -> None:
+    """Draw the sweep with the peak of the result (a design stores many), or the picture of the kind."""
     from service.plots.curves import Response
     from service.plots.responses import response_figure
     from service.plots.style import save
 
-    if answer.result.get("points") and "knee" in answer.result:
+    if kind in _NOT_DRAWN:
+        raise InputError(f"`--plot`: a job `{kind}` is not drawn from its results: use `stickslip {kind}`")
+    if kind == "pareto" and answer.result["points"]:
         from service.plots.pareto import pareto_figure
 
         save(pareto_figure(answer.result), picture)
+        return
+    if kind == "accuracy":
+        from service.plots.accuracy import accuracy_figure
+
+        save(accuracy_figure(answer.result), picture)
         return
     # Of a robust design, the sweeps are those of the search without uncertainty.
     peak = answer.result.get("peak") or (answer.result.get("nominal") or {}).get("peak")

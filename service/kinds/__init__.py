@@ -5,9 +5,13 @@ from __future__ import annotations
 import optim
 import solver
 from service.jobs import Registry
+from service.kinds.accuracy import ACCURACY
+from service.kinds.campbell import CAMPBELL
 from service.kinds.design import DESIGN
+from service.kinds.map import MAP
 from service.kinds.march import MARCH
 from service.kinds.pareto import PARETO
+from service.kinds.peaks import PEAKS
 from service.kinds.solve import SOLVE
 from service.kinds.sweep import SWEEP
 
@@ -20,4 +24,4 @@ def warm_up() -> None:
     optim.design(scene, harmonics=3)
 
 
-SHIPPED = Registry([SWEEP, DESIGN, PARETO, SOLVE, MARCH], warm_up)
+SHIPPED = Registry([SWEEP, MAP, PEAKS, DESIGN, PARETO, SOLVE, MARCH, ACCURACY, CAMPBELL], warm_up)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from service.arrays import encode
@@ -55,6 +56,12 @@ def sweep_record(branch: Branch, frequency_hz: float | None = None) -> SweepReco
         arrays={"parameter": encode(branch.values)}
         | {name: encode(getattr(branch, name)) for name in _ARRAYS},
     )
+
+
+def sweep_records(branches: Iterable[Branch]) -> tuple[SweepRecord, ...]:
+    """The frequency responses that have points, each once."""
+    once = {id(branch): branch for branch in branches if len(branch.values)}
+    return tuple(sweep_record(branch) for branch in once.values())
 
 
 def design_record(result: DesignResult) -> DesignRecord:

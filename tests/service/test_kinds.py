@@ -220,7 +220,17 @@ def test_the_description_is_whole(shipped: httpx.Client) -> None:
             found = found[key]
     body = description["paths"]["/v1/jobs"]["post"]["requestBody"]["content"]["application/json"]["schema"]
     kinds = {one["properties"]["kind"]["const"]: one for one in body["oneOf"]}
-    assert set(kinds) == {"sweep", "design", "pareto", "solve", "march"}
+    assert set(kinds) == {
+        "sweep",
+        "map",
+        "peaks",
+        "design",
+        "pareto",
+        "solve",
+        "march",
+        "accuracy",
+        "campbell",
+    }
     assert {"from", "to", "set", "harmonics", "frequency_hz"} <= set(kinds["sweep"]["properties"])
     assert "requestBody" in description["paths"]["/v1/designs"]["post"]
     assert shipped.get("/openapi.json").json() == description
