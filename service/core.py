@@ -78,7 +78,7 @@ class Service:
     def __init__(self, settings: Settings, registry: Registry = SHIPPED) -> None:
         self.settings = settings
         self.registry = registry
-        self.database = Database(settings.database)
+        self.database = Database(settings.database, settings.database_connections)
         self.jobs = JobRepository(self.database)
         self.sweeps = SweepRepository(self.database)
         self.designs = DesignRepository(self.database)
@@ -96,7 +96,7 @@ class Service:
         self._open = False
 
     def open(self) -> None:
-        """Lock the database and check or make its tables; nothing happens if that was done before.
+        """Lock SQLite's file and check or make the tables; nothing happens if that was done before.
 
         Raises
         ------
@@ -105,7 +105,7 @@ class Service:
         WrongRevisionError
             If the tables are not this version's.
         DatabaseError
-            If the file cannot be used.
+            If the database cannot be used.
         """
         if self._open:
             return
@@ -125,7 +125,7 @@ class Service:
         except BaseException:
             self.database.close()
             raise
-        log.info("database %s, %d workers", self.database.path, self.settings.workers)
+        log.info("database %s, %d workers", self.database.name, self.settings.workers)
 
     def stop(self) -> None:
         """End the workers, give running jobs back to the queue, close the database."""

@@ -1,9 +1,9 @@
-"""The database: engines whose transactions begin the way SQLite needs, and the lock on the file.
+"""The database: SQLite with the transactions and the lock it needs, or PostgreSQL (`service.postgresql`).
 
-The standard driver's legacy transaction control does not begin a transaction before a SELECT, and a
-deferred BEGIN cannot always become a write transaction later. Read-modify-writes of several processes
-then lose updates or fail with "database is locked". Here the driver's own control is switched off
-(`isolation_level=None`), and SQLAlchemy's `begin` event emits ``BEGIN IMMEDIATE`` on the write engine
+On SQLite, the standard driver's legacy transaction control does not begin a transaction before a SELECT,
+and a deferred BEGIN cannot always become a write transaction later. Read-modify-writes of several
+processes then lose updates or fail with "database is locked". Here the driver's own control is switched
+off (`isolation_level=None`), and SQLAlchemy's `begin` event emits ``BEGIN IMMEDIATE`` on the write engine
 and ``BEGIN`` on the read engine.
 """
 
@@ -13,17 +13,38 @@ import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 from sqlalchemy import Connection, Engine, create_engine, event, text
 from sqlalchemy.engine import make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
+from sqlalchemy.exc import DBAPIError, IntegrityError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool
 
+from service import postgresql
 from service.errors import DatabaseError
 from service.lock import FileLock
 
 BUSY_TIMEOUT_SECONDS = 30.0
 SQLITE_WITHOUT_WAL_BUG = (3, 51, 3)
+CONNECTIONS = 16
+
+_Written = TypeVar("_Written")
+
+
+def is_sqlite(url: str) -> bool:
+    """Whether a URL is of SQLite; else it is of PostgreSQL."""
+    return make_url(url).get_backend_name() == "sqlite"
+
+
+def database_name(url: str) -> str:
+    """A database in a sentence: its file, or its URL without the password."""
+    return str(database_path(url)) if is_sqlite(url) else shown(url)
+
+
+def shown(url: str) -> str:
+    """A URL as it may be printed: without the password."""
+    return make_url(url).render_as_string()
 
 
 def database_path(url: str) -> Path:
@@ -68,12 +89,15 @@ def _begin_with(statement: str) -> Callable[[Connection], None]:
     return begin
 
 
-def write_engine(url: str) -> Engine:
-    """An engine whose transactions take the write lock when they begin.
+def write_engine(url: str, connections: int = CONNECTIONS) -> Engine:
+    """An engine whose transactions may write.
 
-    Its pool holds one connection: the threads of a process queue for it in memory, fairly and without
-    the sleeps of SQLite's busy handler.
+    Those of SQLite take the write lock when they begin, and the pool holds one connection: the threads of a
+    process queue for it in memory, fairly and without the sleeps of SQLite's busy handler. `connections` is
+    for PostgreSQL.
     """
+    if not is_sqlite(url):
+        return postgresql.service_engine(url, connections)
     engine = create_engine(
         url,
         pool_size=1,
@@ -87,7 +111,9 @@ def write_engine(url: str) -> Engine:
 
 
 def read_engine(url: str) -> Engine:
-    """An engine whose transactions read one snapshot and cannot write."""
+    """An engine whose transactions read one snapshot and cannot write; not part of a service."""
+    if not is_sqlite(url):
+        return postgresql.reading(postgresql.migration_engine(url))
     engine = create_engine(
         url,
         pool_size=8,
@@ -103,46 +129,95 @@ def read_engine(url: str) -> Engine:
 def migration_engine(url: str) -> Engine:
     """An engine for changes of the tables.
 
-    Foreign keys are off: a table rebuilt by Alembic is dropped on the way, which would delete the rows
-    that refer to it. The keys are checked before the migration commits instead.
+    Foreign keys of SQLite are off: a table rebuilt by Alembic is dropped on the way, which would delete the
+    rows that refer to it. The keys are checked before the migration commits instead.
     """
+    if not is_sqlite(url):
+        return postgresql.migration_engine(url)
     engine = create_engine(url, poolclass=NullPool, connect_args={"timeout": BUSY_TIMEOUT_SECONDS})
     event.listen(engine, "connect", _on_connect(read_only=False, foreign_keys=False))
     event.listen(engine, "begin", _begin_with("BEGIN IMMEDIATE"))
     return engine
 
 
+@contextmanager
+def migrating(url: str) -> Iterator[Connection]:
+    """A transaction for changes of the tables; no other one of this kind runs beside it.
+
+    Raises
+    ------
+    DatabaseError
+        If the database cannot be used.
+    """
+    engine = migration_engine(url)
+    try:
+        with engine.begin() as connection:
+            if not is_sqlite(url):
+                postgresql.lock_tables(connection)
+            yield connection
+    except DBAPIError as error:
+        raise DatabaseError(f"{database_name(url)} cannot be used: {error.orig}") from error
+    finally:
+        engine.dispose()
+
+
 class Database:
-    """An open database: its lock, one engine to write and one to read.
+    """An open database: one engine to write and one to read and, on SQLite, the lock of the file.
 
     Parameters
     ----------
     url : str
-        An SQLite URL.
+        An SQLite or PostgreSQL URL.
+    connections : int
+        Most connections to PostgreSQL at a time.
     """
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, connections: int = CONNECTIONS) -> None:
         self.url = url
-        self.path = database_path(url)
-        self._lock = FileLock(self.path)
-        self._write = write_engine(url)
-        self._read = read_engine(url)
+        self.name = database_name(url)
+        self._lock = FileLock(database_path(url)) if is_sqlite(url) else None
+        self._write = write_engine(url, connections)
+        self._read = read_engine(url) if is_sqlite(url) else postgresql.reading(self._write)
+
+    @property
+    def backend(self) -> str:
+        """``sqlite`` or ``postgresql``."""
+        return self._write.dialect.name
+
+    @property
+    def exclusive(self) -> bool:
+        """Whether one service has the database to itself: jobs that others left running are nobody's."""
+        return self._lock is not None
 
     def acquire(self) -> None:
-        """Lock the file for this process (see `FileLock.acquire` for the errors)."""
-        self._lock.acquire()
+        """Lock the file of SQLite for this process (see `FileLock.acquire` for the errors)."""
+        if self._lock is not None:
+            self._lock.acquire()
 
     def close(self) -> None:
         """Close every connection and release the lock."""
         self._read.dispose()
         self._write.dispose()
-        self._lock.release()
+        if self._lock is not None:
+            self._lock.release()
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:
-        """A transaction that holds the write lock from its first statement; commits at the end."""
+        """A transaction that may write; commits at the end. SQLite's holds the write lock from the start."""
         with self._write.begin() as connection:
             yield connection
+
+    def insert(self, work: Callable[[Connection], _Written]) -> _Written:
+        """Do `work`, which looks for a row and adds it if there is none, in a transaction.
+
+        If another service adds the row between the two, the work is done once more and finds it.
+        """
+        try:
+            with self.writing() as connection:
+                return work(connection)
+        except IntegrityError:
+            with self.writing() as connection:
+                return work(connection)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
@@ -150,10 +225,11 @@ class Database:
         with self._read.begin() as connection:
             yield connection
 
-    def ping(self) -> None:
-        """Read something; raises what the database raises."""
+    def version(self) -> str:
+        """The version of the SQLite library or the PostgreSQL server; raises what the database raises."""
+        query = "SELECT sqlite_version()" if self.exclusive else "SHOW server_version"
         with self.reading() as connection:
-            connection.execute(text("SELECT 1")).scalar_one()
+            return str(connection.execute(text(query)).scalar_one())
 
 
 def backup(url: str, target: Path) -> None:
@@ -162,8 +238,10 @@ def backup(url: str, target: Path) -> None:
     Raises
     ------
     DatabaseError
-        If `target` exists or the source does not.
+        If `target` exists, the source does not, or it is not SQLite.
     """
+    if not is_sqlite(url):
+        raise DatabaseError(f"{database_name(url)} is backed up with PostgreSQL's own pg_dump")
     source = database_path(url)
     if not source.exists():
         raise DatabaseError(f"there is no database {source} to back up")

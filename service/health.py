@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sqlite3
-
 from pydantic import BaseModel, ConfigDict
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -44,7 +42,9 @@ def check(service: Service) -> Health:
     """Look at database, queue and workers."""
     trouble: list[str] = []
     counts: dict[str, int] = {}
+    version = "unknown"
     try:
+        version = service.database.version()
         counts = {state.value: number for state, number in service.jobs.count().items()}
     except SQLAlchemyError as error:
         trouble.append(f"the database does not answer: {type(error).__name__}")
@@ -53,14 +53,17 @@ def check(service: Service) -> Health:
     workers = service.queue.status()
     if not workers.ready:
         trouble.append(workers.trouble or "the worker processes are starting")
-    notes = [sqlite_note(), workers.trouble if workers.ready else None]
+    notes = [
+        sqlite_note() if service.database.exclusive else None,
+        workers.trouble if workers.ready else None,
+    ]
     return Health(
         ready=not trouble,
         trouble=trouble,
         notes=[note for note in notes if note is not None],
         version=SOLVER_VERSION,
-        database="sqlite",
-        database_version=sqlite3.sqlite_version,
+        database=service.database.backend,
+        database_version=version,
         revision=revisions.head_revision(),
         workers=workers.workers,
         workers_ready=workers.ready,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from sqlalchemy.exc import DBAPIError
 
 from service.arrays import decode
-from service.db import database_path, read_engine
+from service.db import database_name, database_path, is_sqlite, read_engine, shown
 from service.errors import DatabaseError
 from service.repository.integrity import Contents, arrays, contents, contradictions, damage
 from service.revisions import current_revision, head_revision
@@ -56,14 +56,14 @@ def check(url: str) -> Findings:
     DatabaseError
         There is no such database, it cannot be read, or it is at another revision.
     """
-    path = database_path(url)
-    if not path.exists():
-        raise DatabaseError(f"there is no database {path} to check")
+    name = database_name(url)
+    if is_sqlite(url) and not database_path(url).exists():
+        raise DatabaseError(f"there is no database {name} to check")
     revision, wanted = current_revision(url), head_revision()
     if revision != wanted:
         raise DatabaseError(
-            f"{path} is at revision {revision}, this version checks {wanted}: "
-            f"run `stickslip db upgrade --database {url}`"
+            f"{name} is at revision {revision}, this version checks {wanted}: "
+            f"run `stickslip db upgrade --database {shown(url)}`"
         )
     engine = read_engine(url)
     try:
@@ -77,7 +77,7 @@ def check(url: str) -> Findings:
             except (DatabaseError, ValueError) as error:
                 damaged.append(f"array `{name}` of sweep {sweep_id}: {error}")
     except DBAPIError as error:
-        raise DatabaseError(f"{path} cannot be read: {error.orig}") from error
+        raise DatabaseError(f"{name} cannot be read: {error.orig}") from error
     finally:
         engine.dispose()
     more = [f"{len(damaged) - MOST_NAMED} more arrays"] if len(damaged) > MOST_NAMED else []

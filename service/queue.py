@@ -79,7 +79,7 @@ class JobQueue:
 
     def start(self) -> None:
         """Take back what a dead owner left running, start the workers and the queue."""
-        recovered = self._jobs.recover_others(self.owner)
+        recovered = self._jobs.recover_abandoned(self.owner)
         if recovered.total:
             log.warning(
                 "an earlier service ended while jobs ran: %d wait again, %d failed, %d dismissed",
@@ -281,6 +281,10 @@ class JobQueue:
         by_attempt = {id(entry.attempt): entry for entry in running}
         for lost in self._jobs.renew([entry.attempt for entry in running], self._lease_until()):
             self._ask_to_stop(by_attempt[id(lost)], _StopReason.LEASE)
+        cancelled = self._jobs.cancelled(self.owner) if running else ()
+        for entry in running:
+            if entry.stop is None and entry.attempt.job_id in cancelled:
+                self._ask_to_stop(entry, _StopReason.CANCEL)
         if self._jobs.recover_expired().total:
             log.warning("jobs whose lease ran out were taken back")
             self._wake.set()

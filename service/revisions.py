@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Engine, inspect
+from sqlalchemy import Connection, inspect
 from sqlalchemy.exc import DBAPIError
 
-from service.db import database_path, migration_engine, read_engine
+from service import postgresql
+from service.db import database_name, database_path, is_sqlite, migrating, read_engine, shown
 from service.errors import DatabaseError, WrongRevisionError
 from service.lock import FileLock
 
@@ -35,14 +38,10 @@ def head_revision() -> str:
     return head
 
 
-def _current(engine: Engine) -> tuple[str | None, bool]:
+def _current(connection: Connection) -> tuple[str | None, bool]:
     """The revision of a database, and whether it has no tables at all."""
-    try:
-        with engine.begin() as connection:
-            revision = MigrationContext.configure(connection).get_current_revision()
-            return revision, not inspect(connection).get_table_names()
-    except DBAPIError as error:
-        raise DatabaseError(f"{engine.url.database} cannot be used: {error.orig}") from error
+    revision = MigrationContext.configure(connection).get_current_revision()
+    return revision, not inspect(connection).get_table_names()
 
 
 def current_revision(url: str) -> str:
@@ -51,20 +50,38 @@ def current_revision(url: str) -> str:
     Raises
     ------
     DatabaseError
-        If the file cannot be used.
+        If it cannot be used.
     """
     engine = read_engine(url)
     try:
-        return _current(engine)[0] or "none"
+        with engine.begin() as connection:
+            return _current(connection)[0] or "none"
+    except DBAPIError as error:
+        raise DatabaseError(f"{database_name(url)} cannot be used: {error.orig}") from error
     finally:
         engine.dispose()
 
 
-def _migrate(engine: Engine, target: str) -> None:
+def _migrate(connection: Connection, target: str) -> None:
     config = _config()
-    with engine.begin() as connection:
-        config.attributes["connection"] = connection
-        command.upgrade(config, target)
+    config.attributes["connection"] = connection
+    command.upgrade(config, target)
+
+
+@contextmanager
+def _without_services(url: str) -> Iterator[Connection]:
+    """A transaction for changes of the tables while no service runs."""
+    name = database_name(url)
+    if not is_sqlite(url):
+        with migrating(url) as connection:
+            postgresql.refuse_running(connection, name)
+            yield connection
+        return
+    path = database_path(url)
+    if not path.absolute().parent.is_dir():
+        raise DatabaseError(f"there is no folder {path.absolute().parent} for the database {path.name}")
+    with FileLock(path), migrating(url) as connection:
+        yield connection
 
 
 def upgrade(url: str, target: str = "head") -> str:
@@ -75,65 +92,55 @@ def upgrade(url: str, target: str = "head") -> str:
     DatabaseInUseError
         If a service is running on it.
     DatabaseError
-        If the file cannot be used, holds another program's tables, or is newer than this version.
+        If it cannot be used, holds another program's tables, or is newer than this version.
     """
-    path = database_path(url)
-    _require_folder(path)
-    with FileLock(path):
-        engine = migration_engine(url)
-        try:
-            revision, empty = _current(engine)
-            _refuse_foreign(path, revision, empty=empty)
-            _refuse_unknown(path, revision)
-            _migrate(engine, target)
-            now = _current(engine)[0]
-        finally:
-            engine.dispose()
+    with _without_services(url) as connection:
+        revision, empty = _current(connection)
+        _refuse_foreign(url, revision, empty=empty)
+        _refuse_unknown(url, revision)
+        _migrate(connection, target)
+        now = _current(connection)[0]
     return now or "base"
 
 
 def prepare(url: str) -> None:
-    """Make a new database's tables, or check those of an existing one. The caller holds the lock.
+    """Make a new database's tables, or check those of an existing one.
+
+    On SQLite the caller holds the lock of the file; on PostgreSQL services may run.
 
     Raises
     ------
     WrongRevisionError
         With the command that brings the database to the right revision.
     DatabaseError
-        If the file holds another program's tables.
+        If it cannot be used or holds another program's tables.
     """
-    path = database_path(url)
-    engine = migration_engine(url)
-    try:
-        revision, empty = _current(engine)
+    with migrating(url) as connection:
+        revision, empty = _current(connection)
         if revision is None and empty:
-            _migrate(engine, "head")
+            _migrate(connection, "head")
             return
-    finally:
-        engine.dispose()
-    _refuse_foreign(path, revision, empty=empty)
-    _refuse_unknown(path, revision)
+    _refuse_foreign(url, revision, empty=empty)
+    _refuse_unknown(url, revision)
     if revision != head_revision():
+        name = database_name(url)
         raise WrongRevisionError(
-            f"{path} is at revision {revision}, this version works with {head_revision()}: "
-            f"back it up, then run `stickslip db upgrade --database {url}`"
+            f"{name} is at revision {revision}, this version works with {head_revision()}: "
+            f"back it up, then run `stickslip db upgrade --database {shown(url)}`"
         )
 
 
-def _require_folder(path: Path) -> None:
-    if not path.absolute().parent.is_dir():
-        raise DatabaseError(f"there is no folder {path.absolute().parent} for the database {path.name}")
-
-
-def _refuse_foreign(path: Path, revision: str | None, *, empty: bool) -> None:
+def _refuse_foreign(url: str, revision: str | None, *, empty: bool) -> None:
     if revision is None and not empty:
-        raise DatabaseError(f"{path} holds the tables of another program: use another file (`--database`)")
+        raise DatabaseError(
+            f"{database_name(url)} holds the tables of another program: use another database (`--database`)"
+        )
 
 
-def _refuse_unknown(path: Path, revision: str | None) -> None:
+def _refuse_unknown(url: str, revision: str | None) -> None:
     known = {script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()}
     if revision is not None and revision not in known:
         raise WrongRevisionError(
-            f"{path} is at revision {revision}, which this version does not know: it was written by a newer "
-            "stickslip. Install that one, or use another file (`--database`)"
+            f"{database_name(url)} is at revision {revision}, which this version does not know: it was "
+            "written by a newer stickslip. Install that one, or use another database (`--database`)"
         )

@@ -67,8 +67,8 @@ def serve(settings: Settings, registry: Registry = SHIPPED) -> None:
 def work(settings: Settings, registry: Registry = SHIPPED, *, until_empty: bool = False) -> None:
     """Run the queue and its workers without HTTP until SIGINT or SIGTERM.
 
-    On SQLite one process owns the file, so this does not add to a service that runs: it works off the
-    jobs that wait in the file while no service does.
+    On PostgreSQL this adds workers to the services that run, from any machine. On SQLite one process owns
+    the file: this works off the jobs that wait in it while no service does.
 
     Parameters
     ----------

@@ -8,10 +8,12 @@ from typing import Self
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
-from sqlalchemy.engine import make_url
+from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError
 
+from service.db import CONNECTIONS
 from service.errors import ConfigurationError
+from service.postgresql import DRIVER
 
 _LOOPBACK_NAMES = ("localhost",)
 
@@ -33,6 +35,28 @@ def is_loopback(host: str) -> bool:
         return False
 
 
+def _sqlite_url(url: str, parsed: URL) -> str:
+    if parsed.drivername not in ("sqlite", "sqlite+pysqlite") or parsed.query:
+        raise ValueError(
+            f"`database` must be a plain sqlite:/// URL without a driver or options, got {url!r}"
+        )
+    if parsed.database in (None, "", ":memory:"):
+        raise ValueError(f"`database` must name a file: one in memory would lose every job, got {url!r}")
+    return url
+
+
+def _postgresql_url(parsed: URL) -> str:
+    """The URL with the driver that is used; messages never show the password."""
+    shown = parsed.render_as_string()
+    if parsed.get_backend_name() not in ("postgresql", "postgres"):
+        raise ValueError(f"`database` must be an SQLite or PostgreSQL URL, got {shown!r}")
+    if parsed.drivername not in ("postgresql", "postgres", DRIVER):
+        raise ValueError(f"`database` must be a URL with the driver psycopg, {DRIVER}://…, got {shown!r}")
+    if not parsed.database:
+        raise ValueError(f"`database` must name a database: {DRIVER}://user@host/name, got {shown!r}")
+    return parsed.set(drivername=DRIVER).render_as_string(hide_password=False)
+
+
 class Settings(BaseSettings):
     """The settings of one service; frozen. `STICKSLIP_PORT` in the environment sets `port`, and so on."""
 
@@ -42,7 +66,11 @@ class Settings(BaseSettings):
 
     database: str = Field(
         default="sqlite:///./stickslip.db",
-        description="Where jobs and results are kept: sqlite:///relative/path or sqlite:////absolute/path.",
+        description="Where jobs and results are kept: sqlite:///relative/path, sqlite:////absolute/path or "
+        "postgresql://user:password@host/name.",
+    )
+    database_connections: int = Field(
+        default=CONNECTIONS, ge=2, le=1000, description="Connections to PostgreSQL at most."
     )
     host: str = Field(default="127.0.0.1", description="Address to listen on.")
     port: int = Field(default=8000, ge=0, le=65535, description="Port to listen on; 0 takes any free one.")
@@ -119,15 +147,9 @@ class Settings(BaseSettings):
             raise ValueError(
                 f"`database` must be a URL such as sqlite:///./stickslip.db, got {url!r}"
             ) from error
-        if parsed.get_backend_name() != "sqlite":
-            raise ValueError(f"`database` must be an SQLite URL in this version, got {url!r}")
-        if parsed.drivername not in ("sqlite", "sqlite+pysqlite") or parsed.query:
-            raise ValueError(
-                f"`database` must be a plain sqlite:/// URL without a driver or options, got {url!r}"
-            )
-        if parsed.database in (None, "", ":memory:"):
-            raise ValueError(f"`database` must name a file: one in memory would lose every job, got {url!r}")
-        return url
+        if parsed.get_backend_name() == "sqlite":
+            return _sqlite_url(url, parsed)
+        return _postgresql_url(parsed)
 
     @model_validator(mode="after")
     def _loopback_unless_allowed(self) -> Self:

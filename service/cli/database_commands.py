@@ -19,10 +19,11 @@ def backup(
 ) -> None:
     """Copy a database to a file, also while a service uses it."""
     from service.db import backup as copy
+    from service.db import shown
 
     url = settings_of(database=database).database
     copy(url, Path(target))
-    say(f"{url} is copied to {target}")
+    say(f"{shown(url)} is copied to {target}")
 
 
 def check(database: options.Database = None, as_json: options.Json = False) -> None:
@@ -30,6 +31,7 @@ def check(database: options.Database = None, as_json: options.Json = False) -> N
 
     The file and its references, the states of jobs against their results, the checksum of every array.
     """
+    from service.db import shown
     from service.integrity import check as look
 
     url = settings_of(database=database).database
@@ -45,7 +47,7 @@ def check(database: options.Database = None, as_json: options.Json = False) -> N
             ("arrays", str(found.contents.arrays)),
             ("sound", "yes" if found.sound else "no"),
         ]
-        print_pairs(url, [*pairs, *(("trouble", words) for words in found.trouble)])
+        print_pairs(shown(url), [*pairs, *(("trouble", words) for words in found.trouble)])
     if not found.sound:
         typer.echo(
             "stickslip: the database is damaged: restore a backup, or export what can be read", err=True

@@ -95,7 +95,9 @@ Plot = Annotated[
 Database = Annotated[
     str | None,
     typer.Option(
-        "--database", metavar="URL", help="sqlite:///path of the database; STICKSLIP_DATABASE sets it too."
+        "--database",
+        metavar="URL",
+        help="sqlite:///path or postgresql://user@host/name; STICKSLIP_DATABASE sets it too.",
     ),
 ]
 Workers = Annotated[

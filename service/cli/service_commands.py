@@ -39,7 +39,7 @@ def worker(
 ) -> None:
     """Work off a queue without HTTP.
 
-    On SQLite only while no service uses the file.
+    On PostgreSQL beside any number of services; on SQLite only while no service uses the file.
     """
     from service.server import work
 
@@ -48,10 +48,11 @@ def worker(
 
 def upgrade(database: options.Database = None) -> None:
     """Bring a database to this version's revision."""
+    from service.db import shown
     from service.revisions import upgrade as bring_up
 
     url = settings_of(database=database).database
-    say(f"{url} is at revision {bring_up(url)}")
+    say(f"{shown(url)} is at revision {bring_up(url)}")
 
 
 def demo(

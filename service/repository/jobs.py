@@ -68,17 +68,20 @@ class JobRepository:
         IdempotencyError
             The key was used for a different request.
         QueueFullError
-            `queue_limit` jobs wait already.
+            `queue_limit` jobs wait already. Jobs that several services accept at the same moment may exceed
+            it by their number.
         """
-        with self._db.writing() as connection:
-            known = self._by_key(connection, new)
-            if known is not None:
-                return known, False
-            source = None if new.fresh else self._computed_before(connection, new)
-            if source is None:
-                self._require_room(connection, queue_limit)
-            job_id = self._insert(connection, new, source)
-            row = _one(connection, Job.id == job_id)
+        return self._db.insert(lambda connection: self._submit(connection, new, queue_limit))
+
+    def _submit(self, connection: Connection, new: NewJob, queue_limit: int) -> tuple[JobRow, bool]:
+        known = self._by_key(connection, new)
+        if known is not None:
+            return known, False
+        source = None if new.fresh else self._computed_before(connection, new)
+        if source is None:
+            self._require_room(connection, queue_limit)
+        job_id = self._insert(connection, new, source)
+        row = _one(connection, Job.id == job_id)
         if row is None:
             raise RuntimeError(f"job {job_id} vanished in its own transaction")
         return row, True
@@ -230,17 +233,31 @@ class JobRepository:
                 _change(connection, running, cancel_requested=True)
             return _one(connection, Job.id == job_id)
 
-    def recover_others(self, owner: str) -> Recovered:
-        """Take back running jobs of every owner but `owner`; only for a caller that holds the file's lock."""
+    def cancelled(self, owner: str) -> set[str]:
+        """Ids of the jobs that `owner` runs and whose cancel was asked for, here or at another service."""
+        query = select(Job.id).where(
+            Job.state == JobState.RUNNING, Job.lease_owner == owner, Job.cancel_requested.is_(True)
+        )
+        with self._db.reading() as connection:
+            return set(connection.execute(query).scalars())
+
+    def recover_abandoned(self, owner: str) -> Recovered:
+        """Take back what a dead owner left running, when `owner` starts.
+
+        With SQLite's file locked there is no other service that could run them. On PostgreSQL there may be:
+        a job is abandoned when its lease ran out.
+        """
+        if not self._db.exclusive:
+            return self.recover_expired()
         with self._db.writing() as connection:
             condition = and_(Job.state == JobState.RUNNING, Job.lease_owner != owner)
             return _recover(connection, condition, "the service ended while the job ran")
 
     def recover_expired(self) -> Recovered:
-        """Take back running jobs whose lease ran out."""
+        """Take back running jobs whose lease ran out; those that another service looks at are left to it."""
         with self._db.writing() as connection:
             condition = and_(Job.state == JobState.RUNNING, Job.lease_until < utc_now())
-            return _recover(connection, condition, "its owner gave no sign of life")
+            return _recover(connection, condition, "its owner gave no sign of life", skip_locked=True)
 
     @staticmethod
     def _by_key(connection: Connection, new: NewJob) -> JobRow | None:
@@ -294,9 +311,15 @@ class JobRepository:
             insert_design(connection, job_id, output.design, created)
 
 
-def _recover(connection: Connection, condition: ColumnElement[bool], reason: str) -> Recovered:
-    """Running jobs without an owner: dismissed if asked for, failed after the last attempt, else waiting."""
-    query = select(Job.id, Job.attempt, Job.max_attempts, Job.cancel_requested).where(condition)
+def _recover(
+    connection: Connection, condition: ColumnElement[bool], reason: str, *, skip_locked: bool = False
+) -> Recovered:
+    """Running jobs without an owner: dismissed if asked for, failed after the last attempt, else waiting.
+
+    PostgreSQL locks the rows as it reads them, so that nobody changes them before they are written.
+    """
+    columns = (Job.id, Job.attempt, Job.max_attempts, Job.cancel_requested)
+    query = select(*columns).where(condition).with_for_update(skip_locked=skip_locked)
     counts = dict.fromkeys(("accepted", "failed", "dismissed"), 0)
     for row in connection.execute(query).all():
         values: dict[str, Any] = {"state": JobState.ACCEPTED, "started": None, "progress": 0.0, "points": 0}

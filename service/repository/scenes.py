@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy import insert, select
+from sqlalchemy import Connection, insert, select
 
 from service.db import Database
 from service.models import Scene
@@ -24,16 +24,18 @@ class SceneRepository:
 
     def add(self, name: str, scene_hash: str, body: dict[str, Any]) -> tuple[SceneRow, bool]:
         """Store a scene, or find the one of this name; whether it was stored."""
-        with self._db.writing() as connection:
+
+        def find_or_add(connection: Connection) -> tuple[SceneRow, bool]:
             query = select(*_COLUMNS).where(Scene.name == name)
             known = connection.execute(query).mappings().one_or_none()
             if known is not None:
                 return SceneRow(**known), False
-            created = utc_now()
-            connection.execute(
-                insert(Scene).values(name=name, scene_hash=scene_hash, created=created, body=body)
-            )
-        return SceneRow(name=name, scene_hash=scene_hash, created=created, body=body), True
+            row = SceneRow(name=name, scene_hash=scene_hash, created=utc_now(), body=body)
+            values = {"name": name, "scene_hash": scene_hash, "created": row.created, "body": body}
+            connection.execute(insert(Scene).values(**values))
+            return row, True
+
+        return self._db.insert(find_or_add)
 
     def get(self, name: str) -> SceneRow | None:
         """The scene, or None."""

@@ -1,31 +1,78 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
 import pytest
+from postgresql_cluster import Cluster, binaries
 from private_kinds import PRIVATE
-from service_helpers import MakeSettings, serving
+from service_helpers import MakeSettings, serving, settings_of
 
+from service import revisions
+from service.db import Database
 from service.embedded import EmbeddedService
 from service.kinds import SHIPPED
-from service.settings import Settings, load_settings
+
+BACKENDS = ("sqlite", "postgresql")
+
+
+@pytest.fixture(scope="session")
+def cluster() -> Iterator[Cluster]:
+    """A PostgreSQL server for the session."""
+    programs = binaries()
+    if programs is None:
+        pytest.skip("PostgreSQL's server is not installed (Debian's package `postgresql`)")
+    with Cluster(programs) as running:
+        yield running
+
+
+@pytest.fixture(params=BACKENDS)
+def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+    """A database without tables, of either kind."""
+    if request.param == "sqlite":
+        yield f"sqlite:///{tmp_path}/jobs.db"
+        return
+    with request.getfixturevalue("cluster").database() as made:
+        yield made
+
+
+@pytest.fixture(params=BACKENDS)
+def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Database]:
+    """A database with its tables, of either kind."""
+    with migrated(request, tmp_path) as made:
+        yield made
+
+
+@pytest.fixture(scope="module", params=BACKENDS)
+def module_database(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Database]:
+    """The same, shared by the tests of a module."""
+    with migrated(request, tmp_path_factory.mktemp("database")) as made:
+        yield made
+
+
+@contextmanager
+def migrated(request: pytest.FixtureRequest, folder: Path) -> Iterator[Database]:
+    if request.param == "sqlite":
+        url = f"sqlite:///{folder}/jobs.db"
+        revisions.upgrade(url)
+        database = Database(url)
+        yield database
+        database.close()
+        return
+    with request.getfixturevalue("cluster").database(empty=False) as url:
+        database = Database(url)
+        yield database
+        database.close()
 
 
 @pytest.fixture
 def make_settings(tmp_path: Path) -> MakeSettings:
-    def make(**values: object) -> Settings:
-        defaults = {
-            "database": f"sqlite:///{tmp_path}/jobs.db",
-            "workers": 1,
-            "port": 0,
-            "grace_seconds": 0.3,
-            "poll_seconds": 1.0,
-        }
-        return load_settings(**{**defaults, **values})
-
-    return make
+    """Makes the settings of a service on SQLite."""
+    return settings_of(f"sqlite:///{tmp_path}/jobs.db")
 
 
 @pytest.fixture

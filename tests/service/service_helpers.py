@@ -20,6 +20,22 @@ from service.settings import Settings, load_settings
 MakeSettings = Callable[..., Settings]
 
 
+def settings_of(url: str) -> MakeSettings:
+    """Makes the settings of a small service on a database."""
+
+    def make(**values: object) -> Settings:
+        defaults = {
+            "database": url,
+            "workers": 1,
+            "port": 0,
+            "grace_seconds": 0.3,
+            "poll_seconds": 1.0,
+        }
+        return load_settings(**{**defaults, **values})
+
+    return make
+
+
 @contextmanager
 def serving(folder: Path, registry: Registry) -> Iterator[httpx.Client]:
     """A client of a real server on loopback."""

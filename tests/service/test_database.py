@@ -1,10 +1,12 @@
-"""The file: its transactions, its lock, its revisions."""
+"""The database: its transactions, its lock, its revisions."""
 
 from __future__ import annotations
 
 import sqlite3
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -13,33 +15,25 @@ from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from private_kinds import PRIVATE
 from service_helpers import MakeSettings
-from sqlalchemy import insert, select, text
-from sqlalchemy.exc import OperationalError, StatementError
+from sqlalchemy import CheckConstraint, insert, inspect, select, text
+from sqlalchemy.exc import DBAPIError, StatementError
 
 from service import revisions
 from service.arrays import decode, encode
 from service.core import Service
-from service.db import Database, backup, migration_engine, sqlite_note, write_engine
+from service.db import Database, backup, is_sqlite, migrating, sqlite_note, write_engine
 from service.embedded import EmbeddedService
 from service.errors import DatabaseError, DatabaseInUseError, WrongRevisionError
 from service.ids import new_id
 from service.jobs import FailureKind, JobFailure, JobOutput, StoredArray
 from service.models import Base, Job, JobState
-from service.repository import Attempt, JobRepository, NewJob
+from service.repository import Attempt, JobRepository, NewJob, SceneRepository
 from service.repository.jobs import utc_now
 
 
 @pytest.fixture
-def url(tmp_path: Path) -> str:
+def file_url(tmp_path: Path) -> str:
     return f"sqlite:///{tmp_path}/jobs.db"
-
-
-@pytest.fixture
-def database(url: str) -> Database:
-    revisions.upgrade(url)
-    database = Database(url)
-    yield database
-    database.close()
 
 
 def new_job(**values: object) -> NewJob:
@@ -62,27 +56,32 @@ def claimed(jobs: JobRepository, owner: str = "one") -> Attempt:
     return attempt
 
 
-def test_read_modify_writes_of_four_processes_lose_nothing(url: str) -> None:
-    engine = write_engine(url)
+def test_read_modify_writes_of_four_processes_lose_nothing(file_url: str) -> None:
+    engine = write_engine(file_url)
     with engine.begin() as connection:
         connection.execute(text("CREATE TABLE counter (number INTEGER NOT NULL)"))
         connection.execute(text("INSERT INTO counter VALUES (0)"))
     script = Path(__file__).with_name("counting.py")
-    running = [subprocess.Popen([sys.executable, str(script), url, "300"]) for _ in range(4)]
+    running = [subprocess.Popen([sys.executable, str(script), file_url, "300"]) for _ in range(4)]
     assert [process.wait(60) for process in running] == [0, 0, 0, 0]
     with engine.begin() as connection:
         assert connection.execute(text("SELECT number FROM counter")).scalar_one() == 1200
     engine.dispose()
 
 
-def test_connections_are_set_up_and_readers_cannot_write(database: Database) -> None:
+def test_connections_are_set_up(file_url: str) -> None:
+    database = Database(file_url)
     with database.writing() as connection:
         pragmas = {
             name: connection.exec_driver_sql(f"PRAGMA {name}").scalar_one()
             for name in ("journal_mode", "synchronous", "foreign_keys", "busy_timeout")
         }
     assert pragmas == {"journal_mode": "wal", "synchronous": 2, "foreign_keys": 1, "busy_timeout": 30_000}
-    with pytest.raises(OperationalError, match="readonly"), database.reading() as connection:
+    database.close()
+
+
+def test_readers_cannot_write(database: Database) -> None:
+    with pytest.raises(DBAPIError, match=r"read-?only"), database.reading() as connection:
         connection.execute(text("DELETE FROM job"))
 
 
@@ -98,7 +97,7 @@ def test_a_reader_sees_one_snapshot(database: Database) -> None:
 def test_a_failed_transaction_writes_nothing(database: Database) -> None:
     jobs = JobRepository(database)
     attempt = claimed(jobs)
-    with pytest.raises(StatementError, match="not JSON serializable"):
+    with pytest.raises((StatementError, TypeError), match="not JSON serializable"):
         jobs.succeed(attempt, JobOutput(result={"not JSON": object()}))
     row = jobs.get(attempt.job_id)
     assert row is not None
@@ -170,23 +169,53 @@ def test_a_cancel_that_was_asked_for_wins_over_a_result(database: Database) -> N
 
 
 def test_what_a_dead_owner_left(database: Database) -> None:
+    """On SQLite everything that others left; on PostgreSQL others may live, and a lease has to run out."""
     jobs = JobRepository(database)
     attempts = [claimed(jobs, "dead") for _ in range(2)]
     jobs.cancel(attempts[0].job_id)
     mine = claimed(jobs, "me")
-    recovered = jobs.recover_others("me")
+    jobs.renew([mine], utc_now() + timedelta(hours=1))
+    recovered = jobs.recover_abandoned("me")
     assert (recovered.accepted, recovered.failed, recovered.dismissed) == (1, 0, 1)
     row = jobs.get(mine.job_id)
     assert row is not None
     assert row.state is JobState.RUNNING
     for _ in range(2):
         assert jobs.claim("dead", utc_now()) is not None
-        recovered = jobs.recover_others("me")
+        recovered = jobs.recover_abandoned("me")
     assert recovered.failed == 1
     row = jobs.get(attempts[1].job_id)
     assert row is not None
     assert row.error is not None
-    assert "the service ended while the job ran, in attempt 3 of 3" in row.error["detail"]
+    why = "the service ended while the job ran" if database.exclusive else "its owner gave no sign of life"
+    assert f"{why}, in attempt 3 of 3" in row.error["detail"]
+
+
+def test_a_job_with_a_lease_is_its_owners_where_several_services_may_run(database: Database) -> None:
+    jobs = JobRepository(database)
+    attempt = claimed(jobs, "other")
+    jobs.renew([attempt], utc_now() + timedelta(hours=1))
+    assert jobs.recover_expired().total == 0
+    assert jobs.recover_abandoned("me").total == (1 if database.exclusive else 0)
+
+
+def test_an_owner_finds_what_was_cancelled_elsewhere(database: Database) -> None:
+    jobs = JobRepository(database)
+    mine, other = claimed(jobs, "me"), claimed(jobs, "other")
+    assert jobs.cancelled("me") == set()
+    for attempt in (mine, other):
+        jobs.cancel(attempt.job_id)
+    assert jobs.cancelled("me") == {mine.job_id}
+
+
+def test_a_key_and_a_name_used_by_several_threads_make_one_row(database: Database) -> None:
+    jobs, scenes = JobRepository(database), SceneRepository(database)
+    job = new_job(idempotency_key="one")
+    with ThreadPoolExecutor(8) as threads:
+        made = list(threads.map(lambda _: jobs.submit(job, queue_limit=100), range(16)))
+        stored = list(threads.map(lambda _: scenes.add("mine", "0" * 64, {}), range(16)))
+    assert len({row.id for row, _ in made}) == 1
+    assert [new for _, new in made].count(True) == [new for _, new in stored].count(True) == 1
 
 
 def test_a_second_service_is_refused(make_settings: MakeSettings) -> None:
@@ -212,30 +241,28 @@ def test_a_second_service_is_refused(make_settings: MakeSettings) -> None:
 def test_the_first_revision_upgraded_is_the_models(url: str) -> None:
     revisions.upgrade(url, "0001")
     revisions.upgrade(url)
-    engine = migration_engine(url)
-    with engine.begin() as connection:
+    with migrating(url) as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
         assert compare_metadata(context, Base.metadata) == []
-        named = {
-            row[0]: row[1]
-            for row in connection.execute(text("SELECT name, sql FROM sqlite_master WHERE type = 'table'"))
-        }
-    engine.dispose()
-    assert "CONSTRAINT ck_job_state CHECK" in named["job"]
-    assert set(named) == {*Base.metadata.tables, "alembic_version"}
+        found = inspect(connection)
+        assert set(found.get_table_names()) == {*Base.metadata.tables, "alembic_version"}
+        for table in Base.metadata.tables.values():
+            named = {check["name"] for check in found.get_check_constraints(table.name)}
+            assert named == {c.name for c in table.constraints if isinstance(c, CheckConstraint)}
 
 
-def test_an_old_file_keeps_its_rows(url: str) -> None:
+def test_an_old_database_keeps_its_rows(url: str) -> None:
     revisions.upgrade(url, "0001")
-    path = url.removeprefix("sqlite:///")
-    connection = sqlite3.connect(path)
-    connection.execute(
-        "INSERT INTO job (id, kind, state, priority, spec_hash, request_hash, attempt, max_attempts, "
-        "cancel_requested, progress, points, created, request, spec) VALUES "
-        "('a', 'iteration', 'accepted', 0, '', '', 0, 3, 0, 0.0, 0, '2026-01-02 03:04:05.000000', '{}', '{}')"
-    )
-    connection.commit()
-    connection.close()
+    zone = "" if is_sqlite(url) else "+00"
+    with migrating(url) as connection:
+        connection.execute(
+            text(
+                "INSERT INTO job (id, kind, state, priority, spec_hash, request_hash, attempt, max_attempts, "
+                "cancel_requested, progress, points, created, request, spec) VALUES ('a', 'iteration', "
+                f"'accepted', 0, '', '', 0, 3, false, 0.0, 0, '2026-01-02 03:04:05.000000{zone}', "
+                "'{}', '{}')"
+            )
+        )
     assert revisions.upgrade(url) == revisions.head_revision()
     database = Database(url)
     row = JobRepository(database).get("a")
@@ -244,11 +271,20 @@ def test_an_old_file_keeps_its_rows(url: str) -> None:
     assert row.created.isoformat() == "2026-01-02T03:04:05+00:00"
 
 
+def test_a_time_is_the_same_before_and_after(database: Database) -> None:
+    begin = utc_now()
+    row, _ = JobRepository(database).submit(new_job(), queue_limit=10)
+    again = JobRepository(database).get(row.id)
+    assert again is not None
+    assert begin <= again.created == row.created <= utc_now()
+    assert again.created.tzinfo is UTC
+    assert [found.id for found in JobRepository(database).page()] == [row.id]
+
+
 def test_a_wrong_revision_is_refused_with_the_command(url: str) -> None:
     revisions.upgrade(url)
-    engine = write_engine(url)
     for revision, words in (("0000", "written by a newer"), (None, "another program")):
-        with engine.begin() as connection:
+        with migrating(url) as connection:
             connection.execute(text("DELETE FROM alembic_version"))
             if revision is not None:
                 connection.execute(text("INSERT INTO alembic_version VALUES (:r)"), {"r": revision})
@@ -256,13 +292,12 @@ def test_a_wrong_revision_is_refused_with_the_command(url: str) -> None:
             revisions.prepare(url)
         with pytest.raises(DatabaseError, match=words):
             revisions.upgrade(url)
-    engine.dispose()
 
 
 def test_an_older_revision_is_refused_with_the_command(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     revisions.upgrade(url)
     monkeypatch.setattr(revisions, "head_revision", lambda: "9999")
-    with pytest.raises(WrongRevisionError, match="run `stickslip db upgrade --database sqlite:///"):
+    with pytest.raises(WrongRevisionError, match=r"run `stickslip db upgrade --database (sqlite|postgresql)"):
         revisions.prepare(url)
 
 
@@ -276,16 +311,21 @@ def test_a_file_that_cannot_be_used(tmp_path: Path, make_settings: MakeSettings)
         Service(make_settings(database=f"sqlite:///{tmp_path}/text.db"), PRIVATE).open()
 
 
-def test_a_backup_is_a_database(url: str, database: Database, tmp_path: Path) -> None:
+def test_a_backup_is_a_database(file_url: str, tmp_path: Path) -> None:
+    revisions.upgrade(file_url)
+    database = Database(file_url)
     claimed(JobRepository(database))
-    backup(url, tmp_path / "copy.db")
+    backup(file_url, tmp_path / "copy.db")
     copy = Database(f"sqlite:///{tmp_path}/copy.db")
     assert len(JobRepository(copy).page()) == 1
     copy.close()
     with pytest.raises(DatabaseError, match="does not overwrite"):
-        backup(url, tmp_path / "copy.db")
+        backup(file_url, tmp_path / "copy.db")
+    database.close()
     with pytest.raises(DatabaseError, match="no database"):
         backup(f"sqlite:///{tmp_path}/none.db", tmp_path / "other.db")
+    with pytest.raises(DatabaseError, match=r"u:\*\*\*@localhost/x is backed up with .* pg_dump"):
+        backup("postgresql+psycopg://u:secret@localhost/x", tmp_path / "other.db")
 
 
 def test_arrays_are_numbers_with_a_checksum() -> None:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 import random
-import sqlite3
 import time
-from collections.abc import Iterator
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +14,19 @@ import httpx
 import pytest
 from alembic import command
 from service_helpers import is_problem
+from sqlalchemy import Connection, func, insert, inspect, select
 
 import optim
 import solver
 from service import revisions
 from service.answers import DesignDetail
 from service.client import Client
-from service.db import Database, migration_engine
+from service.db import Database, migrating
 from service.design_queries import DesignQuery, design_page
 from service.errors import InvalidRequestError
 from service.jobs import DesignRecord, VariableValues
 from service.kinds.records import design_record
+from service.models import Base, JobState
 from service.repository import DesignRepository, JobRepository, NewJob
 from service.repository.designs import insert_design
 from service.repository.jobs import utc_now
@@ -78,14 +79,10 @@ Filled = tuple[Database, dict[str, DesignRecord]]
 
 
 @pytest.fixture(scope="module")
-def filled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Filled]:
-    url = f"sqlite:///{tmp_path_factory.mktemp('designs')}/jobs.db"
-    revisions.upgrade(url)
-    database = Database(url)
+def filled(module_database: Database) -> Filled:
     generator = random.Random(7)
     records = [random_design(generator) for _ in range(400)]
-    yield database, dict(zip(fill(database, records), records, strict=True))
-    database.close()
+    return module_database, dict(zip(fill(module_database, records), records, strict=True))
 
 
 def meets(record: DesignRecord, query: dict[str, Any]) -> bool:
@@ -265,39 +262,40 @@ OLD = {
 }  # fmt: skip
 
 
+_job, _result = Base.metadata.tables["job"], Base.metadata.tables["job_result"]
+BEGIN = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+END = BEGIN + timedelta(seconds=1.5)
+
+
 def old_job(
-    path: str, name: str, kind: str, spec: dict[str, Any], body: dict[str, Any] | None, finished: str | None
-) -> None:
-    state = "successful" if body is not None else "dismissed"
-    connection = sqlite3.connect(path)
+    connection: Connection, name: str, kind: str, spec: dict[str, Any], body: dict[str, Any] | None,
+    finished: datetime | None = END,
+) -> None:  # fmt: skip
+    state = JobState.SUCCESSFUL if body is not None else JobState.DISMISSED
     connection.execute(
-        "INSERT INTO job (id, kind, state, priority, scene_name, scene_hash, spec_hash, request_hash, "
-        "attempt, max_attempts, cancel_requested, progress, points, created, finished, request, spec) "
-        "VALUES (?, ?, ?, 0, 'two-dof', 'abc', '', '', 1, 3, 0, 1.0, 0, '2026-01-02 03:04:05.000000', ?, "
-        "'{}', ?)",
-        (name, kind, state, finished, json.dumps(spec)),
-    )
+        insert(_job).values(
+            id=name, kind=kind, state=state, scene_name="two-dof", scene_hash="abc", spec_hash="",
+            request_hash="", attempt=1, max_attempts=3, progress=1.0, created=BEGIN, finished=finished,
+            request={}, spec=spec,
+        )
+    )  # fmt: skip
     if body is not None:
-        connection.execute("INSERT INTO job_result (job_id, body) VALUES (?, ?)", (name, json.dumps(body)))
-    connection.commit()
-    connection.close()
+        connection.execute(insert(_result).values(job_id=name, body=body))
 
 
-def test_the_designs_of_an_old_file_are_filled_in_and_can_be_taken_back(tmp_path: Path) -> None:
-    url = f"sqlite:///{tmp_path}/jobs.db"
-    path = url.removeprefix("sqlite:///")
+def test_the_designs_of_an_old_database_are_filled_in_and_can_be_taken_back(url: str) -> None:
     revisions.upgrade(url, "0001")
     spec = {"variables": {"damper.N0": [20.0, 1000.0]}, "limit": None, "max_band_hz": None, "harmonics": 7}
-    end = "2026-01-02 03:04:06.500000"
-    old_job(path, "a", "design", spec, OLD, end)
-    old_job(path, "b", "design", {**spec, "max_band_hz": 0.1}, {**OLD, "reached": False}, end)
-    old_job(path, "c", "design", spec, {**OLD, "optimum": {}, "peak": None, "reached": False}, end)
-    old_job(path, "d", "design", spec, None, end)
-    old_job(path, "e", "sweep", {}, {"points": 3}, end)
     new = {**OLD, "method": "ipopt", "objective": 3.5, "work": 14.0, "conditions": {"violation": 0.0}}
-    old_job(path, "f", "design", {**spec, "max_band_hz": 0.1}, new, end)
-    for number in range(450):
-        old_job(path, f"g{number:03d}", "design", spec, OLD, None)
+    with migrating(url) as connection:
+        old_job(connection, "a", "design", spec, OLD)
+        old_job(connection, "b", "design", {**spec, "max_band_hz": 0.1}, {**OLD, "reached": False})
+        old_job(connection, "c", "design", spec, {**OLD, "optimum": {}, "peak": None, "reached": False})
+        old_job(connection, "d", "design", spec, None)
+        old_job(connection, "e", "sweep", {}, {"points": 3})
+        old_job(connection, "f", "design", {**spec, "max_band_hz": 0.1}, new)
+        for number in range(450):
+            old_job(connection, f"g{number:03d}", "design", spec, OLD, None)
     assert revisions.upgrade(url) == revisions.head_revision()
     database = Database(url)
     repository = DesignRepository(database)
@@ -315,25 +313,18 @@ def test_the_designs_of_an_old_file_are_filled_in_and_can_be_taken_back(tmp_path
     assert (rows["c"].peak, variables["c"][0].value) == (None, None)
     assert (rows["f"].method, rows["f"].objective, rows["f"].work) == ("ipopt", 3.5, 14.0)
 
-    engine = migration_engine(url)
     config = revisions._config()
-    with engine.begin() as connection:
+    with migrating(url) as connection:
         config.attributes["connection"] = connection
         command.downgrade(config, "0001")
-    engine.dispose()
-    connection = sqlite3.connect(path)
-    tables = {row[0] for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-    assert not tables & {"design", "design_variable"}
-    assert connection.execute("SELECT count(*) FROM job_result").fetchone() == (455,)
-    connection.close()
+    with migrating(url) as connection:
+        assert not set(inspect(connection).get_table_names()) & {"design", "design_variable"}
+        assert connection.execute(select(func.count()).select_from(_result)).scalar_one() == 455
     assert revisions.upgrade(url) == revisions.head_revision()
 
 
 @pytest.mark.long
-def test_twenty_thousand_designs_are_listed_within_50_ms(tmp_path: Path) -> None:
-    url = f"sqlite:///{tmp_path}/jobs.db"
-    revisions.upgrade(url)
-    database = Database(url)
+def test_twenty_thousand_designs_are_listed_within_50_ms(database: Database) -> None:
     generator = random.Random(1)
     fill(database, [random_design(generator) for _ in range(20_000)])
     repository, settings = DesignRepository(database), load_settings()
@@ -347,4 +338,3 @@ def test_twenty_thousand_designs_are_listed_within_50_ms(tmp_path: Path) -> None
             design_page(repository, DesignQuery(**query), settings)
             times.append(time.perf_counter() - begin)
         assert min(times) < 0.05, query
-    database.close()

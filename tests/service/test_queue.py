@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from private_kinds import PRIVATE, cannot_warm_up
-from service_helpers import MakeSettings, pids, until
+from service_helpers import MakeSettings, pids, settings_of, until
 from sqlalchemy import update
 
 from service.core import Service
@@ -18,6 +18,12 @@ from service.errors import ConflictError, JobFailedError, QueueFullError
 from service.health import check
 from service.jobs import Registry
 from service.models import Job, JobState
+
+
+@pytest.fixture
+def make_settings(url: str) -> MakeSettings:
+    """Makes the settings of a service on either database."""
+    return settings_of(url)
 
 
 def gone(pid: int) -> bool:

@@ -6,6 +6,7 @@ import socket
 
 import pytest
 
+from service.db import database_name
 from service.errors import ConfigurationError
 from service.server import _bind
 from service.settings import Settings, is_loopback, load_settings
@@ -39,7 +40,10 @@ def test_every_setting_is_described() -> None:
         ({"host": "0.0.0.0"}, "can be reached from other machines and the service has no keys yet"),
         ({"host": "::"}, "STICKSLIP_ALLOW_REMOTE=true"),
         ({"host": "example.org"}, "use 127.0.0.1"),
-        ({"database": "postgresql://localhost/x"}, "must be an SQLite URL in this version"),
+        ({"database": "mysql://localhost/x"}, "must be an SQLite or PostgreSQL URL"),
+        ({"database": "postgresql+psycopg2://localhost/x"}, "with the driver psycopg, postgresql+psycopg://"),
+        ({"database": "postgresql://localhost"}, "must name a database"),
+        ({"database": "postgresql+asyncpg://u:hidden@localhost/x"}, "got 'postgresql+asyncpg://u:***@"),
         ({"database": "sqlite://"}, "must name a file"),
         ({"database": "sqlite:///:memory:"}, "must name a file"),
         ({"database": "sqlite:///x.db?mode=ro"}, "without a driver or options"),
@@ -53,6 +57,15 @@ def test_bad_settings_are_refused_with_a_sentence(values: dict[str, object], wor
     with pytest.raises(ConfigurationError) as refused:
         load_settings(**values)
     assert words in str(refused.value)
+    assert "hidden" not in str(refused.value)
+
+
+@pytest.mark.parametrize("scheme", ["postgres", "postgresql", "postgresql+psycopg"])
+def test_postgresql_is_reached_by_one_driver(scheme: str) -> None:
+    url = f"{scheme}://me:a%40b@db.example:5433/jobs?sslmode=require"
+    wanted = "postgresql+psycopg://me:a%40b@db.example:5433/jobs?sslmode=require"
+    assert load_settings(database=url).database == wanted
+    assert database_name(wanted) == "postgresql+psycopg://me:***@db.example:5433/jobs?sslmode=require"
 
 
 def test_loopback() -> None:

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import random
 import time
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from service import revisions
 from service.answers import SweepDetail
 from service.arrays import encode
 from service.db import Database
@@ -69,19 +66,15 @@ def random_sweep(generator: random.Random) -> SweepRecord:
 
 
 @pytest.fixture(scope="module")
-def filled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Database, list[SweepRecord]]]:
+def filled(module_database: Database) -> tuple[Database, list[SweepRecord]]:
     """A database with enough sweeps that some conditions lead a query and others do not."""
-    url = f"sqlite:///{tmp_path_factory.mktemp('sweeps')}/jobs.db"
-    revisions.upgrade(url)
-    database = Database(url)
     generator = random.Random(5)
     records = [random_sweep(generator) for _ in range(3000)]
     new = NewJob(kind="sweep", request={}, spec={}, spec_hash="", request_hash="", max_attempts=1, fresh=True)
-    job, _ = JobRepository(database).submit(new, queue_limit=10)
-    with database.writing() as connection:
+    job, _ = JobRepository(module_database).submit(new, queue_limit=10)
+    with module_database.writing() as connection:
         insert_sweeps(connection, job.id, records, utc_now())
-    yield database, records
-    database.close()
+    return module_database, records
 
 
 def within(value: float | None, query: dict[str, Any], name: str) -> bool:
@@ -153,10 +146,7 @@ def test_filters_sorts_and_pages(filled: tuple[Database, list[SweepRecord]], que
     assert found == sorted(wanted, key=key, reverse=down)
 
 
-def test_a_range_is_met_by_one_contact_alone(tmp_path: Path) -> None:
-    url = f"sqlite:///{tmp_path}/jobs.db"
-    revisions.upgrade(url)
-    database = Database(url)
+def test_a_range_is_met_by_one_contact_alone(database: Database) -> None:
     jobs, repository = JobRepository(database), SweepRepository(database)
     new = NewJob(kind="sweep", request={}, spec={}, spec_hash="", request_hash="", max_attempts=1, fresh=True)
     jobs.submit(new, queue_limit=10)
@@ -178,7 +168,6 @@ def test_a_range_is_met_by_one_contact_alone(tmp_path: Path) -> None:
     assert found() == 2
     [whole] = [row for row in repository.page(SweepQuery().to_filter(), 10) if repository.arrays(row.id)]
     assert SweepDetail.load(whole.id, repository).arrays == {"mean": [1.0, None]}
-    database.close()
 
 
 @pytest.mark.parametrize(
@@ -195,10 +184,7 @@ def test_an_unknown_filter_is_refused() -> None:
 
 
 @pytest.mark.long
-def test_a_hundred_thousand_sweeps_are_listed_within_50_ms(tmp_path: Path) -> None:
-    url = f"sqlite:///{tmp_path}/jobs.db"
-    revisions.upgrade(url)
-    database = Database(url)
+def test_a_hundred_thousand_sweeps_are_listed_within_50_ms(database: Database) -> None:
     new = NewJob(kind="sweep", request={}, spec={}, spec_hash="", request_hash="", max_attempts=1, fresh=True)
     job, _ = JobRepository(database).submit(new, queue_limit=10)
     generator = random.Random(1)
@@ -223,4 +209,3 @@ def test_a_hundred_thousand_sweeps_are_listed_within_50_ms(tmp_path: Path) -> No
             sweep_page(repository, SweepQuery(**query), settings)
             times.append(time.perf_counter() - begin)
         assert min(times) < 0.05, query
-    database.close()
