@@ -26,12 +26,15 @@ class Case:
         By which its peaks count in what is minimised.
     order : int
         How many times a revolution the excitation repeats; turns speeds into frequencies.
+    beside : str or None
+        An earlier case that differs in the observed DOF alone, so that one response serves both.
     """
 
     name: str
     scene: Scene
     weight: float
     order: int
+    beside: str | None = None
 
 
 def with_engine_order(scene: Scene, engine_order: int) -> Scene:
@@ -98,12 +101,15 @@ def _read(scene: Scene, where: str, index: int, table: object) -> list[Case]:
     dofs = [observed] if isinstance(observed, str) else observed
     if not isinstance(dofs, Sequence) or not dofs or not all(isinstance(dof, str) for dof in dofs):
         raise DesignError(f"{where}.observe", observed, "must be the name of a DOF, or a list of them")
+    names = [name if len(dofs) == 1 else f"{name}, {dof}" for dof in dofs]
+    # A DOF of another sector may call for the whole annulus: it gets a response of its own.
+    first = next((i for i, dof in enumerate(dofs) if "@" not in dof), None)
     return [
         Case(
-            name=name if len(dofs) == 1 else f"{name}, {dof}", scene=_observing(here, dof, band),
-            weight=weight, order=order,
+            name=names[i], scene=_observing(here, dof, band), weight=weight, order=order,
+            beside=names[first] if first is not None and i > first and "@" not in dof else None,
         )
-        for dof in dofs
+        for i, dof in enumerate(dofs)
     ]  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from optim.variables import Real, by_variables, by_variables_twice, parameter_va
 from optim.watch import ShouldStop
 from solver.branch import Branch, Peak
 from solver.continuation import sweep
+from solver.observations import observing
 from solver.peaks import HALF_POWER
 from solver.savings import Effects, even_harmonics_reason
 from solver.scene import FrictionContact, Scene
@@ -44,7 +45,8 @@ def evaluate(
     responses: list[Response] = []
     rows: list[Row] = []
     for case in problem.cases:
-        found = _case(problem, case, values, gradients, should_stop)
+        known = [response.branch for response in responses if response.case == case.beside]
+        found = _case(problem, case, values, known, gradients, should_stop)
         responses += found[0]
         rows += found[1]
         if not all(response.branch.completed for response in found[0]):
@@ -53,22 +55,26 @@ def evaluate(
 
 
 def _case(
-    problem: Problem, case: Case, values: Mapping[str, float], gradients: bool, should_stop: ShouldStop
-) -> tuple[list[Response], list[Row]]:
-    """Compute the responses and rows of one case."""
+    problem: Problem, case: Case, values: Mapping[str, float], known: Sequence[Branch], gradients: bool,
+    should_stop: ShouldStop,
+) -> tuple[list[Response], list[Row]]:  # fmt: skip
+    """Compute the responses and rows of one case; `known` are those of a case with another DOF alone."""
     here = case.scene.with_values(parameter_values(problem.variables, values))
     effects = effects_of(problem, here)
     judge = Judge(problem=problem, case=case, gradients=gradients)
-    branch = sweep(
-        here, harmonics=problem.harmonics, limit=problem.limit, effects=effects, should_stop=should_stop
-    )
-    responses, rows = [Response(case=case.name, branch=branch)], judge.response(branch)
-    for low, high in problem.limits.forbidden_hz.get(case.name, ()):
-        branch = sweep(
-            here, start=low, stop=high, harmonics=problem.harmonics, effects=effects, should_stop=should_stop
-        )
+    ranges = ((None, None), *problem.limits.forbidden_hz.get(case.name, ()))
+    responses: list[Response] = []
+    rows: list[Row] = []
+    for i, (low, high) in enumerate(ranges):
+        if known:
+            branch = observing(known[i], here.observe.dof, limit=problem.limit, effects=effects)
+        else:
+            branch = sweep(
+                here, start=low, stop=high, harmonics=problem.harmonics, limit=problem.limit, effects=effects,
+                should_stop=should_stop,
+            )  # fmt: skip
         responses.append(Response(case=case.name, branch=branch))
-        rows += judge.forbidden(branch, low, high)
+        rows += judge.response(branch) if low is None or high is None else judge.forbidden(branch, low, high)
     return responses, rows
 
 

@@ -52,7 +52,17 @@ def test_several_observed_dofs_are_cases_of_their_own() -> None:
     middle = solver.Scene.from_dict(raw).with_values({"shroud.N0": 200.0})
     peaks = {row.case: row.value for row in reversed(found.peaks)}
     assert peaks["bladed-disk, tip"] == highest(scene.with_values({"shroud.N0": 200.0}))
-    assert peaks["bladed-disk, middle"] == highest(middle)
+    assert peaks["bladed-disk, middle"] == pytest.approx(highest(middle), rel=1e-10)
+    ranged = pose(
+        scene,
+        variables=DISK,
+        cases=[{"observe": ["tip", "middle"]}],
+        limit=1e-4,
+        forbidden_hz=[[700.0, 720.0]],
+    )
+    rows = evaluate(ranged, {"shroud.N0": 200.0}).of(Quantity.FORBIDDEN)
+    inside = {row.case: row.value for row in reversed(rows)}
+    assert inside["bladed-disk, middle"] == pytest.approx(highest(middle, start=700.0, stop=720.0), rel=1e-10)
 
 
 def test_contacts_that_share_a_value_have_one_variable() -> None:
@@ -101,7 +111,7 @@ def test_a_contact_that_never_separates() -> None:
     kept = optim.design(scene, variables=TWO, contact_states={"damper": "never-separates"})
     assert kept.reached
     assert kept.optimum["damper.N0"] >= 120.0 * (1.0 - 1e-6)
-    assert kept.peak.value >= free.peak.value  # type: ignore[union-attr]
+    assert kept.peak.value >= free.peak.value * (1.0 - 1e-12)  # type: ignore[union-attr]
 
 
 def test_the_band_can_be_minimised_with_a_limit_on_the_peak() -> None:
