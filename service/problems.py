@@ -11,6 +11,7 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from sqlalchemy.exc import DataError, OperationalError
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -22,6 +23,7 @@ from solver.errors import Issue
 log = logging.getLogger("stickslip.http")
 
 MEDIA_TYPE = "application/problem+json"
+_RETRY_SECONDS = 5
 
 _STATUS: dict[type[errors.ServiceError], tuple[int, str, str]] = {
     errors.InvalidRequestError: (422, "invalid-request", "The request is not valid"),
@@ -68,6 +70,8 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(errors.ServiceError, _service_error)
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(DataError, _unstorable)
+    app.add_exception_handler(OperationalError, _database_away)
     app.add_middleware(_Boundary)
 
 
@@ -100,6 +104,22 @@ async def _service_error(request: Request, error: Exception) -> JSONResponse:
     if not isinstance(error, errors.ServiceError):
         return _unexpected(request, error)
     return service_problem(request, error)
+
+
+async def _unstorable(request: Request, error: Exception) -> JSONResponse:
+    """A value that no row can hold, such as a text with a zero character in PostgreSQL."""
+    log.warning("%s %s holds what the database refuses: %s", request.method, request.url.path, error)
+    status, slug, title = _STATUS[errors.InvalidRequestError]
+    detail = "the request holds a character or a number that cannot be stored or looked for"
+    return problem(request, status, slug, title, detail)
+
+
+async def _database_away(request: Request, error: Exception) -> JSONResponse:
+    """The database does not answer, is full or locked: nothing was written."""
+    log.error("%s %s: the database failed: %s", request.method, request.url.path, error)
+    detail = "the database does not answer at present; nothing was written, try again later"
+    headers = {"Retry-After": str(_RETRY_SECONDS)}
+    return problem(request, 503, "database-away", "The database does not answer", detail, headers=headers)
 
 
 async def _validation_error(request: Request, error: Exception) -> JSONResponse:

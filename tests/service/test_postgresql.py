@@ -1,0 +1,236 @@
+"""Several dispatchers and several services on one PostgreSQL database."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from postgresql_cluster import Cluster
+from private_kinds import PRIVATE
+from service_helpers import pids, settings_of, until
+from sqlalchemy import select, text
+
+from service import postgresql, revisions
+from service.cli import main
+from service.client import Client
+from service.core import Service
+from service.db import Database
+from service.errors import DatabaseError, DatabaseInUseError, ServiceProblem
+from service.health import check
+from service.jobs import JobOutput
+from service.models import Job, JobState
+from service.repository import JobRepository, NewJob
+from service.repository.jobs import utc_now
+
+SCRIPT = Path(__file__).with_name("serve_private.py")
+NEW = NewJob(kind="iteration", request={}, spec={}, spec_hash="", request_hash="", max_attempts=3, fresh=True)
+
+
+@pytest.fixture
+def empty(cluster: Cluster) -> Iterator[str]:
+    """A PostgreSQL database without tables."""
+    with cluster.database() as url:
+        yield url
+
+
+@pytest.fixture
+def url(cluster: Cluster) -> Iterator[str]:
+    """A PostgreSQL database with its tables."""
+    with cluster.database(empty=False) as url:
+        yield url
+
+
+def test_two_dispatchers_take_each_job_once(url: str) -> None:
+    databases = [Database(url) for _ in range(2)]
+    for _ in range(120):
+        JobRepository(databases[0]).submit(NEW, queue_limit=1000)
+
+    def work(number: int) -> list[str]:
+        jobs, owner, done = JobRepository(databases[number % 2]), f"dispatcher {number}", []
+        while (attempt := jobs.claim(owner, utc_now())) is not None:
+            assert jobs.succeed(attempt, JobOutput(result={"by": owner}))
+            done.append(attempt.job_id)
+        return done
+
+    with ThreadPoolExecutor(4) as threads:
+        done = [job for found in threads.map(work, range(4)) for job in found]
+    assert len(done) == len(set(done)) == 120
+    counts = JobRepository(databases[0]).count()
+    assert counts[JobState.SUCCESSFUL] == 120
+    for database in databases:
+        database.close()
+
+
+def test_a_dispatcher_passes_by_what_another_one_is_taking(url: str) -> None:
+    database = Database(url)
+    jobs = JobRepository(database)
+    first, second = (jobs.submit(NEW, queue_limit=10)[0].id for _ in range(2))
+    with database.writing() as taking:
+        taking.execute(select(Job.id).where(Job.id == first).with_for_update())
+        attempt = jobs.claim("me", utc_now())
+        assert attempt is not None
+        assert attempt.job_id == second
+        assert jobs.claim("me", utc_now()) is None
+        assert jobs.recover_expired().accepted == 1, "a lock on one job holds up no other"
+    claimed = jobs.claim("me", utc_now())
+    assert claimed is not None
+    assert claimed.job_id == first
+    database.close()
+
+
+def test_of_services_that_start_on_an_empty_database_one_makes_the_tables(empty: str) -> None:
+    with ThreadPoolExecutor(4) as threads:
+        list(threads.map(revisions.prepare, [empty] * 4))
+    assert revisions.current_revision(empty) == revisions.head_revision()
+
+
+def test_tables_do_not_change_under_a_service(url: str, capsys: pytest.CaptureFixture[str]) -> None:
+    database = Database(url)
+    database.version()
+    with pytest.raises(DatabaseInUseError, match=r":\*\*\*@.* is in use by running stickslip services"):
+        revisions.upgrade(url)
+    database.close()
+    assert main(["db", "upgrade", "--database", url]) == 0
+    printed = capsys.readouterr().out
+    assert f"is at revision {revisions.head_revision()}" in printed
+    assert ":***@" in printed, "no password is printed"
+
+
+def test_a_database_can_be_checked_in_use(url: str, capsys: pytest.CaptureFixture[str]) -> None:
+    database = Database(url)
+    jobs = JobRepository(database)
+    jobs.submit(NEW, queue_limit=10)
+    assert main(["db", "check", "--database", url]) == 0
+    attempt = jobs.claim("me", utc_now())
+    assert attempt is not None
+    assert jobs.succeed(attempt, JobOutput(result={}))
+    with database.writing() as connection:
+        connection.execute(text("DELETE FROM job_result"))
+    assert main(["db", "check", "--database", url]) == 1
+    assert "1 successful jobs without a result" in capsys.readouterr().out
+    database.close()
+
+
+def test_an_old_server_is_refused(empty: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(postgresql, "OLDEST", 99)
+    with pytest.raises(DatabaseError, match=r"needs PostgreSQL 99 or newer, the server is \d+"):
+        revisions.prepare(empty)
+
+
+def test_a_server_that_cannot_be_reached_is_told_without_the_password() -> None:
+    url = "postgresql+psycopg://me:hidden@127.0.0.1:9/jobs"
+    with pytest.raises(DatabaseError, match=r"cannot be used: .*refused") as told:
+        Service(settings_of(url)(), PRIVATE).open()
+    assert "hidden" not in str(told.value)
+
+
+def test_without_the_driver_the_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "psycopg", None)
+    with pytest.raises(DatabaseError, match=r"install stickslip\[postgresql\]"):
+        Database("postgresql+psycopg://localhost/jobs")
+
+
+def test_a_server_that_restarts_is_found_again(cluster: Cluster, url: str) -> None:
+    database = Database(url)
+    jobs = JobRepository(database)
+    job, _ = jobs.submit(NEW, queue_limit=10)
+    attempt = jobs.claim("me", utc_now())
+    assert attempt is not None
+    cluster.stop()
+    cluster.start()
+    assert jobs.succeed(attempt, JobOutput(result={"after": "the restart"}))
+    assert jobs.result(job.id) == {"after": "the restart"}
+    with pytest.raises(DatabaseInUseError):
+        revisions.upgrade(url)
+    database.close()
+
+
+def test_two_services_in_one_process_share_the_jobs(url: str) -> None:
+    with ExitStack() as stack:
+        services = [Service(settings_of(url)(poll_seconds=0.2), PRIVATE) for _ in range(2)]
+        for service in services:
+            service.start()
+            stack.callback(service.stop)
+        one, other = services
+        until(lambda: all(service.queue.status().ready for service in services))
+        assert (check(one).database, check(one).ready) == ("postgresql", True)
+        bodies = [{"kind": "iteration", "seconds": 0.4, "seed": seed} for seed in range(6)]
+        jobs = [one.submit(body)[0].id for body in bodies]
+        until(lambda: all(service.queue.status().busy for service in services))
+        done = [other.wait(job, 30.0) for job in jobs]
+        assert [(row.state, row.attempt) for row in done] == [(JobState.SUCCESSFUL, 1)] * 6
+        long = one.submit({"kind": "iteration", "seconds": 60.0})[0].id
+        until(lambda: one.job(long).state is JobState.RUNNING)
+        away = next(service for service in services if service.queue.live_progress(long) is None)
+        away.dismiss(long)
+        assert away.wait(long, 10.0).state is JobState.DISMISSED, "wherever it runs"
+
+
+Start = Callable[[], "tuple[subprocess.Popen[bytes], Client]"]
+
+
+@pytest.fixture
+def start(url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
+    """Starts services as processes; what they log is shown if the test fails."""
+    monkeypatch.setenv("STICKSLIP_LEASE_SECONDS", "1")
+    monkeypatch.setenv("STICKSLIP_POLL_SECONDS", "0.2")
+    log = tmp_path / "log"
+    with ExitStack() as stack:
+
+        def begin() -> tuple[subprocess.Popen[bytes], Client]:
+            with socket.socket() as probe:
+                probe.bind(("127.0.0.1", 0))
+                port = int(probe.getsockname()[1])
+            with log.open("ab") as stderr:
+                process = subprocess.Popen([sys.executable, str(SCRIPT), url, str(port)], stderr=stderr)
+            stack.callback(process.wait)
+            stack.callback(process.kill)
+            return process, stack.enter_context(Client(f"http://127.0.0.1:{port}"))
+
+        yield begin
+    sys.stderr.write(log.read_text())
+
+
+def answers(client: Client) -> bool:
+    try:
+        list(client.sweeps(limit=1))
+    except ServiceProblem:
+        return False
+    return True
+
+
+def test_the_jobs_of_a_killed_service_are_done_by_another(tmp_path: Path, start: Start) -> None:
+    file = tmp_path / "pids"
+    running = [start() for _ in range(2)]
+    for _, client in running:
+        until(lambda client=client: answers(client))
+    (killed, first), (process, second) = running
+    specs = [{"kind": "iteration", "seconds": 0.8, "seed": n, "pid_file": str(file)} for n in range(8)]
+    jobs = [first.submit(spec).id for spec in specs]
+    until(lambda: len(pids(file)) >= 4)
+    os.kill(killed.pid, signal.SIGKILL)
+    done = [second.wait(job, timeout=30.0) for job in jobs]
+    assert [job.status for job in done] == [JobState.SUCCESSFUL] * 8
+    assert max(job.attempt for job in done) == 2
+    assert sum(job.attempt for job in done) == len(pids(file)), "each attempt is counted, none is made twice"
+    process.terminate()
+    assert process.wait(10.0) == 0
+
+
+def test_names_that_cannot_be_stored_are_refused(start: Start) -> None:
+    _, client = start()
+    until(lambda: answers(client))
+    with pytest.raises(ServiceProblem) as refused:
+        client.job("a\0b")
+    assert refused.value.status == 422
+    with pytest.raises(ServiceProblem) as refused:
+        list(client.sweeps(scene="a\0b"))
+    assert refused.value.status == 422
