@@ -13,7 +13,8 @@ from service.core import SOLVER_VERSION, Service
 from service.http import HostCheck
 from service.jobs import Registry
 from service.kinds import SHIPPED
-from service.routes import designs, health, jobs, plan, scenes, sweeps
+from service.metrics import Measured, Metrics
+from service.routes import designs, health, jobs, metrics, plan, scenes, sweeps
 from service.settings import Settings, load_settings
 
 _DESCRIPTION = "Designs friction dampers: jobs, their results, and every frequency response computed."
@@ -49,9 +50,11 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
         telemetry={"tracing": False, "metrics": False, "logs": False, "auto_configure": False},
     )
     app.state.service = service
+    app.state.metrics = Metrics(service)
     app.add_middleware(HostCheck, hosts=service.settings.hosts)
+    app.add_middleware(Measured, metrics=app.state.metrics)
     problems.install(app)
-    for module in (jobs, designs, sweeps, scenes, plan, health):
+    for module in (jobs, designs, sweeps, scenes, plan, health, metrics):
         app.include_router(module.router)
     openapi.install(app, registry)
     return app

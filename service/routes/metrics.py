@@ -1,0 +1,16 @@
+"""``/metrics`` for a monitor."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request, Response
+
+from service.metrics import CONTENT_TYPE, Metrics
+
+router = APIRouter(tags=["health"])
+
+
+@router.get("/metrics", response_class=Response, responses={200: {"content": {"text/plain": {}}}})
+def metrics(request: Request) -> Response:
+    """Requests, jobs and workers in Prometheus' text format."""
+    held: Metrics = request.app.state.metrics
+    return Response(held.text(), media_type=CONTENT_TYPE)
