@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from solver.least import least_peak
     from solver.maps import MapStatus, ResponseMap, response_map
     from solver.marching import march
+    from solver.mistuned_disks import MistunedDisk, MistuningStatus, MistuningStudy, mistuning_study
     from solver.mistuning import BladeAmplitudes, BladePeaks, blade_amplitudes, blade_peaks, mistuned
     from solver.peak_tracks import Basin, LeastPeak, PeakTrack, TrackStatus
     from solver.response import Solution, SolutionStatus, solve
@@ -46,7 +47,9 @@ _HOME = {
     "Scene": "scene", "load_scene": "scene", "shipped_scenes": "scene",
     "Solution": "response", "SolutionStatus": "response", "solve": "response",
     "Growth": "floquet", "Stability": "floquet", "branch_stability": "floquet", "stability": "floquet",
-    "BladePeaks": "mistuning", "blade_peaks": "mistuning",
+    "BladePeaks": "mistuning", "blade_peaks": "mistuning", "MistunedDisk": "mistuned_disks",
+    "MistuningStatus": "mistuned_disks", "MistuningStudy": "mistuned_disks",
+    "mistuning_study": "mistuned_disks",
     "BladeAmplitudes": "mistuning", "blade_amplitudes": "mistuning", "mistuned": "mistuning",
     "Extent": "sectors", "sectors_needed": "sectors", "annulus": "sectors",
     "Gradient": "sensitivity", "Sensitivities": "sensitivity", "AmplitudeHessian": "curvature",
@@ -85,6 +88,9 @@ __all__ = [
     "MapStatus",
     "Measure",
     "Measured",
+    "MistunedDisk",
+    "MistuningStatus",
+    "MistuningStudy",
     "Peak",
     "PeakGradient",
     "PeakHessian",
@@ -118,6 +124,7 @@ __all__ = [
     "load_scene",
     "march",
     "mistuned",
+    "mistuning_study",
     "motion",
     "peak_gradient",
     "plan",

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from solver import fourier
-from solver.branch import BranchStatus
+from solver.branch import Branch, BranchStatus
 from solver.continuation import ContinuationSettings, sweep
 from solver.errors import SettingError
 from solver.fourier import Real
@@ -67,12 +67,15 @@ class BladePeaks:
         Where [Hz].
     status : tuple of BranchStatus
         How each sector's branch ended.
+    branches : tuple of Branch
+        The response of each blade; the same one where all are alike.
     """
 
     dof: str
     value: Real
     at_hz: Real
     status: tuple[BranchStatus, ...]
+    branches: tuple[Branch, ...]
 
     @property
     def largest(self) -> float:
@@ -97,6 +100,8 @@ def blade_peaks(
     dof: str | None = None,
     harmonics: int = 11,
     settings: ContinuationSettings | None = None,
+    on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
 ) -> BladePeaks:
     """Return the highest peak of every blade: a sweep of the frequency for each, or one where all are alike.
 
@@ -107,6 +112,8 @@ def blade_peaks(
     dof : name of the DOF in one sector; the observed one if left out.
     harmonics : highest harmonic kept.
     settings : of the continuation.
+    on_progress : called with (share done, sweeps so far).
+    should_stop : asked after every step of a sweep.
 
     Raises
     ------
@@ -120,16 +127,27 @@ def blade_peaks(
         names, repeats = [name], structure.sectors
         if sectors_needed(_observing(scene, name)).sectors > 1:
             names, repeats = [f"{name}@{j}" for j in range(structure.sectors)], 1
-    branches = [
-        sweep(_observing(scene, each), start=start, stop=stop, harmonics=harmonics, settings=settings)
-        for each in names
-    ] * repeats
+    branches: list[Branch] = []
+    for done, each in enumerate(names):
+
+        def progress(share: float, _points: int, before: int = done) -> None:
+            if on_progress is not None:
+                on_progress((before + share) / len(names), before)
+
+        branches.append(
+            sweep(
+                _observing(scene, each), start=start, stop=stop, harmonics=harmonics, settings=settings,
+                on_progress=progress, should_stop=should_stop,
+            )
+        )  # fmt: skip
+    branches *= repeats
     known = [branch.peak if branch.completed else None for branch in branches]
     return BladePeaks(
         dof=name,
         value=np.array([math.nan if peak is None else peak.value for peak in known]),
         at_hz=np.array([math.nan if peak is None else peak.at for peak in known]),
         status=tuple(branch.status for branch in branches),
+        branches=tuple(branches),
     )
 
 
@@ -165,13 +183,29 @@ def mistuned(
     SceneError
         A part that does not exist, factors that are not one for each sector or not above 0.
     """
-    if not isinstance(scene.structure, CyclicStructure):
-        raise SettingError("scene", scene.name, "must have a cyclic structure to be mistuned")
     table: dict[str, object] = {"of": [of] if isinstance(of, str) else list(of)}
     table |= {"spread": spread, "seed": seed} if values is None else {"values": list(values)}
+    return annulus(with_mistuning(scene, table))
+
+
+def with_mistuning(scene: Scene, table: Mapping[str, object]) -> Scene:
+    """Return a cyclic scene with another ``[structure.mistuning]``, one sector still.
+
+    Raises
+    ------
+    SettingError
+        The scene is not cyclic.
+    SceneError
+        A part that does not exist, or values that do not fit.
+    """
+    if not isinstance(scene.structure, CyclicStructure):
+        raise SettingError("scene", scene.name, "must have a cyclic structure to be mistuned")
     raw = scene.to_dict()
-    raw["structure"] = {**scene.structure.model_dump(mode="json", exclude_none=True), "mistuning": table}
-    return annulus(Scene.from_dict(raw))
+    raw["structure"] = {
+        **scene.structure.model_dump(mode="json", exclude_none=True),
+        "mistuning": dict(table),
+    }
+    return Scene.from_dict(raw)
 
 
 def blade_amplitudes(solution: Solution, dof: str | None = None) -> BladeAmplitudes:

@@ -134,6 +134,21 @@ def test_a_study_of_accuracy_is_submitted_and_drawn(run: Run, tmp_path: Path) ->
     assert (tmp_path / "cost.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_study_of_mistuned_disks_is_submitted_and_drawn(run: Run, tmp_path: Path) -> None:
+    disk = solver.load_scene("bladed-disk").to_dict()
+    disk["structure"] = {**disk["structure"], "sectors": 3}  # type: ignore[dict-item]
+    (tmp_path / "disk.json").write_text(json.dumps(disk))
+    words = "mistuning disk.json --of tip_middle --samples 3 --from 700 --to 850 --harmonics 1"
+    status, out, err = run(f"submit {words} --wait")
+    assert (status, err) == (0, "")
+    here = run(words)[1]
+    assert _without_time(out)[: len(_without_time(here))] == _without_time(here)
+    assert "seed " in here
+    job = json.loads(run(f"submit {words} --json")[1])["id"]
+    assert run(f"results {job} --plot worst.png")[0] == 0
+    assert (tmp_path / "worst.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_submitted_jobs_can_be_read_by_programs(run: Run) -> None:
     status, out, _ = run("submit solve two-dof --frequency 1.25 --json")
     job = json.loads(out)
@@ -153,6 +168,7 @@ def test_submitted_jobs_can_be_read_by_programs(run: Run) -> None:
         ("submit solve two-dof --frequency 1 --set damper.mu=-1", ["damper.mu", "-1"]),
         ("submit peaks two-dof --parameter damper.N9 --from 1 --to 2", ["/parameter", "N9"]),
         ("submit campbell two-dof --speeds 100 60", ["/speeds_rpm/0", "60"]),
+        ("submit mistuning two-dof --of tip", ["/scene", "cyclic"]),
         ("submit map two-dof --parameter damper.N0 --from 1 --to 2 --steps 1", ["/steps", "1"]),
         ("watch nobody", ["nobody"]),
         ("results nobody", ["nobody"]),

@@ -13,6 +13,7 @@ from service.cli import (
     database_commands,
     design_commands,
     import_command,
+    mistuning_command,
     sensitivity_command,
     service_commands,
     solver_commands,
@@ -43,7 +44,7 @@ _ALONE: tuple[Callable[..., None], ...] = (
 _SUBMITTED: tuple[Callable[..., None], ...] = (
     submit_commands.design, submit_commands.pareto, submit_commands.sweep, submit_commands.solve,
     submit_commands.march, submit_studies.peaks, submit_studies.accuracy,
-    submit_studies.campbell,
+    submit_studies.campbell, submit_studies.mistuning,
 )  # fmt: skip
 
 for _command in _ALONE:
@@ -51,6 +52,7 @@ for _command in _ALONE:
 app.command(name="peaks")(track_commands.peaks)
 app.command(name="map")(track_commands.response_map)
 app.command()(campbell_command.campbell)
+app.command()(mistuning_command.mistuning)
 for _command in _SUBMITTED:
     _submit.command()(_command)
 _submit.command(name="map")(submit_studies.response_map)

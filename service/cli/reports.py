@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from service import units
-from service.cli import campbell_reports, design_reports, robust_reports, track_reports
+from service.cli import campbell_reports, design_reports, mistuning_command, robust_reports, track_reports
 from service.cli.output import print_pairs, print_table, say
 
 if TYPE_CHECKING:
@@ -144,6 +144,7 @@ BY_KIND: Mapping[str, Callable[[Json], None]] = {
     "peaks": track_reports.track,
     "accuracy": accuracy,
     "campbell": campbell_reports.diagram,
+    "mistuning": mistuning_command.report,
 }
 
 

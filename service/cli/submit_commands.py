@@ -265,6 +265,8 @@ def _draw(client: Client, kind: str, answer: ResultsAnswer, picture: Path) -> No
         return
     # Of a robust design, the sweeps are those of the search without uncertainty.
     peak = answer.result.get("peak") or (answer.result.get("nominal") or {}).get("peak")
+    if kind == "mistuning" and answer.result["worst"]:
+        peak = {"value": answer.result["worst"]["largest"]}
     if not answer.sweeps or peak is None:
         raise InputError(f"`--plot`: job {answer.job} stored no sweep to draw")
     best = min(answer.sweeps, key=lambda s: abs(s.peak.value - peak["value"]) if s.peak else float("inf"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from service.cli import options
 from service.cli.campbell_command import BandHz, Limit, Orders, Speeds
+from service.cli.mistuning_command import Dof, Parts, Samples, Seed, Spread
 from service.cli.submit_commands import body_of, hand_in
 from service.cli.track_commands import Checks, Followed, Frequencies, NoRidge, Start, Steps, Stop
 
@@ -74,3 +75,26 @@ def campbell(
     """Submit a Campbell diagram."""
     body = body_of("campbell", name, values, limit=limit, orders=order, band_hz=band, harmonics=harmonics)
     hand_in(url, {**body, "speeds_rpm": [list(speeds)]}, wait=wait, as_json=as_json)
+
+
+def mistuning(
+    name: options.Scene,
+    of: Parts,
+    spread: Spread = 0.02,
+    samples: Samples = 100,
+    seed: Seed = 1,
+    dof: Dof = None,
+    start: options.From = None,
+    stop: options.To = None,
+    values: options.Values = None,
+    harmonics: options.Harmonics = 11,
+    wait: options.Wait = False,
+    as_json: options.Json = False,
+    url: options.Url = options.DEFAULT_URL,
+) -> None:
+    """Submit a study of mistuned disks."""
+    body = body_of(
+        "mistuning", name, values, of=of, spread=spread, samples=samples, seed=seed, dof=dof, to=stop,
+        harmonics=harmonics, **({} if start is None else {"from": start}),
+    )  # fmt: skip
+    hand_in(url, body, wait=wait, as_json=as_json)

@@ -10,6 +10,7 @@ from service.kinds.campbell import CAMPBELL
 from service.kinds.design import DESIGN
 from service.kinds.map import MAP
 from service.kinds.march import MARCH
+from service.kinds.mistuning import MISTUNING
 from service.kinds.pareto import PARETO
 from service.kinds.peaks import PEAKS
 from service.kinds.solve import SOLVE
@@ -24,4 +25,4 @@ def warm_up() -> None:
     optim.design(scene, harmonics=3)
 
 
-SHIPPED = Registry([SWEEP, MAP, PEAKS, DESIGN, PARETO, SOLVE, MARCH, ACCURACY, CAMPBELL], warm_up)
+SHIPPED = Registry([SWEEP, MAP, PEAKS, DESIGN, PARETO, SOLVE, MARCH, ACCURACY, CAMPBELL, MISTUNING], warm_up)

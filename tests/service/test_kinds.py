@@ -230,6 +230,7 @@ def test_the_description_is_whole(shipped: httpx.Client) -> None:
         "march",
         "accuracy",
         "campbell",
+        "mistuning",
     }
     assert {"from", "to", "set", "harmonics", "frequency_hz"} <= set(kinds["sweep"]["properties"])
     assert "requestBody" in description["paths"]["/v1/designs"]["post"]

@@ -1,4 +1,4 @@
-"""The kinds that compute many responses: map, peaks, accuracy and campbell, over REST."""
+"""The kinds that compute many responses: map, peaks, accuracy, campbell and mistuning, over REST."""
 
 from __future__ import annotations
 
@@ -17,6 +17,12 @@ MAP: dict[str, Any] = {**RANGE, "kind": "map", "steps": 5, "frequencies": 20}
 PEAKS: dict[str, Any] = {**RANGE, "kind": "peaks"}
 ACCURACY: dict[str, Any] = {"kind": "accuracy", "scene": "two-dof"}
 CAMPBELL: dict[str, Any] = {"kind": "campbell", "scene": "two-dof", "speeds_rpm": [[60, 100]], "harmonics": 3}
+DISK: dict[str, Any] = dict(solver.load_scene("bladed-disk").to_dict())
+DISK["structure"] = {**DISK["structure"], "sectors": 3}
+MISTUNING: dict[str, Any] = {
+    "kind": "mistuning", "scene": DISK, "of": ["tip_middle", "tip"], "spread": 0.03, "samples": 4, "seed": 5,
+    "from": 700, "to": 850, "harmonics": 1,
+}  # fmt: skip
 
 
 def finished(client: httpx.Client, body: dict[str, Any]) -> dict[str, Any]:
@@ -90,6 +96,26 @@ def test_a_campbell_diagram_is_that_of_python_and_each_response_is_stored_once(s
     assert len(disk["sweeps"]) == 2, "in a disk each order is a response of its own"
 
 
+def test_a_mistuning_study_is_that_of_python_and_the_worst_responses_are_stored(
+    shipped: httpx.Client,
+) -> None:
+    job = finished(shipped, MISTUNING)
+    keys = {key: MISTUNING[key] for key in ("of", "spread", "samples", "seed", "harmonics")}
+    study = solver.mistuning_study(solver.Scene.from_dict(DISK), **keys, start=700.0, stop=850.0)
+    result = job["result"]
+    assert without_time(result) == without_time(study.to_json())
+    assert [disk["seed"] for disk in result["samples"]] == [5, 6, 7, 8]
+    tuned, worst = job["sweeps"]
+    assert tuned["peak"]["value"] == result["tuned"]["peak"]
+    assert worst["peak"]["value"] == result["worst"]["largest"]
+    assert result["worst"]["magnification"] > 1.0
+    again = finished(shipped, {**MISTUNING, "fresh": True})
+    assert without_time(again["result"]) == without_time(result), "the same seed, the same disks"
+    other = finished(shipped, {**MISTUNING, "seed": 8, "samples": 1, "of": "tip_middle", "dof": "middle"})
+    assert other["result"]["samples"][0]["factors"] == result["samples"][3]["factors"]
+    assert other["result"]["dof"] == "middle"
+
+
 @pytest.mark.parametrize(
     "body",
     [
@@ -99,8 +125,9 @@ def test_a_campbell_diagram_is_that_of_python_and_each_response_is_stored_once(s
         {**ACCURACY, "repeats": 500},
         {**CAMPBELL, "scene": "bladed-disk", "speeds_rpm": [[9000, 12000]], "harmonics": 50,
          "orders": list(range(1, 101))},
+        {**MISTUNING, "samples": 1000},
     ],
-    ids=["map", "peaks", "accuracy", "campbell"],
+    ids=["map", "peaks", "accuracy", "campbell", "mistuning"],
 )  # fmt: skip
 def test_a_long_one_tells_how_far_it_is_and_stops_when_it_is_dismissed(
     shipped: httpx.Client, body: dict[str, Any]
@@ -161,6 +188,21 @@ def with_a_gap() -> dict[str, Any]:
         ({**CAMPBELL, "orders": [1] * 101}, ["/orders"]),
         ({**CAMPBELL, "band_hz": [2, 1]}, ["/band_hz"]),
         ({**CAMPBELL, "limit": 0}, ["/limit"]),
+        ({"kind": "mistuning", "scene": "bladed-disk"}, ["/of"]),
+        ({**MISTUNING, "scene": "two-dof"}, ["/scene"]),
+        ({**MISTUNING, "of": []}, ["/of"]),
+        ({**MISTUNING, "of": ["tip", 5]}, ["/of/1"]),
+        ({**MISTUNING, "of": ["tip", "nothing", "nobody"]}, ["/of/1", "/of/2"]),
+        ({**MISTUNING, "of": "../tip"}, ["/of/0"]),
+        ({**MISTUNING, "spread": -0.1}, ["/spread"]),
+        ({**MISTUNING, "spread": 0.9}, ["/spread"]),
+        ({**MISTUNING, "samples": 0}, ["/samples"]),
+        ({**MISTUNING, "samples": 10_001}, ["/samples"]),
+        ({**MISTUNING, "scene": "bladed-disk", "samples": 10_000, "harmonics": 200}, ["/samples"]),
+        ({**MISTUNING, "seed": -1}, ["/seed"]),
+        ({**MISTUNING, "dof": "tip@1"}, ["/dof"]),
+        ({**MISTUNING, "from": 850, "to": 700}, ["/to"]),
+        ({**MISTUNING, "values": [1.0]}, ["/values"]),
     ],
 )  # fmt: skip
 def test_a_bad_request_is_refused_where_it_is_bad(
