@@ -36,13 +36,15 @@ def met(
     identity: InstrumentedAttribute[str],
     conditions: Sequence[Condition],
 ) -> Select[Any]:
-    """The query with every condition, led by one that few rows meet if there is one.
+    """The query with every condition, on SQLite led by one that few rows meet if there is one.
 
     SQLite does not know how many rows a condition leaves and would read the whole table in the order of
     the ids for four rows with a low peak. So each condition with an index is counted up to `_FEW`
-    first, which its index answers in well under a millisecond.
+    first, which its index answers in well under a millisecond. PostgreSQL keeps statistics and knows.
     """
-    lead = next((condition for condition in conditions if _is_few(connection, condition)), None)
+    lead = None
+    if connection.dialect.name == "sqlite":
+        lead = next((condition for condition in conditions if _is_few(connection, condition)), None)
     for condition in conditions:
         query = query.where(identity.in_(condition.ids) if condition is lead else condition.holds)
     return query

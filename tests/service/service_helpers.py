@@ -10,9 +10,11 @@ from pathlib import Path
 
 import httpx
 import pytest
+from sqlalchemy import text
 
 from service.app import create_app
 from service.core import Service
+from service.db import Database
 from service.jobs import Registry
 from service.server import _bind, _config, _Server
 from service.settings import Settings, load_settings
@@ -58,6 +60,13 @@ def serving(folder: Path, registry: Registry) -> Iterator[httpx.Client]:
         server.should_exit = True
         thread.join()
         listener.close()
+
+
+def analyse(database: Database) -> None:
+    """What PostgreSQL does by itself within a minute, in the tests at once."""
+    if database.backend == "postgresql":
+        with database.writing() as connection:
+            connection.execute(text("ANALYZE"))
 
 
 def is_problem(response: httpx.Response, status: int) -> dict:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from service_helpers import analyse
 
 from service.answers import SweepDetail
 from service.arrays import encode
@@ -192,6 +193,7 @@ def test_a_hundred_thousand_sweeps_are_listed_within_50_ms(database: Database) -
         records = [random_sweep(generator) for _ in range(5000)]
         with database.writing() as connection:
             insert_sweeps(connection, job.id, records, utc_now())
+    analyse(database)
     repository, settings = SweepRepository(database), load_settings()
     for query in (
         {},
