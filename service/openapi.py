@@ -80,8 +80,10 @@ def _schema(model: type[BaseModel], schemas: dict[str, Any]) -> dict[str, Any]:
 
 
 def _with_kind(schema: dict[str, Any], name: str) -> dict[str, Any]:
+    examples = [{"kind": name, **example} for example in schema.get("examples", ())]
     return {
         **schema,
+        **({"examples": examples} if examples else {}),
         "properties": {"kind": {"const": name}, **schema["properties"]},
         "required": ["kind", *schema.get("required", [])],
     }

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 import solver
 from service.jobs import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
 from service.kinds.scenes import FrequencyHz, SceneRequest, resolve_scene, resolved
 from solver.scene import Scene
+
+_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2}
 
 
 class MarchRequest(SceneRequest):
@@ -27,6 +29,8 @@ class MarchRequest(SceneRequest):
     max_periods : int
         Periods marched at most.
     """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
 
     frequency_hz: FrequencyHz = Field(description="Excitation frequency [Hz].")
     steps_per_period: Annotated[int, Field(strict=True, ge=16, le=1_000_000)] | None = Field(

@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 import solver
 from service.jobs import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
 from service.kinds.scenes import FrequencyHz, HarmonicRequest, resolve_scene, resolved
 from solver.scene import Scene
 
+_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2, "set": {"damper.N0": 80}}
+
 
 class SolveRequest(HarmonicRequest):
     """One response; `frequency_hz` is the excitation frequency [Hz]."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
 
     frequency_hz: FrequencyHz = Field(description="Excitation frequency [Hz].")
 

@@ -27,6 +27,19 @@ from solver.errors import Issue
 from solver.scene import Scene
 
 FREQUENCY = "frequency"
+_EXAMPLE: dict[str, Any] = {
+    "scene": "bladed-disk",
+    "from": 500,
+    "to": 900,
+    "set": {"shroud.N0": 150},
+}
+_OVER_A_LOAD: dict[str, Any] = {
+    "scene": "bladed-disk",
+    "parameter": "shroud.N0",
+    "from": 20,
+    "to": 300,
+    "frequency_hz": 755,
+}
 
 
 class SweepRequest(HarmonicRequest):
@@ -44,7 +57,9 @@ class SweepRequest(HarmonicRequest):
         Amplitude [m] above which the resonance band is measured.
     """
 
-    model_config = ConfigDict(validate_by_alias=True)
+    model_config = ConfigDict(
+        validate_by_alias=True, json_schema_extra={"examples": [_EXAMPLE, _OVER_A_LOAD]}
+    )
 
     parameter: ParameterPath = Field(default=FREQUENCY, description="Path of what is swept.")
     from_: Number | None = Field(default=None, alias="from", description="Start of the range.")

@@ -11,8 +11,18 @@ import pytest
 from service_helpers import is_problem, job_ids
 
 import solver
+from service.kinds import SHIPPED
 from service.kinds.records import contact_values
 from service.kinds.scenes import MAX_HARMONICS
+from service.validation import validated
+
+
+class Shipped:
+    """The shipped scenes, without a database."""
+
+    def scene_body(self, name: str) -> dict[str, object] | None:
+        return solver.load_scene(name).to_dict() if name in solver.shipped_scenes() else None
+
 
 WAIT = {"Prefer": "wait=60"}
 
@@ -232,6 +242,12 @@ def test_the_description_is_whole(shipped: httpx.Client) -> None:
         "campbell",
         "mistuning",
     }
+    for kind, schema in kinds.items():
+        assert schema["examples"], kind
+        for example in schema["examples"]:
+            assert example["kind"] == kind
+            request = validated(SHIPPED[kind].request, {k: v for k, v in example.items() if k != "kind"})
+            assert SHIPPED[kind].resolve(request, Shipped()).scene_name == example["scene"]
     assert {"from", "to", "set", "harmonics", "frequency_hz"} <= set(kinds["sweep"]["properties"])
     assert "requestBody" in description["paths"]["/v1/designs"]["post"]
     assert shipped.get("/openapi.json").json() == description
