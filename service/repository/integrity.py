@@ -12,6 +12,8 @@ from service.jobs import StoredArray
 from service.models import Job, JobResult, JobState, Sweep, SweepArray
 
 # A job that ends as `successful` wrote its result with the same transaction, unless it repeats another's.
+# One that failed may have kept what it computed short of its goal.
+_WITHOUT_RESULT = (JobState.ACCEPTED, JobState.RUNNING, JobState.DISMISSED)
 _WITH_RESULT = exists().where(JobResult.job_id == Job.id)
 _WITH_SWEEPS = exists().where(Sweep.job_id == Job.id)
 
@@ -43,8 +45,8 @@ def contradictions(connection: Connection) -> list[str]:
         "successful jobs without a result": _jobs(
             Job.state == JobState.SUCCESSFUL, Job.result_of.is_(None), ~_WITH_RESULT
         ),
-        "results of jobs that are not successful": _jobs(Job.state != JobState.SUCCESSFUL, _WITH_RESULT),
-        "sweeps of jobs that are not successful": _jobs(Job.state != JobState.SUCCESSFUL, _WITH_SWEEPS),
+        "results of jobs that computed none": _jobs(Job.state.in_(_WITHOUT_RESULT), _WITH_RESULT),
+        "sweeps of jobs that computed none": _jobs(Job.state.in_(_WITHOUT_RESULT), _WITH_SWEEPS),
         "ended jobs without the time they ended": _jobs(
             Job.state.in_([JobState.SUCCESSFUL, JobState.FAILED, JobState.DISMISSED]), Job.finished.is_(None)
         ),

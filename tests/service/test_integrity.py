@@ -7,12 +7,14 @@ import sqlite3
 from pathlib import Path
 
 import pytest
-from service_helpers import MakeSettings
+from private_kinds import PRIVATE
+from service_helpers import MakeSettings, settings_of
 
 from service.cli import main
 from service.embedded import EmbeddedService
 from service.errors import DatabaseError
 from service.integrity import check
+from service.models import JobState
 
 SWEEP = {"scene": "two-dof", "parameter": "frequency", "from": 0.9, "to": 1.2, "harmonics": 3}
 
@@ -62,8 +64,8 @@ def test_a_used_database_and_its_backup_are_sound(used: Path, copy: Path) -> Non
     [
         ("UPDATE sweep_array SET data = CAST(data || x'00' AS BLOB)", "checksum"),
         ("DELETE FROM job_result", "1 successful jobs without a result"),
-        ("UPDATE job SET state = 'failed'", "1 results of jobs that are not successful"),
-        ("UPDATE job SET state = 'failed'", "1 sweeps of jobs that are not successful"),
+        ("UPDATE job SET state = 'dismissed'", "1 results of jobs that computed none"),
+        ("UPDATE job SET state = 'dismissed'", "1 sweeps of jobs that computed none"),
         ("UPDATE job SET finished = NULL", "1 ended jobs without the time"),
         ("DELETE FROM sweep_array", "1 sweeps without their arrays"),
         ("UPDATE sweep SET job_id = 'nobody'", "a row of `sweep` refers to a row of `job`"),
@@ -112,3 +114,11 @@ def test_a_database_in_use_can_be_checked(make_settings: MakeSettings) -> None:
     with EmbeddedService(settings) as service:
         service.wait(service.submit("sweep", SWEEP))
         assert check(settings.database).sound
+
+
+def test_what_a_job_computed_short_of_its_goal_is_no_damage(url: str) -> None:
+    with EmbeddedService(settings_of(url)(), PRIVATE) as service:
+        done = service.wait(service.submit("falls-short", {"sweeps": 1}), timeout=30.0)
+        assert done.status is JobState.FAILED
+        assert service.results(done.id).sweeps
+        assert check(url).trouble == ()
