@@ -14,7 +14,7 @@ from solver.balance import build
 from solver.errors import SettingError
 from solver.fourier import Integer, Real
 from solver.kernels.rows import GIVEN, MAX_ABS, RESIDUAL, ROW_VALUES, SOLVED, solve_row
-from solver.peak_tracks import PeakTrack
+from solver.peak_tracks import PeakTrack, TrackStatus
 from solver.ridges import check_laws
 from solver.savings import Effects
 from solver.scale import scale_of
@@ -23,6 +23,7 @@ from solver.tracking import track_peak
 from solver.workspace import Workspace
 
 MOST_POINTS = 4_000_000
+_OF_THE_GRID = 0.7  # share of the progress, where the peaks are tracked after it
 
 
 class MapStatus(Enum):
@@ -118,7 +119,7 @@ def response_map(
     ridge : track the peaks over the range too.
     effects : what is paid for though the scene does not call for it.
     on_progress : called with (share done, points so far).
-    should_stop : asked between rows.
+    should_stop : asked between rows, and between the sweeps that look for peaks.
 
     Returns
     -------
@@ -152,13 +153,20 @@ def response_map(
         before, more = _row(workspace, 2.0 * math.pi * band, before, table[row])
         spent += more
         if on_progress is not None:
-            on_progress((row + 1.0) / steps, (row + 1) * frequencies)
+            on_progress((row + 1.0) / steps * (_OF_THE_GRID if ridge else 1.0), (row + 1) * frequencies)
     unsolved = not np.isfinite(table[:, :, MAX_ABS]).all()
     track = None
     if ridge and not stopped:
+
+        def progress(share: float, _sweeps: int) -> None:
+            if on_progress is not None:
+                on_progress(_OF_THE_GRID + (1.0 - _OF_THE_GRID) * share, steps * frequencies)
+
         track = track_peak(
-            scene, parameter, start, stop, harmonics=harmonics, effects=effects, should_stop=should_stop
-        )
+            scene, parameter, start, stop, harmonics=harmonics, effects=effects, on_progress=progress,
+            should_stop=should_stop,
+        )  # fmt: skip
+        stopped = track.status is TrackStatus.STOPPED
     status = MapStatus.STOPPED if stopped else MapStatus.HOLES if unsolved else MapStatus.COMPLETED
     solved = table[:, :, RESIDUAL][np.isfinite(table[:, :, RESIDUAL])]
     return ResponseMap(

@@ -89,9 +89,28 @@ def test_stopped_by_the_caller() -> None:
         should_stop=lambda: next(asked, True), on_progress=lambda share, count: seen.append((share, count)),
     )  # fmt: skip
     assert found.status is MapStatus.STOPPED
-    assert seen == [(pytest.approx(1.0 / 3.0), 7)]
+    assert seen == [(pytest.approx(0.7 / 3.0), 7)]
     assert np.isfinite(found.amplitude[0]).all()
     assert np.isnan(found.amplitude[1:]).all()
+
+
+def test_the_ridge_counts_and_can_be_stopped_too() -> None:
+    two_dof, seen = solver.load_scene("two-dof"), []
+    keys = {"steps": 3, "frequencies": 7, "harmonics": 3}
+    whole = response_map(
+        two_dof, "damper.N0", 50.0, 60.0, **keys, on_progress=lambda share, count: seen.append((share, count))
+    )
+    assert whole.completed
+    assert seen == sorted(seen)
+    assert seen[2] == (pytest.approx(0.7), 21)
+    assert len(seen) > 4
+    assert seen[-1] == (pytest.approx(1.0), 21)
+    asked = iter([False] * 4)
+    found = response_map(
+        two_dof, "damper.N0", 50.0, 60.0, **keys, should_stop=lambda: next(asked, True),
+    )  # fmt: skip
+    assert found.status is MapStatus.STOPPED
+    assert np.isfinite(found.amplitude).all()
 
 
 def test_json_carries_the_grid_and_the_ridge(disk: solver.ResponseMap) -> None:
