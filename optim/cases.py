@@ -96,7 +96,7 @@ def _read(scene: Scene, where: str, index: int, table: object) -> list[Case]:
     here = here.with_values(values)
     band = _band(where, table.get("band"))
     order = _whole(f"{where}.order", table.get("order", max(here.engine_order, 1)), least=1)
-    weight = _positive(f"{where}.weight", table.get("weight", 1.0))
+    weight = positive(f"{where}.weight", table.get("weight", 1.0))
     observed = table.get("observe", here.observe.dof)
     dofs = [observed] if isinstance(observed, str) else observed
     if not isinstance(dofs, Sequence) or not dofs or not all(isinstance(dof, str) for dof in dofs):
@@ -161,7 +161,14 @@ def _whole(name: str, value: object, *, least: int) -> int:
     return value
 
 
-def _positive(name: str, value: object) -> float:
+def positive(name: str, value: object) -> float:
+    """Return a finite number above 0.
+
+    Raises
+    ------
+    DesignError
+        Anything else.
+    """
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not number or not math.isfinite(value) or value <= 0.0:  # type: ignore[arg-type,operator]
         raise DesignError(name, value, "must be a number > 0")

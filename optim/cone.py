@@ -22,7 +22,7 @@ from functools import lru_cache
 import cvxpy
 import numpy as np
 
-from optim.conic import Step, duals_of, numbers_of, solved
+from optim.conic import LimitRows, Step, duals_of, numbers_of, solved
 from optim.model import Model
 from optim.variables import Real
 
@@ -62,7 +62,7 @@ class _Cone:
         self._d, self._t, self._w = cvxpy.Variable(n), cvxpy.Variable(groups), cvxpy.Variable()
         self._heights, self._slopes = cvxpy.Parameter(groups * rows), cvxpy.Parameter((groups * rows, n))
         self._root, self._low, self._high = cvxpy.Parameter((n, n)), cvxpy.Parameter(n), cvxpy.Parameter(n)
-        self._rows_each, self._limited = rows, limited
+        self._rows_each = rows
         owner = np.repeat(np.eye(groups), rows, axis=0)
         self._row = self._heights + self._slopes @ self._d <= owner @ self._t
         curved = cvxpy.hstack([math.sqrt(2.0) * (self._root @ self._d), self._w - 1.0])
@@ -72,13 +72,10 @@ class _Cone:
         ]  # fmt: skip
         self._share = cvxpy.Parameter(nonneg=True)
         objective = self._share * cvxpy.sum(self._t) + self._w
-        if limited:
-            self._s, self._least = cvxpy.Variable(), cvxpy.Parameter()
-            self._excess, self._excess_slopes = cvxpy.Parameter(limited), cvxpy.Parameter((limited, n))
-            self._price = cvxpy.Parameter(nonneg=True)
-            self._limit_row = self._excess + self._excess_slopes @ self._d <= self._s
-            constraints += [self._limit_row, self._least <= self._s]
-            objective = objective + self._price * self._s
+        self._limits = LimitRows(limited, self._d) if limited else None
+        if self._limits is not None:
+            constraints += self._limits.constraints
+            objective = objective + self._limits.penalty
         self._problem = cvxpy.Problem(cvxpy.Minimize(objective), constraints)
 
     def solve(self, model: Model, root: Real, radius: float) -> Step | None:
@@ -87,18 +84,12 @@ class _Cone:
         places = [np.flatnonzero(model.groups == g) for g in np.unique(model.groups)]
         spread = np.concatenate([np.resize(mine, self._rows_each) for mine in places])
         self._heights.value, self._slopes.value = numbers.heights[spread], numbers.slopes[spread]
-        again = np.resize(np.arange(model.excess.size), self._limited)
-        if self._limited:
-            self._excess.value, self._excess_slopes.value = (
-                numbers.excess[again],
-                numbers.excess_slopes[again],
-            )
-            self._least.value, self._price.value = numbers.least, numbers.price
+        again = np.zeros(0, dtype=np.intp) if self._limits is None else self._limits.fill(numbers)
         self._share.value, self._root.value = numbers.share, numbers.root
         self._low.value, self._high.value = numbers.low, numbers.high
         if not solved(self._problem, self._d):
             return None
         return numbers.step(
             np.asarray(self._d.value, dtype=np.float64), duals_of(self._row), spread,
-            duals_of(self._limit_row) if self._limited else np.zeros(0), again,
+            np.zeros(0) if self._limits is None else self._limits.duals(), again,
         )  # fmt: skip

@@ -120,6 +120,30 @@ def numbers_of(model: Model, root: Real, radius: float) -> Numbers:
     )  # fmt: skip
 
 
+class LimitRows:
+    """The limited rows of a programme: excess + slopes · d ≤ s, s ≥ least, at a price of s."""
+
+    def __init__(self, count: int, d: cvxpy.Variable) -> None:
+        self._count = count
+        self._s, self._least = cvxpy.Variable(), cvxpy.Parameter()
+        self._excess, self._slopes = cvxpy.Parameter(count), cvxpy.Parameter((count, d.size))
+        self._price = cvxpy.Parameter(nonneg=True)
+        self._row = self._excess + self._slopes @ d <= self._s
+        self.constraints = [self._row, self._least <= self._s]
+        self.penalty = self._price * self._s
+
+    def fill(self, numbers: Numbers) -> Index:
+        """Set the numbers; return which limited row of the model each row here is."""
+        again = np.resize(np.arange(numbers.excess.size), self._count)
+        self._excess.value, self._slopes.value = numbers.excess[again], numbers.excess_slopes[again]
+        self._least.value, self._price.value = numbers.least, numbers.price
+        return again
+
+    def duals(self) -> Real:
+        """Return the multipliers of the rows."""
+        return duals_of(self._row)
+
+
 def solved(problem: cvxpy.Problem, d: cvxpy.Variable) -> bool:
     """Run the conic solver; return whether it reached optimality, if only to a reduced accuracy."""
     try:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from optim.cases import Case, number_pair, read_cases
+from optim.cases import Case, number_pair, positive, read_cases
 from optim.errors import DesignError
 from optim.rows import Quantity
 from optim.variables import Variable, check_variables
@@ -151,7 +151,7 @@ def pose(
     read = read_cases(scene, cases)
     for name, value in (("limit", limit), ("max_peak", max_peak), ("max_band_hz", max_band_hz)):
         if value is not None:
-            _positive(name, value)
+            positive(name, value)
     limits = Limits(
         peak=max_peak, band_hz=max_band_hz, forbidden_hz=_forbidden(read, forbidden_hz, speeds_rpm),
         friction_work=_friction_work(scene, max_friction_work), in_contact=_in_contact(scene, contact_states),
@@ -168,13 +168,6 @@ def pose(
     if problem.method is Method.TRACKED and problem.why_not_tracked is not None:
         raise DesignError("method", method, f"must be another one: {problem.why_not_tracked}")
     return problem
-
-
-def _positive(name: str, value: object) -> float:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not number or not math.isfinite(value) or not value > 0.0:  # type: ignore[arg-type,operator]
-        raise DesignError(name, value, "must be a number > 0")
-    return float(value)  # type: ignore[arg-type]
 
 
 def _weights(weights: Mapping[str, float] | None) -> dict[Quantity, float]:
@@ -229,11 +222,11 @@ def _friction_work(scene: Scene, limits: object) -> dict[str, float]:
     names = [contact.name for contact in scene.contacts]
     if not isinstance(limits, Mapping):
         rubbing = [contact.name for contact in scene.contacts if isinstance(contact, FrictionContact)]
-        return dict.fromkeys(rubbing, _positive("max_friction_work", limits))
+        return dict.fromkeys(rubbing, positive("max_friction_work", limits))
     for name in limits:
         if name not in names:
             raise DesignError("max_friction_work", name, f"must name contacts: {', '.join(names)}")
-    return {name: _positive(f"max_friction_work.{name}", value) for name, value in limits.items()}
+    return {name: positive(f"max_friction_work.{name}", value) for name, value in limits.items()}
 
 
 def _in_contact(scene: Scene, states: object) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from functools import lru_cache
 import cvxpy
 import numpy as np
 
-from optim.conic import Step, duals_of, numbers_of, solved
+from optim.conic import LimitRows, Step, duals_of, numbers_of, solved
 from optim.model import Model
 from optim.variables import Real
 
@@ -64,14 +64,10 @@ class _Subproblem:
         constraints = [*self._rows, self._low <= self._d, self._d <= self._high]
         self._share = cvxpy.Parameter(nonneg=True)
         objective = self._share * cvxpy.sum(self._t) + 0.5 * cvxpy.sum_squares(self._root @ self._d)
-        self._limited = limited
-        if limited:
-            self._s, self._least = cvxpy.Variable(), cvxpy.Parameter()
-            self._excess, self._excess_slopes = cvxpy.Parameter(limited), cvxpy.Parameter((limited, n))
-            self._price = cvxpy.Parameter(nonneg=True)
-            self._limit_row = self._excess + self._excess_slopes @ self._d <= self._s
-            constraints += [self._limit_row, self._least <= self._s]
-            objective = objective + self._price * self._s
+        self._limits = LimitRows(limited, self._d) if limited else None
+        if self._limits is not None:
+            constraints += self._limits.constraints
+            objective = objective + self._limits.penalty
         self._problem = cvxpy.Problem(cvxpy.Minimize(objective), constraints)
 
     def solve(self, model: Model, root: Real, radius: float) -> Step | None:
@@ -81,13 +77,7 @@ class _Subproblem:
         spread = [np.resize(mine, a.size) for mine, a in zip(places, self._heights, strict=True)]
         for some, a, g in zip(spread, self._heights, self._slopes, strict=True):
             a.value, g.value = numbers.heights[some], numbers.slopes[some]
-        again = np.resize(np.arange(model.excess.size), self._limited)
-        if self._limited:
-            self._excess.value, self._excess_slopes.value = (
-                numbers.excess[again],
-                numbers.excess_slopes[again],
-            )
-            self._least.value, self._price.value = numbers.least, numbers.price
+        again = np.zeros(0, dtype=np.intp) if self._limits is None else self._limits.fill(numbers)
         self._share.value, self._root.value = numbers.share, numbers.root
         self._low.value, self._high.value = numbers.low, numbers.high
         if not solved(self._problem, self._d):
@@ -95,5 +85,5 @@ class _Subproblem:
         return numbers.step(
             np.asarray(self._d.value, dtype=np.float64),
             np.concatenate([duals_of(row) for row in self._rows]), np.concatenate(spread),
-            duals_of(self._limit_row) if self._limited else np.zeros(0), again,
+            np.zeros(0) if self._limits is None else self._limits.duals(), again,
         )  # fmt: skip

@@ -6,6 +6,9 @@ import base64
 import binascii
 import json
 import math
+from urllib.parse import urlencode
+
+from pydantic import BaseModel
 
 from service.errors import InvalidRequestError
 from solver.errors import Issue
@@ -35,6 +38,13 @@ def decode(cursor: str) -> Position:
     if not number or isinstance(value, bool) or not isinstance(row_id, str):
         raise _refused(cursor)
     return value, row_id
+
+
+def next_link(path: str, query: BaseModel, value: float | None, row_id: str) -> str:
+    """The link to the page behind a row: what was asked, but with that row's position."""
+    given = query.model_dump(exclude_defaults=True, exclude={"cursor"}, mode="json")
+    words = {key: str(item).lower() if isinstance(item, bool) else item for key, item in given.items()}
+    return f"{path}?" + urlencode({**words, "cursor": encode(value, row_id)})
 
 
 def _refused(cursor: str) -> InvalidRequestError:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
-from urllib.parse import urlencode
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -108,6 +107,4 @@ def design_detail(found: WholeDesign, repository: DesignRepository) -> DesignDet
 def _next_link(query: DesignQuery, last: DesignRow) -> str:
     column = query.sort.removeprefix("-")
     value = getattr(last, _RANGES[column]) if column in DESIGN_SORTS else None
-    given = query.model_dump(exclude_defaults=True, exclude={"cursor"}, mode="json")
-    words = {key: str(item).lower() if isinstance(item, bool) else item for key, item in given.items()}
-    return "/v1/designs?" + urlencode({**words, "cursor": cursors.encode(value, last.job_id)})
+    return cursors.next_link("/v1/designs", query, value, last.job_id)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from typing import Annotated, Literal
-from urllib.parse import urlencode
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -103,6 +102,4 @@ def sweep_page(repository: SweepRepository, query: SweepQuery, settings: Setting
 def _next_link(query: SweepQuery, last: SweepRow) -> str:
     name = query.sort.removeprefix("-")
     value = getattr(last, name) if name in SWEEP_SORTS else None
-    given = query.model_dump(exclude_defaults=True, exclude={"cursor"}, mode="json")
-    words = {key: str(item).lower() if isinstance(item, bool) else item for key, item in given.items()}
-    return "/v1/sweeps?" + urlencode({**words, "cursor": cursors.encode(value, last.id)})
+    return cursors.next_link("/v1/sweeps", query, value, last.id)
