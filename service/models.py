@@ -19,6 +19,7 @@ from sqlalchemy import (
     String,
     Text,
     TypeDecorator,
+    UniqueConstraint,
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
@@ -31,6 +32,9 @@ NAMING_CONVENTION = {
 }
 
 ID_LENGTH = 36
+OWNER_LENGTH = 100
+NOBODY = ""
+"""The owner of what was made without a key."""
 
 
 class JobState(enum.StrEnum):
@@ -81,6 +85,7 @@ class Base(DeclarativeBase):
     type_annotation_map = {  # noqa: RUF012 - SQLAlchemy reads it from the class
         datetime: UtcDateTime(),
         dict[str, Any]: JSON(none_as_null=True),
+        list[str]: JSON(),
         JobState: Enum(
             JobState,
             name="state",
@@ -105,7 +110,9 @@ class Job(Base):
     scene_hash: Mapped[str | None] = mapped_column(String(64))
     spec_hash: Mapped[str] = mapped_column(String(64))
     request_hash: Mapped[str] = mapped_column(String(64))
-    idempotency_key: Mapped[str | None] = mapped_column(String(200), unique=True)
+    owner: Mapped[str] = mapped_column(String(OWNER_LENGTH), default=NOBODY, server_default=NOBODY)
+    idempotency_key: Mapped[str | None] = mapped_column(String(200))
+    seconds_limit: Mapped[float | None]
     attempt: Mapped[int] = mapped_column(default=0)
     max_attempts: Mapped[int]
     lease_owner: Mapped[str | None] = mapped_column(String(200))
@@ -127,6 +134,8 @@ class Job(Base):
         Index(None, "kind", "id"),
         Index(None, "scene_name", "id"),
         Index(None, "result_of"),
+        Index(None, "owner", "id"),
+        UniqueConstraint("owner", "idempotency_key"),
         CheckConstraint("attempt >= 0 AND max_attempts >= 1", name="attempts"),
         CheckConstraint("(state = 'running') = (lease_owner IS NOT NULL)", name="lease"),
     )
@@ -143,11 +152,64 @@ class JobResult(Base):
     body: Mapped[dict[str, Any]]
 
 
+class Checkpoint(Base):
+    """A piece of what an unfinished job has computed; gone when the job ends."""
+
+    __tablename__ = "checkpoint"
+
+    job_id: Mapped[str] = mapped_column(
+        String(ID_LENGTH), ForeignKey("job.id", ondelete="CASCADE"), primary_key=True
+    )
+    part: Mapped[int] = mapped_column(primary_key=True)
+    attempt: Mapped[int]
+    created: Mapped[datetime]
+    sha256: Mapped[str] = mapped_column(String(64))
+    data: Mapped[bytes] = mapped_column(LargeBinary())
+
+
+class ApiKey(Base):
+    """A key to the REST API; of its secret only a digest is kept."""
+
+    __tablename__ = "api_key"
+
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    owner: Mapped[str] = mapped_column(String(OWNER_LENGTH))
+    scopes: Mapped[list[str]]
+    digest: Mapped[str] = mapped_column(String(64))
+    limits: Mapped[dict[str, Any]]
+    created: Mapped[datetime]
+    expires: Mapped[datetime | None]
+    revoked: Mapped[datetime | None]
+    last_used: Mapped[datetime | None]
+
+    __table_args__ = (Index(None, "owner", "id"),)
+
+
+class Upload(Base):
+    """A file that a client sent, to be referred to by its id."""
+
+    __tablename__ = "upload"
+
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    owner: Mapped[str] = mapped_column(String(OWNER_LENGTH))
+    name: Mapped[str] = mapped_column(String(200))
+    format: Mapped[str] = mapped_column(String(32))
+    size: Mapped[int]
+    sha256: Mapped[str] = mapped_column(String(64))
+    created: Mapped[datetime]
+    data: Mapped[bytes] = mapped_column(LargeBinary())
+
+    __table_args__ = (Index(None, "owner", "id"),)
+
+
 class Scene(Base):
-    """A scene stored under a name; never changed, so that a name means one thing for ever."""
+    """A scene stored under a name; never changed, so that a name means one thing for ever to its owner."""
 
     __tablename__ = "scene"
 
+    owner: Mapped[str] = mapped_column(
+        String(OWNER_LENGTH), primary_key=True, default=NOBODY, server_default=NOBODY
+    )
     name: Mapped[str] = mapped_column(String(200), primary_key=True)
     scene_hash: Mapped[str] = mapped_column(String(64))
     created: Mapped[datetime]
@@ -162,6 +224,7 @@ class Sweep(Base):
     id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
     job_id: Mapped[str] = mapped_column(String(ID_LENGTH), ForeignKey("job.id", ondelete="CASCADE"))
     position: Mapped[int]
+    owner: Mapped[str] = mapped_column(String(OWNER_LENGTH), default=NOBODY, server_default=NOBODY)
     scene_name: Mapped[str] = mapped_column(String(200))
     scene_hash: Mapped[str] = mapped_column(String(64))
     parameter: Mapped[str] = mapped_column(String(200))
@@ -184,6 +247,7 @@ class Sweep(Base):
 
     __table_args__ = (
         Index(None, "job_id", "id"),
+        Index(None, "owner", "id"),
         Index(None, "scene_name", "peak", "id"),
         Index(None, "scene_name", "id"),
         Index(None, "scene_hash", "id"),
@@ -238,6 +302,7 @@ class Design(Base):
     job_id: Mapped[str] = mapped_column(
         String(ID_LENGTH), ForeignKey("job.id", ondelete="CASCADE"), primary_key=True
     )
+    owner: Mapped[str] = mapped_column(String(OWNER_LENGTH), default=NOBODY, server_default=NOBODY)
     scene_name: Mapped[str] = mapped_column(String(200))
     scene_hash: Mapped[str] = mapped_column(String(64))
     method: Mapped[str] = mapped_column(String(32))
@@ -257,6 +322,7 @@ class Design(Base):
     created: Mapped[datetime]
 
     __table_args__ = (
+        Index(None, "owner", "job_id"),
         Index(None, "scene_name", "peak", "job_id"),
         Index(None, "scene_name", "job_id"),
         Index(None, "scene_hash", "job_id"),

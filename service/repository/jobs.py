@@ -263,7 +263,7 @@ class JobRepository:
     def _by_key(connection: Connection, new: NewJob) -> JobRow | None:
         if new.idempotency_key is None:
             return None
-        known = _one(connection, Job.idempotency_key == new.idempotency_key)
+        known = _one(connection, and_(Job.owner == new.owner, Job.idempotency_key == new.idempotency_key))
         if known is not None and known.request_hash != new.request_hash:
             raise IdempotencyError(
                 f"the Idempotency-Key {new.idempotency_key!r} was used for a different request, "

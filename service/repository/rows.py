@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from service.models import JobState
+from service.models import NOBODY, JobState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,7 +21,9 @@ class JobRow:
     scene_hash: str | None
     spec_hash: str
     request_hash: str
+    owner: str
     idempotency_key: str | None
+    seconds_limit: float | None
     attempt: int
     max_attempts: int
     cancel_requested: bool
@@ -50,6 +52,8 @@ class NewJob:
     priority: int = 0
     fresh: bool = False
     idempotency_key: str | None = None
+    owner: str = NOBODY
+    seconds_limit: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy import Connection, insert, select
 
 from service.db import Database
-from service.models import Scene
+from service.models import NOBODY, Scene
 from service.repository.jobs import utc_now
 from service.repository.rows import SceneRow
 
@@ -26,7 +26,7 @@ class SceneRepository:
         """Store a scene, or find the one of this name; whether it was stored."""
 
         def find_or_add(connection: Connection) -> tuple[SceneRow, bool]:
-            query = select(*_COLUMNS).where(Scene.name == name)
+            query = select(*_COLUMNS).where(Scene.owner == NOBODY, Scene.name == name)
             known = connection.execute(query).mappings().one_or_none()
             if known is not None:
                 return SceneRow(**known), False

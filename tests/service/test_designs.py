@@ -12,6 +12,7 @@ from typing import Any
 
 import httpx
 import pytest
+import sqlalchemy as sa
 from alembic import command
 from service_helpers import analyse, is_problem
 from sqlalchemy import Connection, func, insert, inspect, select
@@ -266,7 +267,11 @@ OLD = {
 }  # fmt: skip
 
 
-_job, _result = Base.metadata.tables["job"], Base.metadata.tables["job_result"]
+_result = Base.metadata.tables["job_result"]
+_LATER = {"owner", "seconds_limit"}  # columns that the first revision had not
+_job = sa.table(
+    "job", *(sa.column(c.name, c.type) for c in Base.metadata.tables["job"].columns if c.name not in _LATER)
+)
 BEGIN = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 END = BEGIN + timedelta(seconds=1.5)
 
@@ -279,7 +284,8 @@ def old_job(
     connection.execute(
         insert(_job).values(
             id=name, kind=kind, state=state, scene_name="two-dof", scene_hash="abc", spec_hash="",
-            request_hash="", attempt=1, max_attempts=3, progress=1.0, created=BEGIN, finished=finished,
+            request_hash="", attempt=1, max_attempts=3, progress=1.0,
+            priority=0, points=0, cancel_requested=False, created=BEGIN, finished=finished,
             request={}, spec=spec,
         )
     )  # fmt: skip
