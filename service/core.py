@@ -13,6 +13,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from service import revisions
+from service.clock import Clock, utc_now
 from service.db import Database
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.executors.local import LocalExecutor
@@ -73,13 +74,15 @@ class Service:
         Its settings.
     registry : Registry
         The kinds of job it runs.
+    now : callable
+        Its clock.
     """
 
-    def __init__(self, settings: Settings, registry: Registry = SHIPPED) -> None:
+    def __init__(self, settings: Settings, registry: Registry = SHIPPED, now: Clock = utc_now) -> None:
         self.settings = settings
         self.registry = registry
         self.database = Database(settings.database, settings.database_connections)
-        self.jobs = JobRepository(self.database)
+        self.jobs = JobRepository(self.database, now)
         self.sweeps = SweepRepository(self.database)
         self.designs = DesignRepository(self.database)
         self.scenes = SceneStore(SceneRepository(self.database))

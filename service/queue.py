@@ -19,7 +19,6 @@ from datetime import datetime, timedelta
 from service.executors.base import Executor, ExecutorStatus, Failed, Finished, Lost, Outcome, Stopped
 from service.jobs import FailureKind, JobFailure, JobOutput
 from service.repository import Attempt, JobRepository
-from service.repository.jobs import utc_now
 from service.settings import Settings
 from service.waiters import Waiters
 
@@ -171,7 +170,7 @@ class JobQueue:
         return entry if entry is not None and entry.attempt == attempt else None
 
     def _lease_until(self) -> datetime:
-        return utc_now() + timedelta(seconds=self._settings.lease_seconds)
+        return self._jobs.now() + timedelta(seconds=self._settings.lease_seconds)
 
     def _ask_to_stop(self, entry: _Running, reason: _StopReason) -> None:
         entry.stop = entry.stop or reason

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import fields
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, and_, func, insert, select, update
 
+from service.clock import Clock, utc_now
 from service.db import Database
 from service.errors import IdempotencyError, QueueFullError
 from service.ids import new_id
@@ -23,11 +24,6 @@ __all__ = ["Attempt", "JobRepository", "JobRow", "NewJob", "Recovered"]
 _COLUMNS = [getattr(Job, field.name) for field in fields(JobRow)]
 _LISTED = [getattr(Job, field.name) for field in fields(JobRow) if field.name != "request"]
 _FREE: dict[str, Any] = {"lease_owner": None, "lease_until": None}
-
-
-def utc_now() -> datetime:
-    """Now, aware."""
-    return datetime.now(UTC)
 
 
 def _guard(attempt: Attempt) -> ColumnElement[bool]:
@@ -52,10 +48,19 @@ def _one(connection: Connection, condition: ColumnElement[bool]) -> JobRow | Non
 
 
 class JobRepository:
-    """Jobs of one database."""
+    """Jobs of one database.
 
-    def __init__(self, database: Database) -> None:
+    Parameters
+    ----------
+    database : Database
+        Where they are.
+    now : callable
+        The clock that leases and times are read from.
+    """
+
+    def __init__(self, database: Database, now: Clock = utc_now) -> None:
         self._db = database
+        self.now = now
 
     def submit(self, new: NewJob, queue_limit: int) -> tuple[JobRow, bool]:
         """Insert a job, or find the one this request made before; whether it was inserted.
@@ -145,7 +150,7 @@ class JobRepository:
                 attempt=attempt,
                 lease_owner=owner,
                 lease_until=lease_until,
-                started=utc_now(),
+                started=self.now(),
                 progress=0.0,
                 points=0,
             )
@@ -174,7 +179,7 @@ class JobRepository:
         """Commit state, result and sweeps together, unless the job was lost or its cancel asked for."""
         with self._db.writing() as connection:
             condition = and_(_guard(attempt), Job.cancel_requested.is_(False))
-            finished = utc_now()
+            finished = self.now()
             if not _change(
                 connection, condition, state=JobState.SUCCESSFUL, finished=finished, progress=1.0, **_FREE
             ):
@@ -185,7 +190,7 @@ class JobRepository:
     def fail(self, attempt: Attempt, failure: JobFailure, output: JobOutput | None = None) -> bool:
         """Commit a failure for good, with what was computed all the same."""
         with self._db.writing() as connection:
-            finished = utc_now()
+            finished = self.now()
             changed = _change(
                 connection,
                 _guard(attempt),
@@ -201,7 +206,7 @@ class JobRepository:
     def lose(self, attempt: Attempt, reason: str) -> Recovered:
         """The attempt's worker died: the job waits again, or fails after its last attempt."""
         with self._db.writing() as connection:
-            return _recover(connection, _guard(attempt), reason)
+            return _recover(connection, _guard(attempt), reason, self.now())
 
     def release(self, attempt: Attempt) -> bool:
         """Give an unfinished job back to the queue without costing it an attempt."""
@@ -220,14 +225,16 @@ class JobRepository:
     def dismiss(self, attempt: Attempt) -> bool:
         """The running job was stopped because its cancel was asked for."""
         with self._db.writing() as connection:
-            return _change(connection, _guard(attempt), state=JobState.DISMISSED, finished=utc_now(), **_FREE)
+            return _change(
+                connection, _guard(attempt), state=JobState.DISMISSED, finished=self.now(), **_FREE
+            )
 
     def cancel(self, job_id: str) -> JobRow | None:
         """Ask for the end of a job: a waiting one is dismissed at once, a running one is marked."""
         with self._db.writing() as connection:
             waiting = and_(Job.id == job_id, Job.state == JobState.ACCEPTED)
             if not _change(
-                connection, waiting, state=JobState.DISMISSED, cancel_requested=True, finished=utc_now()
+                connection, waiting, state=JobState.DISMISSED, cancel_requested=True, finished=self.now()
             ):
                 running = and_(Job.id == job_id, Job.state == JobState.RUNNING)
                 _change(connection, running, cancel_requested=True)
@@ -251,13 +258,15 @@ class JobRepository:
             return self.recover_expired()
         with self._db.writing() as connection:
             condition = and_(Job.state == JobState.RUNNING, Job.lease_owner != owner)
-            return _recover(connection, condition, "the service ended while the job ran")
+            return _recover(connection, condition, "the service ended while the job ran", self.now())
 
     def recover_expired(self) -> Recovered:
         """Take back running jobs whose lease ran out; those that another service looks at are left to it."""
         with self._db.writing() as connection:
-            condition = and_(Job.state == JobState.RUNNING, Job.lease_until < utc_now())
-            return _recover(connection, condition, "its owner gave no sign of life", skip_locked=True)
+            condition = and_(Job.state == JobState.RUNNING, Job.lease_until < self.now())
+            return _recover(
+                connection, condition, "its owner gave no sign of life", self.now(), skip_locked=True
+            )
 
     @staticmethod
     def _by_key(connection: Connection, new: NewJob) -> JobRow | None:
@@ -290,9 +299,8 @@ class JobRepository:
                 f"{waiting} jobs wait already, the queue takes {queue_limit}: try again later", retry_after=10
             )
 
-    @staticmethod
-    def _insert(connection: Connection, new: NewJob, source: str | None) -> str:
-        now, job_id = utc_now(), new_id()
+    def _insert(self, connection: Connection, new: NewJob, source: str | None) -> str:
+        now, job_id = self.now(), new_id()
         values = {
             field.name: getattr(new, field.name) for field in fields(NewJob) if field.name not in ("fresh",)
         }
@@ -312,7 +320,12 @@ class JobRepository:
 
 
 def _recover(
-    connection: Connection, condition: ColumnElement[bool], reason: str, *, skip_locked: bool = False
+    connection: Connection,
+    condition: ColumnElement[bool],
+    reason: str,
+    now: datetime,
+    *,
+    skip_locked: bool = False,
 ) -> Recovered:
     """Running jobs without an owner: dismissed if asked for, failed after the last attempt, else waiting.
 
@@ -324,13 +337,13 @@ def _recover(
     for row in connection.execute(query).all():
         values: dict[str, Any] = {"state": JobState.ACCEPTED, "started": None, "progress": 0.0, "points": 0}
         if row.cancel_requested:
-            values = {"state": JobState.DISMISSED, "finished": utc_now()}
+            values = {"state": JobState.DISMISSED, "finished": now}
         elif row.attempt >= row.max_attempts:
             failure = JobFailure(
                 kind=FailureKind.WORKER_LOST,
                 detail=f"{reason}, in attempt {row.attempt} of {row.max_attempts}; it is not tried again",
             )
-            values = {"state": JobState.FAILED, "finished": utc_now(), "error": failure.to_json()}
+            values = {"state": JobState.FAILED, "finished": now, "error": failure.to_json()}
         _change(connection, Job.id == row.id, **values, **_FREE)
         counts[values["state"].value] += 1
     return Recovered(**counts)

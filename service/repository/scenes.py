@@ -6,9 +6,9 @@ from typing import Any
 
 from sqlalchemy import Connection, insert, select
 
+from service.clock import utc_now
 from service.db import Database
 from service.models import NOBODY, Scene
-from service.repository.jobs import utc_now
 from service.repository.rows import SceneRow
 
 __all__ = ["SceneRepository", "SceneRow"]

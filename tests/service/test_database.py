@@ -20,6 +20,7 @@ from sqlalchemy.exc import DBAPIError, StatementError
 
 from service import revisions
 from service.arrays import decode, encode
+from service.clock import utc_now
 from service.core import Service
 from service.db import Database, backup, is_sqlite, migrating, sqlite_note, write_engine
 from service.embedded import EmbeddedService
@@ -28,7 +29,6 @@ from service.ids import new_id
 from service.jobs import FailureKind, JobFailure, JobOutput, StoredArray
 from service.models import Base, Job, JobState
 from service.repository import Attempt, JobRepository, NewJob, SceneRepository
-from service.repository.jobs import utc_now
 
 
 @pytest.fixture

@@ -22,6 +22,7 @@ import solver
 from service import revisions
 from service.answers import DesignDetail
 from service.client import Client
+from service.clock import utc_now
 from service.db import Database, migrating
 from service.design_queries import DesignQuery, design_page
 from service.errors import InvalidRequestError
@@ -31,7 +32,6 @@ from service.kinds.records import design_record
 from service.models import Base, Job, JobState
 from service.repository import DesignRepository
 from service.repository.designs import insert_design
-from service.repository.jobs import utc_now
 from service.settings import load_settings
 from service.validation import validated
 

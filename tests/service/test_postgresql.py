@@ -21,6 +21,7 @@ from sqlalchemy import select, text
 from service import postgresql, revisions
 from service.cli import main
 from service.client import Client
+from service.clock import utc_now
 from service.core import Service
 from service.db import Database
 from service.errors import DatabaseError, DatabaseInUseError, ServiceProblem
@@ -28,7 +29,6 @@ from service.health import check
 from service.jobs import JobOutput
 from service.models import Job, JobState
 from service.repository import JobRepository, NewJob
-from service.repository.jobs import utc_now
 
 SCRIPT = Path(__file__).with_name("serve_private.py")
 NEW = NewJob(kind="iteration", request={}, spec={}, spec_hash="", request_hash="", max_attempts=3, fresh=True)

@@ -13,11 +13,11 @@ from service_helpers import analyse
 
 from service.answers import SweepDetail
 from service.arrays import encode
+from service.clock import utc_now
 from service.db import Database
 from service.errors import InvalidRequestError
 from service.jobs import ContactValues, JobOutput, SweepRecord
 from service.repository import JobRepository, NewJob, SweepRepository
-from service.repository.jobs import utc_now
 from service.repository.sweeps import insert_sweeps
 from service.settings import load_settings
 from service.sweep_queries import SweepQuery, sweep_page
