@@ -1,7 +1,8 @@
 """What a kind of job is: a request model, a resolution of the request, a function that computes.
 
 A new kind is one module in `service.kinds` and one entry in its registry; queue, database, HTTP and
-command know kinds only through this contract.
+command know kinds only through this contract. A kind whose work can be divided says so by a
+`service.parts.Parts`.
 """
 
 from __future__ import annotations
@@ -9,13 +10,16 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.errors import InvalidRequestError
 from service.strict_json import pointer
 from solver.errors import Issue
+
+if TYPE_CHECKING:
+    from service.parts import Parts
 
 Progress = Callable[[float, int], None]
 ShouldStop = Callable[[], bool]
@@ -214,6 +218,9 @@ class JobKind:
         From request to spec; raises InvalidRequestError. Runs in the service.
     run : callable
         From spec to output; raises SolverError for what is wrong for good. Runs in a worker.
+    parts : Parts or None
+        How the work is divided, if it can be; `run` is then ``parts.run``, which computes them one after the
+        other.
     """
 
     name: str
@@ -221,6 +228,7 @@ class JobKind:
     request: type[JobRequest]
     resolve: Resolve
     run: Run
+    parts: Parts | None = None
 
 
 def no_warm_up() -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -17,13 +17,15 @@ from solver.kernels.rows import GIVEN, MAX_ABS, RESIDUAL, ROW_VALUES, SOLVED, so
 from solver.peak_tracks import PeakTrack, TrackStatus
 from solver.ridges import check_laws
 from solver.savings import Effects
-from solver.scale import scale_of
+from solver.scale import Scale, scale_of
 from solver.scene import Scene
 from solver.tracking import track_peak
 from solver.workspace import Workspace
 
 MOST_POINTS = 4_000_000
-_OF_THE_GRID = 0.7  # share of the progress, where the peaks are tracked after it
+OF_THE_GRID = 0.7  # share of the progress, where the peaks are tracked too
+_WORK_OF_A_STRIP = 25_000  # frequencies × harmonics: 0.1 s, measured on bladed-disk
+_MOST_STRIPS = 256
 
 
 class MapStatus(Enum):
@@ -130,7 +132,169 @@ def response_map(
     SettingError
         A bad path, range, grid or number of harmonics, or a ridge asked for that cannot be tracked.
     """
-    begun = time.perf_counter()
+    grid = map_grid(
+        scene, parameter, start, stop, steps=steps, frequencies=frequencies, harmonics=harmonics,
+        ridge=ridge, effects=effects,
+    )  # fmt: skip
+    strips: list[Strip] = []
+    stopped = False
+    for first, last in grid.strips:
+
+        def progress(share: float, points: int, first: int = first, rows: int = last - first) -> None:
+            if on_progress is not None:
+                done = (first + share * rows) / steps
+                on_progress(done * (OF_THE_GRID if ridge else 1.0), first * frequencies + points)
+
+        strips.append(grid.solve(first, last, on_progress=progress, should_stop=should_stop))
+        stopped = strips[-1].stopped
+        if stopped:
+            break
+    track = None
+    if ridge and not stopped:
+
+        def tracked(share: float, _sweeps: int) -> None:
+            if on_progress is not None:
+                on_progress(OF_THE_GRID + (1.0 - OF_THE_GRID) * share, steps * frequencies)
+
+        track = track_peak(
+            scene, parameter, start, stop, harmonics=harmonics, effects=effects, on_progress=tracked,
+            should_stop=should_stop,
+        )  # fmt: skip
+        stopped = track.status is TrackStatus.STOPPED
+    found = grid.joined(strips, track)
+    return replace(found, status=MapStatus.STOPPED) if stopped else found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Strip:
+    """Some consecutive rows of a map.
+
+    Attributes
+    ----------
+    first : int
+        Row of the map that is its first.
+    values : (rows, F, ROW_VALUES) array
+        Of `solver.kernels.rows`; NaN where no solution was found.
+    stopped : bool
+        Whether it was left before its last row.
+    """
+
+    first: int
+    values: Real
+    newton_iterations: int
+    seconds: float
+    stopped: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapGrid:
+    """The points of a map, in strips of rows that need nothing of each other.
+
+    The division depends on the map alone, so that its numbers do not depend on who solves which strip.
+
+    Attributes
+    ----------
+    scene : Scene
+        With the values that stay fixed.
+    scale : Scale
+        The parameter with its range.
+    steps, frequencies : int
+        Points each way.
+    """
+
+    scene: Scene
+    scale: Scale
+    steps: int
+    frequencies: int
+    harmonics: int
+    effects: Effects | None
+
+    @property
+    def band(self) -> Real:
+        """(frequencies,) Hz."""
+        return np.linspace(*self.scene.observe.band, self.frequencies)
+
+    @property
+    def strips(self) -> tuple[tuple[int, int], ...]:
+        """First row and the one after the last of every strip; each is 0.1 s of work or more."""
+        a_row = self.frequencies * max(self.harmonics, 1)
+        rows = max(math.ceil(_WORK_OF_A_STRIP / a_row), math.ceil(self.steps / _MOST_STRIPS))
+        return tuple((first, min(first + rows, self.steps)) for first in range(0, self.steps, rows))
+
+    def solve(
+        self,
+        first: int,
+        last: int,
+        *,
+        on_progress: Callable[[float, int], None] | None = None,
+        should_stop: Callable[[], bool] | None = None,
+    ) -> Strip:
+        """Solve rows `first` to `last` - 1; a strip of `strips`, to get the numbers of the whole map.
+
+        Parameters
+        ----------
+        first, last : rows.
+        on_progress : called with (share of the strip done, its points so far).
+        should_stop : asked between rows.
+        """
+        begun, spent = time.perf_counter(), 0
+        values, omegas = self.scale.spaced(self.steps), 2.0 * math.pi * self.band
+        table = np.full((last - first, self.frequencies, ROW_VALUES), np.nan)
+        before: tuple[Real, Integer] | None = None
+        stopped = False
+        for row in range(first, last):
+            if should_stop is not None and should_stop():
+                stopped = True
+                break
+            here = self.scene.with_values({self.scale.parameter.path: float(values[row])})
+            workspace = Workspace.of(build(here, harmonics=self.harmonics, effects=self.effects))
+            before, more = _row(workspace, omegas, before, table[row - first])
+            spent += more
+            if on_progress is not None:
+                done = row - first + 1
+                on_progress(done / (last - first), done * self.frequencies)
+        return Strip(
+            first=first, values=table, newton_iterations=spent, stopped=stopped,
+            seconds=time.perf_counter() - begun,
+        )  # fmt: skip
+
+    def joined(self, strips: Sequence[Strip], ridge: PeakTrack | None = None) -> ResponseMap:
+        """Return the map of these strips; what is in none is empty. Its seconds are the sum of theirs."""
+        table = np.full((self.steps, self.frequencies, ROW_VALUES), np.nan)
+        for strip in strips:
+            table[strip.first : strip.first + len(strip.values)] = strip.values
+        solved = table[:, :, RESIDUAL][np.isfinite(table[:, :, RESIDUAL])]
+        whole = bool(np.isfinite(table[:, :, MAX_ABS]).all())
+        seconds = sum(strip.seconds for strip in strips) + (0.0 if ridge is None else ridge.seconds)
+        return ResponseMap(
+            scene=self.scene.name, parameter_path=self.scale.parameter.path, unit=self.scale.parameter.unit,
+            parameter=self.scale.spaced(self.steps), frequency=self.band,
+            amplitude=table[:, :, MAX_ABS].copy(), half_peak_to_peak=table[:, :, 1].copy(), ridge=ridge,
+            n_harmonics=self.harmonics, largest_residual=float(solved.max(initial=0.0)),
+            newton_iterations=sum(strip.newton_iterations for strip in strips),
+            status=MapStatus.COMPLETED if whole else MapStatus.HOLES, seconds=seconds,
+        )  # fmt: skip
+
+
+def map_grid(
+    scene: Scene,
+    parameter: str,
+    start: float,
+    stop: float,
+    *,
+    steps: int = 60,
+    frequencies: int = 400,
+    harmonics: int = 11,
+    ridge: bool = True,
+    effects: Effects | None = None,
+) -> MapGrid:
+    """Return the points of `response_map`, to be solved in strips on several processors.
+
+    Raises
+    ------
+    SettingError
+        As `response_map`.
+    """
     for name, value in (("steps", steps), ("frequencies", frequencies)):
         if isinstance(value, bool) or not isinstance(value, int) or value < 2:
             raise SettingError(name, value, "must be a whole number >= 2")
@@ -138,42 +302,9 @@ def response_map(
         raise SettingError("steps", steps, f"times the frequencies must be at most {MOST_POINTS}")
     if ridge:
         check_laws(scene)
-    scale = scale_of(scene, parameter, start, stop)
-    values = scale.spaced(steps)
-    band = np.linspace(*scene.observe.band, frequencies)
-    table, spent = np.full((steps, frequencies, ROW_VALUES), np.nan), 0
-    before: tuple[Real, Integer] | None = None
-    stopped = False
-    for row, value in enumerate(values):
-        if should_stop is not None and should_stop():
-            stopped = True
-            break
-        here = scene.with_values({parameter: float(value)})
-        workspace = Workspace.of(build(here, harmonics=harmonics, effects=effects))
-        before, more = _row(workspace, 2.0 * math.pi * band, before, table[row])
-        spent += more
-        if on_progress is not None:
-            on_progress((row + 1.0) / steps * (_OF_THE_GRID if ridge else 1.0), (row + 1) * frequencies)
-    unsolved = not np.isfinite(table[:, :, MAX_ABS]).all()
-    track = None
-    if ridge and not stopped:
-
-        def progress(share: float, _sweeps: int) -> None:
-            if on_progress is not None:
-                on_progress(_OF_THE_GRID + (1.0 - _OF_THE_GRID) * share, steps * frequencies)
-
-        track = track_peak(
-            scene, parameter, start, stop, harmonics=harmonics, effects=effects, on_progress=progress,
-            should_stop=should_stop,
-        )  # fmt: skip
-        stopped = track.status is TrackStatus.STOPPED
-    status = MapStatus.STOPPED if stopped else MapStatus.HOLES if unsolved else MapStatus.COMPLETED
-    solved = table[:, :, RESIDUAL][np.isfinite(table[:, :, RESIDUAL])]
-    return ResponseMap(
-        scene=scene.name, parameter_path=parameter, unit=scale.parameter.unit, parameter=values,
-        frequency=band, amplitude=table[:, :, MAX_ABS].copy(), half_peak_to_peak=table[:, :, 1].copy(),
-        ridge=track, n_harmonics=harmonics, largest_residual=float(solved.max(initial=0.0)),
-        newton_iterations=spent, status=status, seconds=time.perf_counter() - begun,
+    return MapGrid(
+        scene=scene, scale=scale_of(scene, parameter, start, stop), steps=steps, frequencies=frequencies,
+        harmonics=harmonics, effects=effects,
     )  # fmt: skip
 
 

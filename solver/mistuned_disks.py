@@ -194,7 +194,7 @@ def mistuning_study(
     """
     begun = time.perf_counter()
     names = (of,) if isinstance(of, str) else tuple(of)
-    factors = disk_factors(scene, names, spread, samples, seed)
+    disk_factors(scene, names, spread, samples, seed)  # refuses what cannot be drawn
     asked = should_stop or (lambda: False)
 
     def peaks_of(disk: Scene, done: int) -> BladePeaks:
@@ -207,24 +207,55 @@ def mistuning_study(
         )
 
     tuned = peaks_of(without_mistuning(scene), 0)
-    disks: list[MistunedDisk] = []
-    first = _worst_branch(tuned)
+    disks: list[BladePeaks] = []
+    first = worst_branch(tuned)
     highest, branches, stopped = -math.inf, first, asked()
-    for k, row in enumerate(factors if first and not stopped else ()):
+    for k in range(samples if first and not stopped else 0):
         peaks = peaks_of(mistuned(scene, of=names, spread=spread, seed=seed + k), k + 1)
         stopped = asked()
         if stopped:
             break
-        factor = peaks.magnification(tuned)
-        disks.append(
-            MistunedDisk(seed=seed + k, factors=row, peaks=replace(peaks, branches=()), magnification=factor)
-        )
-        if factor > highest:
-            highest, branches = factor, first + _worst_branch(peaks)
-    return MistuningStudy(
-        scene=scene.name, of=names, spread=spread, tuned=replace(tuned, branches=()), disks=tuple(disks),
-        branches=branches, n_harmonics=harmonics, status=_status(stopped, bool(first), disks),
+        disks.append(replace(peaks, branches=()))
+        if peaks.largest > highest:
+            highest, branches = peaks.largest, first + worst_branch(peaks)
+    study = joined_study(
+        scene, of=names, spread=spread, seed=seed, harmonics=harmonics, tuned=tuned, disks=disks,
         seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+    return replace(study, branches=branches, status=MistuningStatus.STOPPED if stopped else study.status)
+
+
+def joined_study(
+    scene: Scene,
+    *,
+    of: Sequence[str],
+    spread: float,
+    seed: int,
+    harmonics: int,
+    tuned: BladePeaks,
+    disks: Sequence[BladePeaks],
+    seconds: float,
+) -> MistuningStudy:
+    """Return the study of disks whose peaks are known already, wherever they were computed; no branches.
+
+    Parameters
+    ----------
+    scene, of, spread, seed, harmonics : as in `mistuning_study`.
+    tuned : peaks of the disk `without_mistuning`.
+    disks : peaks of the disks ``mistuned(scene, of=of, spread=spread, seed=seed + k)``, k = 0, 1, …
+    seconds : that they took.
+    """
+    compared = tuned.largest > 0.0
+    drawn = disk_factors(scene, of, spread, max(len(disks), 1), seed)
+    found = [
+        MistunedDisk(
+            seed=seed + k, factors=drawn[k], peaks=peaks, magnification=peaks.magnification(tuned)
+        )
+        for k, peaks in enumerate(disks if compared else ())
+    ]  # fmt: skip
+    return MistuningStudy(
+        scene=scene.name, of=tuple(of), spread=spread, tuned=replace(tuned, branches=()), disks=tuple(found),
+        branches=(), n_harmonics=harmonics, status=_status(compared, found), seconds=seconds,
     )  # fmt: skip
 
 
@@ -261,16 +292,14 @@ def without_mistuning(scene: Scene) -> Scene:
     return scene.model_copy(update={"structure": structure.model_copy(update={"mistuning": None})})
 
 
-def _worst_branch(peaks: BladePeaks) -> tuple[Branch, ...]:
+def worst_branch(peaks: BladePeaks) -> tuple[Branch, ...]:
     """Return the response of the blade with the highest peak, if all are known and one moves."""
     return (peaks.branches[peaks.worst],) if peaks.largest > 0.0 else ()
 
 
-def _status(stopped: bool, tuned: bool, disks: Sequence[MistunedDisk]) -> MistuningStatus:
-    """Return how a study ended."""
-    if stopped:
-        return MistuningStatus.STOPPED
-    if not tuned:
+def _status(compared: bool, disks: Sequence[MistunedDisk]) -> MistuningStatus:
+    """Return how a study ended that was not stopped."""
+    if not compared:
         return MistuningStatus.NO_RESPONSE
     known = all(disk.known for disk in disks)
     return MistuningStatus.COMPLETED if known else MistuningStatus.INCOMPLETE

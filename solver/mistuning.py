@@ -16,10 +16,13 @@ from solver.fourier import Real
 from solver.histories import motion
 from solver.kernels.events import largest
 from solver.kernels.trigpoly import grid_size, grid_tables, on_grid
+from solver.observations import observing
 from solver.response import Solution
 from solver.scene import CyclicStructure, Observe, Scene
 from solver.scene_checks import listing, nearest
 from solver.sectors import annulus, sectors_needed
+
+_OF_THE_SWEEP = 0.4  # share of the time; the rest looks for the peaks of the other blades
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +71,7 @@ class BladePeaks:
     status : tuple of BranchStatus
         How each sector's branch ended.
     branches : tuple of Branch
-        The response of each blade; the same one where all are alike.
+        The response of each blade, the same one where all are alike; without those that were not reached.
     """
 
     dof: str
@@ -103,7 +106,7 @@ def blade_peaks(
     on_progress: Callable[[float, int], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> BladePeaks:
-    """Return the highest peak of every blade: a sweep of the frequency for each, or one where all are alike.
+    """Return the highest peak of every blade, all from one sweep of the frequency.
 
     Parameters
     ----------
@@ -112,8 +115,8 @@ def blade_peaks(
     dof : name of the DOF in one sector; the observed one if left out.
     harmonics : highest harmonic kept.
     settings : of the continuation.
-    on_progress : called with (share done, sweeps so far).
-    should_stop : asked after every step of a sweep.
+    on_progress : called with (share done, blades so far).
+    should_stop : asked between stretches of the sweep and between blades.
 
     Raises
     ------
@@ -127,26 +130,30 @@ def blade_peaks(
         names, repeats = [name], structure.sectors
         if sectors_needed(_observing(scene, name)).sectors > 1:
             names, repeats = [f"{name}@{j}" for j in range(structure.sectors)], 1
-    branches: list[Branch] = []
-    for done, each in enumerate(names):
 
-        def progress(share: float, _points: int, before: int = done) -> None:
-            if on_progress is not None:
-                on_progress((before + share) / len(names), before)
+    def progress(share: float, _points: int) -> None:
+        if on_progress is not None:
+            on_progress(share if len(names) == 1 else _OF_THE_SWEEP * share, 0)
 
-        branches.append(
-            sweep(
-                _observing(scene, each), start=start, stop=stop, harmonics=harmonics, settings=settings,
-                on_progress=progress, should_stop=should_stop,
-            )
-        )  # fmt: skip
-    branches *= repeats
-    known = [branch.peak if branch.completed else None for branch in branches]
+    branch = sweep(
+        _observing(scene, names[0]), start=start, stop=stop, harmonics=harmonics, settings=settings,
+        on_progress=progress, should_stop=should_stop,
+    )  # fmt: skip
+    branches = [branch] * repeats
+    for done, each in enumerate(names[1:], 1):
+        if should_stop is not None and should_stop():
+            break
+        # Every blade moves in the same solutions.
+        branches.append(observing(branch, each))
+        if on_progress is not None:
+            on_progress(_OF_THE_SWEEP + (1.0 - _OF_THE_SWEEP) * (done + 1.0) / len(names), done)
+    missing = len(names) * repeats - len(branches)
+    known = [each.peak if each.completed else None for each in branches] + [None] * missing
     return BladePeaks(
         dof=name,
         value=np.array([math.nan if peak is None else peak.value for peak in known]),
         at_hz=np.array([math.nan if peak is None else peak.at for peak in known]),
-        status=tuple(branch.status for branch in branches),
+        status=tuple(each.status for each in branches) + (BranchStatus.STOPPED,) * missing,
         branches=tuple(branches),
     )
 

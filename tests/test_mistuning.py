@@ -312,6 +312,32 @@ def test_peaks_of_every_blade(written: bool):
         assert np.all(every.max_abs <= found.value * (1.0 + 1e-6))
 
 
+@pytest.mark.parametrize("written", [False, True], ids=["cyclic", "annulus"])
+def test_one_sweep_gives_the_same_peaks_as_one_for_each_blade(written: bool):
+    scene = with_mistuning(disk(2).with_values(LIGHT), of=["root"], values=VALUES)
+    scene = annulus(scene) if written else scene
+    found = blade_peaks(scene, 2.8, 3.8, harmonics=5)
+    for sector in range(6):
+        observe = scene.observe.model_copy(update={"dof": f"blade@{sector}"})
+        alone = sweep(scene.model_copy(update={"observe": observe}), start=2.8, stop=3.8, harmonics=5).peak
+        assert alone is not None
+        assert found.value[sector] == pytest.approx(alone.value, rel=1e-9)
+        assert found.at_hz[sector] == pytest.approx(alone.at, rel=1e-9)
+
+
+def test_stopped_between_two_blades():
+    scene = with_mistuning(disk(2).with_values(LIGHT), of=["root"], values=VALUES)
+    done: list[int] = []
+    found = blade_peaks(
+        scene, 2.8, 3.8, harmonics=3, should_stop=lambda: bool(done) and done[-1] == 2,
+        on_progress=lambda _share, blades: done.append(blades),
+    )  # fmt: skip
+    assert np.isfinite(found.value).tolist() == [True] * 3 + [False] * 3
+    assert found.status[2:4] == (BranchStatus.COMPLETED, BranchStatus.STOPPED)
+    assert len(found.branches) == 3
+    assert math.isnan(found.largest)
+
+
 def test_peaks_that_were_not_reached():
     cut = ContinuationSettings(most_points=5)
     found = blade_peaks(disk(), harmonics=1, settings=cut)

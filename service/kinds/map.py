@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
 import solver
+from service import strict_json
+from service.arrays import decode, encode
 from service.jobs import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
 from service.kinds.ranges import RangeRequest, law_issues, range_issues
-from service.kinds.records import sweep_records
+from service.kinds.records import packed, sweep_records, unpacked
 from service.kinds.scenes import refusal, require, resolve_scene, resolved
 from service.kinds.sizes import MOST_POINTS, dofs_solved, size_issues
+from service.parts import Part, PartOutput, Parts, PartStoppedError
 from solver.errors import Issue
 from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.maps import MapGrid
 
 _EXAMPLE: dict[str, Any] = {
     "scene": "bladed-disk",
@@ -78,9 +84,59 @@ def _size_issues(request: MapRequest, scene: Scene) -> list[Issue]:
     return size_issues("/steps", words, points, request.harmonics, dofs_solved(scene))
 
 
-def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
-    """Solve the grid; the stored sweeps are those that look for peaks."""
-    found = solver.response_map(
+def split(spec: Mapping[str, Any]) -> list[Part]:
+    """The ridge, which takes longest, and strips of rows."""
+    grid, ridge = _grid(spec), spec["ridge"]
+    from solver.maps import OF_THE_GRID
+
+    weight = (OF_THE_GRID if ridge else 1.0) / grid.steps
+    tracked = [Part(spec={"ridge": True}, weight=1.0 - OF_THE_GRID)] if ridge else []
+    return tracked + [
+        Part(spec={"rows": [first, last]}, weight=weight * (last - first)) for first, last in grid.strips
+    ]
+
+
+def run_part(
+    spec: Mapping[str, Any], part: Mapping[str, Any], progress: Progress, should_stop: ShouldStop
+) -> PartOutput:
+    """Track the peaks, or solve some rows."""
+    if part.get("ridge"):
+        return _ridge(spec, progress, should_stop)
+    strip = _grid(spec).solve(*part["rows"], on_progress=progress, should_stop=should_stop)
+    if strip.stopped:
+        raise PartStoppedError
+    return PartOutput(
+        result={
+            "first": strip.first, "newton_iterations": strip.newton_iterations, "seconds": strip.seconds
+        },
+        arrays={"values": encode(strip.values)},
+        points=strip.values.shape[0] * strip.values.shape[1],
+    )  # fmt: skip
+
+
+def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutput:
+    """The map from its strips; the stored sweeps are those that look for peaks."""
+    from solver.maps import Strip
+
+    parts = list(outputs.values())
+    ridge = parts.pop(0) if spec["ridge"] else None
+    found = _grid(spec).joined([Strip(**part.result, values=decode(part.arrays["values"])) for part in parts])
+    result = found.to_json()
+    if ridge is not None:
+        result["ridge"] = ridge.result["ridge"]
+        result["seconds"] = found.seconds + ridge.result["ridge"]["seconds"]
+    return JobOutput(
+        result=result,
+        sweeps=() if ridge is None else unpacked(ridge.result["sweeps"], ridge.arrays),
+        shortfall=None if found.completed else found.status.value,
+    )
+
+
+def _grid(spec: Mapping[str, Any]) -> MapGrid:
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from solver.maps import map_grid
+
+    return map_grid(
         Scene.from_dict(spec["scene"]),
         spec["parameter"],
         spec["start"],
@@ -89,20 +145,31 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
         frequencies=spec["frequencies"],
         ridge=spec["ridge"],
         harmonics=spec["harmonics"],
-        on_progress=progress,
+    )
+
+
+def _ridge(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> PartOutput:
+    track = solver.track_peak(
+        Scene.from_dict(spec["scene"]),
+        spec["parameter"],
+        spec["start"],
+        spec["stop"],
+        harmonics=spec["harmonics"],
+        on_progress=lambda share, _sweeps: progress(share, 0),
         should_stop=should_stop,
     )
-    return JobOutput(
-        result=found.to_json(),
-        sweeps=() if found.ridge is None else sweep_records(found.ridge.branches),
-        shortfall=None if found.completed else found.status.value,
-    )
+    if track.status is solver.TrackStatus.STOPPED:
+        raise PartStoppedError
+    sweeps, arrays = packed(sweep_records(track.branches))
+    return PartOutput(result={"ridge": strict_json.finite(track.to_json()), "sweeps": sweeps}, arrays=arrays)
 
 
+_PARTS = Parts(split=split, run_part=run_part, join=join)
 MAP = JobKind(
     name="map",
     summary="The response over frequency and a parameter, with the ridge of its peaks.",
     request=MapRequest,
     resolve=resolve,
-    run=run,
+    run=_PARTS.run,
+    parts=_PARTS,
 )

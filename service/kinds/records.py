@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, fields
+from typing import TYPE_CHECKING, Any
 
 from service.arrays import encode
-from service.jobs import ContactValues, DesignRecord, SweepRecord, VariableValues
+from service.jobs import ContactValues, DesignRecord, StoredArray, SweepRecord, VariableValues
 from service.strict_json import digest
 from solver.scene import AnyContact, FrictionContact, Scene
 
@@ -62,6 +63,34 @@ def sweep_records(branches: Iterable[Branch]) -> tuple[SweepRecord, ...]:
     """The frequency responses that have points, each once."""
     once = {id(branch): branch for branch in branches if len(branch.values)}
     return tuple(sweep_record(branch) for branch in once.values())
+
+
+def packed(records: Iterable[SweepRecord]) -> tuple[list[dict[str, Any]], dict[str, StoredArray]]:
+    """Records as the parts of a job give them back: JSON, and their arrays by names of their own."""
+    tables: list[dict[str, Any]] = []
+    arrays: dict[str, StoredArray] = {}
+    for index, record in enumerate(records):
+        tables.append({each.name: getattr(record, each.name) for each in fields(record)})
+        tables[-1]["contacts"] = [asdict(contact) for contact in record.contacts]
+        tables[-1]["arrays"] = {name: f"sweep-{index}-{name}" for name in record.arrays}
+        arrays |= {f"sweep-{index}-{name}": array for name, array in record.arrays.items()}
+    return tables, arrays
+
+
+def unpacked(
+    tables: Iterable[Mapping[str, Any]], arrays: Mapping[str, StoredArray]
+) -> tuple[SweepRecord, ...]:
+    """The records of `packed`."""
+    return tuple(
+        SweepRecord(
+            **{
+                **table,
+                "contacts": tuple(ContactValues(**contact) for contact in table["contacts"]),
+                "arrays": {name: arrays[key] for name, key in table["arrays"].items()},
+            }
+        )
+        for table in tables
+    )
 
 
 def design_record(result: DesignResult) -> DesignRecord:
