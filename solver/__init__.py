@@ -62,7 +62,7 @@ _HOME = {
     "track_peak": "tracking", "Shares": "segments_of",
     "ContactWear": "wear", "Measured": "wear", "WearSensitivity": "wear", "contact_wear": "wear",
     "Measure": "wear_peaks", "WorstWear": "wear_peaks", "worst_friction_work": "wear_peaks",
-    "worst_wear": "wear_peaks", "worst_slopes": "wear_corners",
+    "worst_wear": "wear_peaks", "worst_slopes": "wear_corners", "Stretch": "stretches", "joined": "stretches",
 }  # fmt: skip
 
 __all__ = [
@@ -109,6 +109,7 @@ __all__ = [
     "SolutionStatus",
     "SolverError",
     "Stability",
+    "Stretch",
     "TrackStatus",
     "WearSensitivity",
     "WorstWear",
@@ -120,6 +121,7 @@ __all__ = [
     "branch_stability",
     "contact_wear",
     "hysteresis_loop",
+    "joined",
     "least_peak",
     "load_scene",
     "march",

@@ -19,24 +19,27 @@ from solver.balance import Balance, build
 from solver.branch import ENDINGS, Branch, BranchStatus
 from solver.errors import SettingError
 from solver.fourier import Integer, Real, to_full
-from solver.kernels import walk as state_of
-from solver.kernels.observe import MEASURES
+from solver.kernels import walk as walk_states
 from solver.kernels.path import begin_walk, walk_on
 from solver.kernels.walk import Control, walk_by_value
 from solver.peaks import Points, Survey, band_limit
 from solver.savings import Effects
 from solver.scene import Scene
+from solver.stretches import Stretch, go_on_from, joined, rows_of, state_of
 from solver.workspace import Workspace
 
-_STRETCH = 64  # points between two looks at the caller
+_STRETCH = 64  # points between two looks at the caller, at most
+_SHORT_STRETCH = 4  # the first of them where a point may take long
+_LARGE = 400  # unknowns from which it may
+_STRETCH_SECONDS = 0.5
 
 
 class Predictor(IntEnum):
     """How the next point is guessed."""
 
-    TANGENT = state_of.TANGENT
-    SECANT = state_of.SECANT
-    CUBIC = state_of.CUBIC
+    TANGENT = walk_states.TANGENT
+    SECANT = walk_states.SECANT
+    CUBIC = walk_states.CUBIC
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,21 +75,6 @@ class ContinuationSettings:
     most_points: int = 20_000
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Stretch:
-    """Some consecutive points of a branch; the arrays are those of `solver.branch.Branch`."""
-
-    solutions: Real
-    tangents: Real
-    states: Integer
-    observed: Real
-    measures: Real
-    status: BranchStatus | None
-    newton_iterations: int
-    rejected_steps: int
-    stepped_over: int
-
-
 def sweep(
     scene: Scene,
     parameter: str = "frequency",
@@ -100,6 +88,8 @@ def sweep(
     settings: ContinuationSettings | None = None,
     effects: Effects | None = None,
     guess: Real | None = None,
+    resume: Stretch | None = None,
+    on_stretch: Callable[[Stretch], None] | None = None,
     on_progress: Callable[[float, int], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> Branch:
@@ -118,6 +108,9 @@ def sweep(
     settings : of the continuation.
     effects : what is paid for though the scene does not call for it; see `solver.savings.Effects`.
     guess : (n_unknowns,) slip motions [m] to start from, instead of the start-up ladder.
+    resume : the beginning of the same branch, to go on behind its last point.
+    on_stretch : called with all consecutive points as they are found; joined (`solver.joined`) they are what
+        `resume` takes.
     on_progress : called with (share of the range reached, points so far).
     should_stop : asked between stretches of points; True ends the branch with the status STOPPED.
 
@@ -128,11 +121,13 @@ def sweep(
     Raises
     ------
     SettingError
-        A bad path, range, frequency, limit, number of harmonics or accuracy.
+        A bad path, range, frequency, limit, number of harmonics or accuracy; a beginning of another branch.
     """
     if accuracy is not None:
-        if guess is not None:
-            raise SettingError("accuracy", accuracy, "cannot go with a guess, whose harmonics are fixed")
+        if guess is not None or resume is not None:
+            raise SettingError(
+                "accuracy", accuracy, "cannot go with a guess or a beginning, whose harmonics are fixed"
+            )
 
         def sweep_with(count: int) -> Branch:
             return sweep(
@@ -153,11 +148,13 @@ def sweep(
     if limit is not None and not (isinstance(limit, (int, float)) and np.isfinite(limit) and limit > 0.0):
         raise SettingError("limit", limit, "must be an amplitude > 0 m")
     workspace = Workspace.of(balance)
-    stretches: list[Stretch] = []
-    status, count = BranchStatus.TOO_MANY_POINTS, 0
-    for stretch in walk(workspace, first, last, settings, guess):
+    stretches = [] if resume is None else [resume]
+    status, count = BranchStatus.TOO_MANY_POINTS, 0 if resume is None else len(resume.solutions)
+    for stretch in walk(workspace, first, last, settings, guess, resume):
         stretches.append(stretch)
         count += len(stretch.solutions)
+        if on_stretch is not None:
+            on_stretch(stretch)
         if stretch.status is not None:
             status = stretch.status
             break
@@ -171,7 +168,8 @@ def sweep(
             break
     if on_progress is not None and status is BranchStatus.COMPLETED:
         on_progress(1.0, count)
-    return _finish(workspace, stretches, status, first, last, limit, begun)
+    earlier = 0.0 if resume is None else resume.seconds
+    return _finish(workspace, stretches, status, first, last, limit, begun - earlier)
 
 
 def check_range(balance: Balance, start: float | None, stop: float | None) -> tuple[float, float]:
@@ -194,8 +192,9 @@ def check_range(balance: Balance, start: float | None, stop: float | None) -> tu
 
 
 def walk(
-    workspace: Workspace, start: float, stop: float, settings: ContinuationSettings, guess: Real | None = None
-) -> Iterator[Stretch]:
+    workspace: Workspace, start: float, stop: float, settings: ContinuationSettings,
+    guess: Real | None = None, resume: Stretch | None = None,
+) -> Iterator[Stretch]:  # fmt: skip
     """Yield the branch in stretches; the last one carries the status. The caller owns stop, save and plot.
 
     Parameters
@@ -203,7 +202,9 @@ def walk(
     workspace : of the balance in the parameter that is continued in.
     start, stop : the range in user units.
     guess : (n_unknowns,) slip motions to start from [m].
+    resume : the branch so far, to go on behind its last point; it is not among what is yielded.
     """
+    begun = time.perf_counter() - (0.0 if resume is None else resume.seconds)
     balance, system = workspace.balance, workspace.system
     control = Control(
         start=balance.parameter.inside(start), stop=balance.parameter.inside(stop),
@@ -213,47 +214,52 @@ def walk(
         largest_turn=settings.largest_turn, range_weight=settings.range_length,
     )  # fmt: skip
     linear, point = workspace.linear, workspace.point
-    found = workspace.solve(control.start, guess)
-    if not found.converged:
-        yield _no_start(balance, found.iterations)
-        return
-    code, state = begin_walk(system, linear, point, control, found.u)
-    while code == state_of.RUNNING:
-        rows = _rows(balance, _STRETCH)
-        code, count = walk_on(system, linear, point, control, state, _STRETCH, *rows)
-        yield _stretch(rows, count, ENDINGS.get(code), state, found.iterations)
-    if code == state_of.NO_START:
-        yield _no_start(balance, found.iterations)
+    if resume is None:
+        found = workspace.solve(control.start, guess)
+        spent = found.iterations
+        if not found.converged:
+            yield _no_start(balance, spent, begun)
+            return
+        code, state = begin_walk(system, linear, point, control, found.u)
+    else:
+        state, spent = go_on_from(workspace, control, resume)
+        code = walk_states.RUNNING
+        if resume.status is not None:
+            yield _stretch(rows_of(balance, 0), 0, resume.status, state, spent, begun)
+            return
+    size = _STRETCH if balance.n_unknowns <= _LARGE else _SHORT_STRETCH
+    while code == walk_states.RUNNING:
+        rows, before = rows_of(balance, size), time.perf_counter()
+        code, count = walk_on(system, linear, point, control, state, size, *rows)
+        yield _stretch(rows, count, ENDINGS.get(code), state, spent, begun)
+        elapsed = time.perf_counter() - before
+        size = min(_STRETCH, max(1, int(size * min(2.0, _STRETCH_SECONDS / max(elapsed, 1e-9)))))
+    if code == walk_states.NO_START:
+        yield _no_start(balance, spent, begun)
 
 
-def _no_start(balance: Balance, iterations: int) -> Stretch:
+def _no_start(balance: Balance, iterations: int, begun: float) -> Stretch:
     """Return the stretch of a branch that could not begin."""
-    rows = _rows(balance, 0)
+    rows = rows_of(balance, 0)
     return Stretch(
         solutions=rows[0], tangents=rows[1], states=rows[2], observed=rows[3], measures=rows[4],
         status=BranchStatus.NO_START, newton_iterations=iterations, rejected_steps=0, stepped_over=0,
-    )  # fmt: skip
-
-
-def _rows(balance: Balance, count: int) -> tuple[Real, Real, Integer, Real, Real]:
-    """Return empty rows for `count` points: solutions, tangents, states, observed, measures."""
-    nt, n = balance.n_unknowns, balance.n_coefficients
-    return (
-        np.zeros((count, nt + 1)), np.zeros((count, nt + 1)),
-        np.zeros((count, len(balance.scene.contacts)), np.int64), np.zeros((count, n)),
-        np.zeros((count, MEASURES)),
+        seconds=time.perf_counter() - begun, walk=np.zeros(0),
     )  # fmt: skip
 
 
 def _stretch(
     rows: tuple[Real, Real, Integer, Real, Real], count: int, status: BranchStatus | None,
-    state: state_of.Walk, spent: int,
+    state: walk_states.Walk, spent: int, begun: float,
 ) -> Stretch:  # fmt: skip
     numbers = walk_by_value(state).numbers
     return Stretch(
         solutions=rows[0][:count], tangents=rows[1][:count], states=rows[2][:count], observed=rows[3][:count],
-        measures=rows[4][:count], status=status, newton_iterations=spent + int(numbers[state_of.ITERATIONS]),
-        rejected_steps=int(numbers[state_of.REJECTED]), stepped_over=int(numbers[state_of.STEPPED_OVER]),
+        measures=rows[4][:count], status=status,
+        newton_iterations=spent + int(numbers[walk_states.ITERATIONS]),
+        rejected_steps=int(numbers[walk_states.REJECTED]),
+        stepped_over=int(numbers[walk_states.STEPPED_OVER]),
+        seconds=time.perf_counter() - begun, walk=state_of(state),
     )  # fmt: skip
 
 
@@ -263,10 +269,8 @@ def _finish(
 ) -> Branch:  # fmt: skip
     """Put the stretches together, polish the peaks and measure the band."""
     balance = workspace.balance
-    solutions = np.concatenate([stretch.solutions for stretch in stretches])
-    tangents = np.concatenate([stretch.tangents for stretch in stretches])
-    measures = np.concatenate([stretch.measures for stretch in stretches])
-    observed = np.concatenate([stretch.observed for stretch in stretches])
+    whole = joined(stretches)
+    solutions, tangents, measures = whole.solutions, whole.tangents, whole.measures
     points = Points(solutions=solutions, tangents=tangents, measures=measures)
     survey = Survey(workspace, points)
     at = band_limit(limit, survey.peaks, balance.parameter.kind)
@@ -274,11 +278,11 @@ def _finish(
     return Branch(
         balance=balance, status=status, start=start, stop=stop,
         values=balance.parameter.all_outside(solutions[:, -1].copy()), solutions=solutions,
-        tangents=tangents, observed=to_full(observed, balance.system.ks, balance.n_harmonics),
-        measures=measures, states=np.concatenate([stretch.states for stretch in stretches]),
+        tangents=tangents, observed=to_full(whole.observed, balance.system.ks, balance.n_harmonics),
+        measures=measures, states=whole.states,
         peaks=survey.peaks,
         band=band, error_estimate=peak_error(workspace, survey.peaks),
-        newton_iterations=stretches[-1].newton_iterations + survey.spent,
-        rejected_steps=stretches[-1].rejected_steps, stepped_over=stretches[-1].stepped_over,
+        newton_iterations=whole.newton_iterations + survey.spent,
+        rejected_steps=whole.rejected_steps, stepped_over=whole.stepped_over,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
