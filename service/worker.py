@@ -109,7 +109,7 @@ class _Stop:
         return self.obeyed
 
 
-class _Throttle:
+class Throttle:
     """`on_progress` of one task; sends at most one report every `interval` seconds."""
 
     def __init__(self, send: Callable[[Report], None], interval: float) -> None:
@@ -146,11 +146,11 @@ def main(
         if task is None:
             return
         stop = _Stop(flag, task.token)
-        done = _compute(runs, task, _Throttle(connection.send, progress_seconds), stop)
+        done = _compute(runs, task, Throttle(connection.send, progress_seconds), stop)
         try:
             connection.send(done)
         except (pickle.PicklingError, TypeError, AttributeError) as error:
-            connection.send(Done(failure=_failure(task, error)))
+            connection.send(Done(failure=failure_of(task, error)))
 
 
 def _leave_soon(_signal: int, _frame: FrameType | None) -> None:
@@ -167,25 +167,25 @@ def _die_with_parent() -> None:
         os._exit(_PARENT_DIED)
 
 
-def _compute(runs: Mapping[str, Run], task: Task, progress: _Throttle, stop: _Stop) -> Done:
+def _compute(runs: Mapping[str, Run], task: Task, progress: Throttle, stop: _Stop) -> Done:
     """Run one task; every error becomes an answer, the process lives on."""
     try:
-        output = _checked(runs[task.kind](task.spec, progress, stop))
+        output = checked(runs[task.kind](task.spec, progress, stop))
     except MemoryError as error:
         return Done(retry=f"the worker ran out of memory ({error})")
     except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
-        return Done() if stop.obeyed else Done(failure=_failure(task, error))
+        return Done() if stop.obeyed else Done(failure=failure_of(task, error))
     return Done() if stop.obeyed else Done(output=output)
 
 
-def _checked(output: JobOutput) -> JobOutput:
+def checked(output: JobOutput) -> JobOutput:
     """The output with its result as JSON: null where a number is not finite, TypeError if it cannot be."""
     result = strict_json.finite(output.result)
     strict_json.dumps(result)
     return replace(output, result=cast(dict[str, Any], result))
 
 
-def _failure(task: Task, error: Exception) -> JobFailure:
+def failure_of(task: Task, error: Exception) -> JobFailure:
     """A deterministic error, as the job keeps it."""
     if isinstance(error, SceneError):
         return JobFailure(kind=FailureKind.SCENE, detail=str(error), issues=error.issues)
