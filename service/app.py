@@ -14,7 +14,7 @@ from service.http import HostCheck
 from service.jobs import Registry
 from service.kinds import SHIPPED
 from service.metrics import Measured, Metrics
-from service.routes import designs, health, jobs, metrics, plan, scenes, sweeps
+from service.routes import designs, events, health, jobs, metrics, plan, scenes, sweeps
 from service.settings import Settings, load_settings
 
 _DESCRIPTION = "Designs friction dampers: jobs, their results, and every frequency response computed."
@@ -54,7 +54,8 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
     app.add_middleware(HostCheck, hosts=service.settings.hosts)
     app.add_middleware(Measured, metrics=app.state.metrics)
     problems.install(app)
-    for module in (jobs, designs, sweeps, scenes, plan, health, metrics):
+    events.install(app)
+    for module in (jobs, events, designs, sweeps, scenes, plan, health, metrics):
         app.include_router(module.router)
     openapi.install(app, registry)
     return app

@@ -8,7 +8,7 @@ command know kinds only through this contract. A kind whose work can be divided 
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -21,8 +21,19 @@ from solver.errors import Issue
 if TYPE_CHECKING:
     from service.parts import Parts
 
-Progress = Callable[[float, int], None]
+Point = tuple[float, float]
+"""Value of what is swept and amplitude [m]."""
 ShouldStop = Callable[[], bool]
+
+
+class Progress(Protocol):
+    """What a run says on its way; both methods cost next to nothing and may be called at any rate."""
+
+    def __call__(self, fraction: float, points: int) -> None:
+        """So far it got: share of its path, points computed."""
+
+    def found(self, points: Sequence[Point]) -> None:
+        """The next points of the branch it follows; they go with the next report."""
 
 
 class JobRequest(BaseModel):

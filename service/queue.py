@@ -13,11 +13,12 @@ import secrets
 import socket
 import threading
 import time
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 from service.executors.base import Executor, ExecutorStatus, Failed, Finished, Lost, Outcome, Stopped
-from service.jobs import FailureKind, JobFailure, JobOutput
+from service.jobs import FailureKind, JobFailure, JobOutput, Point
 from service.repository import Attempt, JobRepository
 from service.settings import Settings
 from service.waiters import Waiters
@@ -25,6 +26,7 @@ from service.waiters import Waiters
 log = logging.getLogger("stickslip.queue")
 
 _TROUBLE_SECONDS = 1.0
+_MOST_POINTS = 50_000
 
 
 class _StopReason(enum.Enum):
@@ -45,6 +47,31 @@ class _Running:
     fraction: float = 0.0
     points: int = 0
     stop: _StopReason | None = None
+    tag: str = field(default_factory=lambda: secrets.token_hex(4))
+    found: list[Point] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Live:
+    """How far an attempt is that runs here, newer than its row.
+
+    Attributes
+    ----------
+    tag : str
+        Of this run alone; another one has found other points.
+    attempt : int
+        Which attempt at the job it is.
+    fraction, points : float, int
+        Share of its path, points computed.
+    found : list of (value, amplitude)
+        The points of its branch so far, if its kind tells them; grows while it runs.
+    """
+
+    tag: str
+    attempt: int
+    fraction: float
+    points: int
+    found: Sequence[Point]
 
 
 class JobQueue:
@@ -118,6 +145,17 @@ class JobQueue:
             entry = self._running.get(job_id)
         return None if entry is None else (entry.fraction, entry.points)
 
+    def live(self, job_id: str) -> Live | None:
+        """How far a job is that runs here."""
+        with self._lock:
+            entry = self._running.get(job_id)
+        if entry is None:
+            return None
+        return Live(
+            tag=entry.tag, attempt=entry.attempt.attempt, fraction=entry.fraction, points=entry.points,
+            found=entry.found,
+        )  # fmt: skip
+
     def status(self) -> ExecutorStatus:
         """How the workers are."""
         return self._executor.status()
@@ -142,6 +180,12 @@ class JobQueue:
             self._waiters.progress(attempt.job_id, fraction, points)
         else:
             self._ask_to_stop(entry, _StopReason.LEASE)
+
+    def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
+        """From the executor: keep the points of a branch for those who follow it."""
+        entry = self._entry(attempt)
+        if entry is not None:
+            entry.found.extend(points[: _MOST_POINTS - len(entry.found)])
 
     def ended(self, attempt: Attempt, outcome: Outcome) -> None:
         """From the executor: write what became of an attempt.
@@ -255,6 +299,7 @@ class JobQueue:
             attempt.max_attempts,
         )
         self._executor.submit(attempt)
+        self._waiters.progress(attempt.job_id, 0.0, 0)
         return True
 
     def _patience(self) -> float:

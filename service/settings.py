@@ -126,6 +126,9 @@ class Settings(BaseSettings):
     max_wait_seconds: float = Field(
         default=60.0, ge=0.0, le=3600.0, description="Longest `Prefer: wait=N` honoured [s]."
     )
+    heartbeat_seconds: float = Field(
+        default=10.0, ge=0.1, le=600.0, description="Longest silence of an event stream [s]."
+    )
     page_limit: int = Field(default=1000, ge=1, le=10_000, description="Most rows one page of a list has.")
     shutdown_seconds: float = Field(
         default=2.0, ge=0.1, le=60.0, description="Time open requests have to end when the service stops [s]."

@@ -15,7 +15,7 @@ import pickle
 import signal
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from types import FrameType
@@ -23,7 +23,7 @@ from typing import Any, cast
 
 from optim.errors import DesignError
 from service import strict_json
-from service.jobs import FailureKind, JobFailure, JobOutput, Run, WarmUp
+from service.jobs import FailureKind, JobFailure, JobOutput, Point, Run, WarmUp
 from solver.errors import SceneError, SettingError, SolverError
 
 THREAD_LIMITS = dict.fromkeys(
@@ -62,10 +62,11 @@ class Ready:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """From a worker: how far it got."""
+    """From a worker: how far it got, with the points found since the last report."""
 
     fraction: float
     points: int
+    found: tuple[Point, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,12 +117,18 @@ class Throttle:
         self._send = send
         self._interval = interval
         self._next = 0.0
+        self._found: list[Point] = []
 
     def __call__(self, fraction: float, points: int) -> None:
         now = time.monotonic()
         if now >= self._next:
             self._next = now + self._interval
-            self._send(Report(min(max(float(fraction), 0.0), 1.0), int(points)))
+            self._send(Report(min(max(float(fraction), 0.0), 1.0), int(points), tuple(self._found)))
+            self._found.clear()
+
+    def found(self, points: Sequence[Point]) -> None:
+        """Keep points for the next report."""
+        self._found.extend(points)
 
 
 def main(

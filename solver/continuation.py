@@ -20,6 +20,7 @@ from solver.branch import ENDINGS, Branch, BranchStatus
 from solver.errors import SettingError
 from solver.fourier import Integer, Real, to_full
 from solver.kernels import walk as walk_states
+from solver.kernels.observe import MAX_ABS
 from solver.kernels.path import begin_walk, walk_on
 from solver.kernels.walk import Control, walk_by_value
 from solver.peaks import Points, Survey, band_limit
@@ -91,6 +92,7 @@ def sweep(
     resume: Stretch | None = None,
     on_stretch: Callable[[Stretch], None] | None = None,
     on_progress: Callable[[float, int], None] | None = None,
+    on_points: Callable[[Real, Real], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> Branch:
     """Follow the periodic response over a range of one parameter.
@@ -112,6 +114,9 @@ def sweep(
     on_stretch : called with all consecutive points as they are found; joined (`solver.joined`) they are what
         `resume` takes.
     on_progress : called with (share of the range reached, points so far).
+    on_points : called before it with the new points, at first with those of `resume`:
+        (k,) values in user units, (k,) amplitudes [m]; not while `accuracy` is looked for, which may begin
+        again with more harmonics.
     should_stop : asked between stretches of points; True ends the branch with the status STOPPED.
 
     Returns
@@ -150,6 +155,8 @@ def sweep(
     workspace = Workspace.of(balance)
     stretches = [] if resume is None else [resume]
     status, count = BranchStatus.TOO_MANY_POINTS, 0 if resume is None else len(resume.solutions)
+    if on_points is not None and resume is not None:
+        on_points(*_curve(balance, resume))
     for stretch in walk(workspace, first, last, settings, guess, resume):
         stretches.append(stretch)
         count += len(stretch.solutions)
@@ -158,6 +165,8 @@ def sweep(
         if stretch.status is not None:
             status = stretch.status
             break
+        if on_points is not None:
+            on_points(*_curve(balance, stretch))
         if on_progress is not None:
             here = float(balance.parameter.outside(stretch.solutions[-1, -1]))
             on_progress(min(max((here - first) / (last - first), 0.0), 1.0), count)
@@ -170,6 +179,11 @@ def sweep(
         on_progress(1.0, count)
     earlier = 0.0 if resume is None else resume.seconds
     return _finish(workspace, stretches, status, first, last, limit, begun - earlier)
+
+
+def _curve(balance: Balance, stretch: Stretch) -> tuple[Real, Real]:
+    """Values in user units and amplitudes [m] of the points."""
+    return balance.parameter.all_outside(stretch.solutions[:, -1].copy()), stretch.measures[:, MAX_ABS]
 
 
 def check_range(balance: Balance, start: float | None, stop: float | None) -> tuple[float, float]:

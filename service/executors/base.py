@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from service.jobs import JobFailure, JobOutput
+from service.jobs import JobFailure, JobOutput, Point
 from service.repository import Attempt
 
 
@@ -43,6 +44,9 @@ class Sink(Protocol):
 
     def progress(self, attempt: Attempt, fraction: float, points: int) -> None:
         """The attempt got this far: fraction 0..1 of its path, points computed."""
+
+    def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
+        """The next points of the attempt's branch; said before the progress that counts them."""
 
     def ended(self, attempt: Attempt, outcome: Outcome) -> None:
         """The attempt ended; called exactly once for each one submitted."""

@@ -239,6 +239,8 @@ class _Slot(threading.Thread):
             while True:
                 message = child.connection.recv()
                 if isinstance(message, Report):
+                    if message.found:
+                        self._executor.sink.found(attempt, message.found)
                     self._executor.sink.progress(attempt, message.fraction, message.points)
                 elif isinstance(message, Done):
                     return _outcome(message)

@@ -126,6 +126,9 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
         frequency_hz=spec["frequency_hz"],
         limit=spec["limit"],
         on_progress=progress,
+        on_points=lambda values, amplitudes: progress.found(
+            list(zip(values.tolist(), amplitudes.tolist(), strict=True))
+        ),
         should_stop=should_stop,
     )
     return JobOutput(

@@ -34,6 +34,7 @@ class IterationRequest(JobRequest):
     seconds: float = Field(default=0.0, strict=True, ge=0.0, le=600.0)
     pid_file: str | None = None
     sweeps: int = Field(default=0, strict=True, ge=0, le=10)
+    tells: bool = False
 
 
 def as_it_is(request: IterationRequest, _source: object) -> Resolved:
@@ -58,6 +59,9 @@ def power_iteration(spec: Mapping[str, Any], progress: Progress, should_stop: Sh
         value = float(vector @ image / (vector @ vector))
         vector = image / np.linalg.norm(image)
         steps += 1
+        if spec["tells"]:
+            progress.found([(float(steps), value)])
+            time.sleep(0.002)
         progress(min(1.0, (time.monotonic() - start) / max(spec["seconds"], 1e-9)), steps)
     records = tuple(_record(vector, value, steps, index) for index in range(spec["sweeps"]))
     return JobOutput(result={"eigenvalue": value, "steps": steps}, sweeps=records)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import httpx
 import pytest
+from fastapi import FastAPI
 from sqlalchemy import text
 
 from service.app import create_app
@@ -38,12 +39,22 @@ def settings_of(url: str) -> MakeSettings:
     return make
 
 
+class ServedClient(httpx.Client):
+    """A client that knows the application behind it."""
+
+    def __init__(self, app: FastAPI, port: int) -> None:
+        super().__init__(base_url=f"http://127.0.0.1:{port}", timeout=60.0)
+        self.service: Service = app.state.service
+
+
 @contextmanager
-def serving(folder: Path, registry: Registry) -> Iterator[httpx.Client]:
+def serving(folder: Path, registry: Registry, **values: object) -> Iterator[ServedClient]:
     """A client of a real server on loopback."""
-    settings = load_settings(
-        database=f"sqlite:///{folder}/jobs.db", workers=1, port=0, max_body_bytes=20_000, page_limit=50
-    )
+    defaults = {
+        "database": f"sqlite:///{folder}/jobs.db", "workers": 1, "port": 0, "max_body_bytes": 20_000,
+        "page_limit": 50,
+    }  # fmt: skip
+    settings = load_settings(**{**defaults, **values})
     app = create_app(settings, registry)
     service: Service = app.state.service
     listener = _bind(settings)
@@ -52,7 +63,7 @@ def serving(folder: Path, registry: Registry) -> Iterator[httpx.Client]:
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
     thread.start()
     try:
-        with httpx.Client(base_url=f"http://127.0.0.1:{listener.getsockname()[1]}", timeout=60.0) as client:
+        with ServedClient(app, listener.getsockname()[1]) as client:
             until(lambda: server.started)
             until(lambda: client.get("/health/ready").status_code == 200, seconds=600.0)
             yield client
