@@ -6,7 +6,7 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from queue import Empty, SimpleQueue
@@ -17,7 +17,7 @@ from service.clock import Clock, utc_now
 from service.db import Database
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.executors.local import LocalExecutor
-from service.jobs import Registry
+from service.jobs import OnProgress, Registry
 from service.kinds import SHIPPED
 from service.models import JobState
 from service.queue import JobQueue
@@ -39,8 +39,6 @@ from service.waiters import Event, Waiters
 from solver.errors import Issue
 
 log = logging.getLogger("stickslip.service")
-
-OnProgress = Callable[[float, int], None]
 
 SOLVER_VERSION = version("stickslip")
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any, Self
 
 from service.answers import DesignAnswer, DesignDetail, JobAnswer, ResultsAnswer, SweepAnswer, SweepDetail
-from service.core import OnProgress, Service
+from service.core import Service
 from service.design_queries import DesignQuery, design_detail, design_page
-from service.jobs import Registry
+from service.jobs import OnProgress, Registry
 from service.kinds import SHIPPED
 from service.settings import Settings, load_settings
 from service.sweep_queries import SweepQuery, sweep_page

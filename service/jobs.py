@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 Point = tuple[float, float]
 """Value of what is swept and amplitude [m]."""
+OnProgress = Callable[[float, int], None]
 ShouldStop = Callable[[], bool]
 
 

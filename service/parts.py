@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from service.jobs import JobOutput, Progress, ShouldStop, StoredArray
+from service.jobs import JobOutput, OnProgress, ShouldStop, StoredArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +59,7 @@ class PartStoppedError(Exception):
 
 
 Split = Callable[[Mapping[str, Any]], Sequence[Part]]
-RunPart = Callable[[Mapping[str, Any], Mapping[str, Any], Progress, ShouldStop], PartOutput]
+RunPart = Callable[[Mapping[str, Any], Mapping[str, Any], OnProgress, ShouldStop], PartOutput]
 Join = Callable[[Mapping[str, Any], Mapping[int, PartOutput]], JobOutput]
 OnPart = Callable[[int, PartOutput], None]
 
@@ -90,7 +90,7 @@ class Parts:
     def run(
         self,
         spec: Mapping[str, Any],
-        progress: Progress,
+        progress: OnProgress,
         should_stop: ShouldStop,
         known: Mapping[int, PartOutput] | None = None,
         on_part: OnPart = _not_kept,
@@ -145,7 +145,9 @@ class Account:
         Told of the job's share and points.
     """
 
-    def __init__(self, parts: Sequence[Part], outputs: Mapping[int, PartOutput], progress: Progress) -> None:
+    def __init__(
+        self, parts: Sequence[Part], outputs: Mapping[int, PartOutput], progress: OnProgress
+    ) -> None:
         total = sum(part.weight for part in parts)
         self._weights = [part.weight / total for part in parts]
         self._shares = [0.0] * len(parts)
@@ -154,7 +156,7 @@ class Account:
         for index, output in outputs.items():
             self._shares[index], self._points[index] = 1.0, output.points
 
-    def of(self, index: int) -> Progress:
+    def of(self, index: int) -> OnProgress:
         """The `progress` of one part."""
 
         def progress(share: float, points: int) -> None:

@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field
 import solver
 from service import strict_json
 from service.arrays import decode, encode
-from service.jobs import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from service.jobs import JobKind, JobOutput, OnProgress, Resolved, SceneSource, ShouldStop
 from service.kinds.ranges import RangeRequest, law_issues, range_issues
 from service.kinds.records import packed, sweep_records, unpacked
 from service.kinds.scenes import refusal, require, resolve_scene, resolved
@@ -97,7 +97,7 @@ def split(spec: Mapping[str, Any]) -> list[Part]:
 
 
 def run_part(
-    spec: Mapping[str, Any], part: Mapping[str, Any], progress: Progress, should_stop: ShouldStop
+    spec: Mapping[str, Any], part: Mapping[str, Any], progress: OnProgress, should_stop: ShouldStop
 ) -> PartOutput:
     """Track the peaks, or solve some rows."""
     if part.get("ridge"):
@@ -148,7 +148,7 @@ def _grid(spec: Mapping[str, Any]) -> MapGrid:
     )
 
 
-def _ridge(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> PartOutput:
+def _ridge(spec: Mapping[str, Any], progress: OnProgress, should_stop: ShouldStop) -> PartOutput:
     track = solver.track_peak(
         Scene.from_dict(spec["scene"]),
         spec["parameter"],

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
 
 import solver
 from service.arrays import decode, encode
-from service.jobs import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from service.jobs import JobKind, JobOutput, OnProgress, Resolved, SceneSource, ShouldStop
 from service.kinds.problem import Name
 from service.kinds.records import packed, sweep_records, unpacked
 from service.kinds.scenes import FrequencyHz, HarmonicRequest, refusal, require, resolve_scene, resolved
@@ -172,7 +172,7 @@ def split(spec: Mapping[str, Any]) -> list[Part]:
 
 
 def run_part(
-    spec: Mapping[str, Any], part: Mapping[str, Any], progress: Progress, should_stop: ShouldStop
+    spec: Mapping[str, Any], part: Mapping[str, Any], progress: OnProgress, should_stop: ShouldStop
 ) -> PartOutput:
     """Find the peaks of all blades of the tuned disk, or of some others."""
     from solver.mistuned_disks import without_mistuning, worst_branch
