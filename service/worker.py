@@ -120,6 +120,7 @@ class Throttle:
         self._found: list[Point] = []
 
     def __call__(self, fraction: float, points: int) -> None:
+        """Send it if the last report is long enough ago."""
         now = time.monotonic()
         if now >= self._next:
             self._next = now + self._interval
