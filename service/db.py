@@ -18,16 +18,20 @@ from typing import TypeVar
 from sqlalchemy import Connection, Engine, create_engine, event, text
 from sqlalchemy.engine import make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
-from sqlalchemy.exc import DBAPIError, IntegrityError
+from sqlalchemy.exc import DBAPIError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool
 
-from service import postgresql
+from service import postgresql, strict_json
 from service.errors import DatabaseError
+from service.grouping import GroupedWrites
 from service.lock import FileLock
 
 BUSY_TIMEOUT_SECONDS = 30.0
 SQLITE_WITHOUT_WAL_BUG = (3, 51, 3)
 CONNECTIONS = 16
+# Of the transactions that threads share: PostgreSQL runs several at a time, and each of these collects what
+# comes while its server answers.
+_LEADERS = 4
 
 _Written = TypeVar("_Written")
 
@@ -103,6 +107,7 @@ def write_engine(url: str, connections: int = CONNECTIONS) -> Engine:
         pool_size=1,
         max_overflow=0,
         pool_timeout=BUSY_TIMEOUT_SECONDS,
+        json_serializer=strict_json.stored,
         connect_args={"timeout": BUSY_TIMEOUT_SECONDS},
     )
     event.listen(engine, "connect", _on_connect(read_only=False, foreign_keys=True))
@@ -178,6 +183,8 @@ class Database:
         self._lock = FileLock(database_path(url)) if is_sqlite(url) else None
         self._write = write_engine(url, connections)
         self._read = read_engine(url) if is_sqlite(url) else postgresql.reading(self._write)
+        leaders = 1 if is_sqlite(url) else max(1, min(_LEADERS, connections // 2))
+        self._grouped = GroupedWrites(self.writing, leaders)
 
     @property
     def backend(self) -> str:
@@ -207,17 +214,12 @@ class Database:
         with self._write.begin() as connection:
             yield connection
 
-    def insert(self, work: Callable[[Connection], _Written]) -> _Written:
-        """Do `work`, which looks for a row and adds it if there is none, in a transaction.
+    def grouped(self, work: Callable[[Connection], _Written]) -> _Written:
+        """Have `work` done in a transaction that it may share with that of other threads (`GroupedWrites`).
 
-        If another service adds the row between the two, the work is done once more and finds it.
+        If another service writes the same row meanwhile the work is done once more and finds it.
         """
-        try:
-            with self.writing() as connection:
-                return work(connection)
-        except IntegrityError:
-            with self.writing() as connection:
-                return work(connection)
+        return self._grouped.do(work)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.errors import InvalidRequestError
-from service.strict_json import pointer
+from service.strict_json import JsonText, pointer
 from solver.errors import Issue
 
 if TYPE_CHECKING:
@@ -174,10 +174,13 @@ class JobOutput:
     shortfall : str or None
         If the computation did not reach its goal: the status, a sentence that says what to try. The job
         then fails with it; result and sweeps are kept.
+    encoded : JsonText or None
+        The result as it is stored, if the worker has encoded it already; `result` is then empty.
     """
 
     result: dict[str, Any]
     sweeps: tuple[SweepRecord, ...] = ()
+    encoded: JsonText | None = None
     design: DesignRecord | None = None
     shortfall: str | None = None
 

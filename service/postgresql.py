@@ -16,6 +16,7 @@ from sqlalchemy.engine import URL, make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool
 
+from service import strict_json
 from service.errors import DatabaseError, DatabaseInUseError
 
 DRIVER = "postgresql+psycopg"
@@ -26,6 +27,7 @@ _CONNECT_SECONDS = 10
 # Two numbers of our own; advisory locks know their holders' agreement by number alone.
 _SERVICES = 0x5354_4943_4B01
 _TABLES = 0x5354_4943_4B02
+_ROOM = 0x5354_4943_4B03
 
 
 def _arguments(url: URL) -> dict[str, Any]:
@@ -37,7 +39,9 @@ def _arguments(url: URL) -> dict[str, Any]:
 def _create(url: str, **pool: Any) -> Engine:
     parsed = make_url(url)
     try:
-        return create_engine(parsed, connect_args=_arguments(parsed), **pool)
+        return create_engine(
+            parsed, connect_args=_arguments(parsed), json_serializer=strict_json.stored, **pool
+        )
     except ModuleNotFoundError as error:
         raise DatabaseError(
             f"PostgreSQL needs the package psycopg ({error}): install stickslip[postgresql]"
@@ -103,6 +107,11 @@ def lock_tables(connection: Connection) -> None:
         version = ".".join(map(str, found or ("unknown",)))
         raise DatabaseError(f"stickslip needs PostgreSQL {OLDEST} or newer, the server is {version}")
     connection.execute(text(f"SELECT pg_advisory_xact_lock({_TABLES})"))
+
+
+def lock_room(connection: Connection) -> None:
+    """Be the only one, until the transaction ends, who adds jobs to a queue that may be full."""
+    connection.execute(text(f"SELECT pg_advisory_xact_lock({_ROOM})"))
 
 
 def refuse_running(connection: Connection, name: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 from alembic import command
@@ -30,6 +31,7 @@ def _config() -> Config:
     return config
 
 
+@cache
 def head_revision() -> str:
     """The revision this version works with."""
     head = ScriptDirectory.from_config(_config()).get_current_head()

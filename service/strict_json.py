@@ -11,6 +11,23 @@ from service.errors import InvalidRequestError, MalformedBodyError
 from solver.errors import Issue
 
 
+class JsonText(str):
+    """JSON that is encoded already: it is stored as it is."""
+
+
+def stored(value: object) -> str:
+    """A value as the JSON of a column."""
+    return value if isinstance(value, JsonText) else json.dumps(value)
+
+
+def encoded(value: object) -> JsonText:
+    """A result as the JSON of its column: null where a number is not finite, TypeError if it cannot be."""
+    try:
+        return JsonText(json.dumps(value, separators=(",", ":"), allow_nan=False))
+    except ValueError:
+        return JsonText(json.dumps(finite(value), separators=(",", ":"), allow_nan=False))
+
+
 def pointer(*parts: object) -> str:
     """RFC 6901 pointer from keys and indices."""
     return "".join("/" + str(part).replace("~", "~0").replace("/", "~1") for part in parts)

@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from types import FrameType
-from typing import Any, cast
+from typing import Any
 
 from optim.errors import DesignError
 from service import strict_json
@@ -187,10 +187,8 @@ def _compute(runs: Mapping[str, Run], task: Task, progress: Throttle, stop: _Sto
 
 
 def checked(output: JobOutput) -> JobOutput:
-    """The output with its result as JSON: null where a number is not finite, TypeError if it cannot be."""
-    result = strict_json.finite(output.result)
-    strict_json.dumps(result)
-    return replace(output, result=cast(dict[str, Any], result))
+    """The output with its result encoded, so that the service does not have to; TypeError if it cannot be."""
+    return replace(output, result={}, encoded=strict_json.encoded(output.result))
 
 
 def failure_of(task: Task, error: Exception) -> JobFailure:

@@ -7,15 +7,17 @@ from dataclasses import fields
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, and_, func, insert, select, update
+from sqlalchemy import ColumnElement, Connection, Executable, and_, func, select, update
 
 from service.clock import Clock, utc_now
 from service.db import Database
-from service.errors import IdempotencyError, QueueFullError
+from service.errors import IdempotencyError
 from service.ids import new_id
 from service.jobs import FailureKind, JobFailure, JobOutput
 from service.models import Job, JobResult, JobState
+from service.repository import job_statements as statements
 from service.repository.designs import insert_design
+from service.repository.room import Room
 from service.repository.rows import Attempt, JobRow, NewJob, Recovered
 from service.repository.sweeps import insert_sweeps
 
@@ -41,6 +43,19 @@ def _change(connection: Connection, condition: ColumnElement[bool], **values: An
     return connection.execute(update(Job).where(condition).values(**values)).rowcount > 0
 
 
+def _guarded(connection: Connection, statement: Executable, attempt: Attempt, values: dict[str, Any]) -> bool:
+    """Execute a guarded change of the attempt's row; whether the attempt owned it."""
+    guard = {"job": attempt.job_id, "number": attempt.attempt, "holder": attempt.lease_owner}
+    return connection.execute(statement, guard | values).rowcount > 0
+
+
+def _attempt(row: Any, owner: str) -> Attempt:
+    """The attempt that begins with a row as it waited."""
+    values = row._asdict()
+    job_id, number = values.pop("id"), values.pop("attempt") + 1
+    return Attempt(job_id=job_id, attempt=number, lease_owner=owner, **values)
+
+
 def _one(connection: Connection, condition: ColumnElement[bool]) -> JobRow | None:
     query = select(*_COLUMNS).where(condition).order_by(Job.id.desc()).limit(1)
     row = connection.execute(query).mappings().one_or_none()
@@ -61,6 +76,7 @@ class JobRepository:
     def __init__(self, database: Database, now: Clock = utc_now) -> None:
         self._db = database
         self.now = now
+        self._room = Room()
 
     def submit(self, new: NewJob, queue_limit: int) -> tuple[JobRow, bool]:
         """Insert a job, or find the one this request made before; whether it was inserted.
@@ -73,10 +89,9 @@ class JobRepository:
         IdempotencyError
             The key was used for a different request.
         QueueFullError
-            `queue_limit` jobs wait already. Jobs that several services accept at the same moment may exceed
-            it by their number.
+            `queue_limit` jobs wait already.
         """
-        return self._db.insert(lambda connection: self._submit(connection, new, queue_limit))
+        return self._db.grouped(lambda connection: self._submit(connection, new, queue_limit))
 
     def _submit(self, connection: Connection, new: NewJob, queue_limit: int) -> tuple[JobRow, bool]:
         known = self._by_key(connection, new)
@@ -84,12 +99,8 @@ class JobRepository:
             return known, False
         source = None if new.fresh else self._computed_before(connection, new)
         if source is None:
-            self._require_room(connection, queue_limit)
-        job_id = self._insert(connection, new, source)
-        row = _one(connection, Job.id == job_id)
-        if row is None:
-            raise RuntimeError(f"job {job_id} vanished in its own transaction")
-        return row, True
+            self._room.require(connection, queue_limit)
+        return self._insert(connection, new, source), True
 
     def get(self, job_id: str) -> JobRow | None:
         """The job, or None."""
@@ -131,44 +142,37 @@ class JobRepository:
 
     def claim(self, owner: str, lease_until: datetime) -> Attempt | None:
         """Take the next waiting job for `owner`; None if none waits."""
-        query = (
-            select(Job.id, Job.kind, Job.spec, Job.attempt, Job.max_attempts)
-            .where(Job.state == JobState.ACCEPTED)
-            .order_by(Job.priority.desc(), Job.id)
-            .limit(1)
-            .with_for_update(skip_locked=True)
-        )
-        with self._db.writing() as connection:
-            row = connection.execute(query).one_or_none()
-            if row is None:
-                return None
-            attempt = row.attempt + 1
-            _change(
-                connection,
-                and_(Job.id == row.id, Job.state == JobState.ACCEPTED),
-                state=JobState.RUNNING,
-                attempt=attempt,
-                lease_owner=owner,
-                lease_until=lease_until,
-                started=self.now(),
-                progress=0.0,
-                points=0,
-            )
-        return Attempt(
-            job_id=row.id,
-            kind=row.kind,
-            spec=row.spec,
-            attempt=attempt,
-            max_attempts=row.max_attempts,
-            lease_owner=owner,
-        )
+        return next(iter(self.claim_several(owner, lease_until, 1)), None)
+
+    def claim_several(self, owner: str, lease_until: datetime, most: int) -> list[Attempt]:
+        """Take the next waiting jobs for `owner`, in the order in which they are to run."""
+        return self._db.grouped(lambda connection: self._claim(connection, owner, lease_until, most))
+
+    def _claim(self, connection: Connection, owner: str, lease_until: datetime, most: int) -> list[Attempt]:
+        """Take jobs of the highest priority first.
+
+        The index holds priorities and ids both ascending: one priority after the other is read from it in
+        order, where "highest priority, then lowest id" would sort all that waits for every job taken.
+        """
+        found: list[Any] = []
+        below = statements.ABOVE_ALL
+        while len(found) < most:
+            below = connection.execute(statements.NEXT_PRIORITY, {"below": below}).scalar_one()
+            if below is None:
+                break
+            asked = {"priority": below, "most": most - len(found)}
+            found += connection.execute(statements.NEXT_JOBS, asked).all()
+        if not found:
+            return []
+        taken = {"holder": owner, "until": lease_until, "begun": self.now()}
+        changes = [{"job": row.id, "number": row.attempt + 1, **taken} for row in found]
+        connection.execute(statements.TAKE, changes)
+        return [_attempt(row, owner) for row in found]
 
     def report(self, attempt: Attempt, fraction: float, points: int, lease_until: datetime) -> bool:
         """Write progress and renew the lease; False if the attempt owns the job no more."""
-        with self._db.writing() as connection:
-            return _change(
-                connection, _guard(attempt), progress=fraction, points=points, lease_until=lease_until
-            )
+        values = {"fraction": fraction, "counted": points, "until": lease_until}
+        return self._db.grouped(lambda connection: _guarded(connection, statements.REPORT, attempt, values))
 
     def renew(self, attempts: Iterable[Attempt], lease_until: datetime) -> list[Attempt]:
         """Renew the leases; gives back the attempts that own their job no more."""
@@ -177,15 +181,15 @@ class JobRepository:
 
     def succeed(self, attempt: Attempt, output: JobOutput) -> bool:
         """Commit state, result and sweeps together, unless the job was lost or its cancel asked for."""
-        with self._db.writing() as connection:
-            condition = and_(_guard(attempt), Job.cancel_requested.is_(False))
-            finished = self.now()
-            if not _change(
-                connection, condition, state=JobState.SUCCESSFUL, finished=finished, progress=1.0, **_FREE
-            ):
+        finished = self.now()
+
+        def write(connection: Connection) -> bool:
+            if not _guarded(connection, statements.SUCCEED, attempt, {"ended": finished}):
                 return False
             self._store(connection, attempt.job_id, output, finished)
             return True
+
+        return self._db.grouped(write)
 
     def fail(self, attempt: Attempt, failure: JobFailure, output: JobOutput | None = None) -> bool:
         """Commit a failure for good, with what was computed all the same."""
@@ -282,38 +286,23 @@ class JobRepository:
 
     @staticmethod
     def _computed_before(connection: Connection, new: NewJob) -> str | None:
-        query = (
-            select(Job.id)
-            .where(Job.spec_hash == new.spec_hash, Job.state == JobState.SUCCESSFUL, Job.result_of.is_(None))
-            .order_by(Job.id.desc())
-            .limit(1)
-        )
-        return connection.execute(query).scalar_one_or_none()
+        return connection.execute(statements.COMPUTED_BEFORE, {"hash": new.spec_hash}).scalar_one_or_none()
 
-    @staticmethod
-    def _require_room(connection: Connection, queue_limit: int) -> None:
-        query = select(func.count()).select_from(Job).where(Job.state == JobState.ACCEPTED)
-        waiting = connection.execute(query).scalar_one()
-        if waiting >= queue_limit:
-            raise QueueFullError(
-                f"{waiting} jobs wait already, the queue takes {queue_limit}: try again later", retry_after=10
-            )
-
-    def _insert(self, connection: Connection, new: NewJob, source: str | None) -> str:
-        now, job_id = self.now(), new_id()
-        values = {
-            field.name: getattr(new, field.name) for field in fields(NewJob) if field.name not in ("fresh",)
-        }
-        state = JobState.ACCEPTED
+    def _insert(self, connection: Connection, new: NewJob, source: str | None) -> JobRow:
+        """Insert a job; its row is what was written, not read again."""
+        now = self.now()
+        values = {name: getattr(new, name) for name in statements.NEW_COLUMNS}
+        values |= {"id": new_id(), "created": now, "result_of": source, "state": JobState.ACCEPTED}
         if source is not None:
-            state = JobState.SUCCESSFUL
-            values |= {"result_of": source, "started": now, "finished": now, "progress": 1.0}
-        connection.execute(insert(Job).values(id=job_id, state=state, created=now, **values))
-        return job_id
+            values |= {"state": JobState.SUCCESSFUL, "started": now, "finished": now, "progress": 1.0}
+        written: dict[str, Any] = statements.INITIAL | values
+        connection.execute(statements.INSERT_JOB, written)
+        return JobRow(**{name: written[name] for name in statements.ROW})
 
     @staticmethod
     def _store(connection: Connection, job_id: str, output: JobOutput, created: datetime) -> None:
-        connection.execute(insert(JobResult).values(job_id=job_id, body=output.result))
+        body = output.result if output.encoded is None else output.encoded
+        connection.execute(statements.INSERT_RESULT, {"job_id": job_id, "body": body})
         insert_sweeps(connection, job_id, output.sweeps, created)
         if output.design is not None:
             insert_design(connection, job_id, output.design, created)

@@ -35,7 +35,7 @@ class SceneRepository:
             connection.execute(insert(Scene).values(**values))
             return row, True
 
-        return self._db.insert(find_or_add)
+        return self._db.grouped(find_or_add)
 
     def get(self, name: str) -> SceneRow | None:
         """The scene, or None."""

@@ -17,6 +17,7 @@ from service.app import create_app
 from service.core import Service
 from service.db import Database
 from service.jobs import Registry
+from service.repository import NewJob
 from service.server import _bind, _config, _Server
 from service.settings import Settings, load_settings
 
@@ -45,6 +46,20 @@ class ServedClient(httpx.Client):
     def __init__(self, app: FastAPI, port: int) -> None:
         super().__init__(base_url=f"http://127.0.0.1:{port}", timeout=60.0)
         self.service: Service = app.state.service
+
+
+def new_job(**values: object) -> NewJob:
+    """A job to be inserted."""
+    defaults = {
+        "kind": "iteration",
+        "request": {},
+        "spec": {},
+        "spec_hash": "0" * 64,
+        "request_hash": "0" * 64,
+        "max_attempts": 3,
+        "fresh": True,
+    }
+    return NewJob(**{**defaults, **values})
 
 
 @contextmanager

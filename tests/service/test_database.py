@@ -14,7 +14,7 @@ import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from private_kinds import PRIVATE
-from service_helpers import MakeSettings
+from service_helpers import MakeSettings, new_job
 from sqlalchemy import CheckConstraint, insert, inspect, select, text
 from sqlalchemy.exc import DBAPIError, StatementError
 
@@ -28,25 +28,12 @@ from service.errors import DatabaseError, DatabaseInUseError, WrongRevisionError
 from service.ids import new_id
 from service.jobs import FailureKind, JobFailure, JobOutput, StoredArray
 from service.models import Base, Job, JobState
-from service.repository import Attempt, JobRepository, NewJob, SceneRepository
+from service.repository import Attempt, JobRepository, SceneRepository
 
 
 @pytest.fixture
 def file_url(tmp_path: Path) -> str:
     return f"sqlite:///{tmp_path}/jobs.db"
-
-
-def new_job(**values: object) -> NewJob:
-    defaults = {
-        "kind": "iteration",
-        "request": {},
-        "spec": {},
-        "spec_hash": "0" * 64,
-        "request_hash": "0" * 64,
-        "max_attempts": 3,
-        "fresh": True,
-    }
-    return NewJob(**{**defaults, **values})
 
 
 def claimed(jobs: JobRepository, owner: str = "one") -> Attempt:
