@@ -10,6 +10,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service import openapi, problems
 from service.core import SOLVER_VERSION, Service
+from service.head import Head
 from service.http import HostCheck
 from service.jobs import Registry
 from service.kinds import SHIPPED
@@ -51,6 +52,7 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
     )
     app.state.service = service
     app.state.metrics = Metrics(service)
+    app.add_middleware(Head)
     app.add_middleware(HostCheck, hosts=service.settings.hosts)
     app.add_middleware(Measured, metrics=app.state.metrics)
     problems.install(app)

@@ -59,6 +59,10 @@ class UnsupportedMediaError(ServiceError):
     """A request body of another media type than JSON."""
 
 
+class NotAcceptableError(ServiceError):
+    """The client takes none of the representations there are."""
+
+
 class BodyTooLargeError(ServiceError):
     """A request body larger than the service accepts."""
 

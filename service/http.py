@@ -13,6 +13,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service import strict_json
+from service.answers import DesignPage, JobPage, SweepPage
 from service.core import Service
 from service.errors import (
     BodyTooLargeError,
@@ -23,6 +24,7 @@ from service.errors import (
 )
 from service.problems import service_problem
 from service.repository import JobRow
+from service.representations import JSON, LIST_MEDIA, chosen, csv_of_items
 from service.waiters import Event
 from solver.errors import Issue
 
@@ -96,13 +98,30 @@ def idempotency_key(headers: Mapping[str, str]) -> str | None:
     raise InvalidRequestError([Issue(pointer="/Idempotency-Key", message=message)], source="header")
 
 
-def tagged(request: Request, body: bytes) -> Response:
-    """A JSON body with its strong ETag (RFC 9110); 304 without it if the client has the same."""
+def tagged(
+    request: Request,
+    body: bytes,
+    media_type: str = "application/json",
+    headers: Mapping[str, str] | None = None,
+) -> Response:
+    """A body with its strong ETag (RFC 9110); 304 without it if the client has the same."""
     tag = f'"{hashlib.sha256(body).hexdigest()}"'
     known = {one.strip().removeprefix("W/") for one in request.headers.get("if-none-match", "").split(",")}
+    kept = {**(headers or {}), "ETag": tag}
     if tag in known or "*" in known:
-        return Response(status_code=304, headers={"ETag": tag})
-    return Response(body, media_type="application/json", headers={"ETag": tag})
+        return Response(status_code=304, headers=kept)
+    return Response(body, media_type=media_type, headers=kept)
+
+
+def listing(request: Request, page: SweepPage | DesignPage | JobPage) -> Response:
+    """A page of a list as JSON or CSV, with a link to the next one in its header too (RFC 8288)."""
+    kind = chosen(request.headers.get("accept"), LIST_MEDIA)
+    headers = {"Vary": "Accept"}
+    if page.next is not None:
+        headers["Link"] = f'<{page.next}>; rel="next"'
+    if kind == JSON:
+        return Response(page.model_dump_json(), media_type=kind, headers=headers)
+    return Response(csv_of_items(page.model_dump(mode="json")["items"]), media_type=kind, headers=headers)
 
 
 async def wait_for_end(service: Service, job_id: str, seconds: float) -> JobRow:

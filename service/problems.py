@@ -29,6 +29,7 @@ _STATUS: dict[type[errors.ServiceError], tuple[int, str, str]] = {
     errors.InvalidRequestError: (422, "invalid-request", "The request is not valid"),
     errors.MalformedBodyError: (400, "malformed-body", "The body cannot be read"),
     errors.UnsupportedMediaError: (415, "unsupported-media-type", "The body must be JSON"),
+    errors.NotAcceptableError: (406, "not-acceptable", "Not available in a form you accept"),
     errors.BodyTooLargeError: (413, "body-too-large", "The body is too large"),
     errors.HostRefusedError: (421, "host-refused", "This service does not answer to this host name"),
     errors.NotFoundError: (404, "not-found", "Not found"),
@@ -87,6 +88,8 @@ def service_problem(request: Request, error: errors.ServiceError) -> JSONRespons
     headers: dict[str, str] = {}
     if isinstance(error, errors.InvalidRequestError):
         issues = [_entry(issue, error.source) for issue in error.issues]
+    elif isinstance(error, errors.NotAcceptableError):
+        headers["Vary"] = "Accept"
     elif isinstance(error, errors.QueueFullError):
         headers["Retry-After"] = str(error.retry_after)
     elif isinstance(error, errors.JobFailedError):
@@ -159,7 +162,7 @@ def _allowed(request: Request) -> list[str]:
         method
         for method in methods
         if any(
-            route.matches({**request.scope, "method": method})[0] is Match.FULL
+            route.matches({**request.scope, "method": "GET" if method == "HEAD" else method})[0] is Match.FULL
             for route in request.app.routes
         )
     ]

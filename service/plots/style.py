@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -97,8 +98,20 @@ def plain_log(axis: Axis) -> None:
 
 def save(page: Figure, path: Path) -> None:
     """Write a picture, whole or not at all; the suffix chooses the format."""
+    with whole(path) as temporary:
+        _write(page, temporary, path.suffix.lower().removeprefix("."))
+
+
+def written(page: Figure, suffix: str) -> bytes:
+    """Return the bytes of a picture in the format `svg` or `png`."""
+    buffer = io.BytesIO()
+    _write(page, buffer, suffix)
+    return buffer.getvalue()
+
+
+def _write(page: Figure, file: Path | io.BytesIO, suffix: str) -> None:
     # No date in the file: the same picture gives the same bytes.
-    date = "CreationDate" if path.suffix.lower() == ".pdf" else "Date"
-    metadata = {} if path.suffix.lower() == ".png" else {date: None}
-    with styled(), whole(path) as temporary:
-        page.savefig(temporary, dpi=DOTS_PER_INCH, metadata=metadata)
+    date = "CreationDate" if suffix == "pdf" else "Date"
+    metadata = {} if suffix == "png" else {date: None}
+    with styled():
+        page.savefig(file, format=suffix, dpi=DOTS_PER_INCH, metadata=metadata)

@@ -12,6 +12,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.core import Service
 from service.events import END, job_events
+from service.head import HEADERS_ONLY
 from service.http import ServiceDependency
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
@@ -31,14 +32,17 @@ class _Watched:
     service: Service
     job_id: str
     last_event_id: str | None
+    headers_only: bool
 
 
-async def _watched(job_id: str, service: ServiceDependency, last_event_id: LastEventId = None) -> _Watched:
+async def _watched(
+    job_id: str, request: Request, service: ServiceDependency, last_event_id: LastEventId = None
+) -> _Watched:
     """The job to follow; refused here, before the answer begins, if there is none."""
     row = await run_in_threadpool(service.job, job_id)
     if last_event_id == END and row.state.finished:
         raise _ToldEverything
-    return _Watched(service, job_id, last_event_id)
+    return _Watched(service, job_id, last_event_id, HEADERS_ONLY in request.scope)
 
 
 @router.get(
@@ -53,6 +57,8 @@ async def events(watched: Annotated[_Watched, Depends(_watched)]) -> AsyncIterat
     points as `[value, amplitude]` from number `start` on; `end`, the last one, the job. After a broken
     connection, `Last-Event-ID` goes on with the points not received.
     """
+    if watched.headers_only:
+        return
     async for event in job_events(watched.service, watched.job_id, watched.last_event_id):
         yield event
 

@@ -14,9 +14,17 @@ from service import cursors
 from service.answers import FinishedJob, JobAnswer, JobPage, ResultsAnswer, SweepAnswer
 from service.core import Service
 from service.errors import InvalidRequestError
-from service.http import JsonBody, ServiceDependency, idempotency_key, preferred_wait, wait_for_end
+from service.http import (
+    JsonBody,
+    ServiceDependency,
+    idempotency_key,
+    listing,
+    preferred_wait,
+    wait_for_end,
+)
 from service.models import JobState
 from service.repository import JobRow
+from service.routes.described import LISTED
 from solver.errors import Issue
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
@@ -55,8 +63,8 @@ async def submit_design(request: Request, body: JsonBody, service: ServiceDepend
     return await _submit(request, service, {**body, "kind": "design"})
 
 
-@router.get("/jobs")
-def list_jobs(service: ServiceDependency, query: Annotated[JobQuery, Query()]) -> JobPage:
+@router.get("/jobs", response_model=JobPage, responses=LISTED)
+def list_jobs(request: Request, service: ServiceDependency, query: Annotated[JobQuery, Query()]) -> Response:
     """Jobs, newest first."""
     size = min(query.limit, service.settings.page_limit)
     before = None if query.cursor is None else cursors.decode(query.cursor)[1]
@@ -67,7 +75,8 @@ def list_jobs(service: ServiceDependency, query: Annotated[JobQuery, Query()]) -
     if len(rows) > size:
         words = query.model_dump(exclude_none=True, exclude={"cursor"}, mode="json")
         following = "/v1/jobs?" + urlencode({**words, "cursor": cursors.encode(None, rows[size - 1].id)})
-    return JobPage(items=[_answer(service, row) for row in rows[:size]], next=following)
+    items = [_answer(service, row) for row in rows[:size]]
+    return listing(request, JobPage(items=items, next=following))
 
 
 @router.get("/jobs/{job_id}")

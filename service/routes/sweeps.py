@@ -2,24 +2,84 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request, Response
 
 from service.answers import SweepDetail, SweepPage
-from service.http import ServiceDependency
+from service.http import ServiceDependency, listing, tagged
+from service.representations import (
+    BY_FORMAT,
+    JSON,
+    SUFFIXES,
+    SWEEP_MEDIA,
+    chosen,
+    sweep_body,
+    sweep_picture,
+)
+from service.routes.described import BINARY, LISTED, TEXT, UNCHANGED, media
 from service.sweep_queries import SweepQuery, sweep_page
 
 router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
 
+_PICTURE_TYPES = {"svg": "image/svg+xml", "png": "image/png"}
+_FORMS: dict[int | str, dict[str, Any]] = {
+    200: media({form: TEXT if form.startswith("text/") else BINARY for form in SWEEP_MEDIA if form != JSON}),
+    **UNCHANGED,
+}
 
-@router.get("")
-def list_sweeps(service: ServiceDependency, query: Annotated[SweepQuery, Query()]) -> SweepPage:
+
+@router.get("", response_model=SweepPage, responses=LISTED)
+def list_sweeps(
+    request: Request, service: ServiceDependency, query: Annotated[SweepQuery, Query()]
+) -> Response:
     """Stored sweeps that meet every filter, newest first unless `sort` says otherwise."""
-    return sweep_page(service.sweeps, query, service.settings)
+    return listing(request, sweep_page(service.sweeps, query, service.settings))
 
 
-@router.get("/{sweep_id}")
-def get_sweep(sweep_id: str, service: ServiceDependency) -> SweepDetail:
-    """A stored sweep with its arrays."""
-    return SweepDetail.load(sweep_id, service.sweeps)
+@router.get("/{sweep_id}", response_model=SweepDetail, responses=_FORMS)
+def get_sweep(
+    sweep_id: str,
+    request: Request,
+    service: ServiceDependency,
+    form: Annotated[
+        Literal["json", "csv", "npz", "parquet"] | None,
+        Query(alias="format", description="In place of `Accept`, for links."),
+    ] = None,
+) -> Response:
+    """A stored sweep with its arrays, in the form that `Accept` prefers.
+
+    `text/csv` has a row for each point and a column for each array of one number a point. All arrays are in
+    `application/x-npz` (also as `application/zip`), which `numpy.load` reads, and in
+    `application/vnd.apache.parquet`.
+    """
+    accept = request.headers.get("accept") if form is None else BY_FORMAT[form]
+    kind = chosen(accept, SWEEP_MEDIA)
+    headers = {"Vary": "Accept"}
+    if kind in SUFFIXES:
+        headers["Content-Disposition"] = f'attachment; filename="sweep-{sweep_id}.{SUFFIXES[kind]}"'
+    return tagged(request, sweep_body(sweep_id, kind, service.sweeps), kind, headers)
+
+
+@router.get(
+    "/{sweep_id}/plot.svg",
+    response_class=Response,
+    responses={200: media({"image/svg+xml": TEXT}), **UNCHANGED},
+)
+def plot_svg(sweep_id: str, request: Request, service: ServiceDependency) -> Response:
+    """The curve of a stored sweep, its peak marked, its band shaded."""
+    return _picture(sweep_id, "svg", request, service)
+
+
+@router.get(
+    "/{sweep_id}/plot.png",
+    response_class=Response,
+    responses={200: media({"image/png": BINARY}), **UNCHANGED},
+)
+def plot_png(sweep_id: str, request: Request, service: ServiceDependency) -> Response:
+    """The curve of a stored sweep, its peak marked, its band shaded."""
+    return _picture(sweep_id, "png", request, service)
+
+
+def _picture(sweep_id: str, suffix: str, request: Request, service: ServiceDependency) -> Response:
+    return tagged(request, sweep_picture(sweep_id, suffix, service.sweeps), _PICTURE_TYPES[suffix])

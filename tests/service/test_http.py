@@ -189,8 +189,8 @@ def test_other_refusals(http: httpx.Client) -> None:
     is_problem(http.get("/v1/sweeps/none"), 404)
     is_problem(http.get("/v1/scenes/none"), 404)
     put = http.put("/v1/jobs", json={})
-    assert is_problem(put, 405)["detail"] == "PUT is not possible at /v1/jobs, use GET, POST"
-    assert put.headers["allow"] == "GET, POST"
+    assert is_problem(put, 405)["detail"] == "PUT is not possible at /v1/jobs, use GET, HEAD, POST"
+    assert put.headers["allow"] == "GET, HEAD, POST"
     form = http.post("/v1/jobs", data={"kind": "iteration"})
     assert "application/json" in is_problem(form, 415)["detail"]
     is_problem(http.post("/v1/designs", json={"kind": "iteration"}), 422)
