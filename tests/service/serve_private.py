@@ -1,4 +1,4 @@
-"""A service with the private kinds as a process of its own: ``serve_private.py URL [port | work]``."""
+"""A service with the private kinds as a process of its own: ``serve_private.py URL port|work|dispatch``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from service.settings import load_settings
 
 if __name__ == "__main__":
     url, what = sys.argv[1:]
-    if what == "work":
-        work(load_settings(database=url, workers=1), PRIVATE, until_empty=True)
+    if what in ("work", "dispatch"):
+        work(load_settings(database=url, workers=1), PRIVATE, until_empty=what == "work")
     else:
         serve(load_settings(database=url, workers=2, port=int(what)), PRIVATE)

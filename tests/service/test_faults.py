@@ -1,0 +1,134 @@
+"""Faults at random moments: every accepted job ends, with one result, and nothing is left over.
+
+``pytest -m long tests/service/test_faults.py -s`` makes more than 200 of them and prints what happened.
+"""
+
+from __future__ import annotations
+
+import random
+import subprocess
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import httpx
+import pytest
+from fault_kinds import (
+    Fault,
+    child_killed,
+    child_paused,
+    connections_cut,
+    disk_full,
+    program_killed,
+    program_paused,
+    program_stopped,
+    queue_full,
+    server_restarted,
+)
+from fault_site import Site, clients, free_port
+from postgresql_cluster import Cluster
+from sqlalchemy import func, select
+
+from service.db import Database
+from service.integrity import check
+from service.models import Job, JobResult, JobState, Sweep
+
+COMMON: dict[str, Fault] = {
+    "worker killed": child_killed,
+    "worker paused past the lease": child_paused,
+    "service killed": program_killed,
+    "service stopped": program_stopped,
+    "service paused past the lease": program_paused,
+    "queue full": queue_full,
+}
+
+
+def undergo(site: Site, faults: Mapping[str, Fault], number: int, seed: int) -> None:
+    """Let faults happen while clients submit; then wait for the end of every accepted job, and check."""
+    generator, names = random.Random(seed), list(faults)
+    began = time.monotonic()
+    with site:
+        with clients(site, jobs=8 * number, seed=seed):
+            for index in range(number):
+                time.sleep(generator.uniform(0.05, 0.4))
+                name = names[index % len(names)] if index < len(names) else generator.choice(names)
+                faults[name](site, generator)
+                site.faults[name] += 1
+        took = await_end(site)
+    assert site.await_nobody() == [], "processes are left over"
+    assert site.wrong == []
+    states = check_rows(site)
+    print(
+        f"\n{sum(site.faults.values())} faults in {time.monotonic() - began:.0f} s {dict(site.faults)}; "
+        f"{len(site.accepted)} jobs accepted, {dict(states)}, the last {took:.1f} s after the last fault; "
+        f"refused meanwhile {dict(site.refused)}"
+    )
+
+
+def await_end(site: Site, seconds: float = 120.0) -> float:
+    """Wait until every accepted job has ended; the time it took [s]."""
+    begin = time.monotonic()
+    with httpx.Client(timeout=20.0) as client:
+        for job in list(site.accepted):
+            while True:
+                assert time.monotonic() < begin + seconds, f"job {job} does not end"
+                answer = client.get(f"{site.base()}/v1/jobs/{job}")
+                if answer.status_code == 200 and answer.json()["finished"] is not None:
+                    break
+                time.sleep(0.1)
+    return time.monotonic() - begin
+
+
+def check_rows(site: Site) -> Counter[str]:
+    """Every accepted job was successful and has one result; nothing else has one; the database is sound."""
+    database = Database(site.url)
+    with database.reading() as connection:
+        states = {row.id: row.state for row in connection.execute(select(Job.id, Job.state))}
+        results = connection.execute(select(JobResult.job_id)).scalars().all()
+        counts = select(Sweep.job_id, func.count().label("number")).group_by(Sweep.job_id)
+        sweeps = {row.job_id: row.number for row in connection.execute(counts)}
+    database.close()
+    assert set(site.accepted) <= set(states), "an accepted job was lost"
+    assert set(states.values()) == {JobState.SUCCESSFUL}
+    assert len(results) == len(set(results))
+    assert set(results) == set(states)
+    for job, body in site.accepted.items():
+        assert sweeps.get(job, 0) == body["sweeps"]
+    assert check(site.url).trouble == ()
+    return Counter(state.value for state in states.values())
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of a few megabytes."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", "size=24m", "tmpfs", str(folder)]
+    if subprocess.run(command, capture_output=True, check=False).returncode != 0:
+        pytest.skip("a small disk can be mounted by root only")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+@pytest.mark.parametrize("number", [6, pytest.param(90, marks=pytest.mark.long)])
+def test_one_service_on_sqlite(tmp_path: Path, number: int) -> None:
+    site = Site(f"sqlite:///{tmp_path}/jobs.db", tmp_path, [free_port()])
+    undergo(site, COMMON, number, seed=number)
+
+
+@pytest.mark.parametrize("number", [2, pytest.param(30, marks=pytest.mark.long)])
+def test_a_disk_that_is_full_for_a_while(tmp_path: Path, small_disk: Path, number: int) -> None:
+    site = Site(f"sqlite:///{small_disk}/jobs.db", tmp_path, [free_port()])
+    undergo(site, {"disk full": disk_full(small_disk)}, number, seed=number)
+
+
+@pytest.mark.parametrize("number", [5, pytest.param(100, marks=pytest.mark.long)])
+def test_services_and_a_dispatcher_on_postgresql(cluster: Cluster, tmp_path: Path, number: int) -> None:
+    with cluster.database(empty=False) as url:
+        site = Site(url, tmp_path, [free_port(), free_port(), None])
+        own = {
+            "PostgreSQL restarted": server_restarted(cluster),
+            "connections cut": connections_cut(cluster, url),
+        }
+        undergo(site, {**own, **COMMON}, number, seed=number)
