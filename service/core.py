@@ -13,7 +13,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from service import revisions
-from service.clock import Clock, utc_now
+from service.clock import Clock
 from service.db import Database
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.executors.local import LocalExecutor
@@ -72,11 +72,11 @@ class Service:
         Its settings.
     registry : Registry
         The kinds of job it runs.
-    now : callable
-        Its clock.
+    now : callable, optional
+        Its clock (see `JobRepository`).
     """
 
-    def __init__(self, settings: Settings, registry: Registry = SHIPPED, now: Clock = utc_now) -> None:
+    def __init__(self, settings: Settings, registry: Registry = SHIPPED, now: Clock | None = None) -> None:
         self.settings = settings
         self.registry = registry
         self.database = Database(settings.database, settings.database_connections)

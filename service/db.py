@@ -12,16 +12,18 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
-from sqlalchemy import Connection, Engine, create_engine, event, text
+from sqlalchemy import Connection, Engine, create_engine, event, func, select, text
 from sqlalchemy.engine import make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool
 
 from service import postgresql, strict_json
+from service.clock import utc_now
 from service.errors import DatabaseError
 from service.grouping import GroupedWrites
 from service.lock import FileLock
@@ -226,6 +228,14 @@ class Database:
         """A transaction that sees one snapshot of the database."""
         with self._read.begin() as connection:
             yield connection
+
+    def time(self) -> datetime:
+        """The time of the PostgreSQL server, for SQLite of this machine."""
+        if self.exclusive:
+            return utc_now()
+        with self.reading() as connection:
+            found: datetime = connection.execute(select(func.clock_timestamp())).scalar_one()
+        return found.astimezone(UTC)
 
     def version(self) -> str:
         """The version of the SQLite library or the PostgreSQL server; raises what the database raises."""

@@ -105,6 +105,7 @@ class JobQueue:
 
     def start(self) -> None:
         """Take back what a dead owner left running, start the workers and the queue."""
+        self._jobs.keep_time()
         recovered = self._jobs.recover_abandoned(self.owner)
         if recovered.total:
             log.warning(
@@ -322,6 +323,7 @@ class JobQueue:
         if now < self._next_upkeep:
             return
         self._next_upkeep = now + min(self._settings.lease_seconds / 3.0, self._settings.poll_seconds)
+        self._jobs.keep_time()
         by_attempt = {id(entry.attempt): entry for entry in running}
         for lost in self._jobs.renew([entry.attempt for entry in running], self._lease_until()):
             self._ask_to_stop(by_attempt[id(lost)], _StopReason.LEASE)
@@ -329,6 +331,6 @@ class JobQueue:
         for entry in running:
             if entry.stop is None and entry.attempt.job_id in cancelled:
                 self._ask_to_stop(entry, _StopReason.CANCEL)
-        if self._jobs.recover_expired().total:
+        if self._jobs.recover_expired([entry.attempt.job_id for entry in running]).total:
             log.warning("jobs whose lease ran out were taken back")
             self._wake.set()

@@ -9,7 +9,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, Executable, and_, func, select, update
 
-from service.clock import Clock, utc_now
+from service.clock import Clock, SharedClock, utc_now
 from service.db import Database
 from service.errors import IdempotencyError
 from service.ids import new_id
@@ -69,13 +69,14 @@ class JobRepository:
     ----------
     database : Database
         Where they are.
-    now : callable
-        The clock that leases and times are read from.
+    now : callable, optional
+        The clock that leases and times are read from: by default that of this machine where one service
+        has the database for itself, that of the server where several share it.
     """
 
-    def __init__(self, database: Database, now: Clock = utc_now) -> None:
+    def __init__(self, database: Database, now: Clock | None = None) -> None:
         self._db = database
-        self.now = now
+        self.now: Clock = now or (utc_now if database.exclusive else SharedClock(database.time))
         self._room = Room()
 
     def submit(self, new: NewJob, queue_limit: int) -> tuple[JobRow, bool]:
@@ -101,6 +102,11 @@ class JobRepository:
         if source is None:
             self._room.require(connection, queue_limit)
         return self._insert(connection, new, source), True
+
+    def keep_time(self) -> None:
+        """Look at the server's clock, if that is the one."""
+        if isinstance(self.now, SharedClock):
+            self.now.look()
 
     def get(self, job_id: str) -> JobRow | None:
         """The job, or None."""
@@ -264,10 +270,17 @@ class JobRepository:
             condition = and_(Job.state == JobState.RUNNING, Job.lease_owner != owner)
             return _recover(connection, condition, "the service ended while the job ran", self.now())
 
-    def recover_expired(self) -> Recovered:
-        """Take back running jobs whose lease ran out; those that another service looks at are left to it."""
+    def recover_expired(self, running_here: Iterable[str] = ()) -> Recovered:
+        """Take back running jobs whose lease ran out; those that another service looks at are left to it.
+
+        Those that run here are kept, whatever a clock that was set says of their leases.
+        """
         with self._db.writing() as connection:
-            condition = and_(Job.state == JobState.RUNNING, Job.lease_until < self.now())
+            condition = and_(
+                Job.state == JobState.RUNNING,
+                Job.lease_until < self.now(),
+                Job.id.not_in(list(running_here)),
+            )
             return _recover(
                 connection, condition, "its owner gave no sign of life", self.now(), skip_locked=True
             )

@@ -21,7 +21,7 @@ from typing import Any, Self
 import httpx
 
 SCRIPT = Path(__file__).with_name("serve_private.py")
-LEASE = 2.0
+LEASE = 1.0
 _MARK = "STICKSLIP_TEST_SITE"
 _SETTINGS = {
     "STICKSLIP_LEASE_SECONDS": str(LEASE),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import random
 import subprocess
+import sys
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -59,10 +60,10 @@ def undergo(site: Site, faults: Mapping[str, Fault], number: int, seed: int) -> 
     assert site.await_nobody() == [], "processes are left over"
     assert site.wrong == []
     states = check_rows(site)
-    print(
+    sys.stdout.write(
         f"\n{sum(site.faults.values())} faults in {time.monotonic() - began:.0f} s {dict(site.faults)}; "
         f"{len(site.accepted)} jobs accepted, {dict(states)}, the last {took:.1f} s after the last fault; "
-        f"refused meanwhile {dict(site.refused)}"
+        f"refused meanwhile {dict(site.refused)}\n"
     )
 
 
