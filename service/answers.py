@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.arrays import decode
-from service.errors import NotFoundError
 from service.jobs import ContactValues, VariableValues
 from service.models import JobState
 from service.repository import DesignRepository, DesignRow, JobRow, SweepRepository, SweepRow
@@ -22,11 +21,31 @@ if TYPE_CHECKING:
     from service.core import Results
 
 _SAME = (
-    *("id", "scene_hash", "parameter", "frequency_hz", "excitation_amplitude", "harmonics", "points"),
+    *(
+        "id",
+        "owner",
+        "scene_hash",
+        "parameter",
+        "frequency_hz",
+        "excitation_amplitude",
+        "harmonics",
+        "points",
+    ),
     *("limit", "band_hz", "newton_iterations", "rejected_steps", "seconds", "completed", "status", "created"),
 )
 _SAME_OF_DESIGNS = (
-    *("scene_hash", "method", "robust", "reached", "feasible", "status", "objective", "limit", "band_hz"),
+    *(
+        "owner",
+        "scene_hash",
+        "method",
+        "robust",
+        "reached",
+        "feasible",
+        "status",
+        "objective",
+        "limit",
+        "band_hz",
+    ),
     *("harmonics", "evaluations", "work", "seconds", "created"),
 )
 
@@ -41,6 +60,7 @@ class JobAnswer(Answer):
     """A job."""
 
     id: str
+    owner: str = Field(description="Whom it belongs to; empty if it was made without a key.")
     kind: str
     status: JobState
     progress: float = Field(description="Fraction of the path, 0 to 1.")
@@ -72,6 +92,7 @@ class JobAnswer(Answer):
             links["design"] = f"/v1/designs/{source}"
         return cls(
             id=row.id,
+            owner=row.owner,
             kind=row.kind,
             status=row.state,
             progress=progress,
@@ -121,6 +142,7 @@ class SweepAnswer(Answer):
     model_config = ConfigDict(frozen=True, validate_by_name=True, serialize_by_alias=True)
 
     id: str
+    owner: str
     job: str
     scene: str
     scene_hash: str
@@ -173,14 +195,11 @@ class SweepDetail(SweepAnswer):
     arrays: dict[str, list[Any]]
 
     @classmethod
-    def load(cls, sweep_id: str, repository: SweepRepository) -> Self:
-        """The sweep of this id (NotFoundError if there is none)."""
-        row = repository.get(sweep_id)
-        if row is None:
-            raise NotFoundError(f"there is no sweep {sweep_id!r}")
-        stored = repository.arrays(sweep_id)
+    def load(cls, row: SweepRow, repository: SweepRepository) -> Self:
+        """The sweep of a row."""
+        stored = repository.arrays(row.id)
         return cls(
-            **cls.values(row, repository.contacts([sweep_id])[sweep_id]),
+            **cls.values(row, repository.contacts([row.id])[row.id]),
             arrays={name: _listed(decode(array)) for name, array in stored.items()},
         )
 
@@ -223,6 +242,7 @@ class DesignAnswer(Answer):
     """A stored design; its id is that of its job."""
 
     id: str
+    owner: str
     scene: str
     scene_hash: str
     method: str
@@ -292,6 +312,7 @@ class FinishedJob(JobAnswer):
 class SceneAnswer(Answer):
     """A scene in a list."""
 
+    owner: str = Field(description="Whose it is; a shipped scene is everybody's.")
     name: str
     shipped: bool
     scene_hash: str
@@ -307,6 +328,7 @@ class SceneAnswer(Answer):
     def values(cls, scene: KnownScene) -> dict[str, Any]:
         """The fields of the answer for a scene."""
         return {
+            "owner": scene.owner,
             "name": scene.name,
             "shipped": scene.shipped,
             "scene_hash": scene.scene_hash,

@@ -13,6 +13,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from service import revisions
+from service.access.callers import KEYLESS, Caller, visible
 from service.clock import Clock
 from service.db import Database
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
@@ -140,8 +141,10 @@ class Service:
         self.stopping.set()
         self.waiters.wake_all()
 
-    def submit(self, body: Mapping[str, Any], idempotency_key: str | None = None) -> tuple[JobRow, bool]:
-        """Accept a job; whether it is new (it is not if its idempotency key was used for it before).
+    def submit(
+        self, body: Mapping[str, Any], idempotency_key: str | None = None, caller: Caller = KEYLESS
+    ) -> tuple[JobRow, bool]:
+        """Accept a job of the caller's; whether it is new, and not made before under its idempotency key.
 
         Raises
         ------
@@ -154,7 +157,7 @@ class Service:
             raise InvalidRequestError([Issue(pointer="/kind", message="`kind` is missing")])
         kind = self.registry.get(body["kind"])
         request = validated(kind.request, {key: value for key, value in body.items() if key != "kind"})
-        resolved = kind.resolve(request, self.scenes)
+        resolved = kind.resolve(request, self.scenes.of(caller))
         new = NewJob(
             kind=kind.name,
             request=dict(body),
@@ -167,38 +170,45 @@ class Service:
             priority=request.priority,
             fresh=request.fresh,
             idempotency_key=idempotency_key,
+            owner=caller.owner,
         )
         row, inserted = self.jobs.submit(new, self.settings.queue_limit)
         if row.state is JobState.ACCEPTED:
             self.queue.wake()
         return row, inserted
 
-    def job(self, job_id: str) -> JobRow:
+    def job(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:
         """The job.
 
         Raises
         ------
         NotFoundError
-            If there is none of this id.
+            If there is none of this id that the caller may see.
         """
-        row = self.jobs.get(job_id)
-        if row is None:
-            raise NotFoundError(f"there is no job {job_id!r}")
-        return row
+        return visible(self.jobs.get(job_id), caller, f"there is no job {job_id!r}")
 
-    def dismiss(self, job_id: str) -> JobRow:
+    def sweep(self, sweep_id: str, caller: Caller = KEYLESS) -> SweepRow:
+        """A stored sweep.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of this id that the caller may see.
+        """
+        return visible(self.sweeps.get(sweep_id), caller, f"there is no sweep {sweep_id!r}")
+
+    def dismiss(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:
         """Cancel a job. A running one ends within the grace; the row given back may say `running` still.
 
         Raises
         ------
         NotFoundError
-            If there is none of this id.
+            If there is none of this id that the caller may see.
         ConflictError
             If it ended before.
         """
-        row = self.jobs.cancel(job_id)
-        if row is None:
-            raise NotFoundError(f"there is no job {job_id!r}")
+        self.job(job_id, caller)
+        row = visible(self.jobs.cancel(job_id), caller, f"there is no job {job_id!r}")
         if row.state in (JobState.SUCCESSFUL, JobState.FAILED):
             raise ConflictError(f"job {job_id} ended before ({row.state.value}), there is nothing to dismiss")
         if row.state is JobState.RUNNING:
@@ -207,7 +217,7 @@ class Service:
             self.waiters.ended(job_id)
         return row
 
-    def results(self, job_id: str) -> Results:
+    def results(self, job_id: str, caller: Caller = KEYLESS) -> Results:
         """What a job computed; of a failed one, what it computed all the same.
 
         Raises
@@ -219,7 +229,7 @@ class Service:
         JobFailedError
             If it failed and computed nothing.
         """
-        row = self.job(job_id)
+        row = self.job(job_id, caller)
         source = row.result_of or row.id
         result = self.jobs.result(source)
         if result is not None:
@@ -231,39 +241,44 @@ class Service:
             raise ConflictError(f"job {job_id} was dismissed, it has no results")
         raise ConflictError(f"job {job_id} is {row.state.value}, it has no results yet")
 
-    def design(self, design_id: str) -> WholeDesign:
+    def design(self, design_id: str, caller: Caller = KEYLESS) -> WholeDesign:
         """A stored design; the id of a later job that asked for the same names it too.
 
         Raises
         ------
         NotFoundError
-            If there is none of this id.
+            If there is none of this id that the caller may see.
         """
-        job = self.jobs.get(design_id)
+        missing = f"there is no design {design_id!r}"
+        job: JobRow | None = visible(self.jobs.get(design_id), caller, missing)
         if job is not None and job.result_of is not None:
             job = self.jobs.get(job.result_of)
         row = None if job is None else self.designs.get(job.id)
         result = None if row is None else self.jobs.result(row.job_id)
         if job is None or row is None or result is None:
-            raise NotFoundError(f"there is no design {design_id!r}")
+            raise NotFoundError(missing)
         return WholeDesign(row=row, job=job, result=result)
 
     def wait(
-        self, job_id: str, timeout: float | None = None, on_progress: OnProgress | None = None
+        self,
+        job_id: str,
+        timeout: float | None = None,
+        on_progress: OnProgress | None = None,
+        caller: Caller = KEYLESS,
     ) -> JobRow:
         """Wait in this thread until a job has ended, the time [s] is over or the service stops."""
         events: SimpleQueue[Event] = SimpleQueue()
         end = math.inf if timeout is None else time.monotonic() + timeout
         with self.waiters.listening(job_id, events.put):
-            row = self.job(job_id)
+            row = self.job(job_id, caller)
             while not (row.state.finished or self.stopping.is_set() or time.monotonic() >= end):
                 try:
                     event = events.get(timeout=max(0.0, min(end - time.monotonic(), _LOOK_AGAIN_SECONDS)))
                 except Empty:
-                    row = self.job(job_id)
+                    row = self.job(job_id, caller)
                     continue
                 if event.ended:
-                    row = self.job(job_id)
+                    row = self.job(job_id, caller)
                 elif on_progress is not None:
                     on_progress(event.fraction, event.points)
         return row

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service import cursors
 from service.answers import DesignAnswer, DesignDetail, DesignPage
+from service.models import NOBODY
 from service.repository import DESIGN_SORTS, DesignFilter, DesignRepository, DesignRow
 from service.settings import Settings
 
@@ -26,6 +27,7 @@ _RANGES = {
     "seconds": "seconds",
 }  # fmt: skip
 _EQUAL = {
+    "owner": "owner",
     "scene": "scene_name", "scene_hash": "scene_hash", "method": "method", "robust": "robust",
     "reached": "reached", "feasible": "feasible", "harmonics": "harmonics",
 }  # fmt: skip
@@ -36,6 +38,7 @@ class DesignQuery(BaseModel):
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
 
+    owner: Name = Field(default=None, description="For keys with the scope admin: whose.")
     scene: Name = None
     scene_hash: Name = None
     variable: Name = Field(default=None, description="Name of a variable it must have.")
@@ -62,10 +65,11 @@ class DesignQuery(BaseModel):
     limit: int = Field(default=100, ge=1, le=10_000)
     cursor: str | None = Field(default=None, max_length=500)
 
-    def to_filter(self) -> DesignFilter:
-        """The query of the repository."""
+    def to_filter(self, sees: str | None = NOBODY) -> DesignFilter:
+        """The query of the repository; of what belongs to `sees`, or to everybody (None)."""
         equal = {column: getattr(self, name) for name, column in _EQUAL.items()}
         return DesignFilter(
+            owner=sees,
             equal={column: value for column, value in equal.items() if value is not None},
             ranges={column: self._range(name) for name, column in _RANGES.items()},
             variable=self.variable,
@@ -78,7 +82,9 @@ class DesignQuery(BaseModel):
         return getattr(self, f"{name}_min"), getattr(self, f"{name}_max")
 
 
-def design_page(repository: DesignRepository, query: DesignQuery, settings: Settings) -> DesignPage:
+def design_page(
+    repository: DesignRepository, query: DesignQuery, settings: Settings, sees: str | None = NOBODY
+) -> DesignPage:
     """A page of designs and the link to the next one.
 
     Raises
@@ -88,7 +94,7 @@ def design_page(repository: DesignRepository, query: DesignQuery, settings: Sett
     """
     limit = min(query.limit, settings.page_limit)
     after = None if query.cursor is None else cursors.decode(query.cursor)
-    rows = repository.page(query.to_filter(), limit + 1, after)
+    rows = repository.page(query.to_filter(sees), limit + 1, after)
     shown, more = rows[:limit], len(rows) > limit
     return DesignPage(
         items=DesignAnswer.of_rows(shown, repository),

@@ -81,7 +81,7 @@ class EmbeddedService:
 
     def sweep(self, sweep_id: str) -> SweepDetail:
         """A stored sweep with its arrays (NotFoundError if there is none)."""
-        return SweepDetail.load(sweep_id, self._service.sweeps)
+        return SweepDetail.load(self._service.sweep(sweep_id), self._service.sweeps)
 
     def designs(self, **filters: Any) -> list[DesignAnswer]:
         """Stored designs, newest first unless `sort` is given; the filters of ``GET /v1/designs``."""

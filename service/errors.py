@@ -72,7 +72,17 @@ class HostRefusedError(ServiceError):
 
 
 class NotFoundError(ServiceError):
-    """Nothing has this id or name."""
+    """Nothing has this id or name, as far as the caller may know.
+
+    Attributes
+    ----------
+    withheld : bool
+        Whether it is there and belongs to another; for the log alone.
+    """
+
+    def __init__(self, detail: str, *, withheld: bool = False) -> None:
+        self.withheld = withheld
+        super().__init__(detail)
 
 
 class ConflictError(ServiceError):

@@ -14,6 +14,7 @@ from fastapi.sse import ServerSentEvent
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
+from service.access.callers import Caller
 from service.answers import Answer, JobAnswer
 from service.core import Service
 from service.models import JobState
@@ -118,7 +119,7 @@ async def _within(event: asyncio.Event, seconds: float) -> None:
 
 
 async def job_events(
-    service: Service, job_id: str, last_event_id: str | None = None
+    service: Service, job_id: str, caller: Caller, last_event_id: str | None = None
 ) -> AsyncIterator[ServerSentEvent]:
     """Yield the events of a job until it has ended or the service stops.
 
@@ -128,6 +129,8 @@ async def job_events(
         Runs the job, or shares its database with the one that does.
     job_id : str
         A job there is.
+    caller : Caller
+        Who may see it.
     last_event_id : str or None
         What the client was told last: points it has are not sent again.
     """
@@ -136,7 +139,7 @@ async def job_events(
     heartbeat = service.settings.heartbeat_seconds
     with service.waiters.listening(job_id, bell.listen):
         yield ServerSentEvent(comment=f"job {job_id}", retry=_RETRY_MILLISECONDS)
-        row = await run_in_threadpool(service.job, job_id)
+        row = await run_in_threadpool(service.job, job_id, caller)
         looked = said = loop.time()
         while not service.stopping.is_set():
             live = service.queue.live(job_id)
@@ -152,7 +155,7 @@ async def job_events(
             changed = await bell.rung(max(min(looked + look_after, said + heartbeat) - now, 0.0))
             now = loop.time()
             if changed or now - looked >= look_after:
-                row = await run_in_threadpool(service.job, job_id)
+                row = await run_in_threadpool(service.job, job_id, caller)
                 looked = now
             if now - said >= heartbeat:
                 yield ServerSentEvent(comment="still here")

@@ -13,6 +13,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service import strict_json
+from service.access.callers import KEYLESS, Caller
 from service.answers import DesignPage, JobPage, SweepPage
 from service.core import Service
 from service.errors import (
@@ -40,6 +41,15 @@ def service_of(request: Request) -> Service:
 
 
 ServiceDependency = Annotated[Service, Depends(service_of)]
+
+
+def caller_of(request: Request) -> Caller:
+    """Who asks: the gate has put them there."""
+    caller: Caller = getattr(request.state, "caller", KEYLESS)
+    return caller
+
+
+CallerDependency = Annotated[Caller, Depends(caller_of)]
 
 
 async def json_body(request: Request) -> dict[str, Any]:
@@ -124,7 +134,7 @@ def listing(request: Request, page: SweepPage | DesignPage | JobPage) -> Respons
     return Response(csv_of_items(page.model_dump(mode="json")["items"]), media_type=kind, headers=headers)
 
 
-async def wait_for_end(service: Service, job_id: str, seconds: float) -> JobRow:
+async def wait_for_end(service: Service, job_id: str, seconds: float, caller: Caller = KEYLESS) -> JobRow:
     """The job when it has ended, the time is over or the service stops; holds no thread meanwhile."""
     loop = asyncio.get_running_loop()
     changed = asyncio.Event()
@@ -136,7 +146,7 @@ async def wait_for_end(service: Service, job_id: str, seconds: float) -> JobRow:
     end = loop.time() + seconds
     with service.waiters.listening(job_id, listen):
         while True:
-            row = await run_in_threadpool(service.job, job_id)
+            row = await run_in_threadpool(service.job, job_id, caller)
             left = end - loop.time()
             if row.state.finished or service.stopping.is_set() or left <= 0.0:
                 return row

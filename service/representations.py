@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from service.answers import SweepAnswer, SweepDetail
 from service.arrays import decode
-from service.errors import NotAcceptableError, NotFoundError
+from service.errors import NotAcceptableError
 from service.jobs import StoredArray
 from service.negotiation import preferred
-from service.repository import SweepRepository
+from service.repository import SweepRepository, SweepRow
 
 JSON, CSV = "application/json", "text/csv"
 NPZ, ZIP, PARQUET = "application/x-npz", "application/zip", "application/vnd.apache.parquet"
@@ -57,33 +57,24 @@ def chosen(accept: str | None, media: Sequence[str]) -> str:
     raise NotAcceptableError(detail)
 
 
-def sweep_body(sweep_id: str, media: str, repository: SweepRepository) -> bytes:
-    """A stored sweep in a media type of `SWEEP_MEDIA`.
-
-    Raises
-    ------
-    NotFoundError
-        If there is no such sweep.
-    """
+def sweep_body(row: SweepRow, media: str, repository: SweepRepository) -> bytes:
+    """A stored sweep in a media type of `SWEEP_MEDIA`."""
     if media == JSON:
-        return SweepDetail.load(sweep_id, repository).model_dump_json().encode()
-    row = repository.get(sweep_id)
-    if row is None:
-        raise NotFoundError(f"there is no sweep {sweep_id!r}")
+        return SweepDetail.load(row, repository).model_dump_json().encode()
     about = SweepAnswer.of_rows([row], repository)[0]
-    stored = repository.arrays(sweep_id)
+    stored = repository.arrays(row.id)
     if media == CSV:
         return _csv_of_sweep(stored)
     return _parquet(about, stored) if media == PARQUET else _npz(about, stored)
 
 
-def sweep_picture(sweep_id: str, suffix: str, repository: SweepRepository) -> bytes:
+def sweep_picture(row: SweepRow, suffix: str, repository: SweepRepository) -> bytes:
     """The curve of a stored sweep as `svg` or `png`; its peak is marked, its band shaded."""
     from service.plots.curves import Response
     from service.plots.responses import response_figure
     from service.plots.style import written
 
-    sweep = SweepDetail.load(sweep_id, repository)
+    sweep = SweepDetail.load(row, repository)
     # Matplotlib's settings belong to the process.
     with _drawing:
         return written(response_figure(Response.of_stored(sweep)), suffix)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
+from service.access.callers import KEYLESS, Caller
 from service.errors import ConflictError, NotFoundError
 from service.kinds.scenes import read_scene
-from service.repository import SceneRepository
+from service.models import NOBODY
+from service.repository import SceneRepository, SceneRow
 from service.strict_json import digest
 from solver.scene import load_scene, shipped_scenes
 
@@ -23,6 +25,8 @@ class KnownScene:
         Whether it comes with the package.
     created : datetime or None
         When it was stored; None for a shipped one.
+    owner : str
+        Whose it is; a shipped one is nobody's.
     """
 
     name: str
@@ -30,13 +34,19 @@ class KnownScene:
     scene_hash: str
     body: Mapping[str, object]
     created: datetime | None = None
+    owner: str = NOBODY
 
 
+@dataclass(frozen=True, slots=True)
 class SceneStore:
-    """Scenes by name; implements `service.jobs.SceneSource`."""
+    """Scenes by name, as one caller sees them; implements `service.jobs.SceneSource`."""
 
-    def __init__(self, repository: SceneRepository) -> None:
-        self._repository = repository
+    repository: SceneRepository
+    caller: Caller = KEYLESS
+
+    def of(self, caller: Caller) -> SceneStore:
+        """The same scenes as another caller sees them."""
+        return replace(self, caller=caller)
 
     def scene_body(self, name: str) -> Mapping[str, object] | None:
         """Tables and lists of the scene, or None."""
@@ -46,7 +56,7 @@ class SceneStore:
             return None
 
     def get(self, name: str) -> KnownScene:
-        """The scene of this name; only names are looked up, never paths.
+        """The shipped scene of this name, or the caller's own; only names are looked up, never paths.
 
         Raises
         ------
@@ -55,23 +65,16 @@ class SceneStore:
         """
         if name in shipped_scenes():
             return _shipped(name)
-        row = self._repository.get(name)
+        row = self.repository.get(self.caller.owner, name)
         if row is None:
             known = ", ".join(shipped_scenes())
             raise NotFoundError(f"there is no scene {name!r}: shipped are {known}, GET /v1/scenes lists all")
-        return KnownScene(
-            name=name, shipped=False, scene_hash=row.scene_hash, body=row.body, created=row.created
-        )
+        return _stored(row)
 
     def all(self) -> list[KnownScene]:
-        """Shipped scenes, then stored ones, each by name."""
-        stored = [
-            KnownScene(
-                name=row.name, shipped=False, scene_hash=row.scene_hash, body=row.body, created=row.created
-            )
-            for row in self._repository.all()
-        ]
-        return [_shipped(name) for name in shipped_scenes()] + stored
+        """Shipped scenes, then the stored ones that the caller may see, each by name."""
+        stored = self.repository.all(self.caller.sees)
+        return [*map(_shipped, shipped_scenes()), *map(_stored, stored)]
 
     def add(self, body: Mapping[str, object]) -> tuple[KnownScene, bool]:
         """Store a scene under its own name; whether it is new.
@@ -81,7 +84,7 @@ class SceneStore:
         InvalidRequestError
             If it is not a scene.
         ConflictError
-            If another scene has the name: a name means one scene for ever.
+            If another scene of the caller's has the name: a name means one scene for ever.
         """
         scene = read_scene(body)
         tables = scene.to_dict()
@@ -89,10 +92,8 @@ class SceneStore:
         if scene.name in shipped_scenes():
             known, added = _shipped(scene.name), False
         else:
-            row, added = self._repository.add(scene.name, scene_hash, tables)
-            known = KnownScene(
-                name=row.name, shipped=False, scene_hash=row.scene_hash, body=row.body, created=row.created
-            )
+            row, added = self.repository.add(self.caller.owner, scene.name, scene_hash, tables)
+            known = _stored(row)
         if known.scene_hash != scene_hash:
             kind = "shipped" if known.shipped else "stored"
             raise ConflictError(
@@ -105,3 +106,14 @@ class SceneStore:
 def _shipped(name: str) -> KnownScene:
     body = load_scene(name).to_dict()
     return KnownScene(name=name, shipped=True, scene_hash=digest(body), body=body)
+
+
+def _stored(row: SceneRow) -> KnownScene:
+    return KnownScene(
+        name=row.name,
+        shipped=False,
+        scene_hash=row.scene_hash,
+        body=row.body,
+        created=row.created,
+        owner=row.owner,
+    )

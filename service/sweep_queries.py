@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service import cursors
 from service.answers import SweepAnswer, SweepPage
+from service.models import NOBODY
 from service.repository import SWEEP_SORTS, SweepFilter, SweepRepository, SweepRow
 from service.settings import Settings
 
@@ -22,6 +23,7 @@ Sort = Literal[
 _RANGES = ("peak", "peak_at", "band_hz", "points", "seconds")
 _CONTACT_RANGES = ("N0", "N1", "kt", "mu")
 _EQUAL = {
+    "owner": "owner",
     "scene": "scene_name",
     "scene_hash": "scene_hash",
     "parameter": "parameter",
@@ -36,6 +38,7 @@ class SweepQuery(BaseModel):
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
 
+    owner: Name = Field(default=None, description="For keys with the scope admin: whose.")
     scene: Name = None
     scene_hash: Name = None
     parameter: Name = None
@@ -65,10 +68,11 @@ class SweepQuery(BaseModel):
     limit: int = Field(default=100, ge=1, le=10_000)
     cursor: str | None = Field(default=None, max_length=500)
 
-    def to_filter(self) -> SweepFilter:
-        """The query of the repository."""
+    def to_filter(self, sees: str | None = NOBODY) -> SweepFilter:
+        """The query of the repository; of what belongs to `sees`, or to everybody (None)."""
         equal = {column: getattr(self, name) for name, column in _EQUAL.items()}
         return SweepFilter(
+            owner=sees,
             equal={column: value for column, value in equal.items() if value is not None},
             ranges={name: self._range(name) for name in _RANGES},
             contact_ranges={n: self._range(n) for n in _CONTACT_RANGES if self._range(n) != (None, None)},
@@ -81,7 +85,9 @@ class SweepQuery(BaseModel):
         return getattr(self, f"{name}_min"), getattr(self, f"{name}_max")
 
 
-def sweep_page(repository: SweepRepository, query: SweepQuery, settings: Settings) -> SweepPage:
+def sweep_page(
+    repository: SweepRepository, query: SweepQuery, settings: Settings, sees: str | None = NOBODY
+) -> SweepPage:
     """A page of sweeps and the link to the next one.
 
     Raises
@@ -91,7 +97,7 @@ def sweep_page(repository: SweepRepository, query: SweepQuery, settings: Setting
     """
     limit = min(query.limit, settings.page_limit)
     after = None if query.cursor is None else cursors.decode(query.cursor)
-    rows = repository.page(query.to_filter(), limit + 1, after)
+    rows = repository.page(query.to_filter(sees), limit + 1, after)
     shown, more = rows[:limit], len(rows) > limit
     return SweepPage(
         items=SweepAnswer.of_rows(shown, repository),

@@ -11,8 +11,17 @@ from sqlalchemy.orm import InstrumentedAttribute
 
 from service.db import Database
 from service.jobs import DesignRecord, VariableValues
-from service.models import Design, DesignVariable
-from service.repository.listing import Condition, Position, Range, met, ordered, plain_conditions, within
+from service.models import NOBODY, Design, DesignVariable
+from service.repository.listing import (
+    Condition,
+    Position,
+    Range,
+    met,
+    ordered,
+    owner_condition,
+    plain_conditions,
+    within,
+)
 from service.repository.rows import DesignRow
 
 __all__ = ["DESIGN_SORTS", "DesignFilter", "DesignRepository", "DesignRow", "insert_design"]
@@ -36,6 +45,8 @@ class DesignFilter:
 
     Attributes
     ----------
+    owner : str or None
+        Whose; None for everybody's.
     equal : mapping
         Column name to value: scene_name, scene_hash, method, robust, reached, feasible, harmonics.
     ranges : mapping
@@ -52,6 +63,7 @@ class DesignFilter:
         Largest or newest first.
     """
 
+    owner: str | None = NOBODY
     equal: Mapping[str, object] = field(default_factory=dict)
     ranges: Mapping[str, Range] = field(default_factory=dict)
     variable: str | None = None
@@ -69,8 +81,11 @@ class DesignRepository:
     def page(self, wanted: DesignFilter, limit: int, after: Position | None = None) -> list[DesignRow]:
         """A page of designs; `after` is the sort value and id of the last one of the page before."""
         with self._db.reading() as connection:
-            query = met(connection, select(*_COLUMNS), Design.job_id, _conditions(wanted))
             column = DESIGN_SORTS.get(wanted.sort)
+            conditions = _conditions(wanted)
+            leads = column is None and not wanted.equal
+            conditions += owner_condition(connection, Design.job_id, Design.owner, wanted.owner, leads=leads)
+            query = met(connection, select(*_COLUMNS), Design.job_id, conditions)
             query = ordered(query, Design.job_id, column, descending=wanted.descending, after=after)
             return [DesignRow(**row) for row in connection.execute(query.limit(limit)).mappings()]
 
@@ -97,11 +112,13 @@ class DesignRepository:
         return found
 
 
-def insert_design(connection: Connection, job_id: str, design: DesignRecord, created: datetime) -> None:
-    """Write the design of a job inside the transaction that writes its result."""
+def insert_design(
+    connection: Connection, job_id: str, design: DesignRecord, created: datetime, owner: str = NOBODY
+) -> None:
+    """Write the design of a job inside the transaction that writes its result; `owner` is the job's."""
     values = {item.name: getattr(design, item.name) for item in fields(DesignRecord)}
     variables: tuple[VariableValues, ...] = values.pop("variables")
-    connection.execute(insert(Design).values(job_id=job_id, created=created, **values))
+    connection.execute(insert(Design).values(job_id=job_id, owner=owner, created=created, **values))
     rows = [
         {"design_id": job_id, "position": position} | {name: getattr(one, name) for name in _VARIABLE_NAMES}
         for position, one in enumerate(variables)

@@ -31,6 +31,7 @@ INSERT_RESULT = insert(_RESULT)
 COMPUTED_BEFORE = (
     select(_C.id)
     .where(_C.spec_hash == bindparam("hash"), _C.state == JobState.SUCCESSFUL, _C.result_of.is_(None))
+    .where(_C.owner == bindparam("owner"))
     .order_by(_C.id.desc())
     .limit(1)
 )

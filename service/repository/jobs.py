@@ -14,9 +14,10 @@ from service.db import Database
 from service.errors import IdempotencyError
 from service.ids import new_id
 from service.jobs import FailureKind, JobFailure, JobOutput
-from service.models import Job, JobResult, JobState
+from service.models import NOBODY, Job, JobResult, JobState
 from service.repository import job_statements as statements
 from service.repository.designs import insert_design
+from service.repository.listing import met, owner_condition, plain_conditions
 from service.repository.room import Room
 from service.repository.rows import Attempt, JobRow, NewJob, Recovered
 from service.repository.sweeps import insert_sweeps
@@ -25,6 +26,7 @@ __all__ = ["Attempt", "JobRepository", "JobRow", "NewJob", "Recovered"]
 
 _COLUMNS = [getattr(Job, field.name) for field in fields(JobRow)]
 _LISTED = [getattr(Job, field.name) for field in fields(JobRow) if field.name != "request"]
+_CLAIMED = (Job.id, Job.kind, Job.spec, Job.attempt, Job.max_attempts, Job.owner, Job.seconds_limit)
 _FREE: dict[str, Any] = {"lease_owner": None, "lease_until": None}
 
 
@@ -116,20 +118,25 @@ class JobRepository:
     def page(
         self,
         *,
+        owner: str | None = NOBODY,
         state: JobState | None = None,
         kind: str | None = None,
         scene: str | None = None,
         before: str | None = None,
         limit: int = 100,
     ) -> list[JobRow]:
-        """Jobs, newest first, older than the job `before`."""
+        """Jobs of an owner, or of everybody (None), newest first, older than the job `before`."""
         query = select(*_LISTED).order_by(Job.id.desc()).limit(limit)
-        for column, value in ((Job.state, state), (Job.kind, kind), (Job.scene_name, scene)):
-            if value is not None:
-                query = query.where(column == value)
         if before is not None:
             query = query.where(Job.id < before)
+        equal = ((Job.state, state), (Job.kind, kind), (Job.scene_name, scene))
+        conditions = plain_conditions(
+            Job.id, [column == value for column, value in equal if value is not None]
+        )
+        leads = kind is None and scene is None
         with self._db.reading() as connection:
+            conditions += owner_condition(connection, Job.id, Job.owner, owner, leads=leads)
+            query = met(connection, query, Job.id, conditions)
             return [JobRow(**row) for row in connection.execute(query).mappings()]
 
     def result(self, job_id: str) -> dict[str, Any] | None:
@@ -192,7 +199,7 @@ class JobRepository:
         def write(connection: Connection) -> bool:
             if not _guarded(connection, statements.SUCCEED, attempt, {"ended": finished}):
                 return False
-            self._store(connection, attempt.job_id, output, finished)
+            self._store(connection, attempt, output, finished)
             return True
 
         return self._db.grouped(write)
@@ -210,7 +217,7 @@ class JobRepository:
                 **_FREE,
             )
             if changed and output is not None:
-                self._store(connection, attempt.job_id, output, finished)
+                self._store(connection, attempt, output, finished)
             return changed
 
     def lose(self, attempt: Attempt, reason: str) -> Recovered:
@@ -299,7 +306,8 @@ class JobRepository:
 
     @staticmethod
     def _computed_before(connection: Connection, new: NewJob) -> str | None:
-        return connection.execute(statements.COMPUTED_BEFORE, {"hash": new.spec_hash}).scalar_one_or_none()
+        known = {"hash": new.spec_hash, "owner": new.owner}
+        return connection.execute(statements.COMPUTED_BEFORE, known).scalar_one_or_none()
 
     def _insert(self, connection: Connection, new: NewJob, source: str | None) -> JobRow:
         """Insert a job; its row is what was written, not read again."""
@@ -313,12 +321,13 @@ class JobRepository:
         return JobRow(**{name: written[name] for name in statements.ROW})
 
     @staticmethod
-    def _store(connection: Connection, job_id: str, output: JobOutput, created: datetime) -> None:
+    def _store(connection: Connection, attempt: Attempt, output: JobOutput, created: datetime) -> None:
+        job_id, owner = attempt.job_id, attempt.owner
         body = output.result if output.encoded is None else output.encoded
         connection.execute(statements.INSERT_RESULT, {"job_id": job_id, "body": body})
-        insert_sweeps(connection, job_id, output.sweeps, created)
+        insert_sweeps(connection, job_id, output.sweeps, created, owner)
         if output.design is not None:
-            insert_design(connection, job_id, output.design, created)
+            insert_design(connection, job_id, output.design, created, owner)
 
 
 def _recover(

@@ -8,19 +8,29 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, Select, func, literal, select, tuple_
 from sqlalchemy.orm import InstrumentedAttribute
+from sqlalchemy.sql.elements import UnaryExpression
+from sqlalchemy.sql.operators import custom_op
 
 Range = tuple[float | None, float | None]
 Position = tuple[float | None, str]
 
 _FEW = 2000
+_FEW_OF_AN_OWNER = 5000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
-    """A condition on rows, in two forms: the ids that meet it, and whether a row does."""
+    """A condition on rows, in two forms: the ids that meet it, and whether a row does.
+
+    Attributes
+    ----------
+    few : int
+        Up to so many rows it leads a query (see `met`).
+    """
 
     ids: Select[str]
     holds: ColumnElement[bool]
+    few: int = _FEW
 
 
 def plain_conditions(
@@ -28,6 +38,33 @@ def plain_conditions(
 ) -> list[Condition]:
     """Conditions on the columns of the table itself."""
     return [Condition(ids=select(identity).where(holds), holds=holds) for holds in found]
+
+
+def owner_condition(
+    connection: Connection,
+    identity: InstrumentedAttribute[str],
+    column: InstrumentedAttribute[str],
+    owner: str | None,
+    *,
+    leads: bool,
+) -> list[Condition]:
+    """The condition that rows are an owner's; none for everybody's (None).
+
+    Parameters
+    ----------
+    leads : bool
+        Whether nothing else names an index: the one of the owner, in the order of the ids, is then the way.
+        Else SQLite must not take it: without statistics it holds every equality for rare, and would sort all
+        rows of an owner who has most of them. An owner of few rows leads all the same (see `met`).
+    """
+    if owner is None:
+        return []
+    holds = column == owner
+    if connection.dialect.name == "sqlite" and not leads:
+        # The unary plus of SQLite's documentation: the value as it is, but no index.
+        holds = UnaryExpression(column.expression, operator=custom_op("+")) == owner
+    ids = select(identity).where(column == owner)
+    return [Condition(ids=ids, holds=holds, few=_FEW_OF_AN_OWNER)]
 
 
 def met(
@@ -39,20 +76,23 @@ def met(
     """The query with every condition, on SQLite led by one that few rows meet if there is one.
 
     SQLite does not know how many rows a condition leaves and would read the whole table in the order of
-    the ids for four rows with a low peak. So each condition with an index is counted up to `_FEW`
-    first, which its index answers in well under a millisecond. PostgreSQL keeps statistics and knows.
+    the ids for four rows with a low peak. So each condition with an index is counted first, up to
+    `few` rows, which its index answers in well under a millisecond. PostgreSQL keeps statistics and knows,
+    if it plans with the values: a plan kept for any owner is wrong for who has few rows, or most of them.
     """
     lead = None
     if connection.dialect.name == "sqlite":
         lead = next((condition for condition in conditions if _is_few(connection, condition)), None)
+    else:
+        connection.exec_driver_sql("SET LOCAL plan_cache_mode = force_custom_plan")
     for condition in conditions:
         query = query.where(identity.in_(condition.ids) if condition is lead else condition.holds)
     return query
 
 
 def _is_few(connection: Connection, condition: Condition) -> bool:
-    bounded = condition.ids.limit(_FEW + 1).subquery()
-    return connection.execute(select(func.count()).select_from(bounded)).scalar_one() <= _FEW
+    bounded = condition.ids.limit(condition.few + 1).subquery()
+    return connection.execute(select(func.count()).select_from(bounded)).scalar_one() <= condition.few
 
 
 def within(column: InstrumentedAttribute[Any], bounds: Range) -> list[ColumnElement[bool]]:

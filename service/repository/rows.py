@@ -66,6 +66,8 @@ class Attempt:
     attempt: int
     max_attempts: int
     lease_owner: str
+    owner: str = NOBODY
+    seconds_limit: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,6 +88,7 @@ class Recovered:
 class SceneRow:
     """A stored scene."""
 
+    owner: str
     name: str
     scene_hash: str
     created: datetime
@@ -99,6 +102,7 @@ class SweepRow:
     id: str
     job_id: str
     position: int
+    owner: str
     scene_name: str
     scene_hash: str
     parameter: str
@@ -125,6 +129,7 @@ class DesignRow:
     """A stored design without its variables."""
 
     job_id: str
+    owner: str
     scene_name: str
     scene_hash: str
     method: str

@@ -12,8 +12,17 @@ from sqlalchemy.orm import InstrumentedAttribute
 from service.db import Database
 from service.ids import new_id
 from service.jobs import ContactValues, StoredArray, SweepRecord
-from service.models import Sweep, SweepArray, SweepContact
-from service.repository.listing import Condition, Position, Range, met, ordered, plain_conditions, within
+from service.models import NOBODY, Sweep, SweepArray, SweepContact
+from service.repository.listing import (
+    Condition,
+    Position,
+    Range,
+    met,
+    ordered,
+    owner_condition,
+    plain_conditions,
+    within,
+)
 from service.repository.rows import SweepRow
 
 __all__ = ["SWEEP_SORTS", "SweepFilter", "SweepRepository", "SweepRow", "insert_sweeps"]
@@ -43,6 +52,8 @@ class SweepFilter:
 
     Attributes
     ----------
+    owner : str or None
+        Whose; None for everybody's.
     equal : mapping
         Column name to value: scene_name, scene_hash, parameter, harmonics, job_id, completed.
     ranges : mapping
@@ -57,6 +68,7 @@ class SweepFilter:
         Largest or newest first.
     """
 
+    owner: str | None = NOBODY
     equal: Mapping[str, object] = field(default_factory=dict)
     ranges: Mapping[str, Range] = field(default_factory=dict)
     contact_ranges: Mapping[str, Range] = field(default_factory=dict)
@@ -117,13 +129,13 @@ class SweepRepository:
 
 
 def insert_sweeps(
-    connection: Connection, job_id: str, sweeps: Sequence[SweepRecord], created: datetime
+    connection: Connection, job_id: str, sweeps: Sequence[SweepRecord], created: datetime, owner: str = NOBODY
 ) -> None:
-    """Write the sweeps of a job inside the transaction that writes its result."""
+    """Write the sweeps of a job inside the transaction that writes its result; `owner` is the job's."""
     names = [item.name for item in fields(SweepRecord) if item.name not in _CHILD_FIELDS]
     for position, sweep in enumerate(sweeps):
         sweep_id = new_id()
-        values = {name: getattr(sweep, name) for name in names}
+        values = {name: getattr(sweep, name) for name in names} | {"owner": owner}
         connection.execute(
             insert(Sweep).values(id=sweep_id, job_id=job_id, position=position, created=created, **values)
         )
@@ -145,8 +157,11 @@ def insert_sweeps(
 def _query(connection: Connection, wanted: SweepFilter, after: Position | None) -> Select[tuple[object, ...]]:
     """The query of a page."""
     query: Select[tuple[object, ...]] = select(*_COLUMNS)
-    query = met(connection, query, Sweep.id, _conditions(wanted))
     column = SWEEP_SORTS.get(wanted.sort)
+    conditions = _conditions(wanted)
+    leads = column is None and not wanted.equal
+    conditions += owner_condition(connection, Sweep.id, Sweep.owner, wanted.owner, leads=leads)
+    query = met(connection, query, Sweep.id, conditions)
     return ordered(query, Sweep.id, column, descending=wanted.descending, after=after)
 
 

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from service.answers import DesignDetail, DesignPage
 from service.design_queries import DesignQuery, design_detail, design_page
-from service.http import ServiceDependency, listing, tagged
+from service.http import CallerDependency, ServiceDependency, listing, tagged
 from service.routes.described import LISTED, UNCHANGED
 
 router = APIRouter(prefix="/v1/designs", tags=["designs"])
@@ -16,14 +16,19 @@ router = APIRouter(prefix="/v1/designs", tags=["designs"])
 
 @router.get("", response_model=DesignPage, responses=LISTED)
 def list_designs(
-    request: Request, service: ServiceDependency, query: Annotated[DesignQuery, Query()]
+    request: Request,
+    service: ServiceDependency,
+    caller: CallerDependency,
+    query: Annotated[DesignQuery, Query()],
 ) -> Response:
     """Stored designs that meet every filter, newest first unless `sort` says otherwise."""
-    return listing(request, design_page(service.designs, query, service.settings))
+    return listing(request, design_page(service.designs, query, service.settings, caller.sees))
 
 
 @router.get("/{design_id}", response_model=DesignDetail, responses=UNCHANGED)
-def get_design(design_id: str, request: Request, service: ServiceDependency) -> Response:
+def get_design(
+    design_id: str, request: Request, service: ServiceDependency, caller: CallerDependency
+) -> Response:
     """A stored design with the whole result of its job; its id is that of the job. Has a strong ETag."""
-    answer = design_detail(service.design(design_id), service.designs)
+    answer = design_detail(service.design(design_id, caller), service.designs)
     return tagged(request, answer.model_dump_json().encode())

@@ -10,10 +10,11 @@ from fastapi import APIRouter, Depends, FastAPI, Header, Request, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
+from service.access.callers import Caller
 from service.core import Service
 from service.events import END, job_events
 from service.head import HEADERS_ONLY
-from service.http import ServiceDependency
+from service.http import CallerDependency, ServiceDependency
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
@@ -30,19 +31,24 @@ class _ToldEverything(Exception):  # noqa: N818 - no error: there is nothing mor
 @dataclass(frozen=True, slots=True)
 class _Watched:
     service: Service
+    caller: Caller
     job_id: str
     last_event_id: str | None
     headers_only: bool
 
 
 async def _watched(
-    job_id: str, request: Request, service: ServiceDependency, last_event_id: LastEventId = None
+    job_id: str,
+    request: Request,
+    service: ServiceDependency,
+    caller: CallerDependency,
+    last_event_id: LastEventId = None,
 ) -> _Watched:
     """The job to follow; refused here, before the answer begins, if there is none."""
-    row = await run_in_threadpool(service.job, job_id)
+    row = await run_in_threadpool(service.job, job_id, caller)
     if last_event_id == END and row.state.finished:
         raise _ToldEverything
-    return _Watched(service, job_id, last_event_id, HEADERS_ONLY in request.scope)
+    return _Watched(service, caller, job_id, last_event_id, HEADERS_ONLY in request.scope)
 
 
 @router.get(
@@ -59,7 +65,7 @@ async def events(watched: Annotated[_Watched, Depends(_watched)]) -> AsyncIterat
     """
     if watched.headers_only:
         return
-    async for event in job_events(watched.service, watched.job_id, watched.last_event_id):
+    async for event in job_events(watched.service, watched.job_id, watched.caller, watched.last_event_id):
         yield event
 
 

@@ -11,10 +11,12 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
 
 from service import cursors
+from service.access.callers import Caller
 from service.answers import FinishedJob, JobAnswer, JobPage, ResultsAnswer, SweepAnswer
 from service.core import Service
 from service.errors import InvalidRequestError
 from service.http import (
+    CallerDependency,
     JsonBody,
     ServiceDependency,
     idempotency_key,
@@ -49,27 +51,41 @@ class JobQuery(BaseModel):
 
 
 @router.post("/jobs", status_code=202, responses=_SUBMIT_ANSWERS, response_model=None)
-async def submit(request: Request, body: JsonBody, service: ServiceDependency) -> Response:
+async def submit(
+    request: Request, body: JsonBody, service: ServiceDependency, caller: CallerDependency
+) -> Response:
     """Accept a job. With `Prefer: wait=N` the answer waits up to N seconds for its end."""
-    return await _submit(request, service, body)
+    return await _submit(request, service, caller, body)
 
 
 @router.post("/designs", status_code=202, responses=_SUBMIT_ANSWERS, response_model=None)
-async def submit_design(request: Request, body: JsonBody, service: ServiceDependency) -> Response:
+async def submit_design(
+    request: Request, body: JsonBody, service: ServiceDependency, caller: CallerDependency
+) -> Response:
     """Accept a design: a job of the kind `design`."""
     if body.get("kind", "design") != "design":
         message = f"`kind` must be design here or be left out, got {body['kind']!r}"
         raise InvalidRequestError([Issue(pointer="/kind", message=message)])
-    return await _submit(request, service, {**body, "kind": "design"})
+    return await _submit(request, service, caller, {**body, "kind": "design"})
 
 
 @router.get("/jobs", response_model=JobPage, responses=LISTED)
-def list_jobs(request: Request, service: ServiceDependency, query: Annotated[JobQuery, Query()]) -> Response:
+def list_jobs(
+    request: Request,
+    service: ServiceDependency,
+    caller: CallerDependency,
+    query: Annotated[JobQuery, Query()],
+) -> Response:
     """Jobs, newest first."""
     size = min(query.limit, service.settings.page_limit)
     before = None if query.cursor is None else cursors.decode(query.cursor)[1]
     rows = service.jobs.page(
-        state=query.status, kind=query.kind, scene=query.scene, before=before, limit=size + 1
+        owner=caller.sees,
+        state=query.status,
+        kind=query.kind,
+        scene=query.scene,
+        before=before,
+        limit=size + 1,
     )
     following = None
     if len(rows) > size:
@@ -80,33 +96,35 @@ def list_jobs(request: Request, service: ServiceDependency, query: Annotated[Job
 
 
 @router.get("/jobs/{job_id}")
-def get_job(job_id: str, service: ServiceDependency) -> JobAnswer:
+def get_job(job_id: str, service: ServiceDependency, caller: CallerDependency) -> JobAnswer:
     """A job."""
-    return _answer(service, service.job(job_id))
+    return _answer(service, service.job(job_id, caller))
 
 
 @router.delete("/jobs/{job_id}")
-async def dismiss(job_id: str, service: ServiceDependency) -> JobAnswer:
+async def dismiss(job_id: str, service: ServiceDependency, caller: CallerDependency) -> JobAnswer:
     """Dismiss a job. A running one is stopped within the grace; the answer waits for that."""
-    row = await run_in_threadpool(service.dismiss, job_id)
+    row = await run_in_threadpool(service.dismiss, job_id, caller)
     if not row.state.finished:
-        row = await wait_for_end(service, job_id, service.settings.grace_seconds + _STOP_MARGIN_SECONDS)
+        row = await wait_for_end(
+            service, job_id, service.settings.grace_seconds + _STOP_MARGIN_SECONDS, caller
+        )
     return _answer(service, row)
 
 
 @router.get("/jobs/{job_id}/results")
-def results(job_id: str, service: ServiceDependency) -> ResultsAnswer:
+def results(job_id: str, service: ServiceDependency, caller: CallerDependency) -> ResultsAnswer:
     """What a job computed."""
-    return ResultsAnswer.of(service.results(job_id), service.sweeps)
+    return ResultsAnswer.of(service.results(job_id, caller), service.sweeps)
 
 
-async def _submit(request: Request, service: Service, body: dict[str, Any]) -> Response:
+async def _submit(request: Request, service: Service, caller: Caller, body: dict[str, Any]) -> Response:
     key = idempotency_key(request.headers)
     seconds = preferred_wait(request.headers, service.settings.max_wait_seconds)
-    row, _ = await run_in_threadpool(service.submit, body, key)
+    row, _ = await run_in_threadpool(service.submit, body, key, caller)
     headers = {"Location": f"/v1/jobs/{row.id}"}
     if seconds is not None:
-        row = await wait_for_end(service, row.id, seconds)
+        row = await wait_for_end(service, row.id, seconds, caller)
         headers["Preference-Applied"] = f"wait={seconds:g}"
     if not row.state.finished:
         return JSONResponse(_answer(service, row).model_dump(mode="json"), 202, headers)

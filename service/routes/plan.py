@@ -7,7 +7,7 @@ from typing import Any
 from fastapi import APIRouter
 
 import solver
-from service.http import JsonBody, ServiceDependency
+from service.http import CallerDependency, JsonBody, ServiceDependency
 from service.kinds.scenes import HarmonicRequest, resolve_scene
 from service.validation import validated
 
@@ -19,8 +19,8 @@ class PlanRequest(HarmonicRequest):
 
 
 @router.post("")
-def plan(body: JsonBody, service: ServiceDependency) -> dict[str, Any]:
+def plan(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> dict[str, Any]:
     """The effects this scene calls for and those left out, each with the reason; sizes and cost."""
     request = validated(PlanRequest, body)
-    scene = resolve_scene(request, service.scenes)
+    scene = resolve_scene(request, service.scenes.of(caller))
     return solver.plan(scene, harmonics=request.harmonics).to_json()

@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Query, Request, Response
 
 from service.answers import SweepDetail, SweepPage
-from service.http import ServiceDependency, listing, tagged
+from service.http import CallerDependency, ServiceDependency, listing, tagged
+from service.repository import SweepRow
 from service.representations import (
     BY_FORMAT,
     JSON,
@@ -31,10 +32,13 @@ _FORMS: dict[int | str, dict[str, Any]] = {
 
 @router.get("", response_model=SweepPage, responses=LISTED)
 def list_sweeps(
-    request: Request, service: ServiceDependency, query: Annotated[SweepQuery, Query()]
+    request: Request,
+    service: ServiceDependency,
+    caller: CallerDependency,
+    query: Annotated[SweepQuery, Query()],
 ) -> Response:
     """Stored sweeps that meet every filter, newest first unless `sort` says otherwise."""
-    return listing(request, sweep_page(service.sweeps, query, service.settings))
+    return listing(request, sweep_page(service.sweeps, query, service.settings, caller.sees))
 
 
 @router.get("/{sweep_id}", response_model=SweepDetail, responses=_FORMS)
@@ -42,6 +46,7 @@ def get_sweep(
     sweep_id: str,
     request: Request,
     service: ServiceDependency,
+    caller: CallerDependency,
     form: Annotated[
         Literal["json", "csv", "npz", "parquet"] | None,
         Query(alias="format", description="In place of `Accept`, for links."),
@@ -58,7 +63,7 @@ def get_sweep(
     headers = {"Vary": "Accept"}
     if kind in SUFFIXES:
         headers["Content-Disposition"] = f'attachment; filename="sweep-{sweep_id}.{SUFFIXES[kind]}"'
-    return tagged(request, sweep_body(sweep_id, kind, service.sweeps), kind, headers)
+    return tagged(request, sweep_body(service.sweep(sweep_id, caller), kind, service.sweeps), kind, headers)
 
 
 @router.get(
@@ -66,9 +71,11 @@ def get_sweep(
     response_class=Response,
     responses={200: media({"image/svg+xml": TEXT}), **UNCHANGED},
 )
-def plot_svg(sweep_id: str, request: Request, service: ServiceDependency) -> Response:
+def plot_svg(
+    sweep_id: str, request: Request, service: ServiceDependency, caller: CallerDependency
+) -> Response:
     """The curve of a stored sweep, its peak marked, its band shaded."""
-    return _picture(sweep_id, "svg", request, service)
+    return _picture(service.sweep(sweep_id, caller), "svg", request, service)
 
 
 @router.get(
@@ -76,10 +83,12 @@ def plot_svg(sweep_id: str, request: Request, service: ServiceDependency) -> Res
     response_class=Response,
     responses={200: media({"image/png": BINARY}), **UNCHANGED},
 )
-def plot_png(sweep_id: str, request: Request, service: ServiceDependency) -> Response:
+def plot_png(
+    sweep_id: str, request: Request, service: ServiceDependency, caller: CallerDependency
+) -> Response:
     """The curve of a stored sweep, its peak marked, its band shaded."""
-    return _picture(sweep_id, "png", request, service)
+    return _picture(service.sweep(sweep_id, caller), "png", request, service)
 
 
-def _picture(sweep_id: str, suffix: str, request: Request, service: ServiceDependency) -> Response:
-    return tagged(request, sweep_picture(sweep_id, suffix, service.sweeps), _PICTURE_TYPES[suffix])
+def _picture(sweep: SweepRow, suffix: str, request: Request, service: ServiceDependency) -> Response:
+    return tagged(request, sweep_picture(sweep, suffix, service.sweeps), _PICTURE_TYPES[suffix])

@@ -27,7 +27,7 @@ from service.embedded import EmbeddedService
 from service.errors import DatabaseError, DatabaseInUseError, WrongRevisionError
 from service.ids import new_id
 from service.jobs import FailureKind, JobFailure, JobOutput, StoredArray
-from service.models import Base, Job, JobState
+from service.models import NOBODY, Base, Job, JobState
 from service.repository import Attempt, JobRepository, SceneRepository
 
 
@@ -200,7 +200,7 @@ def test_a_key_and_a_name_used_by_several_threads_make_one_row(database: Databas
     job = new_job(idempotency_key="one")
     with ThreadPoolExecutor(8) as threads:
         made = list(threads.map(lambda _: jobs.submit(job, queue_limit=100), range(16)))
-        stored = list(threads.map(lambda _: scenes.add("mine", "0" * 64, {}), range(16)))
+        stored = list(threads.map(lambda _: scenes.add(NOBODY, "mine", "0" * 64, {}), range(16)))
     assert len({row.id for row, _ in made}) == 1
     assert [new for _, new in made].count(True) == [new for _, new in stored].count(True) == 1
 

@@ -14,6 +14,7 @@ from postgresql_cluster import Cluster
 from private_kinds import PRIVATE
 from service_helpers import is_problem, serving, settings_of, until
 
+from service.access.callers import KEYLESS
 from service.core import Service
 from service.events import job_events
 
@@ -162,7 +163,7 @@ def test_a_job_of_another_service_is_followed_by_its_row(cluster: Cluster) -> No
             row, _ = other.submit({"kind": "iteration", "seconds": 1.5})
 
             async def told() -> list[str | None]:
-                return [event.event async for event in job_events(here, row.id) if event.event]
+                return [event.event async for event in job_events(here, row.id, KEYLESS) if event.event]
 
             names = asyncio.run(told())
             assert names[-1] == "end"

@@ -17,6 +17,7 @@ from service.clock import utc_now
 from service.db import Database
 from service.errors import InvalidRequestError
 from service.jobs import ContactValues, JobOutput, SweepRecord
+from service.models import NOBODY
 from service.repository import JobRepository, NewJob, SweepRepository
 from service.repository.sweeps import insert_sweeps
 from service.settings import load_settings
@@ -43,6 +44,8 @@ ONE = SweepRecord(
     completed=True,
     status="done",
 )
+
+NEW = NewJob(kind="sweep", request={}, spec={}, spec_hash="", request_hash="", max_attempts=1, fresh=True)
 
 
 def contact(name: str, load: float | None) -> ContactValues:
@@ -71,8 +74,7 @@ def filled(module_database: Database) -> tuple[Database, list[SweepRecord]]:
     """A database with enough sweeps that some conditions lead a query and others do not."""
     generator = random.Random(5)
     records = [random_sweep(generator) for _ in range(3000)]
-    new = NewJob(kind="sweep", request={}, spec={}, spec_hash="", request_hash="", max_attempts=1, fresh=True)
-    job, _ = JobRepository(module_database).submit(new, queue_limit=10)
+    job, _ = JobRepository(module_database).submit(NEW, queue_limit=10)
     with module_database.writing() as connection:
         insert_sweeps(connection, job.id, records, utc_now())
     return module_database, records
@@ -168,7 +170,7 @@ def test_a_range_is_met_by_one_contact_alone(database: Database) -> None:
     assert found(N0_max=1e9) == 1, "a load that was swept has no single value"
     assert found() == 2
     [whole] = [row for row in repository.page(SweepQuery().to_filter(), 10) if repository.arrays(row.id)]
-    assert SweepDetail.load(whole.id, repository).arrays == {"mean": [1.0, None]}
+    assert SweepDetail.load(whole, repository).arrays == {"mean": [1.0, None]}
 
 
 @pytest.mark.parametrize(
@@ -184,30 +186,40 @@ def test_an_unknown_filter_is_refused() -> None:
         validated(SweepQuery, {"colour": "red"})
 
 
+QUERIES: tuple[dict[str, Any], ...] = (
+    {},
+    {"scene": "disk", "peak_max": 0.05},
+    {"peak_max": 0.02},
+    {"peak_min": 1e9},
+    {"points_min": 100},
+    {"N0_min": 100.0, "N0_max": 101.0},
+    {"N0_min": 100.0, "N0_max": 700.0, "contact": "root", "sort": "peak"},
+    {"band_hz_max": 0.001, "sort": "band_hz"},
+    {"harmonics": 7, "sort": "-peak"},
+)
+OWNERS = {"old": 3000, "few": 500, NOBODY: 90_000, "one": 1, "others": 6499}
+
+
 @pytest.mark.long
 def test_a_hundred_thousand_sweeps_are_listed_within_50_ms(database: Database) -> None:
-    new = NewJob(kind="sweep", request={}, spec={}, spec_hash="", request_hash="", max_attempts=1, fresh=True)
-    job, _ = JobRepository(database).submit(new, queue_limit=10)
     generator = random.Random(1)
-    for _ in range(20):
-        records = [random_sweep(generator) for _ in range(5000)]
+    for owner, count in OWNERS.items():
+        job, _ = JobRepository(database).submit(replace(NEW, owner=owner), queue_limit=10)
         with database.writing() as connection:
-            insert_sweeps(connection, job.id, records, utc_now())
+            records = [random_sweep(generator) for _ in range(count)]
+            insert_sweeps(connection, job.id, records, utc_now(), owner)
     analyse(database)
-    repository, settings = SweepRepository(database), load_settings()
-    for query in (
-        {},
-        {"scene": "disk", "peak_max": 0.05},
-        {"peak_max": 0.02},
-        {"peak_min": 1e9},
-        {"N0_min": 100.0, "N0_max": 101.0},
-        {"N0_min": 100.0, "N0_max": 700.0, "contact": "root", "sort": "peak"},
-        {"band_hz_max": 0.001, "sort": "band_hz"},
-        {"harmonics": 7, "sort": "-peak"},
-    ):
-        times = []
-        for _ in range(5):
-            begin = time.perf_counter()
-            sweep_page(repository, SweepQuery(**query), settings)
-            times.append(time.perf_counter() - begin)
-        assert min(times) < 0.05, query
+    for owner in (*OWNERS, "nothing", None):
+        for query in QUERIES:
+            assert listing_milliseconds(database, owner, query) < 50.0, (owner, query)
+
+
+def listing_milliseconds(database: Database, owner: str | None, query: dict[str, Any]) -> float:
+    """The least of five times, which other work on the machine disturbs least."""
+    repository, settings, times = SweepRepository(database), load_settings(), []
+    for _ in range(5):
+        begin = time.perf_counter()
+        found = sweep_page(repository, SweepQuery(**query), settings, owner)
+        times.append(time.perf_counter() - begin)
+        assert owner is None or all(one.owner == owner for one in found.items)
+    return 1e3 * min(times)

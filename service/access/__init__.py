@@ -1,0 +1,1 @@
+"""Who may do what: callers, keys, limits, and the gate that every request passes."""
