@@ -91,7 +91,7 @@ class Service:
             registry.warm_up,
             workers=settings.workers,
             grace_seconds=settings.grace_seconds,
-            progress_seconds=settings.progress_seconds,
+            pace=settings.pace,
         )
         self.queue = JobQueue(self.jobs, executor, settings, self.waiters)
         self.stopping = threading.Event()

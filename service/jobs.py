@@ -19,6 +19,7 @@ from service.strict_json import JsonText, pointer
 from solver.errors import Issue
 
 if TYPE_CHECKING:
+    from service.checkpoints import Checkpoints
     from service.parts import Parts
 
 Point = tuple[float, float]
@@ -98,6 +99,34 @@ class StoredArray:
 
     sha256: str
     data: bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Piece:
+    """A piece of what an unfinished job has computed, with the SHA-256 of its bytes in hexadecimal."""
+
+    part: int
+    sha256: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pace:
+    """How often a worker tells what.
+
+    Attributes
+    ----------
+    progress_seconds : float
+        Least time between two reports of an attempt [s].
+    checkpoint_seconds : float
+        Least time between two checkpoints of an attempt [s].
+    checkpoint_bytes : int
+        Most that a job keeps for later attempts.
+    """
+
+    progress_seconds: float
+    checkpoint_seconds: float
+    checkpoint_bytes: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -213,6 +242,7 @@ class JobFailure:
 
 
 Run = Callable[[Mapping[str, Any], Progress, ShouldStop], JobOutput]
+RunOn = Callable[[Mapping[str, Any], Progress, ShouldStop, "Checkpoints"], JobOutput]
 WarmUp = Callable[[], None]
 Resolve = Callable[[Any, SceneSource], Resolved]
 
@@ -236,6 +266,9 @@ class JobKind:
     parts : Parts or None
         How the work is divided, if it can be; `run` is then ``parts.run``, which computes them one after the
         other.
+    run_on : callable or None
+        `run` with a fourth argument, `service.checkpoints.Checkpoints`: keeps what it has, and goes on from
+        what an earlier attempt kept. Divided kinds need none: their parts are kept.
     """
 
     name: str
@@ -244,6 +277,7 @@ class JobKind:
     resolve: Resolve
     run: Run
     parts: Parts | None = None
+    run_on: RunOn | None = None
 
 
 def no_warm_up() -> None:
@@ -288,6 +322,30 @@ class Registry:
         """This registry with further kinds."""
         return Registry([*self, *kinds], self.warm_up)
 
-    def runs(self) -> dict[str, Run]:
-        """The functions workers call, by kind."""
-        return {kind.name: kind.run for kind in self}
+    def runs(self) -> dict[str, RunOn]:
+        """The functions workers call, by kind; sent by name."""
+        return {kind.name: _run_on(kind) for kind in self}
+
+
+@dataclass(frozen=True, slots=True)
+class _FromTheStart:
+    """A run that keeps nothing."""
+
+    run: Run
+
+    def __call__(
+        self, spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, _checkpoints: Checkpoints
+    ) -> JobOutput:
+        """Compute."""
+        return self.run(spec, progress, should_stop)
+
+
+def _run_on(kind: JobKind) -> RunOn:
+    if kind.run_on is not None:
+        return kind.run_on
+    if kind.parts is None:
+        return _FromTheStart(kind.run)
+    # Imported here: what divided kinds are made of knows jobs.
+    from service.checkpoints import RunParts
+
+    return RunParts(kind.parts)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 from service.executors.base import Executor, ExecutorStatus, Failed, Finished, Lost, Outcome, Stopped
-from service.jobs import FailureKind, JobFailure, JobOutput, Point
+from service.jobs import FailureKind, JobFailure, JobOutput, Piece, Point
 from service.repository import Attempt, JobRepository
 from service.settings import Settings
 from service.waiters import Waiters
@@ -188,6 +188,20 @@ class JobQueue:
         if entry is not None:
             entry.found.extend(points[: _MOST_POINTS - len(entry.found)])
 
+    def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:
+        """From the executor: store pieces for a later attempt, also while the service stops."""
+        entry = self._entry(attempt)
+        if entry is None:
+            return
+        fraction, points, until = entry.fraction, entry.points, self._lease_until()
+        try:
+            owned = self._jobs.keep(attempt, pieces, fraction, points, until, anew=anew)
+        except Exception:
+            log.exception("job %s: its checkpoint could not be written", attempt.job_id)
+            return
+        if not owned:
+            self._ask_to_stop(entry, _StopReason.LEASE)
+
     def ended(self, attempt: Attempt, outcome: Outcome) -> None:
         """From the executor: write what became of an attempt.
 
@@ -291,7 +305,12 @@ class JobQueue:
             if attempt is None:
                 return False
             with self._lock:
-                self._running[attempt.job_id] = _Running(attempt=attempt, started=time.monotonic())
+                self._running[attempt.job_id] = _Running(
+                    attempt=attempt,
+                    started=time.monotonic(),
+                    fraction=attempt.progress,
+                    points=attempt.points,
+                )
         log.info(
             "job %s (%s), attempt %d of %d",
             attempt.job_id,
@@ -300,7 +319,7 @@ class JobQueue:
             attempt.max_attempts,
         )
         self._executor.submit(attempt)
-        self._waiters.progress(attempt.job_id, 0.0, 0)
+        self._waiters.progress(attempt.job_id, attempt.progress, attempt.points)
         return True
 
     def _patience(self) -> float:

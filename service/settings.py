@@ -13,6 +13,7 @@ from sqlalchemy.exc import ArgumentError
 
 from service.db import CONNECTIONS
 from service.errors import ConfigurationError
+from service.jobs import Pace
 from service.postgresql import DRIVER
 
 _LOOPBACK_NAMES = ("localhost",)
@@ -113,6 +114,18 @@ class Settings(BaseSettings):
     progress_seconds: float = Field(
         default=0.1, ge=0.01, le=60.0, description="Least time between two reports of a job's progress [s]."
     )
+    checkpoint_seconds: float = Field(
+        default=10.0,
+        ge=0.05,
+        le=86400.0,
+        description="Time after which a long job keeps what it has for a later attempt [s].",
+    )
+    checkpoint_bytes: int = Field(
+        default=256_000_000,
+        ge=0,
+        le=1_000_000_000,
+        description="Most that a job keeps for a later attempt [bytes]; 0 keeps nothing.",
+    )
     job_seconds: float = Field(
         default=3600.0, ge=0.1, le=1e7, description="Longest time one attempt at a job may take [s]."
     )
@@ -140,6 +153,15 @@ class Settings(BaseSettings):
         if self.allowed_hosts is not None:
             return self.allowed_hosts
         return ("localhost", "127.0.0.1", "[::1]") if is_loopback(self.host) else ("*",)
+
+    @property
+    def pace(self) -> Pace:
+        """How often workers tell what."""
+        return Pace(
+            progress_seconds=self.progress_seconds,
+            checkpoint_seconds=self.checkpoint_seconds,
+            checkpoint_bytes=self.checkpoint_bytes,
+        )
 
     @field_validator("database")
     @classmethod

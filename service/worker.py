@@ -23,7 +23,8 @@ from typing import Any
 
 from optim.errors import DesignError
 from service import strict_json
-from service.jobs import FailureKind, JobFailure, JobOutput, Point, Run, WarmUp
+from service.checkpoints import Checkpoints
+from service.jobs import FailureKind, JobFailure, JobOutput, Pace, Piece, Point, RunOn, WarmUp
 from solver.errors import SceneError, SettingError, SolverError
 
 THREAD_LIMITS = dict.fromkeys(
@@ -47,12 +48,13 @@ log = logging.getLogger("stickslip.worker")
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """To a worker: compute this. `token` is larger than that of every task before."""
+    """To a worker: compute this, from what earlier attempts kept. `token` is larger than any before."""
 
     token: int
     job_id: str
     kind: str
     spec: Mapping[str, Any]
+    saved: tuple[Piece, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,9 +137,9 @@ class Throttle:
 def main(
     connection: Connection,
     number: ctypes.c_longlong,
-    runs: Mapping[str, Run],
+    runs: Mapping[str, RunOn],
     warm_up: WarmUp,
-    progress_seconds: float,
+    pace: Pace,
 ) -> None:
     """The life of a worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -154,7 +156,8 @@ def main(
         if task is None:
             return
         stop = _Stop(flag, task.token)
-        done = _compute(runs, task, Throttle(connection.send, progress_seconds), stop)
+        kept = Checkpoints(task.job_id, task.saved, connection.send, pace)
+        done = _compute(runs, task, Throttle(connection.send, pace.progress_seconds), stop, kept)
         try:
             connection.send(done)
         except (pickle.PicklingError, TypeError, AttributeError) as error:
@@ -175,15 +178,23 @@ def _die_with_parent() -> None:
         os._exit(_PARENT_DIED)
 
 
-def _compute(runs: Mapping[str, Run], task: Task, progress: Throttle, stop: _Stop) -> Done:
+def _compute(
+    runs: Mapping[str, RunOn], task: Task, progress: Throttle, stop: _Stop, kept: Checkpoints
+) -> Done:
     """Run one task; every error becomes an answer, the process lives on."""
     try:
-        output = checked(runs[task.kind](task.spec, progress, stop))
+        output = checked(runs[task.kind](task.spec, progress, stop, kept))
     except MemoryError as error:
         return Done(retry=f"the worker ran out of memory ({error})")
     except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
-        return Done() if stop.obeyed else Done(failure=failure_of(task, error))
-    return Done() if stop.obeyed else Done(output=output)
+        return _stopped(kept) if stop.obeyed else Done(failure=failure_of(task, error))
+    return _stopped(kept) if stop.obeyed else Done(output=output)
+
+
+def _stopped(kept: Checkpoints) -> Done:
+    """The answer of a run that was told to stop; what it has goes before, for the next attempt."""
+    kept.flush()
+    return Done()
 
 
 def checked(output: JobOutput) -> JobOutput:

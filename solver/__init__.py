@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from solver.sectors import Extent, annulus, sectors_needed
     from solver.segments_of import Shares
     from solver.sensitivity import Gradient, Sensitivities
+    from solver.stretches import Stretch, joined
     from solver.tracking import track_peak
     from solver.wear import ContactWear, Measured, WearSensitivity, contact_wear
     from solver.wear_corners import worst_slopes

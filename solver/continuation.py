@@ -153,14 +153,12 @@ def sweep(
     if limit is not None and not (isinstance(limit, (int, float)) and np.isfinite(limit) and limit > 0.0):
         raise SettingError("limit", limit, "must be an amplitude > 0 m")
     workspace = Workspace.of(balance)
-    stretches = [] if resume is None else [resume]
-    status, count = BranchStatus.TOO_MANY_POINTS, 0 if resume is None else len(resume.solutions)
-    if on_points is not None and resume is not None:
-        on_points(*_curve(balance, resume))
+    stretches: list[Stretch] = []
+    status, count = BranchStatus.TOO_MANY_POINTS, 0
     for stretch in walk(workspace, first, last, settings, guess, resume):
         stretches.append(stretch)
         count += len(stretch.solutions)
-        if on_stretch is not None:
+        if on_stretch is not None and stretch is not resume:
             on_stretch(stretch)
         if stretch.status is not None:
             status = stretch.status
@@ -216,7 +214,7 @@ def walk(
     workspace : of the balance in the parameter that is continued in.
     start, stop : the range in user units.
     guess : (n_unknowns,) slip motions to start from [m].
-    resume : the branch so far, to go on behind its last point; it is not among what is yielded.
+    resume : the branch so far, to go on behind its last point; it is the first that is yielded.
     """
     begun = time.perf_counter() - (0.0 if resume is None else resume.seconds)
     balance, system = workspace.balance, workspace.system
@@ -237,10 +235,8 @@ def walk(
         code, state = begin_walk(system, linear, point, control, found.u)
     else:
         state, spent = go_on_from(workspace, control, resume)
-        code = walk_states.RUNNING
-        if resume.status is not None:
-            yield _stretch(rows_of(balance, 0), 0, resume.status, state, spent, begun)
-            return
+        code = walk_states.RUNNING if resume.status is None else walk_states.FINISHED
+        yield resume
     size = _STRETCH if balance.n_unknowns <= _LARGE else _SHORT_STRETCH
     while code == walk_states.RUNNING:
         rows, before = rows_of(balance, size), time.perf_counter()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scene_cases import bladed_disk, two_dof
@@ -73,19 +75,23 @@ def assert_same(resumed: Branch, whole: Branch, known: int) -> None:
     assert resumed.seconds > 0.0
 
 
+def more_than(kept: list[Stretch], count: int) -> bool:
+    return len(kept) > count
+
+
 def test_resumed_twice_and_stopped_between() -> None:
     """Every attempt adds its stretches; the progress begins where the last one ended."""
     whole = sweep(two_dof(), settings=FINE)
     kept: list[Stretch] = []
     shares: list[float] = []
-    for _ in range(50):
+    for attempt in range(50):
         branch = sweep(
             two_dof(),
             settings=FINE,
             resume=joined(kept) if kept else None,
             on_stretch=kept.append,
             on_progress=lambda share, _points: shares.append(share),
-            should_stop=lambda: True,
+            should_stop=partial(more_than, kept, attempt),
         )
         if branch.status is not BranchStatus.STOPPED:
             break

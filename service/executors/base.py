@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from service.jobs import JobFailure, JobOutput, Point
+from service.jobs import JobFailure, JobOutput, Piece, Point
 from service.repository import Attempt
 
 
@@ -47,6 +47,9 @@ class Sink(Protocol):
 
     def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
         """The next points of the attempt's branch; said before the progress that counts them."""
+
+    def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:
+        """The attempt keeps pieces of its work for a later one; `anew` if they replace all before them."""
 
     def ended(self, attempt: Attempt, outcome: Outcome) -> None:
         """The attempt ended; called exactly once for each one submitted."""

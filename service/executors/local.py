@@ -15,8 +15,9 @@ from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 
+from service.checkpoints import Kept
 from service.executors.base import ExecutorStatus, Failed, Finished, Lost, Outcome, Sink, Stopped
-from service.jobs import Run, WarmUp
+from service.jobs import Pace, RunOn, WarmUp
 from service.repository import Attempt
 from service.worker import THREAD_LIMITS, Done, Ready, Report, StopFlag, Task, main
 
@@ -62,7 +63,7 @@ def _death(process: SpawnProcess) -> str:
 class _Child:
     """One worker process and the parent's end of its pipe."""
 
-    def __init__(self, runs: Mapping[str, Run], warm_up: WarmUp, progress_seconds: float) -> None:
+    def __init__(self, runs: Mapping[str, RunOn], warm_up: WarmUp, pace: Pace) -> None:
         context = mp.get_context("spawn")
         number: ctypes.c_longlong = context.RawValue(ctypes.c_longlong, 0)
         self.flag = StopFlag(number)
@@ -70,7 +71,7 @@ class _Child:
         self.connection, theirs = context.Pipe()
         self.process = context.Process(
             target=main,
-            args=(theirs, number, runs, warm_up, progress_seconds),
+            args=(theirs, number, runs, warm_up, pace),
             name="stickslip worker",
             daemon=True,
         )
@@ -151,7 +152,7 @@ class _Slot(threading.Thread):
             self._executor.warmed.wait()
         while not self._closing:
             try:
-                child = _Child(self._executor.runs, self._executor.warm_up, self._executor.progress_seconds)
+                child = _Child(self._executor.runs, self._executor.warm_up, self._executor.pace)
             except OSError as error:
                 trouble = f"a worker process could not be started: {error}"
             else:
@@ -235,13 +236,16 @@ class _Slot(threading.Thread):
 
     def _run_attempt(self, child: _Child, attempt: Attempt, token: int) -> Outcome:
         try:
-            child.connection.send(Task(token, attempt.job_id, attempt.kind, attempt.spec))
+            task = Task(token, attempt.job_id, attempt.kind, attempt.spec, attempt.saved)
+            child.connection.send(task)
             while True:
                 message = child.connection.recv()
                 if isinstance(message, Report):
                     if message.found:
                         self._executor.sink.found(attempt, message.found)
                     self._executor.sink.progress(attempt, message.fraction, message.points)
+                elif isinstance(message, Kept):
+                    self._executor.sink.kept(attempt, message.pieces, anew=message.anew)
                 elif isinstance(message, Done):
                     return _outcome(message)
         except (EOFError, OSError):
@@ -272,23 +276,23 @@ class LocalExecutor:
         Number of processes.
     grace_seconds : float
         Time between asking an attempt to stop and killing its process [s].
-    progress_seconds : float
-        Least time between two reports of an attempt [s].
+    pace : Pace
+        How often the processes tell what.
     """
 
     def __init__(
         self,
-        runs: Mapping[str, Run],
+        runs: Mapping[str, RunOn],
         warm_up: WarmUp,
         *,
         workers: int,
         grace_seconds: float,
-        progress_seconds: float,
+        pace: Pace,
     ) -> None:
         self.runs = runs
         self.warm_up = warm_up
         self.grace_seconds = grace_seconds
-        self.progress_seconds = progress_seconds
+        self.pace = pace
         self.trouble: str | None = None
         # The first process fills the cache of compiled loops that the others then only read.
         self.warmed = threading.Event()

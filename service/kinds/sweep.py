@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ConfigDict, Field
 
 import solver
+from service.checkpoints import Checkpoints
 from service.jobs import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
 from service.kinds.records import sweep_record
 from service.kinds.scenes import (
@@ -23,8 +24,11 @@ from service.kinds.scenes import (
     resolve_scene,
     resolved,
 )
-from solver.errors import Issue
+from solver.errors import Issue, SettingError
 from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver import Branch, Stretch
 
 FREQUENCY = "frequency"
 _EXAMPLE: dict[str, Any] = {
@@ -117,6 +121,45 @@ def _issues(request: SweepRequest, scene: Scene, start: float | None, stop: floa
 
 def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
     """Follow the branch."""
+    return run_on(spec, progress, should_stop, Checkpoints.none())
+
+
+def run_on(
+    spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, checkpoints: Checkpoints
+) -> JobOutput:
+    """Follow the branch, from where an earlier attempt got; keep what is new from time to time."""
+    try:
+        branch = _follow(spec, progress, should_stop, checkpoints)
+    except SettingError as error:
+        if error.name != "resume":
+            raise
+        checkpoints.begin_anew(str(error))
+        branch = _follow(spec, progress, should_stop, checkpoints)
+    return JobOutput(
+        result=branch.to_json(),
+        sweeps=(sweep_record(branch, spec["frequency_hz"]),) if len(branch.values) else (),
+        shortfall=None if branch.completed else branch.status.value,
+    )
+
+
+def _follow(
+    spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, checkpoints: Checkpoints
+) -> Branch:
+    known = _beginning(checkpoints)
+    part = len(known)
+    fresh: list[Stretch] = []
+
+    def keep() -> None:
+        nonlocal part
+        checkpoints.add(part, solver.joined(fresh).to_arrays())
+        part += 1
+        fresh.clear()
+
+    def add(stretch: Stretch) -> None:
+        fresh.append(stretch)
+        if checkpoints.due():
+            keep()
+
     branch = solver.sweep(
         Scene.from_dict(spec["scene"]),
         parameter=spec["parameter"],
@@ -125,17 +168,26 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
         harmonics=spec["harmonics"],
         frequency_hz=spec["frequency_hz"],
         limit=spec["limit"],
+        resume=solver.joined(known) if known else None,
+        on_stretch=add,
         on_progress=progress,
         on_points=lambda values, amplitudes: progress.found(
             list(zip(values.tolist(), amplitudes.tolist(), strict=True))
         ),
         should_stop=should_stop,
     )
-    return JobOutput(
-        result=branch.to_json(),
-        sweeps=(sweep_record(branch, spec["frequency_hz"]),) if len(branch.values) else (),
-        shortfall=None if branch.completed else branch.status.value,
-    )
+    if branch.status is solver.BranchStatus.STOPPED and fresh:
+        keep()
+    return branch
+
+
+def _beginning(checkpoints: Checkpoints) -> list[Stretch]:
+    """What earlier attempts found of the branch."""
+    try:
+        return [solver.Stretch.from_arrays(arrays) for _, arrays in sorted(checkpoints.found().items())]
+    except (KeyError, ValueError, IndexError) as error:
+        checkpoints.begin_anew(f"{type(error).__name__}: {error}")
+        return []
 
 
 SWEEP = JobKind(
@@ -144,4 +196,5 @@ SWEEP = JobKind(
     request=SweepRequest,
     resolve=resolve,
     run=run,
+    run_on=run_on,
 )

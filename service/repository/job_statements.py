@@ -39,7 +39,8 @@ COMPUTED_BEFORE = (
 NEXT_PRIORITY = select(func.max(_C.priority)).where(
     _C.state == JobState.ACCEPTED, _C.priority < bindparam("below")
 )
-_TAKEN = ["id", *(item.name for item in fields(Attempt) if item.name not in ("job_id", "lease_owner"))]
+_NOT_OF_THE_ROW = ("job_id", "lease_owner", "saved")
+_TAKEN = ["id", *(item.name for item in fields(Attempt) if item.name not in _NOT_OF_THE_ROW)]
 NEXT_JOBS = (
     select(*(_C[name] for name in _TAKEN))
     .where(_C.state == JobState.ACCEPTED, _C.priority == bindparam("priority"))
@@ -56,8 +57,6 @@ TAKE = (
         lease_owner=bindparam("holder"),
         lease_until=bindparam("until"),
         started=bindparam("begun"),
-        progress=0.0,
-        points=0,
     )
 )
 

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, Executable, and_, func, select, update
+from sqlalchemy import ColumnElement, Connection, Executable, and_, func, select
 
 from service.clock import Clock, SharedClock, utc_now
 from service.db import Database
 from service.errors import IdempotencyError
 from service.ids import new_id
-from service.jobs import FailureKind, JobFailure, JobOutput
+from service.jobs import JobFailure, JobOutput, Piece
 from service.models import NOBODY, Job, JobResult, JobState
 from service.repository import job_statements as statements
+from service.repository.checkpoints import (
+    as_far_as_kept,
+    drop_checkpoint,
+    store_pieces,
+    with_what_was_kept,
+)
 from service.repository.designs import insert_design
 from service.repository.listing import met, owner_condition, plain_conditions
+from service.repository.recovery import FREE, change, guard, recover
 from service.repository.room import Room
 from service.repository.rows import Attempt, JobRow, NewJob, Recovered
 from service.repository.sweeps import insert_sweeps
@@ -26,23 +33,6 @@ __all__ = ["Attempt", "JobRepository", "JobRow", "NewJob", "Recovered"]
 
 _COLUMNS = [getattr(Job, field.name) for field in fields(JobRow)]
 _LISTED = [getattr(Job, field.name) for field in fields(JobRow) if field.name != "request"]
-_CLAIMED = (Job.id, Job.kind, Job.spec, Job.attempt, Job.max_attempts, Job.owner, Job.seconds_limit)
-_FREE: dict[str, Any] = {"lease_owner": None, "lease_until": None}
-
-
-def _guard(attempt: Attempt) -> ColumnElement[bool]:
-    """True for the job's row only while this attempt owns it."""
-    return and_(
-        Job.id == attempt.job_id,
-        Job.attempt == attempt.attempt,
-        Job.lease_owner == attempt.lease_owner,
-        Job.state == JobState.RUNNING,
-    )
-
-
-def _change(connection: Connection, condition: ColumnElement[bool], **values: Any) -> bool:
-    """Update the rows of `condition`; whether there was one."""
-    return connection.execute(update(Job).where(condition).values(**values)).rowcount > 0
 
 
 def _guarded(connection: Connection, statement: Executable, attempt: Attempt, values: dict[str, Any]) -> bool:
@@ -159,7 +149,8 @@ class JobRepository:
 
     def claim_several(self, owner: str, lease_until: datetime, most: int) -> list[Attempt]:
         """Take the next waiting jobs for `owner`, in the order in which they are to run."""
-        return self._db.grouped(lambda connection: self._claim(connection, owner, lease_until, most))
+        taken = self._db.grouped(lambda connection: self._claim(connection, owner, lease_until, most))
+        return [with_what_was_kept(self._db, attempt) if attempt.points else attempt for attempt in taken]
 
     def _claim(self, connection: Connection, owner: str, lease_until: datetime, most: int) -> list[Attempt]:
         """Take jobs of the highest priority first.
@@ -187,10 +178,31 @@ class JobRepository:
         values = {"fraction": fraction, "counted": points, "until": lease_until}
         return self._db.grouped(lambda connection: _guarded(connection, statements.REPORT, attempt, values))
 
+    def keep(
+        self,
+        attempt: Attempt,
+        pieces: Sequence[Piece],
+        fraction: float,
+        points: int,
+        lease_until: datetime,
+        *,
+        anew: bool = False,
+    ) -> bool:
+        """Store pieces for a later attempt, with progress and lease; False if the job is owned no more.
+
+        A waiting job with points is one with a checkpoint: there is at least one point then.
+        """
+        values = {"progress": fraction, "points": max(points, 1), "lease_until": lease_until}
+        with self._db.writing() as connection:
+            owned = change(connection, guard(attempt), **values)
+            if owned:
+                store_pieces(connection, attempt, pieces, self.now(), anew=anew)
+            return owned
+
     def renew(self, attempts: Iterable[Attempt], lease_until: datetime) -> list[Attempt]:
         """Renew the leases; gives back the attempts that own their job no more."""
         with self._db.writing() as connection:
-            return [a for a in attempts if not _change(connection, _guard(a), lease_until=lease_until)]
+            return [a for a in attempts if not change(connection, guard(a), lease_until=lease_until)]
 
     def succeed(self, attempt: Attempt, output: JobOutput) -> bool:
         """Commit state, result and sweeps together, unless the job was lost or its cancel asked for."""
@@ -199,6 +211,7 @@ class JobRepository:
         def write(connection: Connection) -> bool:
             if not _guarded(connection, statements.SUCCEED, attempt, {"ended": finished}):
                 return False
+            drop_checkpoint(connection, attempt.job_id)
             self._store(connection, attempt, output, finished)
             return True
 
@@ -208,14 +221,16 @@ class JobRepository:
         """Commit a failure for good, with what was computed all the same."""
         with self._db.writing() as connection:
             finished = self.now()
-            changed = _change(
+            changed = change(
                 connection,
-                _guard(attempt),
+                guard(attempt),
                 state=JobState.FAILED,
                 finished=finished,
                 error=failure.to_json(),
-                **_FREE,
+                **FREE,
             )
+            if changed:
+                drop_checkpoint(connection, attempt.job_id)
             if changed and output is not None:
                 self._store(connection, attempt, output, finished)
             return changed
@@ -223,38 +238,42 @@ class JobRepository:
     def lose(self, attempt: Attempt, reason: str) -> Recovered:
         """The attempt's worker died: the job waits again, or fails after its last attempt."""
         with self._db.writing() as connection:
-            return _recover(connection, _guard(attempt), reason, self.now())
+            return recover(connection, guard(attempt), reason, self.now())
 
     def release(self, attempt: Attempt) -> bool:
-        """Give an unfinished job back to the queue without costing it an attempt."""
+        """Give an unfinished job back to the queue, with its checkpoint, without costing it an attempt."""
         with self._db.writing() as connection:
-            return _change(
+            return change(
                 connection,
-                _guard(attempt),
+                guard(attempt),
                 state=JobState.ACCEPTED,
                 attempt=attempt.attempt - 1,
                 started=None,
-                progress=0.0,
-                points=0,
-                **_FREE,
+                **as_far_as_kept(),
+                **FREE,
             )
 
     def dismiss(self, attempt: Attempt) -> bool:
         """The running job was stopped because its cancel was asked for."""
         with self._db.writing() as connection:
-            return _change(
-                connection, _guard(attempt), state=JobState.DISMISSED, finished=self.now(), **_FREE
+            dismissed = change(
+                connection, guard(attempt), state=JobState.DISMISSED, finished=self.now(), **FREE
             )
+            if dismissed:
+                drop_checkpoint(connection, attempt.job_id)
+            return dismissed
 
     def cancel(self, job_id: str) -> JobRow | None:
         """Ask for the end of a job: a waiting one is dismissed at once, a running one is marked."""
         with self._db.writing() as connection:
             waiting = and_(Job.id == job_id, Job.state == JobState.ACCEPTED)
-            if not _change(
+            if change(
                 connection, waiting, state=JobState.DISMISSED, cancel_requested=True, finished=self.now()
             ):
+                drop_checkpoint(connection, job_id)
+            else:
                 running = and_(Job.id == job_id, Job.state == JobState.RUNNING)
-                _change(connection, running, cancel_requested=True)
+                change(connection, running, cancel_requested=True)
             return _one(connection, Job.id == job_id)
 
     def cancelled(self, owner: str) -> set[str]:
@@ -275,7 +294,7 @@ class JobRepository:
             return self.recover_expired()
         with self._db.writing() as connection:
             condition = and_(Job.state == JobState.RUNNING, Job.lease_owner != owner)
-            return _recover(connection, condition, "the service ended while the job ran", self.now())
+            return recover(connection, condition, "the service ended while the job ran", self.now())
 
     def recover_expired(self, running_here: Iterable[str] = ()) -> Recovered:
         """Take back running jobs whose lease ran out; those that another service looks at are left to it.
@@ -288,7 +307,7 @@ class JobRepository:
                 Job.lease_until < self.now(),
                 Job.id.not_in(list(running_here)),
             )
-            return _recover(
+            return recover(
                 connection, condition, "its owner gave no sign of life", self.now(), skip_locked=True
             )
 
@@ -328,33 +347,3 @@ class JobRepository:
         insert_sweeps(connection, job_id, output.sweeps, created, owner)
         if output.design is not None:
             insert_design(connection, job_id, output.design, created, owner)
-
-
-def _recover(
-    connection: Connection,
-    condition: ColumnElement[bool],
-    reason: str,
-    now: datetime,
-    *,
-    skip_locked: bool = False,
-) -> Recovered:
-    """Running jobs without an owner: dismissed if asked for, failed after the last attempt, else waiting.
-
-    PostgreSQL locks the rows as it reads them, so that nobody changes them before they are written.
-    """
-    columns = (Job.id, Job.attempt, Job.max_attempts, Job.cancel_requested)
-    query = select(*columns).where(condition).with_for_update(skip_locked=skip_locked)
-    counts = dict.fromkeys(("accepted", "failed", "dismissed"), 0)
-    for row in connection.execute(query).all():
-        values: dict[str, Any] = {"state": JobState.ACCEPTED, "started": None, "progress": 0.0, "points": 0}
-        if row.cancel_requested:
-            values = {"state": JobState.DISMISSED, "finished": now}
-        elif row.attempt >= row.max_attempts:
-            failure = JobFailure(
-                kind=FailureKind.WORKER_LOST,
-                detail=f"{reason}, in attempt {row.attempt} of {row.max_attempts}; it is not tried again",
-            )
-            values = {"state": JobState.FAILED, "finished": now, "error": failure.to_json()}
-        _change(connection, Job.id == row.id, **values, **_FREE)
-        counts[values["state"].value] += 1
-    return Recovered(**counts)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
+from service.jobs import Piece
 from service.models import NOBODY, JobState
 
 
@@ -58,7 +59,17 @@ class NewJob:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attempt:
-    """One attempt at a job: what a worker needs, and what guards the write of its outcome."""
+    """One attempt at a job: what a worker needs, and what guards the write of its outcome.
+
+    Attributes
+    ----------
+    seconds_limit : float or None
+        Longest time it may take [s], if the job has a limit of its own.
+    progress, points : float, int
+        How far earlier attempts got, as far as `saved` goes; 0 without it.
+    saved : tuple of Piece
+        What they kept.
+    """
 
     job_id: str
     kind: str
@@ -68,6 +79,9 @@ class Attempt:
     lease_owner: str
     owner: str = NOBODY
     seconds_limit: float | None = None
+    progress: float = 0.0
+    points: int = 0
+    saved: tuple[Piece, ...] = field(default=(), compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from service.arrays import encode
+from service.checkpoints import Checkpoints, RunParts
 from service.jobs import (
     ContactValues,
     JobKind,
@@ -23,6 +25,8 @@ from service.jobs import (
     ShouldStop,
     SweepRecord,
 )
+from service.kinds import sweep
+from service.kinds.map import MAP
 from solver.errors import Issue, SceneError, SettingError
 
 
@@ -137,6 +141,33 @@ def threads(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldS
     return JobOutput(result={name: os.environ.get(name) for name in names})
 
 
+STRETCH_SECONDS = 0.1
+
+
+def slow(should_stop: ShouldStop) -> ShouldStop:
+    """Asked between stretches of a branch and between parts: makes each of them last longer."""
+
+    def slowly() -> bool:
+        time.sleep(STRETCH_SECONDS)
+        return should_stop()
+
+    return slowly
+
+
+def slow_sweep(
+    spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, checkpoints: Checkpoints
+) -> JobOutput:
+    """The kind `sweep`, slowly."""
+    return sweep.run_on(spec, progress, slow(should_stop), checkpoints)
+
+
+def slow_map(
+    spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, checkpoints: Checkpoints
+) -> JobOutput:
+    """The kind `map`, slowly."""
+    return RunParts(MAP.parts)(spec, progress, slow(should_stop), checkpoints)
+
+
 _RUNS = {
     "iteration": power_iteration,
     "deaf": deaf,
@@ -156,11 +187,16 @@ def confused(_request: IterationRequest, _source: object) -> Resolved:
     raise RuntimeError("a mistake in the program")
 
 
+SLOW = (
+    replace(sweep.SWEEP, name="slow-sweep", run_on=slow_sweep),
+    replace(MAP, name="slow-map", parts=None, run_on=slow_map),
+)
 PRIVATE = Registry(
     JobKind(name=name, summary=name, request=IterationRequest, resolve=as_it_is, run=run)
     for name, run in _RUNS.items()
 ).extended(
-    JobKind(name="confused", summary="", request=IterationRequest, resolve=confused, run=power_iteration)
+    JobKind(name="confused", summary="", request=IterationRequest, resolve=confused, run=power_iteration),
+    *SLOW,
 )
 
 

@@ -14,9 +14,11 @@ from pathlib import Path
 import pytest
 from service_helpers import pids, until
 
+import solver
 from service.client import Client
 from service.errors import ServiceProblem
 from service.models import JobState
+from solver.scene import Scene
 
 SCRIPT = Path(__file__).with_name("serve_private.py")
 
@@ -130,3 +132,44 @@ def test_workers_that_get_the_same_sigterm_as_their_service_cost_no_attempt(
     process.terminate()
     process.wait(10.0)
     assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 1)
+
+
+@pytest.mark.parametrize(
+    "ends",
+    [
+        (signal.SIGKILL,),
+        pytest.param((signal.SIGTERM, signal.SIGKILL, signal.SIGINT), marks=pytest.mark.long),
+    ],
+)
+def test_a_long_sweep_goes_on_after_every_way_to_end_a_service(
+    ends: tuple[signal.Signals, ...],
+    port: int,
+    client: Client,
+    start: Start,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("STICKSLIP_CHECKPOINT_SECONDS", "0.05")
+    disk = solver.annulus(solver.load_scene("bladed-disk")).to_dict()
+    body = {"scene": disk, "from": 600, "to": 800, "harmonics": 13}
+    process = start(port)
+    until(lambda: answers(client))
+    job = client.submit({**body, "kind": "slow-sweep"}).id
+    for number in ends:
+        known = client.job(job).progress
+        until(lambda far=known: client.job(job).progress > far + 0.1)
+        reached = client.job(job).progress
+        process.send_signal(number)
+        process.wait(10.0)
+        process = start(port)
+        until(lambda: answers(client))
+        assert client.job(job).progress > 0.5 * reached, "what was computed is not lost"
+    done = client.wait(job, timeout=30.0)
+    assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 2), "a kill costs an attempt"
+    branch = solver.sweep(Scene.from_dict(disk), start=600.0, stop=800.0, harmonics=13)
+    result = client.results(job).result
+    assert result["parameter"] == branch.values.tolist()
+    assert result["peak"] == pytest.approx(
+        {"value": branch.peak.value, "at": branch.peak.at} if branch.peak else None, rel=1e-9
+    )
+    process.terminate()
+    assert process.wait(10.0) == 0
