@@ -1,4 +1,4 @@
-"""Matrices and modes from files: NumPy, SciPy, MATLAB, MatrixMarket, Harwell-Boeing; chosen by the suffix."""
+"""Matrices and modes from files of mathematics and of finite-element programs; chosen by the suffix."""
 
 from __future__ import annotations
 
@@ -14,11 +14,17 @@ from numpy.typing import NDArray
 from scipy.io import loadmat, mmread
 from scipy.sparse import coo_array, issparse
 
+from solver.matrices.abaqus import is_matrix_market, read_abaqus
+from solver.matrices.calculix import CALCULIX, read_calculix
+from solver.matrices.dmig import DMIG, read_dmig
 from solver.matrices.harwell_boeing import read_harwell_boeing
+from solver.matrices.output4 import read_output4
+from solver.matrices.triplets import MOST_ROWS, Labelled
 from solver.matrices.values import Modes
 
 FloatArray = NDArray[np.float64]
 HARWELL_BOEING = (
+    ".matrix",  # what Ansys calls them (HBMAT)
     ".rb",
     ".hb",
     ".rsa",
@@ -32,7 +38,9 @@ HARWELL_BOEING = (
     ".csa",
     ".cua",
 )
-SUFFIXES = (".npz", ".npy", ".mat", ".mtx", *HARWELL_BOEING)
+SUFFIXES = (".npz", ".npy", ".mat", ".mtx", ".op4", *DMIG, *CALCULIX, *HARWELL_BOEING)
+# What names of matrices begin with in Nastran and elsewhere, for each of ours.
+_NAMES = {"M": ("M",), "K": ("K", "STIF"), "C": ("C", "B", "DAMP")}
 _DAMAGE = (ValueError, KeyError, TypeError, EOFError, IndexError, OverflowError, NotImplementedError,
            zipfile.BadZipFile, zlib.error)  # fmt: skip
 
@@ -44,15 +52,33 @@ class MatrixFileError(ValueError):
 def read_matrix(path: Path, key: str) -> coo_array:
     """Read the matrix `key` (``M``, ``C`` or ``K``) from a file.
 
-    A file of several arrays (.npz, .mat) must hold one named `key`, or one alone.
+    A file of several arrays (.npz, .mat, .op4, DMIG) must hold one named `key`, or one alone; Nastran's names
+    (KAAX, MAAX, BAAX) count too.
 
     Raises
     ------
     MatrixFileError
         No such file, an unknown suffix, a damaged file, or no real matrix in it.
     """
+    return read_labelled(path, key).matrix
+
+
+def read_labelled(path: Path, key: str) -> Labelled:
+    """Read the matrix `key` as `read_matrix` does, with the labels of its rows if the file has them.
+
+    Raises
+    ------
+    MatrixFileError
+        As for `read_matrix`.
+    """
     found = _read(path, lambda suffix: _matrix(path, suffix, key))
-    array = found if issparse(found) else np.asarray(found)
+    if isinstance(found, Labelled):
+        return Labelled(matrix=_checked(found.matrix, path), labels=found.labels, held=found.held)
+    return Labelled(matrix=_checked(found if issparse(found) else np.asarray(found), path))
+
+
+def _checked(array: Any, path: Path) -> coo_array:
+    """A square matrix of finite real numbers."""
     if array.dtype.kind == "c" and not np.any(np.imag(array.data if issparse(array) else array)):
         array = array.real
     if array.dtype.kind not in "fiu":
@@ -60,6 +86,8 @@ def read_matrix(path: Path, key: str) -> coo_array:
     if array.ndim != 2 or array.shape[0] != array.shape[1] or not array.shape[0]:
         shape = " x ".join(map(str, array.shape))
         raise MatrixFileError(f"{str(path)!r} must hold a square matrix, got {shape or 'a number'}")
+    if array.shape[0] > MOST_ROWS:
+        raise MatrixFileError(f"{str(path)!r} may hold {MOST_ROWS} rows, got {array.shape[0]}")
     matrix = coo_array(array, dtype=np.float64)
     bad = np.flatnonzero(~np.isfinite(matrix.data))
     if bad.size:
@@ -70,7 +98,9 @@ def read_matrix(path: Path, key: str) -> coo_array:
 
 
 def array_names(path: Path) -> list[str]:
-    """Names of the arrays in a .npz or .mat file; none for a file of one matrix.
+    """Names of the arrays in a file that may hold several; none for a file of one matrix.
+
+    Matrices of Nastran are named M, K and C if their own names say so.
 
     Raises
     ------
@@ -84,6 +114,10 @@ def array_names(path: Path) -> list[str]:
 def _names(path: Path, suffix: str) -> list[str]:
     if suffix == ".mat":
         return list(_matlab(path))
+    if suffix == ".op4" or suffix in DMIG:
+        names = list(read_output4(path) if suffix == ".op4" else read_dmig(path))
+        roles = {name: key for key in _NAMES for name in _alike(names, key)}
+        return [roles.get(name, name) for name in names]
     if suffix != ".npz":
         return []
     with _archive(path) as arrays:
@@ -137,7 +171,13 @@ def _matrix(path: Path, suffix: str, key: str) -> Any:
     if suffix in HARWELL_BOEING:
         return read_harwell_boeing(path)
     if suffix == ".mtx":
-        return _matrix_market(path)
+        return _text_matrix(path)
+    if suffix in CALCULIX:
+        return read_calculix(path)
+    if suffix == ".op4":
+        return _of_nastran(read_output4(path), key, path)
+    if suffix in DMIG:
+        return _of_nastran(read_dmig(path), key, path)
     if suffix == ".npy":
         return np.load(path, allow_pickle=False)
     if suffix == ".mat":
@@ -148,10 +188,13 @@ def _matrix(path: Path, suffix: str, key: str) -> Any:
         return _chosen({name: arrays[name] for name in _wanted(arrays.files, key, path)}, key, path)
 
 
-def _matrix_market(path: Path) -> Any:
+def _text_matrix(path: Path) -> Any:
+    """MatrixMarket, which begins with %%, or a matrix of Abaqus."""
     with path.open("rb") as file:
-        banner = file.readline(200).decode("ascii", "replace").lower().split()
-    if "pattern" in banner:
+        start = file.readline(200)
+    if not is_matrix_market(start):
+        return read_abaqus(path)
+    if "pattern" in start.decode("ascii", "replace").lower().split():
         raise MatrixFileError(f"{str(path)!r}, line 1: a pattern has no values")
     return mmread(path, spmatrix=False)
 
@@ -206,8 +249,18 @@ def _wanted(names: list[str], key: str, path: Path) -> list[str]:
     )
 
 
+def _alike(names: list[str], key: str) -> list[str]:
+    """The names that begin as those of the matrix `key` do; none if it is none of M, K and C."""
+    return [name for name in names if name.upper().startswith(_NAMES.get(key, ()))]
+
+
 def _chosen(arrays: Mapping[str, Any], key: str, path: Path) -> Any:
     return arrays[_wanted(list(arrays), key, path)[0]]
+
+
+def _of_nastran(arrays: Mapping[str, Any], key: str, path: Path) -> Any:
+    alike = _alike(list(arrays), key)
+    return arrays[alike[0]] if len(alike) == 1 else _chosen(arrays, key, path)
 
 
 def _modes_arrays(path: Path, suffix: str) -> dict[str, FloatArray]:

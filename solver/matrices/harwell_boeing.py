@@ -17,17 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-LARGEST = 2**31 - 1
+from solver.matrices.text import LARGEST, FormatError, ascii_lines
+
 _INTEGERS = re.compile(r"\(?\s*(\d*)\s*I\s*(\d+)(?:\.\d+)?\s*\)?")
 _REALS = re.compile(
     r"\(?\s*(?:([+-]?\d+)\s*P\s*,?)?\s*(\d*)\s*\(?\s*[EDFG]\s*(\d+)\s*\.\s*(\d+)(?:E\d+)?\s*\)*"
 )
 _EXPONENT = re.compile(r"([+-]?[\d.]+)(?:[ED]\s*([+-]?\d+)|([+-]\d+))?")
 _SHAPES = "SURHZ"  # symmetric, unsymmetric, rectangular, Hermitian, skew symmetric
-
-
-class FormatError(ValueError):
-    """A file that does not follow its format; the message names the line."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,10 +62,7 @@ def read_harwell_boeing(path: Path) -> csc_array:
     OSError
         The file cannot be read.
     """
-    try:
-        lines = path.read_bytes().decode("ascii").splitlines()
-    except UnicodeDecodeError as error:
-        raise FormatError(f"byte {error.start} is not ASCII: not a Harwell-Boeing file") from error
+    lines = ascii_lines(path, "a Harwell-Boeing file")
     header = _header(lines)
     cursor = header.first_line
     pointers = _integers(lines, cursor, header.pointer_lines, header.pointers, header.columns + 1, "pointer")
@@ -127,14 +121,14 @@ def _check_kind(kind: str) -> None:
 
 def _integer_format(text: str) -> _Format:
     found = _INTEGERS.fullmatch(text.strip().upper())
-    if not found or not int(found[2]):
+    if not found or not int(found[2]) or found[1] == "0":
         raise FormatError(f"line 4: {text.strip()!r} is not a format of whole numbers such as (16I5)")
     return _Format(count=int(found[1] or 1), width=int(found[2]))
 
 
 def _real_format(text: str) -> _Format:
     found = _REALS.fullmatch(text.strip().upper())
-    if not found or not int(found[3]):
+    if not found or not int(found[3]) or found[2] == "0":
         raise FormatError(f"line 4: {text.strip()!r} is not a format of real numbers such as (5E16.8)")
     return _Format(
         count=int(found[2] or 1), width=int(found[3]), decimals=int(found[4]), power=int(found[1] or 0)
@@ -177,8 +171,27 @@ def _parsed(fields: Iterator[tuple[str, int, int]], parse: Callable[[str], float
 def _integers(
     lines: list[str], first: int, n_lines: int, form: _Format, count: int, what: str
 ) -> NDArray[np.int64]:
+    quick = _quick_fields(lines, first, form, count) if -(-count // form.count) <= n_lines else None
+    if quick is not None:
+        try:
+            numbers = quick.astype(np.int64)
+        except (ValueError, OverflowError):
+            numbers = np.array([-1])  # the slow way names the field
+        if numbers.min(initial=0) >= 0 and numbers.max(initial=0) <= LARGEST:
+            return numbers
     fields = _fields(lines, first, n_lines, form, count, what)
     return np.array(_parsed(fields, _bounded, what), dtype=np.int64)
+
+
+def _quick_fields(lines: list[str], first: int, form: _Format, count: int) -> NDArray[np.bytes_] | None:
+    """The fields of a section as one array; None if lines are short or missing, or characters are odd."""
+    needed, width = -(-count // form.count), form.width
+    chosen = lines[first : first + needed]
+    text = "".join(line[: form.count * width] for line in chosen)[: count * width]
+    full = all(len(line) >= form.count * width for line in chosen[:-1])
+    if not full or len(chosen) < needed or len(text) != count * width or "\0" in text or "_" in text:
+        return None
+    return np.frombuffer(text.upper().replace("D", "E").encode("ascii"), dtype=f"S{width}")
 
 
 def _bounded(text: str) -> int:
@@ -189,8 +202,23 @@ def _bounded(text: str) -> int:
 
 
 def _reals(lines: list[str], first: int, n_lines: int, form: _Format, count: int) -> NDArray[np.float64]:
+    if -(-count // form.count) <= n_lines:
+        quick = _quick_fields(lines, first, form, count)
+        if quick is not None and _plain(quick):
+            try:
+                return quick.astype(np.float64)
+            except ValueError:
+                quick = None  # the slow way names the field
     fields = _fields(lines, first, n_lines, form, count, "value")
     return np.array(_parsed(fields, lambda text: _real(text, form), "value"), dtype=np.float64)
+
+
+def _plain(fields: NDArray[np.bytes_]) -> bool:
+    """Whether every field has a decimal point and an exponent with its letter, so that no rule applies."""
+    letters = fields.view("u1").reshape(fields.size, -1)
+    pointed = (letters == ord(".")).any(axis=1)
+    lettered = (letters == ord("E")).any(axis=1)
+    return bool(pointed.all() and lettered.all())
 
 
 def _real(text: str, form: _Format) -> float:

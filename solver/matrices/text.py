@@ -1,0 +1,122 @@
+"""Numbers in text files of matrices: quickly where all is well, line by line where it is not."""
+
+from __future__ import annotations
+
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+LARGEST = 2**31 - 1
+_EXPONENT = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]([+-]?\d+)|([+-]\d+))")
+
+
+class FormatError(ValueError):
+    """A file that does not follow its format; the message names the line or the byte."""
+
+
+def ascii_lines(path: Path, what: str) -> list[str]:
+    """The lines of a text file.
+
+    Raises
+    ------
+    FormatError
+        A byte that is not ASCII.
+    OSError
+        The file cannot be read.
+    """
+    try:
+        return path.read_bytes().decode("ascii").splitlines()
+    except UnicodeDecodeError as error:
+        raise FormatError(f"byte {error.start} is not ASCII: not {what}") from error
+
+
+def fortran_real(text: str) -> float:
+    """A number as Fortran and Nastran write it: 1.5E+3, 1.5D+3, 1.5+3.
+
+    Raises
+    ------
+    ValueError
+        It is not a number.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        found = _EXPONENT.fullmatch(text.strip())
+        if found is None:
+            raise
+        return float(f"{found[1]}E{found[2] or found[3]}")
+
+
+def table(lines: list[str], columns: tuple[int, ...], what: str, comment: str = "") -> NDArray[np.float64]:
+    """The rows of numbers in `lines`, separated by blanks or commas; as many as one of `columns` says.
+
+    Parameters
+    ----------
+    what : what a line must hold, for the message.
+    comment : what lines begin with that say nothing.
+
+    Returns
+    -------
+    (n, columns) array
+
+    Raises
+    ------
+    FormatError
+        With the line (counted from 1) that holds something else.
+    """
+    data = [line for line in lines if not comment or not line.startswith(comment)] if comment else lines
+    first = next((line for line in data if line.strip()), None)
+    if first is None:
+        raise FormatError(f"line 1: the file holds no line with {what}")
+    separator = "," if "," in first else None
+    try:
+        found = np.loadtxt(io.StringIO("\n".join(data)), delimiter=separator, comments=None, ndmin=2)
+    except ValueError as error:
+        raise FormatError(_first_bad(lines, columns, what, comment) or str(error)) from error
+    if found.shape[1] not in columns:
+        raise FormatError(_first_bad(lines, columns, what, comment) or f"every line must hold {what}")
+    return np.asarray(found, dtype=np.float64)
+
+
+def _first_bad(lines: list[str], columns: tuple[int, ...], what: str, comment: str) -> str | None:
+    """The message about the first line that cannot be read."""
+    count = 0
+    for number, line in enumerate(lines, start=1):
+        words = line.replace(",", " ").split()
+        if not words or (comment and line.startswith(comment)):
+            continue
+        if len(words) not in ((count,) if count else columns):
+            return f"line {number} must hold {what}, got {line.strip()[:80]!r}"
+        count = len(words)
+        for word in words:
+            try:
+                float(word)
+            except ValueError:
+                return f"line {number}: {word[:40]!r} is not a number"
+    return None
+
+
+def whole_numbers(
+    values: NDArray[np.float64], least: int, what: str, lines: list[str], comment: str = ""
+) -> NDArray[np.int64]:
+    """A column of a table as whole numbers.
+
+    Raises
+    ------
+    FormatError
+        With the line of one that is not whole, below `least` or too large.
+    """
+    bad = np.flatnonzero(~((values >= least) & (values <= LARGEST) & (values == np.floor(values))))
+    if bad.size:
+        numbers = [
+            i
+            for i, line in enumerate(lines, start=1)
+            if line.strip() and not (comment and line.startswith(comment))
+        ]
+        raise FormatError(
+            f"line {numbers[bad[0]]}: the {what} must be a whole number from {least}, got {values[bad[0]]:g}"
+        )
+    return values.astype(np.int64)
