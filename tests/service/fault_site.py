@@ -103,6 +103,9 @@ class Site:
 
     def await_answer(self, program: Program, seconds: float = 60.0) -> None:
         end = time.monotonic() + seconds
+        while program.port is None and not self.children(program):
+            assert time.monotonic() < end, "the dispatcher starts no worker"
+            time.sleep(0.05)
         while program.port is not None:
             with contextlib.suppress(httpx.TransportError):
                 if httpx.get(f"http://127.0.0.1:{program.port}/health/live").status_code == 200:

@@ -1,0 +1,126 @@
+"""A database written by the first version, with data, goes up, down and up again on both databases."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+from typing import Any
+
+import pytest
+import sqlalchemy as sa
+from alembic import command
+
+from service import revisions
+from service.arrays import decode
+from service.core import Service
+from service.db import database_path, is_sqlite, migrating
+from service.integrity import check
+from service.models import JobState
+from service.settings import load_settings
+
+# Written by the version with revision 0001: two sweeps (the second answered by the first), solve, march, a
+# design that was found and one that was not, a dismissed and a waiting job, a stored scene.
+OLD = Path(__file__).parent.parent / "data" / "first_revision.db.gz"
+TABLES = ("job", "job_result", "scene", "sweep", "sweep_contact", "sweep_array")
+Rows = dict[str, list[dict[str, Any]]]
+
+
+@pytest.fixture
+def old(url: str, tmp_path: Path) -> str:
+    """The old database as SQLite's file, or its rows in a PostgreSQL of the first revision."""
+    file = database_path(url) if is_sqlite(url) else tmp_path / "old.db"
+    file.write_bytes(gzip.decompress(OLD.read_bytes()))
+    if not is_sqlite(url):
+        rows = contents(f"sqlite:///{file}")
+        revisions.upgrade(url, "0001")
+        with migrating(url) as connection:
+            for name, found in rows.items():
+                table = sa.Table(name, sa.MetaData(), autoload_with=connection)
+                # A job that was answered by another one refers to it.
+                found.sort(key=lambda row: row.get("result_of") is not None)
+                connection.execute(sa.insert(table), found)
+    return url
+
+
+def contents(url: str) -> Rows:
+    """Every row of the first revision's tables, with the columns it has now."""
+    with migrating(url) as connection:
+        meta = sa.MetaData()
+        found = {}
+        for name in TABLES:
+            table = sa.Table(name, meta, autoload_with=connection)
+            query = sa.select(table).order_by(*table.primary_key)
+            found[name] = [dict(row) for row in connection.execute(query).mappings()]
+    return found
+
+
+def down(url: str, revision: str) -> None:
+    config = revisions._config()
+    with migrating(url) as connection:
+        config.attributes["connection"] = connection
+        command.downgrade(config, revision)
+
+
+def test_up_down_and_up_again_keeps_every_row(old: str) -> None:
+    before = contents(old)
+    assert {name: len(rows) for name, rows in before.items()} == {
+        "job": 8, "job_result": 5, "scene": 1, "sweep": 5, "sweep_contact": 5, "sweep_array": 30,
+    }  # fmt: skip
+    assert revisions.upgrade(old) == revisions.head_revision()
+    above = contents(old)
+    for name, rows in before.items():
+        same = [{key: row[key] for key in first} for first, row in zip(rows, above[name], strict=True)]
+        assert same == rows
+    down(old, "0001")
+    assert contents(old) == before
+    assert revisions.upgrade(old) == revisions.head_revision()
+    assert contents(old) == above
+    assert check(old).trouble == ()
+
+
+def test_a_service_of_today_works_with_what_the_first_one_stored(old: str) -> None:
+    revisions.upgrade(old)
+    service = Service(load_settings(database=old, workers=1))
+    service.open()
+    try:
+        jobs = service.jobs.page(limit=100)
+        states = [job.state for job in jobs]
+        assert {state: states.count(state) for state in JobState} == {
+            JobState.ACCEPTED: 1, JobState.RUNNING: 0, JobState.SUCCESSFUL: 5, JobState.FAILED: 1,
+            JobState.DISMISSED: 1,
+        }  # fmt: skip
+        for job in jobs:
+            if job.state is not JobState.SUCCESSFUL:
+                continue
+            results = service.results(job.id)
+            assert results.result
+            for sweep in results.sweeps:
+                arrays = service.sweeps.arrays(sweep.id)
+                assert decode(arrays["amplitude"]).shape == (sweep.points,)
+        assert service.scenes.get("our-blade").body["name"] == "our-blade"
+        keyed = next(job for job in jobs if job.idempotency_key == "first-sweep")
+        assert keyed.owner == ""
+        designs = [job for job in jobs if job.kind == "design"]
+        assert {service.design(job.id).row.reached for job in designs} == {True, False}
+    finally:
+        service.database.close()
+
+
+def test_what_several_owners_made_is_told_apart_no_more_below_the_keys(old: str) -> None:
+    """Down from 0003: of two scenes of one name, and of two jobs of one key, one keeps it."""
+    revisions.upgrade(old)
+    with migrating(old) as connection:
+        table = sa.Table("scene", sa.MetaData(), autoload_with=connection)
+        row = dict(connection.execute(sa.select(table)).mappings().one())
+        connection.execute(sa.insert(table).values({**row, "owner": "alice"}))
+        table = sa.Table("job", sa.MetaData(), autoload_with=connection)
+        query = sa.select(table).where(table.c.idempotency_key == "first-sweep")
+        row = dict(connection.execute(query).mappings().one())
+        connection.execute(sa.insert(table).values({**row, "owner": "alice", "id": "zz"}))
+    down(old, "0002")
+    rows = contents(old)
+    assert len(rows["scene"]) == 1
+    keyed = [job["id"] for job in rows["job"] if job["idempotency_key"] == "first-sweep"]
+    assert len(keyed) == 1
+    assert keyed != ["zz"]
+    assert len(rows["job"]) == 9
