@@ -128,8 +128,9 @@ def test_a_form_that_is_not_there_is_refused_with_those_that_are(
     assert "pip install 'stickslip[parquet]'" in problem["detail"]
 
 
+@pytest.mark.usefixtures("sweep")
 @pytest.mark.parametrize("path", ["/v1/sweeps", "/v1/designs", "/v1/jobs"])
-def test_lists_are_tables_too(shipped: httpx.Client, sweep: dict, path: str) -> None:
+def test_lists_are_tables_too(shipped: httpx.Client, path: str) -> None:
     for seed in range(2):
         body = {"kind": "design", "scene": "two-dof", "variables": {"damper.N0": [20, 1000 + seed]}}
         answer = shipped.post("/v1/jobs", json=body, headers={"Prefer": "wait=60"})
