@@ -15,7 +15,7 @@ from service.http import HostCheck
 from service.jobs import Registry
 from service.kinds import SHIPPED
 from service.metrics import Measured, Metrics
-from service.routes import designs, events, health, jobs, metrics, plan, scenes, sweeps
+from service.routes import designs, events, health, jobs, metrics, plan, scenes, sweeps, uploads
 from service.settings import Settings, load_settings
 
 _DESCRIPTION = "Designs friction dampers: jobs, their results, and every frequency response computed."
@@ -57,7 +57,7 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
     app.add_middleware(Measured, metrics=app.state.metrics)
     problems.install(app)
     events.install(app)
-    for module in (jobs, events, designs, sweeps, scenes, plan, health, metrics):
+    for module in (jobs, events, designs, sweeps, scenes, uploads, plan, health, metrics):
         app.include_router(module.router)
     openapi.install(app, registry)
     return app

@@ -31,10 +31,12 @@ from service.repository import (
     SceneRepository,
     SweepRepository,
     SweepRow,
+    UploadRepository,
 )
 from service.scene_store import SceneStore
 from service.settings import Settings
 from service.strict_json import digest
+from service.uploads import Uploads
 from service.validation import validated
 from service.waiters import Event, Waiters
 from solver.errors import Issue
@@ -84,7 +86,8 @@ class Service:
         self.jobs = JobRepository(self.database, now)
         self.sweeps = SweepRepository(self.database)
         self.designs = DesignRepository(self.database)
-        self.scenes = SceneStore(SceneRepository(self.database))
+        self.uploads = Uploads(UploadRepository(self.database), settings)
+        self.scenes = SceneStore(SceneRepository(self.database), self.uploads)
         self.waiters = Waiters()
         executor = LocalExecutor(
             registry.runs(),

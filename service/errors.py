@@ -56,7 +56,7 @@ class MalformedBodyError(ServiceError):
 
 
 class UnsupportedMediaError(ServiceError):
-    """A request body of another media type than JSON."""
+    """A request body of a media type or an encoding that is not read here."""
 
 
 class NotAcceptableError(ServiceError):
@@ -65,6 +65,14 @@ class NotAcceptableError(ServiceError):
 
 class BodyTooLargeError(ServiceError):
     """A request body larger than the service accepts."""
+
+
+class SlowBodyError(ServiceError):
+    """A request body that does not arrive in time."""
+
+
+class UnreadableUploadError(ServiceError):
+    """An uploaded file that holds no usable matrix or modes."""
 
 
 class HostRefusedError(ServiceError):

@@ -14,10 +14,10 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service import strict_json
 from service.access.callers import KEYLESS, Caller
-from service.answers import DesignPage, JobPage, SweepPage
+from service.answers import DesignPage, JobPage, SweepPage, UploadPage
+from service.bodies import whole
 from service.core import Service
 from service.errors import (
-    BodyTooLargeError,
     HostRefusedError,
     InvalidRequestError,
     MalformedBodyError,
@@ -57,32 +57,20 @@ async def json_body(request: Request) -> dict[str, Any]:
 
     Raises
     ------
-    UnsupportedMediaError, BodyTooLargeError, MalformedBodyError, InvalidRequestError
+    UnsupportedMediaError, BodyTooLargeError, SlowBodyError, MalformedBodyError, InvalidRequestError
         For a body that is not that.
     """
     kind = request.headers.get("content-type", "").split(";")[0].strip().lower()
     if kind != "application/json" and not kind.endswith("+json"):
         raise UnsupportedMediaError(f"`Content-Type` must be application/json, got {kind or 'none'}")
-    value = strict_json.loads(await _read(request, service_of(request).settings.max_body_bytes))
+    settings = service_of(request).settings
+    value = strict_json.loads(await whole(request, settings.max_body_bytes, settings.body_seconds))
     if not isinstance(value, dict):
         raise MalformedBodyError(f"the body must be a JSON object, got {type(value).__name__}")
     return value
 
 
 JsonBody = Annotated[dict[str, Any], Depends(json_body)]
-
-
-async def _read(request: Request, limit: int) -> bytes:
-    declared = request.headers.get("content-length", "")
-    if declared.isdigit() and int(declared) > limit:
-        raise BodyTooLargeError(f"the body may have {limit} bytes, this one has {declared}")
-    chunks, size = [], 0
-    async for chunk in request.stream():
-        size += len(chunk)
-        if size > limit:
-            raise BodyTooLargeError(f"the body may have {limit} bytes, this one has more")
-        chunks.append(chunk)
-    return b"".join(chunks)
 
 
 def preferred_wait(headers: Mapping[str, str], longest: float) -> float | None:
@@ -123,7 +111,7 @@ def tagged(
     return Response(body, media_type=media_type, headers=kept)
 
 
-def listing(request: Request, page: SweepPage | DesignPage | JobPage) -> Response:
+def listing(request: Request, page: SweepPage | DesignPage | JobPage | UploadPage) -> Response:
     """A page of a list as JSON or CSV, with a link to the next one in its header too (RFC 8288)."""
     kind = chosen(request.headers.get("accept"), LIST_MEDIA)
     headers = {"Vary": "Accept"}

@@ -63,6 +63,9 @@ class SceneSource(Protocol):
     def scene_body(self, name: str) -> Mapping[str, object] | None:
         """Tables and lists of a shipped or stored scene, or None."""
 
+    def with_uploads(self, body: Mapping[str, object]) -> Mapping[str, object]:
+        """A scene with what its uploads hold in place of their ids."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resolved:

@@ -13,6 +13,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from sqlalchemy.exc import DataError, OperationalError
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.routing import Match
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -28,7 +29,9 @@ _RETRY_SECONDS = 5
 _STATUS: dict[type[errors.ServiceError], tuple[int, str, str]] = {
     errors.InvalidRequestError: (422, "invalid-request", "The request is not valid"),
     errors.MalformedBodyError: (400, "malformed-body", "The body cannot be read"),
-    errors.UnsupportedMediaError: (415, "unsupported-media-type", "The body must be JSON"),
+    errors.UnsupportedMediaError: (415, "unsupported-media-type", "A body of this kind is not read here"),
+    errors.SlowBodyError: (408, "body-too-slow", "The body did not arrive in time"),
+    errors.UnreadableUploadError: (422, "unreadable-upload", "The file cannot be used"),
     errors.NotAcceptableError: (406, "not-acceptable", "Not available in a form you accept"),
     errors.BodyTooLargeError: (413, "body-too-large", "The body is too large"),
     errors.HostRefusedError: (421, "host-refused", "This service does not answer to this host name"),
@@ -71,6 +74,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(errors.ServiceError, _service_error)
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(ClientDisconnect, _gone)
     app.add_exception_handler(DataError, _unstorable)
     app.add_exception_handler(OperationalError, _database_away)
     app.add_middleware(_Boundary)
@@ -88,6 +92,9 @@ def service_problem(request: Request, error: errors.ServiceError) -> JSONRespons
     headers: dict[str, str] = {}
     if isinstance(error, errors.InvalidRequestError):
         issues = [_entry(issue, error.source) for issue in error.issues]
+    elif isinstance(error, errors.BodyTooLargeError | errors.SlowBodyError):
+        # What is still to come of the body is not waited for.
+        headers["Connection"] = "close"
     elif isinstance(error, errors.NotAcceptableError):
         headers["Vary"] = "Accept"
     elif isinstance(error, errors.QueueFullError):
@@ -107,6 +114,11 @@ async def _service_error(request: Request, error: Exception) -> JSONResponse:
     if not isinstance(error, errors.ServiceError):
         return _unexpected(request, error)
     return service_problem(request, error)
+
+
+async def _gone(request: Request, _error: Exception) -> JSONResponse:
+    """The client left before its body was here; nobody reads this."""
+    return problem(request, 400, "body-incomplete", "The body is incomplete", "the body ended too early")
 
 
 async def _unstorable(request: Request, error: Exception) -> JSONResponse:

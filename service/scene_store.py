@@ -12,6 +12,7 @@ from service.kinds.scenes import read_scene
 from service.models import NOBODY
 from service.repository import SceneRepository, SceneRow
 from service.strict_json import digest
+from service.uploads import Uploads
 from solver.scene import load_scene, shipped_scenes
 
 
@@ -42,11 +43,16 @@ class SceneStore:
     """Scenes by name, as one caller sees them; implements `service.jobs.SceneSource`."""
 
     repository: SceneRepository
+    uploads: Uploads
     caller: Caller = KEYLESS
 
     def of(self, caller: Caller) -> SceneStore:
         """The same scenes as another caller sees them."""
         return replace(self, caller=caller)
+
+    def with_uploads(self, body: Mapping[str, object]) -> Mapping[str, object]:
+        """A scene with what the caller's uploads hold in place of their ids."""
+        return self.uploads.resolved(body, self.caller)
 
     def scene_body(self, name: str) -> Mapping[str, object] | None:
         """Tables and lists of the scene, or None."""
@@ -86,7 +92,7 @@ class SceneStore:
         ConflictError
             If another scene of the caller's has the name: a name means one scene for ever.
         """
-        scene = read_scene(body)
+        scene = read_scene(self.with_uploads(body))
         tables = scene.to_dict()
         scene_hash = digest(tables)
         if scene.name in shipped_scenes():

@@ -136,6 +136,18 @@ class Settings(BaseSettings):
     max_body_bytes: int = Field(
         default=4 * 1024 * 1024, ge=1024, le=1024**3, description="Largest request body accepted [bytes]."
     )
+    max_upload_bytes: int = Field(
+        default=64 * 1024 * 1024, ge=1024, le=1024**3, description="Largest upload accepted [bytes]."
+    )
+    body_seconds: float = Field(
+        default=30.0, ge=0.1, le=3600.0, description="Time a request body may take to arrive [s]."
+    )
+    upload_seconds: float = Field(
+        default=300.0, ge=0.1, le=86400.0, description="Time an upload may take to arrive [s]."
+    )
+    inspection_seconds: float = Field(
+        default=30.0, ge=1.0, le=3600.0, description="Time reading an uploaded file may take [s]."
+    )
     max_wait_seconds: float = Field(
         default=60.0, ge=0.0, le=3600.0, description="Longest `Prefer: wait=N` honoured [s]."
     )

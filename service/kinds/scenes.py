@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
@@ -16,6 +16,8 @@ from solver.scene import Scene
 
 MAX_HARMONICS = 200
 LARGEST = 1e15
+UPLOAD = "upload:"
+"""What stands before the id of an upload where a scene file names a file."""
 
 _SCENE_NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 _PATH_PATTERN = r"^[A-Za-z0-9_@-]+(\.[A-Za-z0-9_@-]+)?$"
@@ -94,7 +96,24 @@ def _read(reference: object, source: SceneSource) -> Scene:
     if not isinstance(body, Mapping):
         message = f"`scene` {reference!r} is neither a shipped scene nor a stored one"
         raise InvalidRequestError([Issue(pointer=pointer("scene"), message=message)])
+    if body is reference and _refers_to_uploads(body):
+        try:
+            body = source.with_uploads(body)
+        except InvalidRequestError as error:
+            raise _below_scene(error.issues) from error
     return read_scene(body, prefix=pointer("scene"))
+
+
+def _refers_to_uploads(body: Mapping[str, object]) -> bool:
+    structure = body.get("structure")
+    return isinstance(structure, Mapping) and any(
+        isinstance(item, str) and item.startswith(UPLOAD) for item in structure.values()
+    )
+
+
+def _below_scene(issues: Iterable[Issue]) -> InvalidRequestError:
+    found = [Issue(pointer=pointer("scene") + issue.pointer, message=issue.message) for issue in issues]
+    return InvalidRequestError(found)
 
 
 def read_scene(body: Mapping[str, object], prefix: str = "") -> Scene:

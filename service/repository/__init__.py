@@ -4,6 +4,7 @@ from service.repository.designs import DESIGN_SORTS, DesignFilter, DesignReposit
 from service.repository.jobs import Attempt, JobRepository, JobRow, NewJob, Recovered
 from service.repository.scenes import SceneRepository, SceneRow
 from service.repository.sweeps import SWEEP_SORTS, SweepFilter, SweepRepository, SweepRow
+from service.repository.uploads import UploadRepository, UploadRow
 
 __all__ = [
     "DESIGN_SORTS",
@@ -21,4 +22,6 @@ __all__ = [
     "SweepFilter",
     "SweepRepository",
     "SweepRow",
+    "UploadRepository",
+    "UploadRow",
 ]

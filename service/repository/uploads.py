@@ -1,0 +1,100 @@
+"""The uploaded files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from datetime import datetime
+
+from sqlalchemy import Connection, delete, insert, select
+
+from service.clock import utc_now
+from service.db import Database
+from service.errors import NotFoundError
+from service.ids import new_id
+from service.models import Upload
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UploadRow:
+    """An upload without its bytes."""
+
+    id: str
+    owner: str
+    name: str
+    format: str
+    size: int
+    sha256: str
+    created: datetime
+
+
+_COLUMNS = [getattr(Upload, item.name) for item in fields(UploadRow)]
+
+
+class UploadRepository:
+    """Uploads of one database; a stored one never changes."""
+
+    def __init__(self, database: Database) -> None:
+        self._db = database
+
+    def add(
+        self, *, owner: str, name: str, format: str, size: int, sha256: str, data: bytes
+    ) -> tuple[UploadRow, bool]:
+        """Store a file, or find the same one of the same owner and format; whether it was stored."""
+
+        def find_or_add(connection: Connection) -> tuple[UploadRow, bool]:
+            same = (Upload.owner == owner, Upload.sha256 == sha256, Upload.format == format)
+            query = select(*_COLUMNS).where(*same).order_by(Upload.id).limit(1)
+            known = connection.execute(query).mappings().one_or_none()
+            if known is not None:
+                return UploadRow(**known), False
+            row = UploadRow(
+                id=new_id(),
+                owner=owner,
+                name=name,
+                format=format,
+                size=size,
+                sha256=sha256,
+                created=utc_now(),
+            )
+            values = {item.name: getattr(row, item.name) for item in fields(UploadRow)}
+            connection.execute(insert(Upload).values(**values, data=data))
+            return row, True
+
+        with self._db.writing() as connection:
+            return find_or_add(connection)
+
+    def get(self, upload_id: str) -> UploadRow | None:
+        """The upload, or None."""
+        query = select(*_COLUMNS).where(Upload.id == upload_id)
+        with self._db.reading() as connection:
+            row = connection.execute(query).mappings().one_or_none()
+        return None if row is None else UploadRow(**row)
+
+    def data(self, upload_id: str) -> bytes:
+        """The bytes of an upload.
+
+        Raises
+        ------
+        NotFoundError
+            If it was deleted.
+        """
+        with self._db.reading() as connection:
+            data = connection.execute(select(Upload.data).where(Upload.id == upload_id)).scalar_one_or_none()
+        if data is None:
+            raise NotFoundError(f"there is no upload {upload_id!r}")
+        return data
+
+    def page(self, limit: int, before: str | None = None, owner: str | None = None) -> list[UploadRow]:
+        """Uploads, newest first, older than the upload `before`; only those of `owner` if given."""
+        query = select(*_COLUMNS).order_by(Upload.id.desc()).limit(limit)
+        if before is not None:
+            query = query.where(Upload.id < before)
+        if owner is not None:
+            query = query.where(Upload.owner == owner)
+        with self._db.reading() as connection:
+            return [UploadRow(**row) for row in connection.execute(query).mappings()]
+
+    def delete(self, upload_id: str) -> None:
+        """Forget an upload."""
+        with self._db.writing() as connection:
+            connection.execute(delete(Upload).where(Upload.id == upload_id))

@@ -1,0 +1,188 @@
+"""Uploaded files of matrices and modes, and scenes that refer to them."""
+
+from __future__ import annotations
+
+import enum
+import tempfile
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from service.access.callers import KEYLESS, Caller, visible
+from service.errors import InvalidRequestError, NotFoundError, UnreadableUploadError
+from service.inspection import contents, resolved_structure
+from service.kinds.scenes import UPLOAD
+from service.repository.uploads import UploadRepository, UploadRow
+from service.settings import Settings
+from service.strict_json import digest, pointer
+from solver.errors import Issue
+
+_KEYS = ("M", "K", "C", "modes")
+_KEPT = 4
+_LARGEST_STRUCTURE = 16 * 1024 * 1024
+
+
+class UploadFormat(enum.StrEnum):
+    """The formats that can be uploaded; the value is a suffix of such files."""
+
+    NPZ = "npz"
+    NPY = "npy"
+    MAT = "mat"
+    MTX = "mtx"
+    OUTPUT4 = "op4"
+    DMIG = "pch"
+    HARWELL_BOEING = "hb"
+
+
+MEDIA = {
+    "application/x-npz": UploadFormat.NPZ,
+    "application/x-npy": UploadFormat.NPY,
+    "application/x-matlab-data": UploadFormat.MAT,
+    "text/x-matrix-market": UploadFormat.MTX,
+    "application/x-matrix-market": UploadFormat.MTX,
+    "application/x-harwell-boeing": UploadFormat.HARWELL_BOEING,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arrived:
+    """A file that came in and was not looked at yet."""
+
+    path: Path
+    name: str
+    format: UploadFormat
+    size: int
+    sha256: str
+
+
+def format_of(asked: UploadFormat | None, name: str, content_type: str) -> UploadFormat:
+    """The format that was asked for, that of the suffix of the name, or of the content type.
+
+    Raises
+    ------
+    InvalidRequestError
+        If none of them says it.
+    """
+    from solver.matrices.dmig import DMIG
+    from solver.matrices.files import HARWELL_BOEING
+
+    if asked is not None:
+        return asked
+    suffix = Path(name).suffix.lower()
+    if suffix in HARWELL_BOEING:
+        return UploadFormat.HARWELL_BOEING
+    if suffix in DMIG:
+        return UploadFormat.DMIG
+    by_suffix = {f".{known.value}": known for known in UploadFormat}
+    found = by_suffix.get(suffix) or MEDIA.get(content_type)
+    if found is not None:
+        return found
+    known = ", ".join(UploadFormat)
+    message = f"`format` must be one of {known}: neither the name {name!r} nor the content type says it"
+    raise InvalidRequestError([Issue(pointer="/format", message=message)], source="query")
+
+
+class Uploads:
+    """The uploaded files of one service."""
+
+    def __init__(self, repository: UploadRepository, settings: Settings) -> None:
+        self.repository = repository
+        self._seconds = settings.inspection_seconds
+        self._lock = threading.Lock()
+        self._resolved: OrderedDict[str, dict[str, Any]] = OrderedDict()
+
+    def add(self, arrived: Arrived, caller: Caller = KEYLESS) -> tuple[UploadRow, list[dict[str, Any]], bool]:
+        """Look at a file and store it; what it holds, and whether it is new to its owner.
+
+        Raises
+        ------
+        UnreadableUploadError
+            If it holds no usable matrix or modes.
+        """
+        found = contents(arrived.path, self._seconds)
+        row, added = self.repository.add(
+            owner=caller.owner, name=arrived.name, format=arrived.format.value, size=arrived.size,
+            sha256=arrived.sha256, data=arrived.path.read_bytes(),
+        )  # fmt: skip
+        return row, found, added
+
+    def get(self, upload_id: str, caller: Caller = KEYLESS) -> UploadRow:
+        """An upload.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of this id that the caller may see.
+        """
+        return visible(self.repository.get(upload_id), caller, f"there is no upload {upload_id!r}")
+
+    def delete(self, upload_id: str, caller: Caller = KEYLESS) -> None:
+        """Forget an upload; scenes and jobs that were made with it keep what it held.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of this id.
+        """
+        self.get(upload_id, caller)
+        self.repository.delete(upload_id)
+
+    def resolved(self, body: Mapping[str, object], caller: Caller = KEYLESS) -> Mapping[str, object]:
+        """A scene with what its uploads hold in place of their ids; one without uploads as it is.
+
+        Raises
+        ------
+        InvalidRequestError
+            With pointers into the scene: an upload that is not there, or that does not fit.
+        """
+        structure = body.get("structure")
+        if not isinstance(structure, Mapping) or structure.get("kind") != "matrices":
+            return body
+        named = {key: structure[key] for key in _KEYS if _is_reference(structure.get(key))}
+        if not named:
+            return body
+        rows, issues = {}, []
+        for key, reference in named.items():
+            try:
+                rows[key] = self.get(reference.removeprefix(UPLOAD), caller)
+            except NotFoundError as error:
+                issues.append(_issue(key, f"`{key}`: {error.detail}"))
+        for key in _KEYS:
+            if isinstance(structure.get(key), str) and key not in named:
+                message = f"`{key}` must be inline or an upload, `{UPLOAD}ID`: files are not read here"
+                issues.append(_issue(key, message))
+        if issues:
+            raise InvalidRequestError(issues)
+        return {**body, "structure": self._with(structure, rows)}
+
+    def _with(self, structure: Mapping[str, Any], rows: Mapping[str, UploadRow]) -> dict[str, Any]:
+        files = {key: f"{row.sha256}.{row.format}" for key, row in rows.items()}
+        tables = {**structure, **files}
+        known = digest(tables)
+        with self._lock:
+            if known in self._resolved:
+                self._resolved.move_to_end(known)
+                return self._resolved[known]
+        with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
+            for key, row in rows.items():
+                (Path(folder) / files[key]).write_bytes(self.repository.data(row.id))
+            try:
+                found = resolved_structure(tables, Path(folder), self._seconds, _LARGEST_STRUCTURE)
+            except UnreadableUploadError as error:
+                raise InvalidRequestError([_issue(next(iter(rows)), error.detail)]) from error
+        with self._lock:
+            self._resolved[known] = found
+            while len(self._resolved) > _KEPT:
+                self._resolved.popitem(last=False)
+        return found
+
+
+def _is_reference(value: object) -> bool:
+    return isinstance(value, str) and value.startswith(UPLOAD)
+
+
+def _issue(key: str, message: str) -> Issue:
+    return Issue(pointer=pointer("structure", key), message=message)

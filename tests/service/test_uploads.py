@@ -1,0 +1,269 @@
+"""Files of matrices: stored after a look at them in a process of its own, referred to by scenes."""
+
+from __future__ import annotations
+
+import io
+import threading
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+from matrix_cases import beam, hb_text, write_scene
+from scipy.io import mmwrite, savemat
+from scipy.sparse import coo_array, save_npz
+from service_helpers import is_problem
+
+import solver
+from service import inspection
+from service.db import Database
+from service.errors import NotFoundError, UnreadableUploadError
+from service.repository import UploadRepository
+
+M, K = beam(4)
+MARKET = b"%%%%MatrixMarket matrix %s real general\n%s"
+
+
+def saved(write: Callable[[Any], object]) -> bytes:
+    buffer = io.BytesIO()
+    write(buffer)
+    return buffer.getvalue()
+
+
+def npz(**arrays: Any) -> bytes:
+    return saved(lambda file: np.savez(file, **arrays))
+
+
+FILES: dict[str, bytes] = {
+    "M.npz": npz(M=M),
+    "all.npz": npz(M=M, K=K),
+    "sparse.npz": saved(lambda file: save_npz(file, coo_array(M).tocsr())),
+    "M.npy": saved(lambda file: np.save(file, M)),
+    "M.mat": saved(lambda file: savemat(file, {"M": M})),
+    "M.mtx": saved(lambda file: mmwrite(file, coo_array(M))),
+    "M.rsa": hb_text(M, "RSA").encode(),
+    "modes.npz": npz(modes=np.eye(3), omega2=np.arange(1.0, 4.0)),
+}
+
+
+def upload(client: httpx.Client, name: str, data: bytes, **params: str) -> httpx.Response:
+    return client.post("/v1/uploads", params={"name": name, **params}, content=data)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_format_is_described(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path(name).write_bytes(FILES[name])
+    found = inspection._answer("describe", name)["found"]
+    sizes = {(one["rows"], one["columns"]) for one in found}
+    assert sizes == ({(3, 3)} if name == "modes.npz" else {M.shape})
+
+
+def test_a_file_comes_in_once(http: httpx.Client) -> None:
+    name = "all.npz"
+    data = FILES[name]
+    answer = upload(http, name, data)
+    assert answer.status_code in (200, 201), answer.text
+    made = answer.json()
+    assert (made["name"], made["size"]) == (name, len(data))
+    assert [one["name"] for one in made["contents"]] == ["M", "K"]
+    again = upload(http, "other-" + name, data)
+    assert (again.status_code, again.json()["id"]) == (200, made["id"]), "the same file once"
+    link = answer.headers["location"]
+    shown = http.get(link).json()
+    assert shown == {key: value for key, value in made.items() if key != "contents"}
+    assert shown in http.get("/v1/uploads").json()["items"]
+    assert http.delete(link).status_code == 204
+    is_problem(http.get(link), 404)
+    is_problem(http.delete(link), 404)
+
+
+def test_the_format_is_told_by_query_name_or_content_type(http: httpx.Client) -> None:
+    assert upload(http, "x", FILES["M.rsa"], format="hb").json()["format"] == "hb"
+    typed = http.post("/v1/uploads", content=FILES["M.npy"], headers={"Content-Type": "application/x-npy"})
+    assert typed.json()["format"] == "npy"
+    untold = is_problem(upload(http, "x", b"?"), 422)
+    assert untold["errors"][0]["pointer"] == "/format"
+    is_problem(upload(http, "x", b"?", format="exe"), 422)
+    for name in ("../x.npz", "/etc/passwd", ".npz", "a\x00.npz", "x" * 201, "ü.npz", "a/b.npz", "-rf"):
+        is_problem(upload(http, name, FILES["M.npz"]), 422)
+
+
+def scene_of(folder: Path, **structure: str) -> dict[str, Any]:
+    scene = solver.load_scene(write_scene(folder)).to_dict()
+    tables = {key: item for key, item in scene["structure"].items() if key not in ("M", "K", "modes")}
+    return {**scene, "structure": {**tables, **structure}}
+
+
+def test_a_scene_refers_to_uploads_and_is_hashed_by_what_they_hold(
+    shipped: httpx.Client, tmp_path: Path
+) -> None:
+    ids = {key: upload(shipped, f"{key}.npz", npz(**{key: array})).json()["id"] for key, array in
+           (("M", M), ("K", K))}  # fmt: skip
+    scene = scene_of(tmp_path, **{key: f"upload:{one}" for key, one in ids.items()})
+    inline = solver.load_scene(tmp_path / "scene.toml").to_dict()
+    body = {"kind": "solve", "frequency_hz": 1.0, "harmonics": 3}
+    first = shipped.post("/v1/jobs", json={**body, "scene": scene}, headers={"Prefer": "wait=60"}).json()
+    assert first["status"] == "successful"
+    second = shipped.post("/v1/jobs", json={**body, "scene": inline}).json()
+    assert second["result_of"] == first["id"], "the same scene, however it came"
+    plan = shipped.post("/v1/plan", json={"scene": scene})
+    assert plan.status_code == 200
+    stored = shipped.post("/v1/scenes", json={**scene, "name": "kept"})
+    assert stored.status_code == 201
+    for one in ids.values():
+        assert shipped.delete(f"/v1/uploads/{one}").status_code == 204
+    kept = shipped.post(
+        "/v1/jobs", json={**body, "scene": "kept", "harmonics": 4}, headers={"Prefer": "wait=60"}
+    )
+    assert kept.json()["status"] == "successful"
+    problem = is_problem(shipped.post("/v1/jobs", json={**body, "scene": scene, "fresh": True}), 422)
+    assert [one["pointer"] for one in problem["errors"]] == ["/scene/structure/M", "/scene/structure/K"]
+
+
+def test_what_does_not_fit_is_refused_with_pointers(shipped: httpx.Client, tmp_path: Path) -> None:
+    small = upload(shipped, "K.npz", npz(K=np.eye(3))).json()["id"]
+    mass = upload(shipped, "M.npz", npz(M=M)).json()["id"]
+    body = {"kind": "solve", "frequency_hz": 1.0}
+
+    def pointers(**structure: Any) -> list[str]:
+        answer = shipped.post("/v1/jobs", json={**body, "scene": scene_of(tmp_path, **structure)})
+        problem = is_problem(answer, 422)
+        assert str(tmp_path) not in str(problem)
+        assert "/tmp" not in str(problem)
+        return [one["pointer"] for one in problem["errors"]]
+
+    assert pointers(M=f"upload:{mass}", K=f"upload:{small}")[0].startswith("/scene/structure")
+    assert pointers(M=f"upload:{mass}", modes=f"upload:{mass}") == ["/scene/structure/modes"]
+    for path in ("M.npz", str(tmp_path / "M.npz"), "upload:../../M.npz", "upload:", "upload:none", "file:x"):
+        assert "/scene/structure/M" in pointers(M=path, K=f"upload:{small}")
+    many = {"M": f"upload:{mass}", "K": f"upload:{mass}", "keep_modes": 10**9}
+    assert pointers(**many) == ["/scene/structure/keep_modes"]
+
+
+def test_a_large_model_is_reduced_where_it_is_read(shipped: httpx.Client, tmp_path: Path) -> None:
+    large_M, large_K = (coo_array(one) for one in beam(40))
+    ids = {}
+    for key, matrix in (("M", large_M), ("K", large_K)):
+        data = saved(lambda file, matrix=matrix: save_npz(file, matrix.tocsr()))
+        ids[key] = f"upload:{upload(shipped, f'{key}.npz', data).json()['id']}"
+    scene = scene_of(tmp_path, **ids)
+    scene["structure"] |= {"keep_modes": 5, "dofs": {"tip": 78, "mid": 38}}
+    body = {"kind": "solve", "scene": scene, "frequency_hz": 1.0, "harmonics": 3}
+    job = shipped.post("/v1/jobs", json=body, headers={"Prefer": "wait=60"}).json()
+    assert job["status"] == "successful", job
+
+
+def zip_bomb() -> bytes:
+    """A .npz of a few kilobytes whose array inflates to four gigabytes; its header says so."""
+    header = saved(lambda f: np.lib.format.write_array_header_1_0(
+        f, {"descr": "<f8", "fortran_order": False, "shape": (23170, 23170)}))  # fmt: skip
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as file:
+        file.writestr("M.npy", header + bytes(64 * 1024**2))
+    return buffer.getvalue()
+
+
+def matlab_bomb() -> bytes:
+    """A MATLAB 5 file with a compressed element that inflates to a gigabyte of nothing."""
+    packer = zlib.compressobj(9)
+    body = b"".join(packer.compress(bytes(16 * 1024**2)) for _ in range(16)) + packer.flush()
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+    return head + np.array([15, len(body)], "<u4").tobytes() + body
+
+
+def pickled(f: Any) -> None:
+    np.save(f, np.array([print]), allow_pickle=True)
+
+
+def huge_header(f: Any) -> None:
+    shape = {"descr": "<f8", "fortran_order": False, "shape": (10**6, 10**6)}
+    np.lib.format.write_array_header_1_0(f, shape)
+
+
+HOSTILE: dict[str, tuple[str, Callable[[], bytes]]] = {
+    "nothing": ("M.npz", lambda: b""),
+    "no zip": ("M.npz", lambda: b"\x00" * 1000),
+    "cut off": ("M.npz", lambda: FILES["M.npz"][:-40]),
+    "objects": ("M.npz", lambda: npz(M=np.array([{}, []], dtype=object))),
+    "pickle": ("M.npy", lambda: saved(pickled)),
+    "NaN": ("M.npy", lambda: saved(lambda f: np.save(f, np.full((3, 3), np.nan)))),
+    "infinity": ("M.npz", lambda: npz(M=np.diag([1.0, np.inf]))),
+    "text": ("M.npz", lambda: npz(M=np.array([["a"]]))),
+    "complex": ("M.npy", lambda: saved(lambda f: np.save(f, np.eye(2) * 1j))),
+    "not square": ("M.npy", lambda: saved(lambda f: np.save(f, np.ones((2, 3))))),
+    "other names": ("M.npz", lambda: npz(a=M, b=K)),
+    "path names": ("M.npz", lambda: npz(**{"../../M": M, "/etc/M": M})),
+    "MATLAB 7.3": ("M.mat", lambda: b"MATLAB 7.3 MAT-file".ljust(512, b" ") + b"\x89HDF\r\n"),
+    "Harwell-Boeing in UTF-16": ("M.hb", lambda: hb_text(M, "RSA").encode("utf-16")),
+    "an HTML page": ("M.mtx", lambda: b"<!doctype html><title>404</title>"),
+}
+BOMBS: dict[str, tuple[str, Callable[[], bytes]]] = {
+    "zip bomb": ("M.npz", zip_bomb),
+    "header larger than the file": ("M.npy", lambda: saved(huge_header)),
+    "MATLAB bomb": ("M.mat", matlab_bomb),
+    "8 terabytes": ("M.mtx", lambda: MARKET % (b"array", b"1000000 1000000\n1\n")),
+    "too many rows": ("M.mtx", lambda: MARKET % (b"coordinate", b"2000000000 2000000000 1\n1 1 1.0\n")),
+    "a false header": (
+        "M.hb",
+        lambda: hb_text(M, "RSA").replace(f"{len(M):14d}", f"{2**31 - 1:14d}").encode(),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", HOSTILE)
+def test_a_hostile_file_is_refused(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    name, make = HOSTILE[case]
+    monkeypatch.chdir(tmp_path)
+    Path(name).write_bytes(make())
+    answer = inspection._answer("describe", name)
+    assert list(answer) == ["error"]
+    assert "/tmp" not in answer["error"]
+
+
+@pytest.mark.parametrize("case", BOMBS)
+def test_a_bomb_is_refused_and_the_service_lives(http: httpx.Client, case: str) -> None:
+    """In a process of its own, which may need all the memory it is allowed."""
+    name, make = BOMBS[case]
+    problem = is_problem(upload(http, name, make()), 422)
+    assert problem["type"] == "urn:stickslip:problem:unreadable-upload"
+    assert http.get("/health/live").status_code == 200
+
+
+def test_compressed_bodies_are_refused(http: httpx.Client) -> None:
+    for encoding in ("gzip", "br", "deflate, gzip"):
+        headers = {"Content-Encoding": encoding}
+        is_problem(http.post("/v1/uploads?name=x.npz", content=b"x", headers=headers), 415)
+
+
+def test_a_reader_that_takes_too_long_or_dies_is_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "M.npz").write_bytes(FILES["M.npz"])
+    with pytest.raises(UnreadableUploadError, match=r"longer than 0\.01 s"):
+        inspection.contents(tmp_path / "M.npz", 0.01)
+    monkeypatch.setattr(inspection, "_AT_ONCE", threading.BoundedSemaphore(1))
+    assert inspection.contents(tmp_path / "M.npz", 30.0)[0]["rows"] == len(M), "its place is free again"
+    with pytest.raises(UnreadableUploadError, match="more than 10 bytes"):
+        inspection.resolved_structure({"kind": "matrices", "M": "M.npz"}, tmp_path, 30.0, 10)
+
+
+def test_uploads_are_kept_by_owner(database: Database) -> None:
+    uploads = UploadRepository(database)
+    given = {"name": "M.npz", "format": "npz", "size": 3, "sha256": "0" * 64, "data": b"abc"}
+    mine, new = uploads.add(owner="me", **given)
+    same, again = uploads.add(owner="me", **given)
+    other, other_new = uploads.add(owner="you", **given)
+    assert (new, again, other_new) == (True, False, True)
+    assert same == mine != other
+    assert uploads.data(mine.id) == b"abc"
+    assert [row.id for row in uploads.page(10)] == [other.id, mine.id]
+    assert uploads.page(10, owner="me") == uploads.page(10, before=other.id) == [mine]
+    uploads.delete(mine.id)
+    assert uploads.get(mine.id) is None
+    with pytest.raises(NotFoundError):
+        uploads.data(mine.id)
