@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service import strict_json
 from service.access.callers import KEYLESS, Caller
-from service.answers import DesignPage, JobPage, SweepPage, UploadPage
+from service.answers import DesignPage, JobPage, SweepPage
 from service.bodies import whole
 from service.core import Service
 from service.errors import (
@@ -26,6 +26,7 @@ from service.errors import (
 from service.problems import service_problem
 from service.repository import JobRow
 from service.representations import JSON, LIST_MEDIA, chosen, csv_of_items
+from service.upload_answers import UploadPage
 from service.waiters import Event
 from solver.errors import Issue
 

@@ -12,10 +12,10 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
 
 from service import cursors
-from service.answers import NewUpload, UploadAnswer, UploadedArray, UploadPage
 from service.bodies import saved
 from service.http import CallerDependency, ServiceDependency, listing
 from service.routes.described import LISTED
+from service.upload_answers import NewUpload, UploadAnswer, UploadedArray, UploadPage
 from service.uploads import MEDIA, Arrived, UploadFormat, format_of
 
 router = APIRouter(prefix="/v1/uploads", tags=["uploads"])
