@@ -18,7 +18,7 @@ from service.clock import Clock
 from service.db import Database
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.executors.local import LocalExecutor
-from service.jobs import OnProgress, Registry
+from service.jobs import JobRequest, OnProgress, Registry
 from service.kinds import SHIPPED
 from service.models import JobState
 from service.queue import JobQueue
@@ -160,6 +160,7 @@ class Service:
             raise InvalidRequestError([Issue(pointer="/kind", message="`kind` is missing")])
         kind = self.registry.get(body["kind"])
         request = validated(kind.request, {key: value for key, value in body.items() if key != "kind"})
+        seconds = self._seconds_limit(request)
         resolved = kind.resolve(request, self.scenes.of(caller))
         new = NewJob(
             kind=kind.name,
@@ -174,11 +175,22 @@ class Service:
             fresh=request.fresh,
             idempotency_key=idempotency_key,
             owner=caller.owner,
+            seconds_limit=seconds,
         )
         row, inserted = self.jobs.submit(new, self.settings.queue_limit)
         if row.state is JobState.ACCEPTED:
             self.queue.wake()
         return row, inserted
+
+    def _seconds_limit(self, request: JobRequest) -> float | None:
+        """The longest time an attempt may take, if the request says so [s]."""
+        asked, most = request.max_seconds, self.settings.job_seconds
+        if asked is not None and asked > most:
+            message = (
+                f"`max_seconds` must be at most {most:g}, which is the service's own limit, got {asked!r}"
+            )
+            raise InvalidRequestError([Issue(pointer="/max_seconds", message=message)])
+        return asked
 
     def job(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:
         """The job.

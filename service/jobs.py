@@ -47,6 +47,8 @@ class JobRequest(BaseModel):
         Compute again even if the same thing was computed before.
     priority : int
         Jobs of a higher priority run first; equal ones in the order they came.
+    max_seconds : float or None
+        Longest time an attempt at it may take [s]; that of the service if left out.
     """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, validate_by_name=True)
@@ -55,6 +57,13 @@ class JobRequest(BaseModel):
         default=False, strict=True, description="Compute again even if a stored result exists."
     )
     priority: int = Field(default=0, strict=True, ge=-100, le=100, description="Higher ones run first.")
+    max_seconds: float | None = Field(
+        default=None,
+        strict=True,
+        ge=0.01,
+        le=1e7,
+        description="Longest time an attempt may take [s]; at most, and if left out, that of the service.",
+    )
 
 
 class SceneSource(Protocol):

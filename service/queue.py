@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import enum
 import logging
+import math
 import os
 import secrets
 import socket
@@ -267,7 +268,7 @@ class JobQueue:
             case _StopReason.SHUTDOWN:
                 self._note(attempt, "given back", written=self._jobs.release(attempt))
             case _StopReason.TIME:
-                limit = self._settings.job_seconds
+                limit = self._seconds_of(attempt)
                 failure = JobFailure(
                     kind=FailureKind.TIME_LIMIT,
                     detail=f"the computation took longer than the {limit:g} s one attempt may take",
@@ -326,10 +327,13 @@ class JobQueue:
         """Time until something must be looked at without being woken [s]."""
         patience = min(self._settings.poll_seconds, self._settings.lease_seconds / 3.0)
         with self._lock:
-            oldest = min((entry.started for entry in self._running.values()), default=None)
-        if oldest is not None:
-            patience = min(patience, max(oldest + self._settings.job_seconds - time.monotonic(), 0.01))
-        return patience
+            ends = [entry.started + self._seconds_of(entry.attempt) for entry in self._running.values()]
+        return min(patience, max(min(ends, default=math.inf) - time.monotonic(), 0.01))
+
+    def _seconds_of(self, attempt: Attempt) -> float:
+        """The longest time an attempt may take [s]: the job's limit, never more than the service's."""
+        own = attempt.seconds_limit
+        return self._settings.job_seconds if own is None else min(own, self._settings.job_seconds)
 
     def _upkeep(self) -> None:
         """Renew leases, take back expired ones, stop what runs too long."""
@@ -337,7 +341,7 @@ class JobQueue:
         with self._lock:
             running = list(self._running.values())
         for entry in running:
-            if entry.stop is None and now - entry.started > self._settings.job_seconds:
+            if entry.stop is None and now - entry.started > self._seconds_of(entry.attempt):
                 self._ask_to_stop(entry, _StopReason.TIME)
         if now < self._next_upkeep:
             return

@@ -20,7 +20,7 @@ from service.kinds.scenes import (
     resolve_scene,
     resolved,
 )
-from service.kinds.sizes import POINTS_OF_A_SWEEP, dofs_solved, size_issues
+from service.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.strict_json import pointer
 from solver.errors import Issue
 from solver.scene import Scene
@@ -71,10 +71,7 @@ def resolve(request: CampbellRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check speeds, orders and band."""
     scene = resolve_scene(request, source)
     sweeps = len(request.orders or [1]) * POINTS_OF_A_SWEEP
-    require(
-        _speed_issues(request)
-        + size_issues("/orders", "points", sweeps, request.harmonics, dofs_solved(scene))
-    )
+    require(_speed_issues(request) + balance_issues("/orders", scene, request.harmonics, sweeps))
     return resolved(
         scene,
         speeds_rpm=request.speeds_rpm,

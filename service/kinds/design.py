@@ -13,6 +13,7 @@ from service.kinds.problem import ProblemRequest, Weight, arguments, default_var
 from service.kinds.problem_check import problem_issues, uncertainty_issues
 from service.kinds.records import design_record, robust_record, sweep_record
 from service.kinds.scenes import FrequencyHz, refusal, require, resolve_scene, resolved
+from service.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.kinds.uncertain import Uncertain
 from service.strict_json import pointer
 from solver.errors import Issue
@@ -92,7 +93,14 @@ def resolve(request: DesignRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check the problem, fill in the variables."""
     scene = resolve_scene(request, source)
     given = arguments(request)
-    require(design_issues(scene, given))
+    cases = len(request.cases or [1])
+    times = cases if request.samples is None or UNCERTAIN not in given else cases * request.samples
+    points = POINTS_OF_A_SWEEP * times
+    where = "/samples" if times > cases else "/cases"
+    require(
+        design_issues(scene, given)
+        or balance_issues(where, scene, request.harmonics, points, "points of one design's responses")
+    )
     return resolved(scene, **given, **default_variables(scene, given))
 
 

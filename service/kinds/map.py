@@ -14,7 +14,7 @@ from service.jobs import JobKind, JobOutput, OnProgress, Resolved, SceneSource, 
 from service.kinds.ranges import RangeRequest, law_issues, range_issues
 from service.kinds.records import packed, sweep_records, unpacked
 from service.kinds.scenes import refusal, require, resolve_scene, resolved
-from service.kinds.sizes import MOST_POINTS, dofs_solved, size_issues
+from service.kinds.sizes import MOST_POINTS, balance_issues
 from service.parts import Part, PartOutput, Parts, PartStoppedError
 from solver.errors import Issue
 from solver.scene import Scene
@@ -81,7 +81,7 @@ def _size_issues(request: MapRequest, scene: Scene) -> list[Issue]:
     if points > MOST_POINTS:
         return [refusal("/steps", f"`steps` × `frequencies` must be at most {MOST_POINTS}, got {points}")]
     words = "`steps` × `frequencies`"
-    return size_issues("/steps", words, points, request.harmonics, dofs_solved(scene))
+    return balance_issues("/steps", scene, request.harmonics, points, words)
 
 
 def split(spec: Mapping[str, Any]) -> list[Part]:

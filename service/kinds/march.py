@@ -9,7 +9,8 @@ from pydantic import ConfigDict, Field
 
 import solver
 from service.jobs import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
-from service.kinds.scenes import FrequencyHz, SceneRequest, resolve_scene, resolved
+from service.kinds.scenes import FrequencyHz, SceneRequest, require, resolve_scene, resolved
+from service.kinds.sizes import march_issues
 from solver.scene import Scene
 
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2}
@@ -45,9 +46,11 @@ class MarchRequest(SceneRequest):
 
 
 def resolve(request: MarchRequest, source: SceneSource) -> Resolved:
-    """Look up the scene."""
+    """Look up the scene, check the size."""
+    scene = resolve_scene(request, source)
+    require(march_issues(scene, request.steps_per_period, request.max_periods))
     return resolved(
-        resolve_scene(request, source),
+        scene,
         frequency_hz=request.frequency_hz,
         steps_per_period=request.steps_per_period,
         tolerance=request.tolerance,

@@ -17,7 +17,7 @@ from service.jobs import JobKind, JobOutput, OnProgress, Resolved, SceneSource, 
 from service.kinds.problem import Name
 from service.kinds.records import packed, sweep_records, unpacked
 from service.kinds.scenes import FrequencyHz, HarmonicRequest, refusal, require, resolve_scene, resolved
-from service.kinds.sizes import POINTS_OF_A_SWEEP, size_issues, whole_disk_dofs
+from service.kinds.sizes import POINTS_OF_A_SWEEP, annulus_issues, size_issues, whole_disk_dofs
 from service.parts import Part, PartOutput, Parts, PartStoppedError
 from service.strict_json import pointer
 from solver.errors import Issue, SceneError, SettingError
@@ -129,7 +129,8 @@ def _issues(request: MistuningRequest, scene: Scene, start: float, stop: float) 
         return [refusal("/scene", message)]
     sweeps = POINTS_OF_A_SWEEP * request.samples * structure.sectors
     words = "points of all sweeps"
-    issues = size_issues("/samples", words, sweeps, request.harmonics, whole_disk_dofs(scene))
+    issues = annulus_issues(scene, request.harmonics)
+    issues += size_issues("/samples", words, sweeps, request.harmonics, whole_disk_dofs(scene))
     # Drawn only if there are not too many.
     issues = issues or _factor_issues(request, scene)
     if request.dof is not None and request.dof not in structure.dofs:

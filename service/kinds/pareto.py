@@ -13,6 +13,7 @@ from service.kinds.problem import ProblemRequest, arguments, default_variables, 
 from service.kinds.problem_check import problem_issues
 from service.kinds.records import sweep_record
 from service.kinds.scenes import require, resolve_scene, resolved
+from service.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
 from solver.errors import Issue
 from solver.scene import Scene
 
@@ -44,7 +45,9 @@ def resolve(request: ParetoRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check the problem, fill in the variables."""
     scene = resolve_scene(request, source)
     given = arguments(request)
-    require(pareto_issues(scene, given))
+    points = POINTS_OF_A_SWEEP * len(request.cases or [1]) * (request.points or 1)
+    words = "points of the responses of a front"
+    require(pareto_issues(scene, given) or balance_issues("/points", scene, request.harmonics, points, words))
     return resolved(scene, **given, **default_variables(scene, given))
 
 

@@ -12,7 +12,7 @@ from service.jobs import JobKind, JobOutput, Progress, Resolved, SceneSource, Sh
 from service.kinds.ranges import RangeRequest, law_issues, range_issues
 from service.kinds.records import sweep_records
 from service.kinds.scenes import require, resolve_scene, resolved
-from service.kinds.sizes import POINTS_OF_A_SWEEP, dofs_solved, size_issues
+from service.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
 from solver.scene import Scene
 
 _EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "parameter": "shroud.N0", "from": 20, "to": 3000}
@@ -41,7 +41,7 @@ def resolve(request: PeaksRequest, source: SceneSource) -> Resolved:
     require(
         range_issues(request, scene)
         + law_issues("/scene", scene)
-        + size_issues("/checks", "points", points, request.harmonics, dofs_solved(scene))
+        + balance_issues("/checks", scene, request.harmonics, points)
     )
     return resolved(
         scene,

@@ -188,7 +188,7 @@ class ProblemRequest(HarmonicRequest):
 
 
 ABOUT_THE_SCENE = ("scene", "set")
-ABOUT_THE_JOB = ("fresh", "priority")
+ABOUT_THE_JOB = ("fresh", "priority", "max_seconds")
 
 
 def arguments(request: ProblemRequest) -> dict[str, Any]:

@@ -10,6 +10,12 @@ MOST_POINTS = 500_000
 """Of a map: its result is text, some 40 bytes a point."""
 MOST_WORK = 1_000_000_000
 """Points × harmonics × DOFs: hours of one processor."""
+MOST_UNKNOWNS = 8_000
+"""Of the balance: its matrix, of which a worker holds some, is then 0.5 GB."""
+MOST_STEPS = 100_000_000_000
+"""Time steps × DOFs of a march: hours of one processor."""
+FEWEST_STEPS = 256
+"""Of a period, where the solver chooses them."""
 POINTS_OF_A_SWEEP = 20
 """Fewer a frequency response seldom has."""
 
@@ -29,6 +35,59 @@ def size_issues(where: str, words: str, points: int, harmonics: int, dofs: int) 
     if work <= MOST_WORK:
         return []
     return [refusal(where, f"{words} × harmonics × DOFs must be at most {MOST_WORK}, got {work}")]
+
+
+def balance_issues(
+    where: str, scene: Scene, harmonics: int, points: int = 1, words: str = "points"
+) -> list[Issue]:
+    """Refuse responses whose balance is too large, or too many of them, at the pointer `where`.
+
+    Parameters
+    ----------
+    where : of the field that makes it large, if it is not the scene itself.
+    harmonics : highest one kept.
+    points : periodic responses to be solved.
+    words : what is counted, for people.
+    """
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from solver.sectors import sectors_needed
+
+    large = _unknown_issues(scene, harmonics, sectors_needed(scene).sectors)
+    return large or size_issues(where, words, points, harmonics, dofs_solved(scene))
+
+
+def annulus_issues(scene: Scene, harmonics: int) -> list[Issue]:
+    """Refuse a balance of all sectors that is too large."""
+    structure = scene.structure
+    sectors = structure.sectors if isinstance(structure, CyclicStructure) else 1
+    return _unknown_issues(scene, harmonics, sectors)
+
+
+def _unknown_issues(scene: Scene, harmonics: int, sectors: int) -> list[Issue]:
+    from solver.contact_rows import port_counts
+
+    motions = int(port_counts(scene).sum()) * sectors
+    unknowns = motions * (2 * harmonics + 1)
+    if unknowns <= MOST_UNKNOWNS:
+        return []
+    fitting = (MOST_UNKNOWNS // motions - 1) // 2
+    got = f"got {motions} motions of contacts × (2 × {harmonics} harmonics + 1) = {unknowns}"
+    if fitting >= 1:
+        words = f"`harmonics` must be at most {fitting} for this scene, {MOST_UNKNOWNS} unknowns"
+        return [refusal("/harmonics", f"{words}, {got}")]
+    words = f"`scene` must have contacts for at most {MOST_UNKNOWNS} unknowns"
+    return [refusal("/scene", f"{words}, {got}")]
+
+
+def march_issues(scene: Scene, steps_per_period: int | None, max_periods: int) -> list[Issue]:
+    """Refuse a march of more steps than one job should make."""
+    dofs = whole_disk_dofs(scene)
+    steps = (steps_per_period or FEWEST_STEPS) * max_periods * dofs
+    if steps <= MOST_STEPS:
+        return []
+    where = "max_periods" if steps_per_period is None else "steps_per_period"
+    words = "steps of a period × periods × DOFs"
+    return [refusal(f"/{where}", f"`{where}`: {words} must be at most {MOST_STEPS}, got {steps}")]
 
 
 def dofs_solved(scene: Scene) -> int:

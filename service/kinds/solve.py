@@ -9,7 +9,8 @@ from pydantic import ConfigDict, Field
 
 import solver
 from service.jobs import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
-from service.kinds.scenes import FrequencyHz, HarmonicRequest, resolve_scene, resolved
+from service.kinds.scenes import FrequencyHz, HarmonicRequest, require, resolve_scene, resolved
+from service.kinds.sizes import balance_issues
 from solver.scene import Scene
 
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2, "set": {"damper.N0": 80}}
@@ -24,8 +25,9 @@ class SolveRequest(HarmonicRequest):
 
 
 def resolve(request: SolveRequest, source: SceneSource) -> Resolved:
-    """Look up the scene."""
+    """Look up the scene, check the size."""
     scene = resolve_scene(request, source)
+    require(balance_issues("/harmonics", scene, request.harmonics))
     return resolved(scene, frequency_hz=request.frequency_hz, harmonics=request.harmonics)
 
 

@@ -24,6 +24,7 @@ from service.kinds.scenes import (
     resolve_scene,
     resolved,
 )
+from service.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
 from solver.errors import Issue, SettingError
 from solver.scene import Scene
 
@@ -83,7 +84,10 @@ def resolve(request: SweepRequest, source: SceneSource) -> Resolved:
     if request.parameter == FREQUENCY:
         start = scene.observe.band[0] if start is None else start
         stop = scene.observe.band[1] if stop is None else stop
-    require(_issues(request, scene, start, stop))
+    require(
+        _issues(request, scene, start, stop)
+        or balance_issues("/harmonics", scene, request.harmonics, POINTS_OF_A_SWEEP)
+    )
     return resolved(
         scene,
         parameter=request.parameter,

@@ -42,7 +42,7 @@ class IterationRequest(JobRequest):
 
 
 def as_it_is(request: IterationRequest, _source: object) -> Resolved:
-    spec = request.model_dump(mode="json", exclude={"fresh", "priority"})
+    spec = request.model_dump(mode="json", exclude={"fresh", "priority", "max_seconds"})
     return Resolved(spec=spec, scene_name="matrix")
 
 

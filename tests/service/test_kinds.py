@@ -119,7 +119,15 @@ def test_a_stored_scene_and_an_inline_scene_are_as_good_as_a_shipped_one(shipped
     assert plan["n_harmonics"] == 3
 
 
+def with_contacts(count: int) -> dict[str, Any]:
+    """The two masses with many dampers side by side."""
+    raw = dict(solver.load_scene("two-dof").to_dict())
+    raw["contacts"] = [{**raw["contacts"][0], "name": f"c{index}"} for index in range(count)]
+    return raw
+
+
 SWEEP: dict[str, Any] = {"kind": "sweep", "scene": "bladed-disk"}
+MANY = with_contacts(100)
 SOLVE: dict[str, Any] = {"kind": "solve", "scene": "two-dof", "frequency_hz": 1.0}
 N0 = {**SWEEP, "parameter": "shroud.N0", "from": 20, "to": 300, "frequency_hz": 755.0}
 
@@ -158,6 +166,16 @@ N0 = {**SWEEP, "parameter": "shroud.N0", "from": 20, "to": 300, "frequency_hz": 
         ({"kind": "solve", "scene": "two-dof"}, ["/frequency_hz"]),
         ({**SOLVE, "kind": "march", "harmonics": 3}, ["/harmonics"]),
         ({**SOLVE, "kind": "march", "tolerance": 1.0}, ["/tolerance"]),
+        ({**SOLVE, "max_seconds": 0}, ["/max_seconds"]),
+        ({**SOLVE, "max_seconds": 3601}, ["/max_seconds"]),
+        ({**SOLVE, "scene": MANY, "harmonics": 61}, ["/harmonics"]),
+        ({**SWEEP, "scene": MANY, "harmonics": 61}, ["/harmonics"]),
+        ({"kind": "design", "scene": MANY, "variables": {"c0.N0": [1, 2]}, "harmonics": 61}, ["/harmonics"]),
+        ({"kind": "pareto", "scene": MANY, "variables": {"c0.N0": [1, 2]}, "harmonics": 61}, ["/harmonics"]),
+        (
+            {**SOLVE, "kind": "march", "steps_per_period": 100_000, "max_periods": 1_000_000},
+            ["/steps_per_period"],
+        ),
     ],
 )
 def test_a_bad_request_is_refused_where_it_is_bad(

@@ -228,6 +228,15 @@ def test_a_spec_computed_before_is_answered_at_once(embedded: EmbeddedService, t
     assert len(pids(file)) == 2
 
 
+def test_a_job_may_take_less_time_than_the_service_allows(embedded: EmbeddedService) -> None:
+    job = embedded.submit("deaf", {"seconds": 60.0, "max_seconds": 0.3})
+    done = embedded.wait(job, timeout=30.0)
+    assert (done.status, done.attempt) == (JobState.FAILED, 1), "what took too long is not tried again"
+    assert done.error is not None
+    assert done.error["type"] == "time-limit"
+    assert "longer than the 0.3 s" in done.error["detail"]
+
+
 def test_a_lease_is_renewed_while_a_silent_job_runs(make_settings: MakeSettings) -> None:
     settings = make_settings(lease_seconds=1.0, progress_seconds=60.0)
     with EmbeddedService(settings, PRIVATE) as service:
