@@ -294,6 +294,6 @@ def test_a_queue_that_forgets_the_guard_is_caught(tmp_path: Path, monkeypatch: p
     def without_owner(attempt: Attempt) -> object:
         return (Job.id == attempt.job_id) & (Job.state == JobState.RUNNING)
 
-    monkeypatch.setattr("service.repository.jobs._guard", without_owner)
+    monkeypatch.setattr("service.repository.jobs.guard", without_owner)
     with pytest.raises(AssertionError):
         run(Database(url), examples=200, steps=50, phases=(Phase.generate,))
