@@ -164,16 +164,25 @@ class RunParts:
         self, spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, checkpoints: Checkpoints
     ) -> JobOutput:
         """Compute the parts and join them."""
-        try:
-            known = {part: _output(arrays) for part, arrays in checkpoints.found().items()}
-        except (KeyError, ValueError, TypeError) as error:
-            checkpoints.begin_anew(f"{type(error).__name__}: {error}")
-            known = {}
 
         def keep(part: int, output: PartOutput) -> None:
-            checkpoints.add(part, _arrays(output))
+            keep_part(checkpoints, part, output)
 
-        return self.parts.run(spec, progress, should_stop, known, keep)
+        return self.parts.run(spec, progress, should_stop, known_parts(checkpoints), keep)
+
+
+def known_parts(checkpoints: Checkpoints) -> dict[int, PartOutput]:
+    """The outputs of parts that earlier attempts kept, by their places."""
+    try:
+        return {part: _output(arrays) for part, arrays in checkpoints.found().items()}
+    except (KeyError, ValueError, TypeError) as error:
+        checkpoints.begin_anew(f"{type(error).__name__}: {error}")
+        return {}
+
+
+def keep_part(checkpoints: Checkpoints, part: int, output: PartOutput) -> None:
+    """Keep the output of a part for a later attempt."""
+    checkpoints.add(part, _arrays(output))
 
 
 def _arrays(output: PartOutput) -> Arrays:

@@ -17,7 +17,7 @@ from service.access.callers import KEYLESS, Caller, visible
 from service.clock import Clock
 from service.db import Database
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
-from service.executors.local import LocalExecutor
+from service.executors import executor_of
 from service.jobs import JobRequest, OnProgress, Registry
 from service.kinds import SHIPPED
 from service.models import JobState
@@ -89,14 +89,7 @@ class Service:
         self.uploads = Uploads(UploadRepository(self.database), settings)
         self.scenes = SceneStore(SceneRepository(self.database), self.uploads)
         self.waiters = Waiters()
-        executor = LocalExecutor(
-            registry.runs(),
-            registry.warm_up,
-            workers=settings.workers,
-            grace_seconds=settings.grace_seconds,
-            pace=settings.pace,
-        )
-        self.queue = JobQueue(self.jobs, executor, settings, self.waiters)
+        self.queue = JobQueue(self.jobs, executor_of(settings, registry), settings, self.waiters)
         self.stopping = threading.Event()
         self._open = False
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import ipaddress
 import os
-from typing import Self
+from typing import Literal, Self
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, FilePath, ValidationError, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError
@@ -87,6 +87,24 @@ class Settings(BaseSettings):
         "by a name of its own; all when bound to another address.",
     )
 
+    executor: Literal["local", "dask"] = Field(
+        default="local", description="Where jobs are computed: local processes, or workers of a Dask cluster."
+    )
+    dask_scheduler: str | None = Field(
+        default=None,
+        pattern=r"^(tcp|tls)://.+:[0-9]+$",
+        description="Address of the Dask scheduler, tcp://host:8786 or tls://host:8786; needed by `dask`.",
+    )
+    dask_ca_file: FilePath | None = Field(
+        default=None, description="Certificates that the Dask scheduler is checked against (PEM), for tls://."
+    )
+    dask_cert_file: FilePath | None = Field(
+        default=None,
+        description="Certificate that the service shows to the Dask scheduler (PEM), for tls://.",
+    )
+    dask_key_file: FilePath | None = Field(
+        default=None, description="Private key of that certificate (PEM), for tls://."
+    )
     workers: int = Field(
         default_factory=_cpu_count, ge=1, le=256, description="Worker processes; one for each processor."
     )
@@ -195,6 +213,21 @@ class Settings(BaseSettings):
                 f"`host` {self.host!r} can be reached from other machines and the service has no keys yet: "
                 "use 127.0.0.1, or set STICKSLIP_ALLOW_REMOTE=true (`allow_remote`) if everyone "
                 "who can reach it may use it"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _cluster_is_known(self) -> Self:
+        if self.executor == "dask" and self.dask_scheduler is None:
+            raise ValueError(
+                "`executor` 'dask' needs the address of a scheduler: set STICKSLIP_DASK_SCHEDULER "
+                "(`dask_scheduler`), for example tcp://10.0.0.5:8786"
+            )
+        files = (self.dask_ca_file, self.dask_cert_file, self.dask_key_file)
+        if (self.dask_scheduler or "").startswith("tls://") and None in files:
+            raise ValueError(
+                f"`dask_scheduler` {self.dask_scheduler!r} needs `dask_ca_file`, `dask_cert_file` and "
+                "`dask_key_file`"
             )
         return self
 

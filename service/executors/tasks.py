@@ -1,0 +1,153 @@
+"""What a worker of a Dask cluster does: computes one order, and says how far it is.
+
+It never opens the database. That a task is not wanted any more, because its job was cancelled or because the
+service or the scheduler is gone, shows in the worker's own state of the task: asking it costs no message and
+cannot hang when the scheduler does.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any
+
+from distributed import Status, Worker, get_worker
+
+from service.checkpoints import Checkpoints
+from service.jobs import JobFailure, JobOutput, Pace, Piece, RunOn, WarmUp
+from service.parts import PartOutput, RunPart
+from service.worker import THREAD_LIMITS, Report, Task, Throttle, checked, failure_of
+
+TOPIC = "stickslip"
+
+_GONE = (Status.closing, Status.closing_gracefully, Status.closed, Status.failed)
+
+_warming = threading.Lock()
+_warmed: set[WarmUp] = set()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Order:
+    """To a worker: compute this job, or this part of it.
+
+    Attributes
+    ----------
+    token : str
+        Names the order in what the worker says about it.
+    run, run_part : callable or None
+        One of them: for a whole job, or for the part whose spec is `part`.
+    saved : tuple of Piece
+        What earlier attempts at a whole job kept. Nothing is kept here: it would go through the scheduler.
+    version : str
+        Of the service; a worker with another one might compute other numbers.
+    progress_seconds : float
+        Least time between two reports [s].
+    """
+
+    token: str
+    job_id: str
+    kind: str
+    spec: Mapping[str, Any]
+    run: RunOn | None
+    run_part: RunPart | None
+    part: Mapping[str, Any] | None
+    saved: tuple[Piece, ...]
+    warm_up: WarmUp
+    version: str
+    progress_seconds: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """From a worker: an output, a failure, a reason to try again, or none of them if it was told to stop."""
+
+    output: JobOutput | PartOutput | None = None
+    failure: JobFailure | None = None
+    retry: str | None = None
+
+
+class _Unwanted:
+    """`should_stop` of one order: whether the cluster still wants its task; remembers that it does not."""
+
+    def __init__(self, worker: Worker, key: object) -> None:
+        self._worker = worker
+        self._tasks: Mapping[object, Any] = worker.state.tasks
+        self._key = key
+        self.obeyed = False
+
+    def __call__(self) -> bool:
+        task = self._tasks.get(self._key)
+        if task is None or task.state in ("cancelled", "resumed") or self._worker.status in _GONE:
+            self.obeyed = True
+        return self.obeyed
+
+
+def compute(order: Order) -> bytes:
+    """Compute an order; every error becomes an answer.
+
+    The answer is pickled here: what cannot be sent is an error of the job, as it is from a local worker.
+    """
+    answer = _answer(order)
+    try:
+        return pickle.dumps(answer)
+    except (pickle.PicklingError, TypeError, AttributeError) as error:
+        return pickle.dumps(Answer(failure=failure_of(_task(order), error)))
+
+
+def _answer(order: Order) -> Answer:
+    worker = get_worker()
+    here = f"{worker.address} (process {os.getpid()})"
+    if (mine := version("stickslip")) != order.version:
+        return Answer(retry=f"worker {here} has stickslip {mine}, the service {order.version}")
+
+    def say(**note: Any) -> None:
+        worker.log_event(TOPIC, {"token": order.token, "worker": worker.address, **note})
+
+    def send(report: Report) -> None:
+        say(share=report.fraction, points=report.points, found=[list(point) for point in report.found])
+
+    # The time tells a second start of an order from the first one, even in the same process.
+    say(begun=time.time_ns(), threads=worker.state.nthreads)
+    stop = _Unwanted(worker, worker.get_current_task())
+    try:
+        return _computed(order, Throttle(send, order.progress_seconds), stop)
+    finally:
+        say(over=True)
+
+
+def _computed(order: Order, progress: Throttle, stop: _Unwanted) -> Answer:
+    try:
+        _warm(order.warm_up)
+        output: JobOutput | PartOutput
+        if order.run_part is not None and order.part is not None:
+            output = order.run_part(order.spec, order.part, progress, stop)
+        elif order.run is not None:
+            pace = Pace(progress_seconds=0.0, checkpoint_seconds=0.0, checkpoint_bytes=0)
+            kept = Checkpoints(order.job_id, order.saved, lambda _kept: None, pace)
+            output = checked(order.run(order.spec, progress, stop, kept))
+    except MemoryError as error:
+        return Answer(retry=f"the worker ran out of memory ({error})")
+    except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
+        if stop.obeyed:
+            return Answer()
+        return Answer(failure=failure_of(_task(order), error))
+    return Answer() if stop.obeyed else Answer(output=output)
+
+
+def _task(order: Order) -> Task:
+    """An order as messages about it name it."""
+    return Task(0, order.job_id, order.kind, order.spec)
+
+
+def _warm(warm_up: WarmUp) -> None:
+    """Load and compile what the kinds need, once in this process and one thread at a time."""
+    with _warming:
+        if warm_up not in _warmed:
+            os.environ.update(THREAD_LIMITS)
+            warm_up()
+            _warmed.add(warm_up)

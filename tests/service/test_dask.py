@@ -1,0 +1,294 @@
+"""Jobs on a real Dask cluster: the same results, whatever happens to workers and scheduler."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from dask_cluster import DaskCluster, lives
+from private_kinds import PRIVATE
+from service_helpers import pids, until
+
+import solver
+from service import strict_json
+from service.embedded import EmbeddedService
+from service.errors import ConfigurationError
+from service.executors import executor_of
+from service.health import check
+from service.jobs import Registry
+from service.kinds import SHIPPED
+from service.models import JobState
+from service.settings import Settings, load_settings
+from service.validation import validated
+
+BOTH = PRIVATE.extended(*SHIPPED)
+DISK: dict[str, Any] = dict(solver.load_scene("bladed-disk").to_dict())
+DISK["structure"] = {**DISK["structure"], "sectors": 3}
+RANGE: dict[str, Any] = {"scene": "two-dof", "parameter": "damper.N0", "from": 60, "to": 160, "harmonics": 3}
+BODIES: dict[str, dict[str, Any]] = {
+    "sweep": {"scene": "two-dof", "harmonics": 3},
+    "map": {**RANGE, "steps": 9, "frequencies": 1500},
+    "peaks": RANGE,
+    "design": {"scene": "two-dof", "variables": {"damper.N0": [20, 500]}, "harmonics": 3},
+    "pareto": {"scene": "two-dof", "variables": {"damper.N0": [20, 500]}, "harmonics": 3, "points": 3},
+    "solve": {"scene": "two-dof", "frequency_hz": 1.2, "harmonics": 3},
+    "march": {"scene": "two-dof", "frequency_hz": 1.2},
+    "accuracy": {"scene": "two-dof", "harmonics": [1, 3], "samples": [64], "repeats": 1},
+    "campbell": {"scene": "two-dof", "speeds_rpm": [[60, 100]], "harmonics": 3},
+    "mistuning": {
+        "scene": DISK, "of": ["tip_middle", "tip"], "spread": 0.03, "samples": 12, "seed": 5, "from": 700,
+        "to": 850, "harmonics": 1,
+    },
+}  # fmt: skip
+OF_TIME = ("seconds", "milliseconds", "pareto")  # the last: whether no other row is faster and as exact
+
+
+class Silent:
+    def __call__(self, _share: float, _points: int) -> None:
+        pass
+
+    def found(self, _points: object) -> None:
+        pass
+
+
+def settings_on(folder: Path, cluster: DaskCluster, **values: object) -> Settings:
+    defaults: dict[str, object] = {"grace_seconds": 0.3, "poll_seconds": 1.0, "max_attempts": 3}
+    return load_settings(
+        database=f"sqlite:///{folder}/jobs.db", executor="dask", dask_scheduler=cluster.address,
+        **{**defaults, **values},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DaskCluster]:
+    """Two workers; none of their processes is left afterwards."""
+    with DaskCluster(tmp_path_factory.mktemp("cluster"), workers=2) as cluster:
+        yield cluster
+        left = [each for process in (*cluster.workers, cluster.scheduler) for each in cluster.family(process)]
+    assert not [process for process in left if lives(process)]
+
+
+@pytest.fixture(scope="module")
+def service(
+    dask: DaskCluster, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[EmbeddedService, DaskCluster]]:
+    with EmbeddedService(settings_on(tmp_path_factory.mktemp("service"), dask), BOTH) as embedded:
+        until(lambda: check(embedded._service).workers_ready == 2, 30.0)
+        yield embedded, dask
+
+
+def timeless(value: Any) -> Any:
+    """A result without the time it took."""
+    if isinstance(value, dict):
+        return {key: timeless(each) for key, each in value.items() if key not in OF_TIME}
+    return [timeless(each) for each in value] if isinstance(value, list) else value
+
+
+Ended = tuple[Any, list[dict[str, str]]]
+"""The result of a job without the time it took, and the checksums of the arrays of its sweeps."""
+
+
+def ended(service: EmbeddedService, kind: str, body: dict[str, Any]) -> Ended:
+    job = service.submit(kind, body)
+    done = service.wait(job, timeout=60.0)
+    assert done.status is JobState.SUCCESSFUL, done
+    results = service.results(job)
+    arrays = [service._service.sweeps.arrays(sweep.id) for sweep in results.sweeps]
+    return timeless(results.result), [{k: a.sha256 for k, a in each.items()} for each in arrays]
+
+
+def computed(service: EmbeddedService, kind: str, body: dict[str, Any]) -> Ended:
+    """The same, computed here and now."""
+    resolved = SHIPPED[kind].resolve(validated(SHIPPED[kind].request, body), service._service.scenes)
+    output = SHIPPED[kind].run(resolved.spec, Silent(), lambda: False)
+    result = json.loads(json.dumps(strict_json.finite(output.result)))
+    return timeless(result), [{k: a.sha256 for k, a in each.arrays.items()} for each in output.sweeps]
+
+
+def threads_idle(service: EmbeddedService) -> bool:
+    status = service._service.queue.status()
+    return status.ready == 2 and status.busy == 0
+
+
+def test_every_kind_gives_what_it_gives_here(service: tuple[EmbeddedService, DaskCluster]) -> None:
+    """Bit for bit, divided or not, with the arrays of all sweeps."""
+    assert set(BODIES) == {kind.name for kind in SHIPPED}
+    for kind, body in BODIES.items():
+        assert ended(service[0], kind, body) == computed(service[0], kind, body), kind
+
+
+@pytest.mark.long
+def test_every_kind_gives_what_local_workers_give(
+    service: tuple[EmbeddedService, DaskCluster], tmp_path: Path
+) -> None:
+    settings = load_settings(database=f"sqlite:///{tmp_path}/jobs.db", workers=1)
+    with EmbeddedService(settings) as local:
+        for kind, body in BODIES.items():
+            fresh = {**body, "fresh": True}
+            assert ended(service[0], kind, fresh) == ended(local, kind, fresh), kind
+
+
+def test_failures_are_those_of_a_local_worker(service: tuple[EmbeddedService, DaskCluster]) -> None:
+    embedded, _ = service
+    expected = {
+        "bad-scene": ("scene", 1), "bad-setting": ("setting", 1), "falls-short": ("goal-not-reached", 1),
+        "broken": ("internal", 1), "not-json": ("internal", 1), "unsendable": ("internal", 1),
+        "out-of-memory": ("worker-lost", 3),
+    }  # fmt: skip
+    jobs = {kind: embedded.submit(kind, {}) for kind in expected}
+    ends = {kind: embedded.wait(job, timeout=30.0) for kind, job in jobs.items()}
+    assert {k: (e.error and e.error["type"], e.attempt) for k, e in ends.items()} == expected
+    threads = embedded.submit("threads", {})
+    assert embedded.wait(threads).status is JobState.SUCCESSFUL
+    assert set(embedded.results(threads).result.values()) == {"1"}
+
+
+def test_progress_and_cancel(service: tuple[EmbeddedService, DaskCluster]) -> None:
+    embedded, _ = service
+    seen: list[float] = []
+    job = embedded.submit("iteration", {"seconds": 0.6})
+    done = embedded.wait(job, on_progress=lambda share, _points: seen.append(share))
+    assert done.status is JobState.SUCCESSFUL
+    assert seen == sorted(seen)
+    assert 2 <= len(seen) <= 8, "at most ten times a second"
+    job = embedded.submit("iteration", {"seconds": 60.0})
+    until(lambda: embedded.job(job).progress > 0.0)
+    begun = time.monotonic()
+    assert embedded.dismiss(job).status is JobState.DISMISSED
+    until(lambda: threads_idle(embedded), 3.0)
+    assert time.monotonic() - begun < 2.0, "its worker heeded, it is not restarted"
+
+
+def test_a_divided_job_leaves_room_for_others(service: tuple[EmbeddedService, DaskCluster]) -> None:
+    """Its parts are on both workers, a small job gets between them, and a cancel ends them all."""
+    embedded, _ = service
+    study = embedded.submit("mistuning", {**BODIES["mistuning"], "samples": 2000})
+    until(lambda: embedded._service.queue.status().busy == 2)
+    until(lambda: embedded.job(study).points > 0)
+    small = embedded.wait(embedded.submit("iteration", {"seed": 4}), timeout=20.0)
+    assert small.status is JobState.SUCCESSFUL
+    assert embedded.job(study).status is JobState.RUNNING
+    assert embedded.dismiss(study).status is JobState.DISMISSED
+    until(lambda: threads_idle(embedded), 3.0)
+
+
+def test_a_worker_with_another_version_computes_nothing(
+    service: tuple[EmbeddedService, DaskCluster], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    embedded, _ = service
+    monkeypatch.setattr(embedded._service.queue._executor, "_version", "0.0.0")
+    done = embedded.wait(embedded.submit("iteration", {"seed": 99}), timeout=20.0)
+    assert done.status is JobState.FAILED
+    assert done.error is not None
+    assert "the service 0.0.0, in attempt 3 of 3" in done.error["detail"]
+
+
+def test_closing_gives_jobs_back_and_frees_the_workers(
+    service: tuple[EmbeddedService, DaskCluster], tmp_path: Path
+) -> None:
+    """A divided job goes on behind the parts that it had."""
+    _, dask = service
+    settings = settings_on(tmp_path, dask)
+    with EmbeddedService(settings, BOTH) as other:
+        study = other.submit("mistuning", {**BODIES["mistuning"], "samples": 2000})
+        job = other.submit("iteration", {"seconds": 1.0})
+        until(lambda: other.job(job).progress > 0.0 and other.job(study).points > 20)
+    with EmbeddedService(settings, BOTH) as other:
+        until(lambda: other.job(study).status is JobState.RUNNING)
+        assert other.job(study).points > 15
+        assert other.wait(job, timeout=30.0).attempt == 1, "a shutdown costs no attempt"
+        assert other.dismiss(study).status is JobState.DISMISSED
+
+
+def test_a_worker_killed_costs_an_attempt(
+    service: tuple[EmbeddedService, DaskCluster], tmp_path: Path
+) -> None:
+    """The scheduler would try it elsewhere by itself: that counts as an attempt all the same."""
+    embedded, _ = service
+    file = tmp_path / "pids"
+    job = embedded.submit("iteration", {"seconds": 1.5, "pid_file": str(file)})
+    until(lambda: embedded.job(job).progress > 0.0)
+    first = pids(file)[0]
+    os.kill(first, signal.SIGKILL)
+    done = embedded.wait(job, timeout=40.0)
+    assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 2)
+    assert first not in pids(file)[1:]
+    until(lambda: threads_idle(embedded), 20.0)
+
+
+def test_a_part_that_is_lost_is_computed_again_alone(
+    service: tuple[EmbeddedService, DaskCluster],
+) -> None:
+    embedded, dask = service
+    body = {**BODIES["mistuning"], "samples": 12, "harmonics": 3, "seed": 70}
+    job = embedded.submit("mistuning", body)
+    until(lambda: embedded.job(job).points > 0)
+    victim = next(p for p in dask.family(dask.workers[0]) if "spawn_main" in " ".join(p.cmdline()))
+    victim.kill()
+    done = embedded.wait(job, timeout=60.0)
+    assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 1)
+    assert timeless(embedded.results(job).result) == computed(embedded, "mistuning", body)[0]
+
+
+def test_the_scheduler_dies_and_comes_back(service: tuple[EmbeddedService, DaskCluster]) -> None:
+    """Health says so; what ran is tried again when scheduler and workers are back."""
+    embedded, dask = service
+    until(lambda: threads_idle(embedded), 20.0)
+    job = embedded.submit("iteration", {"seconds": 1.0})
+    until(lambda: embedded.job(job).progress > 0.0)
+    before = [process for worker in dask.workers for process in dask.family(worker)]
+    dask.kill_scheduler()
+    until(lambda: not check(embedded._service).ready)
+    assert any("Dask scheduler" in line for line in check(embedded._service).trouble)
+    until(lambda: embedded.job(job).status is JobState.ACCEPTED)
+    for worker in dask.workers:
+        assert worker.wait(20) is not None, "Dask's workers end with their scheduler"
+    until(lambda: not [process for process in before if lives(process)])
+    dask.workers.clear()
+    dask.start_scheduler()
+    until(lambda: any("no workers" in line for line in check(embedded._service).trouble))
+    dask.add_worker()
+    dask.add_worker()
+    done = embedded.wait(job, timeout=40.0)
+    assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 2)
+    until(lambda: threads_idle(embedded), 20.0)
+    assert check(embedded._service).trouble == []
+
+
+@pytest.mark.long
+def test_a_worker_that_does_not_heed_is_ended(service: tuple[EmbeddedService, DaskCluster]) -> None:
+    embedded, _ = service
+    job = embedded.submit("deaf", {"seconds": 300.0})
+    until(lambda: embedded.job(job).progress > 0.0)
+    assert embedded.dismiss(job).status is JobState.DISMISSED
+    assert embedded._service.queue.status().busy == 1, "its thread is not given to others"
+    until(lambda: threads_idle(embedded), 40.0)
+
+
+def test_a_service_without_the_extra_says_what_is_missing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    settings = load_settings(
+        database=f"sqlite:///{tmp_path}/jobs.db", executor="dask", dask_scheduler="tcp://127.0.0.1:1"
+    )
+    with pytest.raises(ConfigurationError, match=r"pip install 'stickslip\[dask\]'"):
+        executor_of(settings, Registry([]))
+
+
+def test_a_scheduler_that_is_not_there(tmp_path: Path) -> None:
+    settings = load_settings(
+        database=f"sqlite:///{tmp_path}/jobs.db", executor="dask", dask_scheduler="tcp://127.0.0.1:9"
+    )
+    with EmbeddedService(settings, PRIVATE) as embedded:
+        assert not check(embedded._service).ready
+        job = embedded.submit("iteration", {})
+        until(lambda: "does not answer" in " ".join(check(embedded._service).trouble), 10.0)
+        assert embedded.job(job).status is JobState.ACCEPTED
