@@ -33,6 +33,7 @@ from service.repository import (
     SweepRow,
     UploadRepository,
 )
+from service.retention import Retention
 from service.scene_store import SceneStore
 from service.settings import Settings
 from service.strict_json import digest
@@ -90,6 +91,7 @@ class Service:
         self.scenes = SceneStore(SceneRepository(self.database), self.uploads)
         self.waiters = Waiters()
         self.queue = JobQueue(self.jobs, executor_of(settings, registry), settings, self.waiters)
+        self.retention = Retention(self.database, settings, self.jobs.now)
         self.stopping = threading.Event()
         self._open = False
 
@@ -123,11 +125,13 @@ class Service:
         except BaseException:
             self.database.close()
             raise
+        self.retention.start()
         log.info("database %s, %d workers", self.database.name, self.settings.workers)
 
     def stop(self) -> None:
         """End the workers, give running jobs back to the queue, close the database."""
         self.stop_waiting()
+        self.retention.stop()
         self.queue.stop()
         self.database.close()
         self._open = False

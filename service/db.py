@@ -268,3 +268,12 @@ def backup(url: str, target: Path) -> None:
             writer.close()
     finally:
         reader.close()
+
+
+def shrink(url: str) -> None:
+    """Rewrite the file of SQLite without the pages that deleted rows left free; nobody may be using it."""
+    connection = sqlite3.connect(database_path(url), timeout=BUSY_TIMEOUT_SECONDS, isolation_level=None)
+    try:
+        connection.execute("VACUUM")
+    finally:
+        connection.close()

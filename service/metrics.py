@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable
 
 from prometheus_client import CollectorRegistry, Counter, Histogram, generate_latest
-from prometheus_client.core import GaugeMetricFamily, Metric
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -64,6 +64,13 @@ class _State(Collector):
         for name, count in (("wanted", status.workers), ("ready", status.ready), ("busy", status.busy)):
             workers.add_metric((name,), float(count))
         yield workers
+        pruned = CounterMetricFamily(
+            "stickslip_pruned", "What retention deleted since the service began.", labels=("what",)
+        )
+        gone = self._service.retention.pruned
+        pruned.add_metric(("jobs",), float(gone.jobs))
+        pruned.add_metric(("sweeps",), float(gone.sweeps))
+        yield pruned
 
 
 class Measured:

@@ -148,6 +148,16 @@ class Settings(BaseSettings):
         default=3600.0, ge=0.1, le=1e7, description="Longest time one attempt at a job may take [s]."
     )
 
+    retention_days: float | None = Field(
+        default=None,
+        ge=0.01,
+        le=100_000.0,
+        description="Days after which ended jobs are deleted with their results and sweeps; unset: never.",
+    )
+    retention_keep_designs: bool = Field(
+        default=True, description="Keep designs with their results for ever, and delete their sweeps alone."
+    )
+
     queue_limit: int = Field(
         default=1000, ge=1, le=1_000_000, description="Jobs waiting at most; further ones are answered 503."
     )

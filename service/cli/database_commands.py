@@ -9,6 +9,7 @@ import typer
 
 from service.cli import options
 from service.cli.failures import FELL_SHORT
+from service.cli.inputs import age
 from service.cli.output import print_json, print_pairs, say
 from service.cli.service_commands import settings_of
 
@@ -24,6 +25,36 @@ def backup(
     url = settings_of(database=database).database
     copy(url, Path(target))
     say(f"{shown(url)} is copied to {target}")
+
+
+def prune(
+    older_than: Annotated[
+        float,
+        typer.Option("--older-than", metavar="AGE", parser=age, help="How long ago they ended: 30d, 12h."),
+    ],
+    keep_designs: Annotated[
+        bool, typer.Option("--keep-designs", help="Of designs delete the sweeps alone.")
+    ] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Count, and delete nothing.")] = False,
+    vacuum: Annotated[
+        bool, typer.Option("--vacuum", help="Give the space back to the file system (SQLite).")
+    ] = False,
+    database: options.Database = None,
+    as_json: options.Json = False,
+) -> None:
+    """Delete old jobs with their results and sweeps.
+
+    An SQLite file must not be in use by a service, which can do this itself (STICKSLIP_RETENTION_DAYS).
+    """
+    from service.pruning import prune_database
+
+    url = settings_of(database=database).database
+    found = prune_database(url, older_than, keep_designs=keep_designs, dry_run=dry_run, vacuum=vacuum)
+    if as_json:
+        print_json({"jobs": found.jobs, "sweeps": found.sweeps, "deleted": not dry_run})
+    else:
+        words = "would be deleted" if dry_run else "are deleted"
+        say(f"{found.jobs} jobs and {found.sweeps} sweeps {words}")
 
 
 def check(database: options.Database = None, as_json: options.Json = False) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,6 +35,19 @@ def whole_number(text: str) -> int:
         return int(text)
     except ValueError:
         raise typer.BadParameter(f"must be a whole number, got {text!r}") from None
+
+
+_UNITS = {"d": 86400.0, "h": 3600.0, "min": 60.0, "s": 1.0}
+
+
+def age(text: str) -> float:
+    """A length of time with its unit, in seconds."""
+    digits = text.rstrip("dhmins")
+    unit = _UNITS.get(text[len(digits) :])
+    with suppress(ValueError):
+        if unit is not None and 0.0 <= float(digits) * unit <= 1e10:
+            return float(digits) * unit
+    raise typer.BadParameter(f"must be a length of time such as 30d, 12h or 90min, got {text!r}")
 
 
 def join_words(arguments: Sequence[str]) -> list[str]:

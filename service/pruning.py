@@ -1,0 +1,55 @@
+"""`stickslip db prune`: retention from the command."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+from sqlalchemy.exc import DBAPIError
+
+from service.db import Database, database_name, database_path, is_sqlite, shown, shrink
+from service.errors import DatabaseError
+from service.repository.jobs import JobRepository
+from service.repository.retention import Pruned, RetentionRepository
+from service.retention import prune
+from service.revisions import current_revision, head_revision
+
+
+def prune_database(
+    url: str, seconds: float, *, keep_designs: bool, dry_run: bool = False, vacuum: bool = False
+) -> Pruned:
+    """Delete the jobs that ended longer ago than `seconds`, or count them.
+
+    Raises
+    ------
+    DatabaseInUseError
+        An SQLite file is in use by a service.
+    DatabaseError
+        There is no such database, it cannot be used, or it is at another revision.
+    """
+    name = database_name(url)
+    if vacuum and not is_sqlite(url):
+        raise DatabaseError(
+            f"{name} gives its space back by PostgreSQL's own autovacuum: leave out `--vacuum`"
+        )
+    if is_sqlite(url) and not database_path(url).exists():
+        raise DatabaseError(f"there is no database {name}")
+    revision, wanted = current_revision(url), head_revision()
+    if revision != wanted:
+        raise DatabaseError(
+            f"{name} is at revision {revision}, this version needs {wanted}: "
+            f"run `stickslip db upgrade --database {shown(url)}`"
+        )
+    database = Database(url)
+    try:
+        before = JobRepository(database).now() - timedelta(seconds=seconds)
+        if dry_run:
+            return RetentionRepository(database).count(before, keep_designs=keep_designs)
+        database.acquire()
+        found = prune(database, before, keep_designs=keep_designs, pause=lambda _seconds: False)
+        if vacuum:
+            shrink(url)
+        return found
+    except DBAPIError as error:
+        raise DatabaseError(f"{name} cannot be used: {error.orig}") from error
+    finally:
+        database.close()

@@ -1,0 +1,157 @@
+"""Retention: old jobs and their sweeps are deleted, a little at a time.
+
+Nothing may hold the database for long: SQLite has one writer. Every transaction is as large as it can be
+without taking longer than a few hundredths of a second, and between two of them there is a pause as long as
+the work was.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from functools import partial
+
+from service.db import Database
+from service.repository.retention import Pruned, RetentionRepository
+from service.settings import Settings
+
+log = logging.getLogger("stickslip.retention")
+
+_WANTED_SECONDS = 0.015
+_MOST = 256
+_JOBS = 64
+_JOBS_AT_ONCE = 8
+_ROUND_SECONDS = 600.0
+
+
+class _Paced:
+    """Does work in steps whose size is chosen by how long the last one took."""
+
+    def __init__(self, pause: Callable[[float], bool]) -> None:
+        self._pause = pause
+        self._size = 4
+        self._last = 0.0
+        self.stopped = False
+
+    def all(self, step: Callable[[int], int]) -> int:
+        """Repeat `step`, which does up to a number of things and says how many, until nothing is left."""
+        total, size, done = 0, 0, 0
+        while done == size and not self.stopped:
+            size = self._size
+            done = self.once(partial(step, size))
+            total += done
+            if self._last > _WANTED_SECONDS:
+                self._size = max(1, size // 2)
+            elif self._last < 0.5 * _WANTED_SECONDS:
+                self._size = min(_MOST, 2 * size)
+        return total
+
+    def once(self, step: Callable[[], int]) -> int:
+        """Do one step, and pause."""
+        if self.stopped:
+            return 0
+        begun = time.monotonic()
+        done = step()
+        self._last = time.monotonic() - begun
+        self.stopped = self._pause(self._last)
+        return done
+
+
+def prune(
+    database: Database,
+    before: datetime,
+    *,
+    keep_designs: bool,
+    pause: Callable[[float], bool] | None = None,
+    on_progress: Callable[[Pruned], None] | None = None,
+) -> Pruned:
+    """Delete the jobs that ended before a time, with their results and sweeps.
+
+    Parameters
+    ----------
+    keep_designs : of designs delete the sweeps alone.
+    pause : called between transactions with the time the last one took [s]; True ends the work.
+    on_progress : called with what was deleted in every round.
+    """
+    repository, paced = RetentionRepository(database), _Paced(pause or _sleep)
+    total = Pruned()
+    while not paced.stopped:
+        jobs = repository.take(before, _JOBS, keep_designs=keep_designs)
+        sweeps = paced.all(partial(repository.delete_sweeps, jobs, keep_designs=keep_designs))
+        deleted = 0
+        for index in range(0, len(jobs), _JOBS_AT_ONCE):
+            some = jobs[index : index + _JOBS_AT_ONCE]
+            deleted += paced.once(partial(repository.delete_jobs, some, keep_designs=keep_designs))
+        found = Pruned(jobs=deleted, sweeps=sweeps)
+        total += found
+        if on_progress is not None:
+            on_progress(found)
+        if found == Pruned():
+            return total
+    return total
+
+
+def _sleep(seconds: float) -> bool:
+    time.sleep(seconds)
+    return False
+
+
+class Retention:
+    """Deletes what is older than the settings say, beside the work of a service.
+
+    Parameters
+    ----------
+    database : Database
+        Where the jobs are.
+    settings : Settings
+        `retention_days` and `retention_keep_designs`; without days nothing is ever deleted.
+    now : callable
+        The clock of the database.
+    """
+
+    def __init__(self, database: Database, settings: Settings, now: Callable[[], datetime]) -> None:
+        self._database = database
+        self._settings = settings
+        self._now = now
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._loop, name="stickslip retention", daemon=True)
+        self.pruned = Pruned()
+
+    def start(self) -> None:
+        """Begin, if the settings say so."""
+        if self._settings.retention_days is not None:
+            self._thread.start()
+
+    def stop(self) -> None:
+        """End within the transaction that runs."""
+        self._stop.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def _loop(self) -> None:
+        while not self._stop.is_set():
+            try:
+                found = self.once()
+            except Exception:
+                log.exception("old jobs could not be deleted, it is tried again later")
+            else:
+                if found != Pruned():
+                    log.info("deleted %d old jobs and %d old sweeps", found.jobs, found.sweeps)
+            self._stop.wait(_ROUND_SECONDS)
+
+    def once(self) -> Pruned:
+        """Delete what is too old now."""
+        before = self._now() - timedelta(days=self._settings.retention_days or 0.0)
+        return prune(
+            self._database,
+            before,
+            keep_designs=self._settings.retention_keep_designs,
+            pause=self._stop.wait,
+            on_progress=self._count,
+        )
+
+    def _count(self, found: Pruned) -> None:
+        self.pruned += found

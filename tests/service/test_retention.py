@@ -1,0 +1,178 @@
+"""What is old is deleted a little at a time; what others need is not."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from service_helpers import MakeSettings, until
+from sqlalchemy import func, select, text, update
+from test_database import new_job
+
+from service.arrays import encode
+from service.cli import main
+from service.clock import utc_now
+from service.db import Database
+from service.embedded import EmbeddedService
+from service.errors import DatabaseError
+from service.integrity import check
+from service.jobs import DesignRecord, JobOutput, SweepRecord
+from service.models import Design, Job, JobResult, JobState, Sweep, SweepArray
+from service.pruning import prune_database
+from service.repository import JobRepository
+from service.repository.retention import Pruned, RetentionRepository
+from service.retention import prune
+
+DAY = timedelta(days=1)
+
+
+def sweep(points: int = 10) -> SweepRecord:
+    values = {"scene_name": "s", "scene_hash": "0" * 64, "parameter": "frequency", "from_value": 1.0,
+              "to_value": 2.0, "frequency_hz": None, "excitation_amplitude": 1.0, "harmonics": 1,
+              "points": points, "peak": 1.0, "peak_at": 1.5, "limit": None, "band_hz": None,
+              "newton_iterations": 1, "rejected_steps": 0, "seconds": 0.1, "completed": True,
+              "status": "done"}  # fmt: skip
+    return SweepRecord(**values, arrays={"parameter": encode(np.zeros(points))})
+
+
+def design() -> DesignRecord:
+    return DesignRecord(
+        scene_name="s", scene_hash="0" * 64, method="tracked", robust=False, reached=True, feasible=True,
+        status="done", objective=1.0, peak=1.0, peak_at=1.5, limit=None, band_hz=None, harmonics=1,
+        evaluations=3, work=1.0, seconds=0.1,
+    )  # fmt: skip
+
+
+def ended(database: Database, days: float, output: JobOutput, **values: Any) -> str:
+    """A job that ended some days ago."""
+    jobs = JobRepository(database)
+    row, _ = jobs.submit(new_job(**values), queue_limit=100)
+    if row.state is JobState.ACCEPTED:
+        attempt = jobs.claim("one", utc_now() + DAY)
+        assert attempt is not None
+        assert jobs.succeed(attempt, output)
+    with database.writing() as connection:
+        connection.execute(update(Job).where(Job.id == row.id).values(finished=utc_now() - days * DAY))
+    return row.id
+
+
+def left(database: Database) -> dict[str, int]:
+    tables = {"jobs": Job, "results": JobResult, "sweeps": Sweep, "arrays": SweepArray, "designs": Design}
+    with database.reading() as connection:
+        return {
+            name: connection.execute(select(func.count()).select_from(table)).scalar_one()
+            for name, table in tables.items()
+        }
+
+
+def before(days: float) -> datetime:
+    return utc_now() - days * DAY
+
+
+def at_once(_seconds: float) -> bool:
+    return False
+
+
+@pytest.mark.parametrize("keep", [True, False])
+def test_old_jobs_go_with_all_they_computed(database: Database, keep: bool) -> None:
+    output = JobOutput(result={}, sweeps=(sweep(), sweep()))
+    for index in range(5):
+        ended(database, 40.0, output, spec_hash=f"{index:064}")
+    ended(database, 40.0, JobOutput(result={"optimum": 1}, sweeps=(sweep(),), design=design()))
+    young = ended(database, 20.0, output)
+    waiting, _ = JobRepository(database).submit(new_job(), queue_limit=10)
+    expected = Pruned(jobs=5 if keep else 6, sweeps=11)
+    assert RetentionRepository(database).count(before(30), keep_designs=keep) == expected
+    assert prune(database, before(30), keep_designs=keep, pause=at_once) == expected
+    kept = 1 if keep else 0
+    assert left(database) == {
+        "jobs": 2 + kept, "results": 1 + kept, "sweeps": 2, "arrays": 2, "designs": kept
+    }  # fmt: skip
+    assert prune(database, before(30), keep_designs=keep, pause=at_once) == Pruned()
+    jobs = JobRepository(database)
+    assert jobs.get(young) is not None
+    assert jobs.get(waiting.id) is not None
+
+
+@pytest.mark.parametrize("keep", [True, False])
+def test_an_answer_that_a_younger_job_gives_is_kept(database: Database, keep: bool) -> None:
+    output = JobOutput(result={"value": 1}, sweeps=(sweep(),))
+    source = ended(database, 40.0, output, spec_hash="a" * 64)
+    young = ended(database, 10.0, output, spec_hash="a" * 64, fresh=False)
+    jobs = JobRepository(database)
+    row = jobs.get(young)
+    assert row is not None
+    assert row.result_of == source
+    assert prune(database, before(30), keep_designs=keep, pause=at_once) == Pruned()
+    assert jobs.result(source) == {"value": 1}
+    assert prune(database, before(5), keep_designs=keep, pause=at_once) == Pruned(jobs=2, sweeps=1)
+    assert left(database)["jobs"] == 0
+
+
+def test_what_lost_its_sweeps_answers_nobody(database: Database) -> None:
+    found = JobOutput(result={"optimum": 1}, sweeps=(sweep(),), design=design())
+    old = ended(database, 40.0, found, spec_hash="b" * 64)
+    assert prune(database, before(30), keep_designs=True, pause=at_once) == Pruned(sweeps=1)
+    jobs = JobRepository(database)
+    assert jobs.result(old) == {"optimum": 1}
+    again, _ = jobs.submit(new_job(spec_hash="b" * 64, fresh=False), queue_limit=10)
+    assert (again.state, again.result_of) == (JobState.ACCEPTED, None), "it is computed again"
+
+
+def test_no_transaction_takes_long(database: Database) -> None:
+    """Megabytes of arrays, and a writer beside that never waits long."""
+    heavy = JobOutput(result={}, sweeps=tuple(sweep(4000) for _ in range(40)))
+    for index in range(10):
+        ended(database, 40.0, heavy, spec_hash=f"{index:064}")
+    took: list[float] = []
+    found = prune(database, before(30), keep_designs=True, pause=lambda s: bool(took.append(s)))
+    assert found == Pruned(jobs=10, sweeps=400)
+    assert len(took) > 10
+    assert float(np.median(took)) < 0.05
+
+
+def test_a_service_deletes_what_is_old(make_settings: MakeSettings) -> None:
+    with EmbeddedService(make_settings()) as service:
+        database = service._service.database
+        ended(database, 40.0, JobOutput(result={}, sweeps=(sweep(),)))
+        young = ended(database, 1.0, JobOutput(result={}, sweeps=(sweep(),)))
+    with EmbeddedService(make_settings(retention_days=30.0)) as service:
+        until(lambda: left(service._service.database)["jobs"] == 1)
+        assert service.job(young).status is JobState.SUCCESSFUL
+        until(lambda: service._service.retention.pruned == Pruned(jobs=1, sweeps=1))
+
+
+def test_the_command(tmp_path: Path, make_settings: MakeSettings, capsys: pytest.CaptureFixture[str]) -> None:
+    url = make_settings().database
+    assert main(["db", "prune", "--older-than", "30d", "--database", url]) == 2
+    with EmbeddedService(make_settings()) as service:
+        for index in range(30):
+            ended(service._service.database, 40.0, JobOutput(result={}, sweeps=(sweep(4000),)),
+                  spec_hash=f"{index:064}")  # fmt: skip
+        assert main(["db", "prune", "--older-than", "30d", "--dry-run", "--database", url]) == 0
+        assert "30 jobs and 30 sweeps would be deleted" in capsys.readouterr().out
+        assert main(["db", "prune", "--older-than", "30d", "--database", url]) == 1
+        assert "is in use by another stickslip service" in capsys.readouterr().err
+    size = (tmp_path / "jobs.db").stat().st_size
+    assert main(["db", "prune", "--older-than", "30d", "--vacuum", "--json", "--database", url]) == 0
+    assert '"jobs": 30' in capsys.readouterr().out
+    assert (tmp_path / "jobs.db").stat().st_size < 0.6 * size
+    assert check(url).sound
+    for bad in ("30", "d", "-3d", "3 weeks", "nan d", "1e400d"):
+        assert main(["db", "prune", "--older-than", bad, "--database", url]) == 2
+        assert "such as 30d" in capsys.readouterr().err
+
+
+def test_tables_of_another_revision_are_left_alone(database: Database) -> None:
+    with database.writing() as connection:
+        connection.execute(text("UPDATE alembic_version SET version_num = '0001'"))
+    with pytest.raises(DatabaseError, match="db upgrade"):
+        prune_database(database.url, 1.0, keep_designs=True)
+
+
+def test_space_of_postgresql_is_its_own_affair(cluster: Any) -> None:
+    with cluster.database(empty=False) as url, pytest.raises(DatabaseError, match="autovacuum"):
+        prune_database(url, 1.0, keep_designs=True, vacuum=True)
