@@ -2,34 +2,52 @@
 
 from __future__ import annotations
 
+import io
 import time
+import uuid
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Self
-from urllib.parse import quote
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 
 import httpx
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel
 
 from service.answers import (
     DesignAnswer,
     DesignDetail,
     DesignPage,
+    FinishedJob,
     JobAnswer,
+    JobPage,
     ResultsAnswer,
+    SceneAnswer,
     SceneDetail,
+    SceneList,
     SweepAnswer,
     SweepDetail,
     SweepPage,
 )
 from service.errors import ServiceProblem
+from service.event_answers import END, EventData, JobPoints, JobProgress, told
+from service.transport import Transport, pauses, segment, words
+from service.upload_answers import NewUpload, UploadAnswer, UploadPage
 
-_POLL_SECONDS = (0.02, 0.05, 0.1, 0.2, 0.5)
+_SILENCE_SECONDS = 60.0
+
+if TYPE_CHECKING:
+    from service.health import Health
+
+ModelT = TypeVar("ModelT", bound=BaseModel)
 
 
 class Client:
     """Submits jobs to a service, watches them and fetches what they computed; a context manager.
 
     Every method raises `ServiceProblem` with the problem document if the service refuses, and
-    `ServiceProblem` with status 0 if it cannot be reached.
+    `ServiceProblem` with status 0 if it cannot be reached. A connection that fails is tried again; a job
+    carries an idempotency key, so that it is accepted once however often it was sent.
 
     Parameters
     ----------
@@ -37,10 +55,13 @@ class Client:
         For example ``http://127.0.0.1:8000``.
     timeout : float
         Time one request may take [s].
+    key : str, optional
+        A key to the service, where it needs one.
     """
 
-    def __init__(self, base_url: str, timeout: float = 30.0) -> None:
-        self._http = httpx.Client(base_url=base_url, timeout=timeout)
+    def __init__(self, base_url: str, timeout: float = 30.0, *, key: str | None = None) -> None:
+        self._timeout = timeout
+        self._transport = Transport(base_url, timeout, key)
 
     def __enter__(self) -> Self:
         return self
@@ -50,102 +71,224 @@ class Client:
 
     def close(self) -> None:
         """Close the connections."""
-        self._http.close()
+        self._transport.close()
 
-    def submit(self, body: Mapping[str, Any], *, idempotency_key: str | None = None) -> JobAnswer:
-        """Submit a job: the body of ``POST /v1/jobs``."""
-        headers = {} if idempotency_key is None else {"Idempotency-Key": idempotency_key}
-        answer = self._request("POST", "/v1/jobs", json=dict(body), headers=headers)
-        return JobAnswer.model_validate(answer)
+    def submit(
+        self, body: Mapping[str, Any], *, idempotency_key: str | None = None, wait: float | None = None
+    ) -> JobAnswer:
+        """Submit a job: the body of ``POST /v1/jobs``.
+
+        Parameters
+        ----------
+        idempotency_key : str, optional
+            One of its own if not given.
+        wait : float, optional
+            Wait so many seconds for its end; a job that has ended comes as a `FinishedJob` with its result.
+        """
+        return self._submit("/v1/jobs", body, idempotency_key, wait)
+
+    def submit_design(
+        self, body: Mapping[str, Any], *, idempotency_key: str | None = None, wait: float | None = None
+    ) -> JobAnswer:
+        """Submit a design: the body of ``POST /v1/designs``; as `submit`."""
+        return self._submit("/v1/designs", body, idempotency_key, wait)
 
     def job(self, job_id: str) -> JobAnswer:
         """How a job is."""
-        return JobAnswer.model_validate(self._request("GET", f"/v1/jobs/{_segment(job_id)}"))
+        return self._get(JobAnswer, f"/v1/jobs/{segment(job_id)}")
+
+    def jobs(self, **filters: Any) -> Iterator[JobAnswer]:
+        """Every job that meets the filters of ``GET /v1/jobs``, page after page."""
+        return self._pages(JobPage, "/v1/jobs", filters)
+
+    def events(self, job_id: str, silence: float = _SILENCE_SECONDS) -> Iterator[EventData]:
+        """What happens to a job: `JobProgress`, `JobPoints`, at last the `JobAnswer` of its end.
+
+        A broken connection is made again, and goes on behind the last event.
+
+        Parameters
+        ----------
+        silence : float
+            Time without any sign of life after which the connection counts as broken [s].
+        """
+        path, last = f"/v1/jobs/{segment(job_id)}/events", None
+        tries = pauses()
+        while True:
+            headers: dict[str, str] = {} if last is None else {"Last-Event-ID": last}
+            broken: Exception = ConnectionError("the stream ended before the job")
+            try:
+                with self._transport.stream(path, headers, silence) as answer:
+                    for event in told(answer.iter_lines()):
+                        tries = pauses()
+                        last = event.id or last
+                        if event.data is not None:
+                            yield event.data
+                        if last == END:
+                            return
+            except httpx.TransportError as error:
+                broken = error
+            pause = next(tries)
+            if pause is None:
+                raise self._transport.away(broken) from broken
+            time.sleep(pause)
 
     def wait(
         self,
         job_id: str,
         on_progress: Callable[[float, int], None] | None = None,
         timeout: float | None = None,
+        on_points: Callable[[JobPoints], None] | None = None,
     ) -> JobAnswer:
-        """Look at a job until it has ended; with `timeout` [s] it may be unfinished still."""
+        """Follow a job until it has ended; with `timeout` [s] it may be unfinished still.
+
+        Parameters
+        ----------
+        on_progress : callable, optional
+            Called with the fraction and the points so far.
+        timeout : float, optional
+            Longest time to wait [s].
+        on_points : callable, optional
+            Called with the new points of a sweep.
+        """
         end = None if timeout is None else time.monotonic() + timeout
-        reported: tuple[float, int] | None = None
-        for pause in _pauses():
-            job = self.job(job_id)
-            now = (job.progress, job.points)
-            if on_progress is not None and now != reported and not job.status.finished:
-                on_progress(*now)
-                reported = now
-            if job.status.finished or (end is not None and time.monotonic() >= end):
-                return job
-            time.sleep(pause)
-        raise RuntimeError("the pauses ended")
+        silence = _SILENCE_SECONDS if timeout is None else min(max(timeout, 0.001), _SILENCE_SECONDS)
+        try:
+            for event in self.events(job_id, silence) if timeout is None or timeout > 0.0 else ():
+                if isinstance(event, JobAnswer):
+                    return event
+                if isinstance(event, JobProgress) and on_progress is not None:
+                    on_progress(event.progress, event.points)
+                if isinstance(event, JobPoints) and on_points is not None:
+                    on_points(event)
+                if end is not None and time.monotonic() >= end:
+                    break
+        except ServiceProblem as problem:
+            if problem.status != 0 or end is None or time.monotonic() < end:
+                raise
+        return self.job(job_id)
 
     def results(self, job_id: str) -> ResultsAnswer:
         """What a job computed."""
-        return ResultsAnswer.model_validate(self._request("GET", f"/v1/jobs/{_segment(job_id)}/results"))
+        return self._get(ResultsAnswer, f"/v1/jobs/{segment(job_id)}/results")
 
     def dismiss(self, job_id: str) -> JobAnswer:
         """Cancel a job."""
-        return JobAnswer.model_validate(self._request("DELETE", f"/v1/jobs/{_segment(job_id)}"))
+        return JobAnswer.model_validate(self._transport.json("DELETE", f"/v1/jobs/{segment(job_id)}"))
 
     def sweeps(self, **filters: Any) -> Iterator[SweepAnswer]:
         """Every stored sweep that meets the filters of ``GET /v1/sweeps``, page after page."""
-        page = SweepPage.model_validate(self._request("GET", "/v1/sweeps", params=_words(filters)))
-        yield from page.items
-        while page.next is not None:
-            page = SweepPage.model_validate(self._request("GET", page.next))
-            yield from page.items
+        return self._pages(SweepPage, "/v1/sweeps", filters)
 
     def sweep(self, sweep_id: str) -> SweepDetail:
         """A stored sweep with its arrays."""
-        return SweepDetail.model_validate(self._request("GET", f"/v1/sweeps/{_segment(sweep_id)}"))
+        return self._get(SweepDetail, f"/v1/sweeps/{segment(sweep_id)}")
+
+    def sweep_arrays(self, sweep_id: str) -> dict[str, NDArray[Any]]:
+        """The arrays of a stored sweep, as they were computed."""
+        with np.load(io.BytesIO(self._sweep_as(sweep_id, "application/x-npz")), allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files if name != "about"}
+
+    def sweep_csv(self, sweep_id: str) -> str:
+        """A stored sweep as a table, a row for each point."""
+        return self._sweep_as(sweep_id, "text/csv").decode()
+
+    def sweep_parquet(self, sweep_id: str) -> bytes:
+        """A stored sweep as a Parquet file."""
+        return self._sweep_as(sweep_id, "application/vnd.apache.parquet")
+
+    def sweep_plot(self, sweep_id: str, form: Literal["svg", "png"] = "svg") -> bytes:
+        """A picture of a stored sweep."""
+        return self._transport.send("GET", f"/v1/sweeps/{segment(sweep_id)}/plot.{form}").content
 
     def designs(self, **filters: Any) -> Iterator[DesignAnswer]:
         """Every stored design that meets the filters of ``GET /v1/designs``, page after page."""
-        page = DesignPage.model_validate(self._request("GET", "/v1/designs", params=_words(filters)))
-        yield from page.items
-        while page.next is not None:
-            page = DesignPage.model_validate(self._request("GET", page.next))
-            yield from page.items
+        return self._pages(DesignPage, "/v1/designs", filters)
 
     def design(self, design_id: str) -> DesignDetail:
         """A stored design with the whole result; its id is that of its job."""
-        return DesignDetail.model_validate(self._request("GET", f"/v1/designs/{_segment(design_id)}"))
+        return self._get(DesignDetail, f"/v1/designs/{segment(design_id)}")
+
+    def scenes(self) -> list[SceneAnswer]:
+        """Shipped and stored scenes."""
+        return self._get(SceneList, "/v1/scenes").items
+
+    def scene(self, name: str) -> SceneDetail:
+        """A scene with its tables."""
+        return self._get(SceneDetail, f"/v1/scenes/{segment(name)}")
 
     def store_scene(self, scene: Mapping[str, Any]) -> SceneDetail:
         """Store a scene under its name."""
-        return SceneDetail.model_validate(self._request("POST", "/v1/scenes", json=dict(scene)))
+        return SceneDetail.model_validate(self._transport.json("POST", "/v1/scenes", json=dict(scene)))
 
-    def _request(self, method: str, path: str, **arguments: Any) -> Any:
+    def plan(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Which effects a scene calls for: the body of ``POST /v1/plan``."""
+        answer: dict[str, Any] = self._transport.json("POST", "/v1/plan", json=dict(body))
+        return answer
+
+    def upload(self, file: Path | bytes, name: str | None = None, format: str | None = None) -> NewUpload:
+        """Upload a file of matrices or modes, given by its path or its bytes.
+
+        Parameters
+        ----------
+        name : str, optional
+            To be shown; its suffix tells the format unless `format` does. That of the path if not given.
+        """
+        path = None if isinstance(file, bytes) else file
+        query = words({"name": name or (path.name if path else None), "format": format})
+        content = file if isinstance(file, bytes) else file.read_bytes()
+        # Sending and looking at a large file takes its time.
+        timeout = max(self._timeout, 120.0)
+        answer = self._transport.json("POST", "/v1/uploads", params=query, content=content, timeout=timeout)
+        return NewUpload.model_validate(answer)
+
+    def uploads(self, **filters: Any) -> Iterator[UploadAnswer]:
+        """Every upload, newest first, page after page."""
+        return self._pages(UploadPage, "/v1/uploads", filters)
+
+    def uploaded(self, upload_id: str) -> UploadAnswer:
+        """An upload, without its bytes."""
+        return self._get(UploadAnswer, f"/v1/uploads/{segment(upload_id)}")
+
+    def delete_upload(self, upload_id: str) -> None:
+        """Forget an upload."""
+        self._transport.send("DELETE", f"/v1/uploads/{segment(upload_id)}")
+
+    def health(self) -> Health:
+        """Whether the service can work; also if it cannot."""
+        from service.health import Health
+
         try:
-            response = self._http.request(method, path, **arguments)
-        except httpx.HTTPError as error:
-            detail = f"the service at {self._http.base_url} cannot be reached: {error}"
-            raise ServiceProblem(0, {"title": "No answer", "detail": detail}) from error
-        if response.is_success:
-            return response.json()
-        try:
-            problem = response.json()
-        except ValueError:
-            problem = {"title": response.reason_phrase, "detail": response.text[:500]}
-        raise ServiceProblem(response.status_code, problem if isinstance(problem, dict) else {})
+            return self._get(Health, "/health/ready")
+        except ServiceProblem as problem:
+            if problem.status != 503 or "ready" not in problem.problem:
+                raise
+            return Health.model_validate(problem.problem)
 
+    def metrics(self) -> str:
+        """What a monitor reads, in Prometheus' text format."""
+        return self._transport.send("GET", "/metrics").text
 
-def _words(filters: Mapping[str, Any]) -> dict[str, Any]:
-    """Filters as a query: without those not given, true and false in lower case."""
-    given = {key: value for key, value in filters.items() if value is not None}
-    return {key: str(value).lower() if isinstance(value, bool) else value for key, value in given.items()}
+    def _submit(self, path: str, body: Mapping[str, Any], key: str | None, wait: float | None) -> JobAnswer:
+        headers = {"Idempotency-Key": key or str(uuid.uuid4())}
+        timeout = self._timeout
+        if wait is not None:
+            headers["Prefer"] = f"wait={max(round(wait), 0)}"
+            timeout += wait
+        answer = self._transport.send("POST", path, json=dict(body), headers=headers, timeout=timeout)
+        model = FinishedJob if answer.status_code == httpx.codes.OK else JobAnswer
+        return model.model_validate(answer.json())
 
+    def _sweep_as(self, sweep_id: str, media: str) -> bytes:
+        headers = {"Accept": media}
+        return self._transport.send("GET", f"/v1/sweeps/{segment(sweep_id)}", headers=headers).content
 
-def _segment(name: str) -> str:
-    """An id as one segment of a path."""
-    return quote(name, safe="")
+    def _get(self, model: type[ModelT], path: str) -> ModelT:
+        return model.model_validate(self._transport.json("GET", path))
 
-
-def _pauses() -> Iterator[float]:
-    """Times between looks at a job [s], growing to the last one."""
-    yield from _POLL_SECONDS
-    while True:
-        yield _POLL_SECONDS[-1]
+    def _pages(self, model: type[Any], path: str, filters: Mapping[str, Any]) -> Iterator[Any]:
+        """The items of a list, page after page."""
+        page = model.model_validate(self._transport.json("GET", path, params=words(filters)))
+        yield from page.items
+        while page.next is not None:
+            page = model.model_validate(self._transport.json("GET", page.next))
+            yield from page.items

@@ -11,18 +11,17 @@ import re
 from collections.abc import AsyncIterator, Iterator
 
 from fastapi.sse import ServerSentEvent
-from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
 from service.access.callers import Caller
-from service.answers import Answer, JobAnswer
+from service.answers import JobAnswer
 from service.core import Service
+from service.event_answers import END, PARTIAL, PROGRESS, JobPoints, JobProgress
 from service.models import JobState
 from service.queue import Live
 from service.repository import JobRow
 from service.waiters import Event
 
-END = "end"
 _LEAST_SECONDS = 0.1
 _LOOK_AGAIN_SECONDS = 2.0
 # A job that another service runs tells nothing but what it writes.
@@ -30,23 +29,6 @@ _LOOK_ELSEWHERE_SECONDS = 0.5
 _RETRY_MILLISECONDS = 1000
 _POINTS_OF_AN_EVENT = 2000
 _MARK = re.compile(r"([0-9a-f]{8})\.([0-9]{1,9})")
-
-
-class JobProgress(Answer):
-    """Data of the event `progress`."""
-
-    status: JobState
-    attempt: int
-    progress: float = Field(description="Fraction of the path, 0 to 1.")
-    points: int = Field(description="Points computed so far.")
-
-
-class JobPoints(Answer):
-    """Data of the event `partial`."""
-
-    attempt: int
-    start: int = Field(description="Number of the first of these points; what was there from it on is void.")
-    points: list[tuple[float, float]] = Field(description="Value of what is swept, amplitude [m].")
 
 
 class _Story:
@@ -69,7 +51,7 @@ class _Story:
             now = JobProgress(status=row.state, attempt=row.attempt, progress=row.progress, points=row.points)
         if now != self._said and not now.status.finished:
             self._said = now
-            yield ServerSentEvent(event="progress", data=now, id=self._mark())
+            yield ServerSentEvent(event=PROGRESS, data=now, id=self._mark())
 
     def _points(self, live: Live) -> Iterator[ServerSentEvent]:
         if live.tag != self._tag:
@@ -78,7 +60,7 @@ class _Story:
             points = list(live.found[start : start + _POINTS_OF_AN_EVENT])
             self._count = start + len(points)
             data = JobPoints(attempt=live.attempt, start=start, points=points)
-            yield ServerSentEvent(event="partial", data=data, id=self._mark())
+            yield ServerSentEvent(event=PARTIAL, data=data, id=self._mark())
 
     def _mark(self) -> str | None:
         return f"{self._tag}.{self._count}" if self._tag else None

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from matrix_cases import write_scene
 
 import solver
 from service.cli import main
@@ -195,3 +196,21 @@ def test_a_service_that_is_not_there_is_status_1(run: Run) -> None:
     status, out, err = run("submit solve two-dof --frequency 1 --url http://127.0.0.1:1")
     assert (status, out) == (1, "")
     assert "http://127.0.0.1:1 cannot be reached" in err
+
+
+def test_files_of_matrices_beside_a_scene_are_uploaded(run: Run, tmp_path: Path) -> None:
+    scene = write_scene(tmp_path)
+    arguments = f"solve {scene} --frequency 1 --harmonics 3 --json"
+    status, here, _ = run(arguments)
+    assert status == 0
+    status, there, errors = run(f"submit {arguments} --wait")
+    assert status == 0, errors
+    assert json.loads(there)["result"]["max_abs"] == pytest.approx(json.loads(here)["max_abs"], rel=1e-12)
+    (tmp_path / "K.npz").unlink()
+    status, _, errors = run(f"submit {arguments}")
+    assert status == 2
+    assert "`K` of the scene" in errors
+    (tmp_path / "K.npz").write_bytes(b"no matrix")
+    status, _, errors = run(f"submit {arguments}")
+    assert status == 2
+    assert "not a .npz file" in errors

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from service.cli import inputs
 from service.cli.failures import InputError
 from service.cli.problem_options import ProblemFlags
+from service.cli.scene_files import scene_to_submit
 from solver.errors import Issue, SceneError, SettingError
 
 if TYPE_CHECKING:
@@ -142,7 +143,7 @@ def body_to_submit(told: Description) -> dict[str, Any]:
     """The body for the service; a scene file goes with it, a name is looked up there."""
     reference = told.body["scene"]
     if isinstance(reference, str) and reference.endswith(SCENE_FILES):
-        return {**told.body, "scene": _scene(told).to_dict()}
+        return {**told.body, "scene": scene_to_submit(_reference(told))}
     return dict(told.body)
 
 
@@ -150,9 +151,7 @@ def _scene(told: Description) -> Scene:
     """A shipped scene, a scene file (one that the problem file names lies beside it), or the table itself."""
     import solver
 
-    reference = told.body["scene"]
-    if isinstance(reference, str) and told.file is not None and "scene" not in told.options:
-        reference = str(told.file.parent / reference) if reference.endswith(SCENE_FILES) else reference
+    reference = _reference(told)
     try:
         if isinstance(reference, Mapping):
             return solver.Scene.from_dict(reference)
@@ -162,6 +161,14 @@ def _scene(told: Description) -> Scene:
             raise
         found = [Issue(pointer=f"/scene{issue.pointer}", message=issue.message) for issue in error.issues]
         raise told.refusal(found) from error
+
+
+def _reference(told: Description) -> Any:
+    """The scene as it is named, a file of a problem file as a path from here."""
+    reference = told.body["scene"]
+    if isinstance(reference, str) and told.file is not None and "scene" not in told.options:
+        return str(told.file.parent / reference) if reference.endswith(SCENE_FILES) else reference
+    return reference
 
 
 def _with_values(told: Description, scene: Scene, request: ProblemRequest) -> Scene:

@@ -16,6 +16,7 @@ from service.cli.failures import BAD_INPUT, FELL_SHORT, InputError, option_name
 from service.cli.output import print_json, print_table, say
 from service.cli.problem_options import NOT_OF_A_FRONT, ProblemFlags, takes_problem
 from service.cli.progress import bar
+from service.cli.scene_files import scene_to_submit, uploaded
 
 if TYPE_CHECKING:
     from service.answers import JobAnswer, ResultsAnswer
@@ -179,9 +180,7 @@ def body_of(kind: str, name: str, values: list[str] | None, **fields: Any) -> di
     """The body of ``POST /v1/jobs``; a scene file goes with it, a name is looked up by the service."""
     scene: Any = name
     if name.endswith(problem_inputs.SCENE_FILES):
-        import solver
-
-        scene = solver.load_scene(name).to_dict()
+        scene = scene_to_submit(name)
     given = {key: value for key, value in fields.items() if value is not None}
     for key, value in given.items():
         if isinstance(value, float) and not math.isfinite(value):
@@ -192,7 +191,7 @@ def body_of(kind: str, name: str, values: list[str] | None, **fields: Any) -> di
 def hand_in(url: str, body: Mapping[str, Any], *, wait: bool, as_json: bool) -> None:
     """Submit a job; print its id, or wait for its end and print what came out."""
     with _client(url) as client:
-        job = client.submit(body)
+        job = client.submit(uploaded(client, body))
         if not wait:
             _announce(job, as_json=as_json)
             return

@@ -12,7 +12,8 @@ from starlette.concurrency import run_in_threadpool
 
 from service.access.callers import Caller
 from service.core import Service
-from service.events import END, job_events
+from service.event_answers import END
+from service.events import job_events
 from service.head import HEADERS_ONLY
 from service.http import CallerDependency, ServiceDependency
 

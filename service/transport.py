@@ -1,0 +1,113 @@
+"""How the client reaches a service: requests that are tried again, problems as exceptions."""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+from urllib.parse import quote
+
+import httpx
+
+from service.errors import ServiceProblem
+
+_PAUSES = (0.1, 0.2, 0.4)
+
+
+class Transport:
+    """Sends requests; a connection that fails is tried again, so every request must be safe to repeat.
+
+    Parameters
+    ----------
+    base_url : str
+        For example ``http://127.0.0.1:8000``.
+    timeout : float
+        Time one request may take [s].
+    key : str, optional
+        A key to the service, where it needs one.
+    """
+
+    def __init__(self, base_url: str, timeout: float, key: str | None = None) -> None:
+        headers = {} if key is None else {"Authorization": f"Bearer {key}"}
+        self._http = httpx.Client(base_url=base_url, timeout=timeout, headers=headers)
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._http.close()
+
+    def json(self, method: str, path: str, **arguments: Any) -> Any:
+        """Send a request; the JSON of its answer (`send` lists the errors)."""
+        return self.send(method, path, **arguments).json()
+
+    def send(self, method: str, path: str, **arguments: Any) -> httpx.Response:
+        """Send a request.
+
+        Raises
+        ------
+        ServiceProblem
+            With the problem document if the service refuses; with status 0 if it cannot be reached.
+        """
+        for pause in pauses():
+            try:
+                response = self._http.request(method, path, **arguments)
+            except httpx.TransportError as error:
+                if pause is None:
+                    raise self.away(error) from error
+                time.sleep(pause)
+                continue
+            except httpx.HTTPError as error:
+                raise self.away(error) from error
+            if response.is_success:
+                return response
+            raise refusal(response)
+        raise RuntimeError("the last pause is None")
+
+    @contextmanager
+    def stream(self, path: str, headers: Mapping[str, str], silence: float) -> Iterator[httpx.Response]:
+        """Open a stream for the length of a block; httpx's errors pass, `silence` [s] ends it with one.
+
+        Raises
+        ------
+        ServiceProblem
+            If the service refuses.
+        """
+        timeout = httpx.Timeout(self._http.timeout.connect, read=silence)
+        with self._http.stream("GET", path, headers=dict(headers), timeout=timeout) as response:
+            if not response.is_success:
+                response.read()
+                raise refusal(response)
+            yield response
+
+    def away(self, error: Exception) -> ServiceProblem:
+        """The service does not answer."""
+        detail = f"the service at {self._http.base_url} cannot be reached: {error}"
+        return ServiceProblem(0, {"title": "No answer", "detail": detail})
+
+
+def pauses() -> Iterator[float | None]:
+    """Times between tries [s], growing, with chance in them so that many clients do not come back at once."""
+    for pause in _PAUSES:
+        yield pause * random.uniform(0.75, 1.25)
+    yield None
+
+
+def refusal(response: httpx.Response) -> ServiceProblem:
+    """The problem a service answered with."""
+    try:
+        problem = response.json()
+    except ValueError:
+        problem = {"title": response.reason_phrase, "detail": response.text[:500]}
+    return ServiceProblem(response.status_code, problem if isinstance(problem, dict) else {})
+
+
+def words(filters: Mapping[str, Any]) -> dict[str, Any]:
+    """Filters as a query: without those not given, true and false in lower case."""
+    given = {key: value for key, value in filters.items() if value is not None}
+    return {key: str(value).lower() if isinstance(value, bool) else value for key, value in given.items()}
+
+
+def segment(name: str) -> str:
+    """An id as one segment of a path."""
+    return quote(name, safe="")
