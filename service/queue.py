@@ -27,6 +27,8 @@ from service.waiters import Waiters
 log = logging.getLogger("stickslip.queue")
 
 _TROUBLE_SECONDS = 1.0
+# Progress is told here as it comes, and written for other services and the time after a crash.
+_WRITE_SECONDS = 1.0
 _MOST_POINTS = 50_000
 
 
@@ -45,6 +47,7 @@ class _Running:
 
     attempt: Attempt
     started: float
+    written: float
     fraction: float = 0.0
     points: int = 0
     stop: _StopReason | None = None
@@ -168,11 +171,16 @@ class JobQueue:
         return self._thread.is_alive() and not self._stopping
 
     def progress(self, attempt: Attempt, fraction: float, points: int) -> None:
-        """From the executor: remember, write and pass on how far an attempt got."""
+        """From the executor: remember and pass on how far an attempt got; write it now and then."""
         entry = self._entry(attempt)
         if entry is None or self._stopping:
             return
         entry.fraction, entry.points = fraction, points
+        now = time.monotonic()
+        if now - entry.written < min(_WRITE_SECONDS, self._settings.lease_seconds / 3.0):
+            self._waiters.progress(attempt.job_id, fraction, points)
+            return
+        entry.written = now
         try:
             owned = self._jobs.report(attempt, fraction, points, self._lease_until())
         except Exception:
@@ -200,6 +208,8 @@ class JobQueue:
         except Exception:
             log.exception("job %s: its checkpoint could not be written", attempt.job_id)
             return
+        # The report that counts what is kept comes next, and is written as well.
+        entry.written = -math.inf
         if not owned:
             self._ask_to_stop(entry, _StopReason.LEASE)
 
@@ -216,7 +226,9 @@ class JobQueue:
             log.exception("job %s: its outcome could not be written, it will be tried again", attempt.job_id)
         finally:
             with self._lock:
-                self._running.pop(attempt.job_id, None)
+                # Given back, the job may run here again by now, as another attempt.
+                if entry is not None and self._running.get(attempt.job_id) is entry:
+                    del self._running[attempt.job_id]
             self._waiters.ended(attempt.job_id)
             self._wake.set()
 
@@ -291,7 +303,7 @@ class JobQueue:
         while not self._stopping:
             self._wake.clear()
             try:
-                while not self._stopping and self._executor.free() > 0 and self._take_one():
+                while not self._stopping and self._take_some():
                     pass
                 self._upkeep()
             except Exception:
@@ -299,19 +311,26 @@ class JobQueue:
                 time.sleep(_TROUBLE_SECONDS)
             self._wake.wait(self._patience())
 
-    def _take_one(self) -> bool:
-        """Claim a job and have it run; whether there was one."""
+    def _take_some(self) -> bool:
+        """Claim as many jobs as the executor takes and have them run; whether there may be more."""
+        free = self._executor.free()
+        if free <= 0:
+            return False
         with self._claiming:
-            attempt = self._jobs.claim(self.owner, self._lease_until())
-            if attempt is None:
-                return False
+            attempts = self._jobs.claim_several(self.owner, self._lease_until(), free)
+            now = time.monotonic()
+            entries = [
+                _Running(attempt=one, started=now, written=now, fraction=one.progress, points=one.points)
+                for one in attempts
+            ]
             with self._lock:
-                self._running[attempt.job_id] = _Running(
-                    attempt=attempt,
-                    started=time.monotonic(),
-                    fraction=attempt.progress,
-                    points=attempt.points,
-                )
+                self._running.update((entry.attempt.job_id, entry) for entry in entries)
+        for entry in entries:
+            self._submit(entry)
+        return len(attempts) == free
+
+    def _submit(self, entry: _Running) -> None:
+        attempt = entry.attempt
         log.info(
             "job %s (%s), attempt %d of %d",
             attempt.job_id,
@@ -320,8 +339,10 @@ class JobQueue:
             attempt.max_attempts,
         )
         self._executor.submit(attempt)
+        if entry.stop is not None:
+            # Told to stop before the executor had it.
+            self._executor.stop_attempt(attempt)
         self._waiters.progress(attempt.job_id, attempt.progress, attempt.points)
-        return True
 
     def _patience(self) -> float:
         """Time until something must be looked at without being woken [s]."""

@@ -16,6 +16,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from ctypes import Array
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from types import FrameType
@@ -23,7 +24,7 @@ from typing import Any
 
 from optim.errors import DesignError
 from service import strict_json
-from service.checkpoints import Checkpoints
+from service.checkpoints import Checkpoints, Kept
 from service.jobs import FailureKind, JobFailure, JobOutput, Pace, Piece, Point, RunOn, WarmUp
 from solver.errors import SceneError, SettingError, SolverError
 
@@ -80,45 +81,65 @@ class Done:
     retry: str | None = None
 
 
-class StopFlag:
-    """Shared memory in which the parent writes the token of the task that is to stop.
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """From a worker: something about the task with this token."""
 
-    A plain number: reading it costs nothing, and a process killed while it looks cannot hold a lock.
+    token: int
+    about: Report | Kept | Done
+
+
+class Orders:
+    """Shared memory in which the parent writes which tasks are to stop.
+
+    Plain numbers: reading them costs nothing, and a process killed while it looks cannot hold a lock.
     """
 
-    def __init__(self, number: ctypes.c_longlong) -> None:
-        self._number = number
+    SIZE = 3
 
-    def ask(self, token: int) -> None:
-        """Ask the task with this token to stop; later ones are not meant."""
-        self._number.value = token
+    def __init__(self, numbers: Array[ctypes.c_longlong]) -> None:
+        self._numbers = numbers
 
-    def asked(self, token: int) -> bool:
+    def stop(self, token: int) -> None:
+        """Have the task with this token stop; later ones are not meant."""
+        self._numbers[0] = token
+
+    def withdraw(self, first: int, last: int) -> None:
+        """Have the tasks with these tokens and those between not begin, or stop."""
+        # The range is empty in between: tokens grow, and those withdrawn before were answered by now.
+        self._numbers[1] = first
+        self._numbers[2] = last
+
+    def stopped(self, token: int) -> bool:
         """Whether this task is to stop."""
-        return self._number.value == token
+        return self._numbers[0] == token or self.withdrawn(token)
+
+    def withdrawn(self, token: int) -> bool:
+        """Whether this task is not to begin."""
+        return self._numbers[1] <= token <= self._numbers[2]
 
 
 class _Stop:
     """`should_stop` of one task; remembers that it answered yes."""
 
-    def __init__(self, flag: StopFlag, token: int) -> None:
-        self._flag = flag
+    def __init__(self, orders: Orders, token: int) -> None:
+        self._orders = orders
         self._token = token
         self.obeyed = False
 
     def __call__(self) -> bool:
-        if self._flag.asked(self._token):
+        if self._orders.stopped(self._token):
             self.obeyed = True
         return self.obeyed
 
 
 class Throttle:
-    """`on_progress` of one task; sends at most one report every `interval` seconds."""
+    """`on_progress` of one task; sends at most one report every `interval` seconds, none of a shorter one."""
 
     def __init__(self, send: Callable[[Report], None], interval: float) -> None:
         self._send = send
         self._interval = interval
-        self._next = 0.0
+        self._next = time.monotonic() + interval
         self._found: list[Point] = []
 
     def __call__(self, fraction: float, points: int) -> None:
@@ -136,7 +157,7 @@ class Throttle:
 
 def main(
     connection: Connection,
-    number: ctypes.c_longlong,
+    numbers: Array[ctypes.c_longlong],
     runs: Mapping[str, RunOn],
     warm_up: WarmUp,
     pace: Pace,
@@ -146,7 +167,7 @@ def main(
     signal.signal(signal.SIGTERM, _leave_soon)
     threading.Thread(target=_die_with_parent, name="parent watch", daemon=True).start()
     warm_up()
-    flag = StopFlag(number)
+    orders = Orders(numbers)
     connection.send(Ready())
     while True:
         try:
@@ -155,13 +176,20 @@ def main(
             return
         if task is None:
             return
-        stop = _Stop(flag, task.token)
-        kept = Checkpoints(task.job_id, task.saved, connection.send, pace)
-        done = _compute(runs, task, Throttle(connection.send, pace.progress_seconds), stop, kept)
+        if orders.withdrawn(task.token):
+            connection.send(Reply(task.token, Done()))
+            continue
+        stop, reply = _Stop(orders, task.token), _replying(connection, task)
+        kept = Checkpoints(task.job_id, task.saved, reply, pace)
+        done = _compute(runs, task, Throttle(reply, pace.progress_seconds), stop, kept)
         try:
-            connection.send(done)
+            connection.send(Reply(task.token, done))
         except (pickle.PicklingError, TypeError, AttributeError) as error:
-            connection.send(Done(failure=failure_of(task, error)))
+            connection.send(Reply(task.token, Done(failure=failure_of(task, error))))
+
+
+def _replying(connection: Connection, task: Task) -> Callable[[Report | Kept], None]:
+    return lambda about: connection.send(Reply(task.token, about))
 
 
 def _leave_soon(_signal: int, _frame: FrameType | None) -> None:
