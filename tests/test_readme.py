@@ -72,6 +72,8 @@ def test_commands_run(
     if words[1] == "submit":
         monkeypatch.setenv("STICKSLIP_URL", request.getfixturevalue("server"))
     given = matrix_files(tmp_path) if words[1] == "import" else set()
+    if "--reduce" in words:
+        given |= {f"{Path(words[words.index('--out') + 1]).stem}-reduced.npz"}
     if "--problem" in words:
         (tmp_path / "docs").symlink_to(ROOT / "docs")
         given = {"docs"}

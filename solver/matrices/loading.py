@@ -10,12 +10,15 @@ import numpy as np
 from scipy.sparse import coo_array
 
 from solver.errors import Issue, SceneError
-from solver.matrices.files import MatrixFileError, read_matrix, read_modes
+from solver.matrices.files import MatrixFileError, read_labelled, read_modes
+from solver.matrices.labels import label
 from solver.matrices.reduction import craig_bampton
+from solver.matrices.sets import UNITS, MatrixSet, in_si, put_together
 from solver.matrices.structure import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix, Modes
 
 KEEP_MODES = "keep_modes"
+MAPPING, IN_UNITS = "mapping", "units"
 _MATRICES = ("M", "K", "C")
 
 
@@ -34,22 +37,55 @@ def with_files(raw: Mapping[str, object], folder: Path) -> dict[str, object]:
     structure = raw.get("structure")
     if not isinstance(structure, dict) or structure.get("kind") != "matrices":
         return dict(raw)
-    tables, sparse, issues = dict(structure), {}, []
-    for key in (*_MATRICES, "modes"):
-        if not isinstance(tables.get(key), str):
-            continue
+    tables = dict(structure)
+    try:
+        if isinstance(tables.get("modes"), str):
+            tables["modes"] = read_modes(folder / tables["modes"])
+    except MatrixFileError as error:
+        raise SceneError([_issue("modes", f"`modes`: {error}")]) from error
+    found = _matrices(tables, folder)
+    if isinstance(tables.get("modes"), Modes):
+        tables = _rows_in_use(tables)
+    return {**raw, "structure": _reduced(tables, found.matrices)}
+
+
+def _matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:
+    """The matrices that files hold, in SI units; labels among the DOFs of `tables` become rows."""
+    paths = {key: folder / tables[key] for key in _MATRICES if isinstance(tables.get(key), str)}
+    mapping, units = tables.pop(MAPPING, None), tables.pop(IN_UNITS, "SI")
+    if mapping is not None and not isinstance(mapping, str):
+        raise SceneError([_issue(MAPPING, f"`{MAPPING}` must be the name of a file, got {mapping!r}")])
+    if units not in UNITS:
+        known = ", ".join(UNITS)
+        raise SceneError([_issue(IN_UNITS, f"`{IN_UNITS}` must be one of {known}, got {units!r}")])
+    if not paths:
+        return MatrixSet(matrices={})
+    issues, parts = [], {}
+    for key, path in paths.items():
         try:
-            if key == "modes":
-                tables[key] = read_modes(folder / tables[key])
-            else:
-                sparse[key] = read_matrix(folder / tables[key], key)
+            parts[key] = read_labelled(path, key)
         except MatrixFileError as error:
             issues.append(_issue(key, f"`{key}`: {error}"))
     if issues:
         raise SceneError(issues)
-    if isinstance(tables.get("modes"), Modes):
-        tables = _rows_in_use(tables)
-    return {**raw, "structure": _reduced(tables, sparse)}
+    try:
+        found = in_si(put_together(parts, paths, None if mapping is None else folder / mapping), units)
+    except MatrixFileError as error:
+        raise SceneError([_issue(MAPPING, str(error))]) from error
+    if isinstance(tables.get("dofs"), dict):
+        tables["dofs"] = {name: _row(name, row, found) for name, row in tables["dofs"].items()}
+    return found
+
+
+def _row(name: str, given: object, found: MatrixSet) -> object:
+    """The row that a label such as 1203.UX names; anything else as it is."""
+    if not isinstance(given, str):
+        return given
+    wanted = label(given)
+    row = None if wanted is None else found.row(wanted)
+    if row is None:
+        raise SceneError([_issue(f"dofs/{name}", f"`dofs`: {name!r} {found.no_row(given)}")])
+    return row
 
 
 def _issue(key: str, message: str) -> Issue:
@@ -97,8 +133,7 @@ def _reduced(tables: dict[str, Any], sparse: dict[str, coo_array]) -> dict[str, 
 
 def _too_large(key: str, size: int) -> str:
     return (
-        f"`{key}` has {size} rows, {MOST_DOFS} are the most without reduction: set `{KEEP_MODES}` = 40 (say) "
-        "in [structure] to keep the DOFs named in `dofs` and that many modes of the rest, whose highest "
-        "frequency "
-        "should lie well above the harmonics that matter"
+        f"`{key}` has {size} rows, {MOST_DOFS} are the most without reduction: `stickslip import --reduce` "
+        f"reduces them once onto the DOFs in use and modes of the rest; `{KEEP_MODES}` = 40 (say) in "
+        "[structure] does it whenever the scene is loaded"
     )

@@ -11,6 +11,7 @@ from scipy.sparse import coo_array, csr_array, diags_array
 
 from solver.matrices.files import MatrixFileError, read_labelled
 from solver.matrices.labels import Label, labels_beside, read_labels
+from solver.matrices.labels import label as parsed
 from solver.matrices.text import FormatError
 from solver.matrices.triplets import Labelled
 
@@ -41,6 +42,26 @@ class MatrixSet:
         """The row of a label (zero-based); None if there is none."""
         return None if self.labels is None or label not in self.labels else self.labels.index(label)
 
+    def name(self, row: int) -> str:
+        """A row by its number and, where it is known, its label."""
+        return f"row {row}" if self.labels is None else f"row {row} ({self.labels[row]})"
+
+    def no_row(self, given: str) -> str:
+        """Why `given` names no row, and what would: the end of a sentence."""
+        if self.labels is None:
+            return (
+                f"is {given[:40]!r}, but the files do not tell the nodes of their rows: give the row, or a "
+                "file of labels (name.mapping of Ansys, name.dof of CalculiX) beside the matrices"
+            )
+        wanted = parsed(given)
+        if wanted is None:
+            return f"must be a row or a label such as {self.labels[0]}, got {given[:40]!r}"
+        there = [label for label in self.labels if label.node == wanted.node]
+        if there:
+            return f"is {given}, but node {wanted.node} has the DOFs {', '.join(map(str, there[:12]))}"
+        nodes = f"{self.labels[0].node} to {max(label.node for label in self.labels)}"
+        return f"is {given}, but there is no node {wanted.node} in use (nodes {nodes})"
+
 
 def read_set(paths: Mapping[str, Path], mapping: Path | None = None) -> MatrixSet:
     """Read the matrices of a structure.
@@ -58,7 +79,19 @@ def read_set(paths: Mapping[str, Path], mapping: Path | None = None) -> MatrixSe
     MatrixFileError
         A file that cannot be used, or files that do not belong together.
     """
-    parts = {key: read_labelled(path, key) for key, path in paths.items()}
+    return put_together({key: read_labelled(path, key) for key, path in paths.items()}, paths, mapping)
+
+
+def put_together(
+    parts: Mapping[str, Labelled], paths: Mapping[str, Path], mapping: Path | None = None
+) -> MatrixSet:
+    """The structure of matrices that were read from `paths`, as `read_set` makes it.
+
+    Raises
+    ------
+    MatrixFileError
+        A file of labels that cannot be used.
+    """
     if all(part.labels is not None for part in parts.values()):
         return _together(parts)
     sizes = {key: part.matrix.shape[0] for key, part in parts.items()}

@@ -1,0 +1,189 @@
+"""The files of `stickslip import`: which is M, K and C, which names the rows, and the rows of the DOFs."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from service.cli.failures import InputError
+
+if TYPE_CHECKING:
+    from solver.matrices.sets import MatrixSet
+
+ROLES = ("M", "K", "C")
+MOST_UNNAMED = 200
+_LABELS = (".mapping", ".dof")
+_BY_SUFFIX = {".mas": "M", ".sti": "K"}
+_WORDS = {
+    "M": ("M", "MASS", "MASSE"), "K": ("K", "STIF", "STIFF", "STIFFNESS"), "C": ("C", "DAMP", "DAMPING"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sources:
+    """What a scene is made of.
+
+    Attributes
+    ----------
+    roles : dict
+        File of each of M, K and C, or of ``modes``.
+    mapping : Path or None
+        File of the labels of the rows.
+    units : str
+        Of the files.
+    """
+
+    roles: dict[str, Path]
+    mapping: Path | None
+    units: str
+
+    def table(self, target: Path) -> dict[str, object]:
+        """The table [structure] of a scene at `target` that refers to the files."""
+        table: dict[str, object] = {"kind": "matrices"}
+        table |= {role: relative(path, target) for role, path in self.roles.items()}
+        if self.mapping is not None:
+            table["mapping"] = relative(self.mapping, target)
+        if self.units != "SI":
+            table["units"] = self.units
+        return table
+
+
+def relative(path: Path, target: Path) -> str:
+    """The name of a file as a scene at `target` refers to it."""
+    return Path(os.path.relpath(path.absolute(), target.absolute().parent)).as_posix()
+
+
+def sources(files: Sequence[str], mapping: str | None, units: str) -> Sources:
+    """Sort the files given by what they are."""
+    from solver.matrices.sets import UNITS
+
+    if units not in UNITS:
+        raise InputError(
+            f"`--units` must be one of {', '.join(UNITS)} (mm: mm, t, N, s; in: in, lbf s²/in, lbf, s), "
+            f"got {units!r}"
+        )
+    for name in [*files, *([mapping] if mapping else [])]:
+        if not Path(name).is_file():
+            raise InputError(f"`FILES`: there is no file {name!r}")
+    labels = [name for name in files if Path(name).suffix.lower() in _LABELS]
+    matrices = [name for name in files if name not in labels]
+    if len(labels) + (mapping is not None) > 1:
+        raise InputError(f"`FILES`: one file names the rows, got {', '.join([*labels, mapping or ''])}")
+    if not 0 < len(matrices) <= len(ROLES):
+        raise InputError(f"`FILES` takes M, K and maybe C, got {len(matrices)} files")
+    if len(matrices) == 1:
+        roles = dict.fromkeys(_roles_of_one(Path(matrices[0])), Path(matrices[0]))
+    else:
+        roles = {role: Path(name) for role, name in _assigned(matrices).items()}
+    rows = mapping or next(iter(labels), None)
+    return Sources(roles=roles, mapping=None if rows is None else Path(rows), units=units)
+
+
+def _assigned(files: Sequence[str]) -> dict[str, str]:
+    """Files by their role: as the last word or the suffix of all names tells, else in the order M, K, C."""
+    told = [_role(Path(name)) for name in files]
+    known = [role for role in told if role is not None]
+    if len(set(known)) == len(files) and {"M", "K"} <= set(known):
+        return dict(zip(known, files, strict=True))
+    return dict(zip(ROLES, files, strict=False))
+
+
+def _role(path: Path) -> str | None:
+    if path.suffix.lower() in _BY_SUFFIX:
+        return _BY_SUFFIX[path.suffix.lower()]
+    words = re.findall("[A-Za-z]+", path.stem)
+    last = words[-1].upper() if words else ""
+    return next((role for role, known in _WORDS.items() if last in known), None)
+
+
+def _roles_of_one(path: Path) -> tuple[str, ...]:
+    """What a single file holds: matrices under their names, or modes."""
+    from solver.matrices.files import MatrixFileError, array_names
+
+    try:
+        names = array_names(path)
+    except MatrixFileError as error:
+        raise InputError(f"`FILES`: {error}") from error
+    if {"M", "K"} <= set(names):
+        return tuple(role for role in ROLES if role in names)
+    if "modes" in names:
+        return ("modes",)
+    held = ", ".join(f"`{name}`" for name in names[:20]) or "nothing with a name"
+    raise InputError(f"`FILES`: {str(path)!r} alone must hold M and K, or modes; it holds {held}")
+
+
+def read_sources(found: Sources) -> MatrixSet | None:
+    """The matrices in SI units, checked for size; None for modes."""
+    from solver.matrices.files import MatrixFileError
+    from solver.matrices.sets import in_si, read_set
+
+    if "modes" in found.roles:
+        return None
+    try:
+        return in_si(read_set(found.roles, found.mapping), found.units)
+    except MatrixFileError as error:
+        raise InputError(f"`FILES`: {error}") from error
+
+
+def dof_table(texts: Sequence[str] | None, found: Sources, given: MatrixSet | None) -> dict[str, int | str]:
+    """Names of DOFs, each with its row or label; all rows of a small model if none is named."""
+    if not texts:
+        return _all_rows(found, given)
+    table: dict[str, int | str] = {}
+    for text in texts:
+        name, row = _dof(text)
+        if name in table:
+            raise InputError(f"`--dof` names {name!r} twice; keep one")
+        table[name] = row
+    return table
+
+
+def _dof(text: str) -> tuple[str, int | str]:
+    from solver.matrices.labels import label
+
+    name, equals, row = text.rpartition("=")
+    if equals and name and re.fullmatch(r"[0-9]{1,12}", row):
+        return name, int(row)
+    wanted = label(row)
+    if wanted is None or bool(equals) != bool(name):
+        raise InputError(
+            "`--dof` takes NAME=ROW with a row from 0 or a label, for example tip=399 or tip=1203.UX, "
+            f"got {text!r}"
+        )
+    return name or str(wanted).replace(".", "-"), str(wanted)
+
+
+def _all_rows(found: Sources, given: MatrixSet | None) -> dict[str, int | str]:
+    from solver.matrices.files import MatrixFileError, read_modes
+
+    if given is not None:
+        size = next(iter(given.matrices.values())).shape[0]
+    else:
+        try:
+            size = read_modes(found.roles["modes"]).size
+        except MatrixFileError as error:
+            raise InputError(f"`FILES`: {error}") from error
+    if size > MOST_UNNAMED:
+        example = "tip=399" if given is None or given.labels is None else f"tip={given.labels[-1]}"
+        raise InputError(f"`--dof` is needed: the model has {size} rows, name those that you use ({example})")
+    if given is not None and given.labels is not None:
+        return {str(label).replace(".", "-"): str(label) for label in given.labels}
+    return {f"x{row}": row for row in range(size)}
+
+
+def rows_of(table: Mapping[str, int | str], given: MatrixSet) -> dict[str, int]:
+    """The rows that a table of DOFs names."""
+    from solver.matrices.labels import label
+
+    rows: dict[str, int] = {}
+    for name, row in table.items():
+        wanted = label(row) if isinstance(row, str) else None
+        at = row if isinstance(row, int) else None if wanted is None else given.row(wanted)
+        if at is None:
+            raise InputError(f"`--dof`: {name!r} {given.no_row(str(row))}")
+        rows[name] = at
+    return rows

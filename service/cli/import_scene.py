@@ -1,0 +1,50 @@
+"""The scene that `stickslip import` writes: its table, its band, its text."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from service.cli.failures import InputError
+
+_CONTACT = """
+# A contact joins two DOFs, or one and "ground"; take away the # and give your values.
+# [[contacts]]
+# name = "damper"
+# between = ["{dof}", "ground"]
+# kt = 1e6     # N/m
+# mu = 0.3
+# N0 = 100.0   # N
+"""
+
+
+def band(start: float | None, stop: float | None, frequencies: Sequence[float]) -> list[float]:
+    """The band asked for; around the first elastic mode if left out."""
+    elastic = [f for f in frequencies if f > 1e-5 * frequencies[-1]] or [1.0]
+    low = 0.5 * elastic[0] if start is None else start
+    high = 2.0 * max(elastic[0], low) if stop is None else stop
+    if not 0.0 < low < high < math.inf:
+        raise InputError(
+            f"`--from` and `--to` must be frequencies with 0 < from < to, got {low:g} and {high:g}"
+        )
+    return [float(f"{low:.6g}"), float(f"{high:.6g}")]
+
+
+def toml(raw: Mapping[str, Any], remarks: Sequence[str] = ()) -> str:
+    """The scene as a file; JSON texts are TOML texts."""
+    structure, observe, force = raw["structure"], raw["observe"], raw["excitation"]
+    lines = [f"name = {json.dumps(raw['name'])}", "", *(f"# {remark}" for remark in remarks), "[structure]"]
+    for key, value in structure.items():
+        if key != "dofs":
+            lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
+    lines += [
+        "# stiffness_proportional_damping = 1e-6   # s; see also mass_proportional_damping, damping_ratio"
+    ]
+    lines += ["", "[structure.dofs] # rows of the matrices, zero-based, or node and component"]
+    lines += [f"{json.dumps(name)} = {json.dumps(row)}" for name, row in structure["dofs"].items()]
+    lines += [_CONTACT.format(dof=force["dof"]).rstrip("\n"), "", "[excitation]"]
+    lines += [f"dof = {json.dumps(force['dof'])}", "amplitude = 1.0 # N", "", "[observe]"]
+    lines += [f"dof = {json.dumps(observe['dof'])}", f"band = {json.dumps(observe['band'])} # Hz", ""]
+    return "\n".join(lines)
