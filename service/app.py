@@ -15,7 +15,7 @@ from service.http import HostCheck
 from service.jobs import Registry
 from service.kinds import SHIPPED
 from service.metrics import Measured, Metrics
-from service.routes import designs, events, health, jobs, metrics, plan, scenes, sweeps, uploads
+from service.routes import designs, events, health, jobs, metrics, plan, reference, scenes, sweeps, uploads
 from service.settings import Settings, load_settings
 
 _DESCRIPTION = "Designs friction dampers: jobs, their results, and every frequency response computed."
@@ -47,6 +47,7 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
         version=SOLVER_VERSION,
         lifespan=lifespan,
         docs_url=None,
+        generate_unique_id_function=lambda route: route.name,
         redoc_url=None,
         telemetry={"tracing": False, "metrics": False, "logs": False, "auto_configure": False},
     )
@@ -57,7 +58,7 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
     app.add_middleware(Measured, metrics=app.state.metrics)
     problems.install(app)
     events.install(app)
-    for module in (jobs, events, designs, sweeps, scenes, uploads, plan, health, metrics):
+    for module in (jobs, events, designs, sweeps, scenes, uploads, plan, health, metrics, reference):
         app.include_router(module.router)
     openapi.install(app, registry)
     return app

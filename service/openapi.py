@@ -7,11 +7,17 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic import BaseModel
 
+from service import error_examples
 from service.jobs import Registry
 from service.routes.plan import PlanRequest
-from solver.scene import Scene
+from service.routes.uploads import UPLOAD_MEDIA
+from solver.scene import Scene, load_scene
 
 _REFERENCE = "#/components/schemas/{model}"
+_FILE: dict[str, Any] = {"type": "string", "contentMediaType": "application/octet-stream"}
+_MATRIX = {
+    "MatrixMarket": {"value": "%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 1 1.0\n2 2 2.0\n"}
+}
 _PROBLEM: dict[str, Any] = {
     "type": "object",
     "description": "RFC 9457",
@@ -53,23 +59,32 @@ def install(app: FastAPI, registry: Registry) -> None:
 
 def _complete(description: dict[str, Any], registry: Registry) -> None:
     schemas = description.setdefault("components", {}).setdefault("schemas", {})
-    schemas["Problem"] = _PROBLEM
     kinds = {kind.name: _with_kind(_schema(kind.request, schemas), kind.name) for kind in registry}
     bodies: dict[str, dict[str, Any]] = {
         "/v1/jobs": {"oneOf": list(kinds.values())},
         "/v1/plan": _schema(PlanRequest, schemas),
-        "/v1/scenes": _schema(Scene, schemas),
+        "/v1/scenes": {**_schema(Scene, schemas), "examples": [load_scene("two-dof").to_dict()]},
     }
     if "design" in kinds:
         bodies["/v1/designs"] = _schema(registry["design"].request, schemas)
     for path, schema in bodies.items():
-        content = {"application/json": {"schema": schema}}
+        content = {"application/json": {"schema": schema, "examples": _examples(path, schema, kinds)}}
         description["paths"][path]["post"]["requestBody"] = {"required": True, "content": content}
-    problem = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
-    for operations in description["paths"].values():
-        for operation in operations.values():
-            operation["responses"].pop("422", None)
-            operation["responses"]["default"] = {"description": "A problem.", "content": problem}
+    description["paths"]["/v1/uploads"]["post"]["requestBody"] = {
+        "required": True,
+        "content": {form: {"schema": _FILE, "examples": _MATRIX} for form in UPLOAD_MEDIA},
+    }
+    error_examples.describe(description, _PROBLEM)
+
+
+def _examples(path: str, schema: dict[str, Any], kinds: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """Examples by name: those of every kind of job, or those of the one body."""
+    named = kinds if path == "/v1/jobs" else {path.rpartition("/")[2]: schema}
+    return {
+        f"{name} {number}" if number > 1 else name: {"value": example}
+        for name, one in named.items()
+        for number, example in enumerate(one.get("examples", ()), 1)
+    }
 
 
 def _schema(model: type[BaseModel], schemas: dict[str, Any]) -> dict[str, Any]:

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from fastapi import APIRouter, Response
 
+from service.answers import Answer
 from service.health import Health, check
 from service.http import ServiceDependency
 
 router = APIRouter(prefix="/health", tags=["health"])
 
 
-@router.get("/live")
-async def live() -> dict[str, str]:
+class Alive(Answer):
     """The process answers."""
-    return {"status": "live"}
+
+    status: Literal["live"] = "live"
+
+
+@router.get("/live")
+async def live() -> Alive:
+    """The process answers."""
+    return Alive()
 
 
 @router.get("/ready", responses={503: {"model": Health, "description": "It cannot work now."}})

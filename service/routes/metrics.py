@@ -5,11 +5,12 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 
 from service.metrics import CONTENT_TYPE, Metrics
+from service.routes.described import TEXT, media
 
 router = APIRouter(tags=["health"])
 
 
-@router.get("/metrics", response_class=Response, responses={200: {"content": {"text/plain": {}}}})
+@router.get("/metrics", response_class=Response, responses={200: media({"text/plain": TEXT})})
 def metrics(request: Request) -> Response:
     """Requests, jobs and workers in Prometheus' text format."""
     held: Metrics = request.app.state.metrics

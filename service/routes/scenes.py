@@ -22,7 +22,11 @@ def get_scene(name: str, service: ServiceDependency, caller: CallerDependency) -
     return SceneDetail.of(service.scenes.of(caller).get(name))
 
 
-@router.post("", status_code=201, responses={200: {"description": "The same scene was stored before."}})
+@router.post(
+    "",
+    status_code=201,
+    responses={200: {"model": SceneDetail, "description": "The same scene was stored before."}},
+)
 def store_scene(
     body: JsonBody, service: ServiceDependency, caller: CallerDependency, response: Response
 ) -> SceneDetail:
