@@ -15,6 +15,7 @@ from service.http import HostCheck
 from service.jobs import Registry
 from service.kinds import SHIPPED
 from service.metrics import Measured, Metrics
+from service.request_log import RequestLog
 from service.routes import designs, events, health, jobs, metrics, plan, reference, scenes, sweeps, uploads
 from service.settings import Settings, load_settings
 
@@ -56,6 +57,7 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
     app.add_middleware(Head)
     app.add_middleware(HostCheck, hosts=service.settings.hosts)
     app.add_middleware(Measured, metrics=app.state.metrics)
+    app.add_middleware(RequestLog)
     problems.install(app)
     events.install(app)
     for module in (jobs, events, designs, sweeps, scenes, uploads, plan, health, metrics, reference):

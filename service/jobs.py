@@ -124,7 +124,7 @@ class Piece:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pace:
-    """How often a worker tells what.
+    """How often a worker tells what, and how it logs.
 
     Attributes
     ----------
@@ -134,11 +134,15 @@ class Pace:
         Least time between two checkpoints of an attempt [s].
     checkpoint_bytes : int
         Most that a job keeps for later attempts.
+    log_level, log_format : str
+        As in `service.logs.configure`.
     """
 
     progress_seconds: float
     checkpoint_seconds: float
     checkpoint_bytes: int
+    log_level: str = "INFO"
+    log_format: str = "text"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

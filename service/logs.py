@@ -1,13 +1,77 @@
-"""Where the log of a service process goes."""
+"""The log of a service process: lines for people, or one JSON object a line for programs.
+
+Fields such as the job or the request are not part of a message: they are put on every line that is written
+inside `about`, whoever writes it.
+"""
 
 from __future__ import annotations
 
+import json
 import logging
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from datetime import UTC, datetime
 
-_FORMAT = "%(asctime)s %(levelname)s %(name)s %(message)s"
+_TEXT = "%(asctime)s %(levelname)s %(name)s %(message)s"
+_FIELDS: ContextVar[Mapping[str, object]] = ContextVar("stickslip_log_fields", default={})  # noqa: B039
+# Said in lines for people too: what connects them to a request. A job is in the message.
+_SHOWN = ("request",)
 
 
-def configure(level: int = logging.INFO) -> None:
-    """Log to standard error, unless the program has set up logging already."""
-    logging.basicConfig(level=level, format=_FORMAT)
+@contextmanager
+def about(**fields: object) -> Iterator[None]:
+    """Put fields on every line that is logged inside the block, by this thread or task."""
+    token = _FIELDS.set({**_FIELDS.get(), **{k: v for k, v in fields.items() if v is not None}})
+    try:
+        yield
+    finally:
+        _FIELDS.reset(token)
+
+
+class TextFormatter(logging.Formatter):
+    """Lines for people."""
+
+    def __init__(self) -> None:
+        super().__init__(_TEXT)
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The line of a record."""
+        fields = _FIELDS.get()
+        shown = "".join(f" [{name} {fields[name]}]" for name in _SHOWN if name in fields)
+        return super().format(record) + shown
+
+
+class JsonFormatter(logging.Formatter):
+    """One JSON object a line: time, level, logger, message, the fields, and the exception if there is one."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The line of a record."""
+        time = datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds")
+        line: dict[str, object] = {
+            "time": time.replace("+00:00", "Z"),
+            "level": record.levelname,
+            "logger": record.name,
+            "message": record.getMessage(),
+            **_FIELDS.get(),
+        }
+        if record.exc_info:
+            line["exception"] = self.formatException(record.exc_info)
+        return json.dumps(line, default=str)
+
+
+FORMATTERS: Mapping[str, type[logging.Formatter]] = {"text": TextFormatter, "json": JsonFormatter}
+
+
+def configure(level: str = "INFO", form: str = "text") -> None:
+    """Log to standard error, unless the program has set up logging already.
+
+    Parameters
+    ----------
+    level : least level that is logged.
+    form : ``text`` or ``json``.
+    """
+    handler = logging.StreamHandler()
+    handler.setFormatter(FORMATTERS[form]())
+    logging.basicConfig(level=level, handlers=[handler])
     logging.getLogger("alembic").setLevel(logging.WARNING)

@@ -15,9 +15,11 @@ import socket
 import threading
 import time
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
+from service import logs
 from service.executors.base import Executor, ExecutorStatus, Failed, Finished, Lost, Outcome, Stopped
 from service.jobs import FailureKind, JobFailure, JobOutput, Piece, Point
 from service.repository import Attempt, JobRepository
@@ -76,6 +78,17 @@ class Live:
     fraction: float
     points: int
     found: Sequence[Point]
+
+
+def _about(attempt: Attempt, seconds: float | None = None) -> AbstractContextManager[None]:
+    """Put an attempt on the lines that are logged inside the block."""
+    return logs.about(
+        job=attempt.job_id,
+        kind=attempt.kind,
+        attempt=attempt.attempt,
+        owner=attempt.owner or None,
+        seconds=seconds,
+    )
 
 
 class JobQueue:
@@ -220,8 +233,10 @@ class JobQueue:
         runs out.
         """
         entry = self._entry(attempt)
+        seconds = None if entry is None else round(time.monotonic() - entry.started, 3)
         try:
-            self._conclude(attempt, outcome, None if entry is None else entry.stop)
+            with _about(attempt, seconds):
+                self._conclude(attempt, outcome, None if entry is None else entry.stop)
         except Exception:
             log.exception("job %s: its outcome could not be written, it will be tried again", attempt.job_id)
         finally:
@@ -246,7 +261,8 @@ class JobQueue:
 
     def _ask_to_stop(self, entry: _Running, reason: _StopReason) -> None:
         entry.stop = entry.stop or reason
-        log.info("job %s is told to stop: %s", entry.attempt.job_id, entry.stop.value)
+        with _about(entry.attempt):
+            log.info("job %s is told to stop: %s", entry.attempt.job_id, entry.stop.value)
         self._executor.stop_attempt(entry.attempt)
 
     def _conclude(self, attempt: Attempt, outcome: Outcome, stop: _StopReason | None) -> None:
@@ -269,7 +285,7 @@ class JobQueue:
             failure = JobFailure(kind=FailureKind.GOAL, detail=output.shortfall)
             self._note(attempt, "did not reach its goal", written=self._jobs.fail(attempt, failure, output))
         elif self._jobs.succeed(attempt, output):
-            log.info("job %s was successful", attempt.job_id)
+            log.info("job %s, attempt %d: successful", attempt.job_id, attempt.attempt)
         else:
             self._note(attempt, "dismissed", written=self._jobs.dismiss(attempt))
 
@@ -331,13 +347,9 @@ class JobQueue:
 
     def _submit(self, entry: _Running) -> None:
         attempt = entry.attempt
-        log.info(
-            "job %s (%s), attempt %d of %d",
-            attempt.job_id,
-            attempt.kind,
-            attempt.attempt,
-            attempt.max_attempts,
-        )
+        with _about(attempt):
+            words = "job %s (%s), attempt %d of %d"
+            log.info(words, attempt.job_id, attempt.kind, attempt.attempt, attempt.max_attempts)
         self._executor.submit(attempt)
         if entry.stop is not None:
             # Told to stop before the executor had it.

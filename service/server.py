@@ -49,7 +49,7 @@ def serve(settings: Settings, registry: Registry = SHIPPED) -> None:
     DatabaseError
         If the database cannot be used (see `Service.start`).
     """
-    logs.configure()
+    logs.configure(settings.log_level, settings.log_format)
     app = create_app(settings, registry)
     service: Service = app.state.service
     listener = _bind(settings)
@@ -80,7 +80,7 @@ def work(settings: Settings, registry: Registry = SHIPPED, *, until_empty: bool 
     DatabaseError
         If the database cannot be used; `DatabaseInUseError` if a service has it.
     """
-    logs.configure()
+    logs.configure(settings.log_level, settings.log_format)
     stop = threading.Event()
     service = Service(settings, registry)
     with _signals(stop.set):
@@ -97,6 +97,7 @@ def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
     return uvicorn.Config(
         app,
         log_config=None,
+        access_log=False,
         lifespan="on",
         timeout_graceful_shutdown=max(1, round(settings.shutdown_seconds)),
         server_header=False,

@@ -158,6 +158,13 @@ class Settings(BaseSettings):
         default=True, description="Keep designs with their results for ever, and delete their sweeps alone."
     )
 
+    log_format: Literal["text", "json"] = Field(
+        default="text", description="The log on standard error: lines for people, or JSON objects."
+    )
+    log_level: Literal["DEBUG", "INFO", "WARNING", "ERROR"] = Field(
+        default="INFO", description="Least level that is logged."
+    )
+
     queue_limit: int = Field(
         default=1000, ge=1, le=1_000_000, description="Jobs waiting at most; further ones are answered 503."
     )
@@ -201,6 +208,8 @@ class Settings(BaseSettings):
             progress_seconds=self.progress_seconds,
             checkpoint_seconds=self.checkpoint_seconds,
             checkpoint_bytes=self.checkpoint_bytes,
+            log_level=self.log_level,
+            log_format=self.log_format,
         )
 
     @field_validator("database")

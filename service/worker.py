@@ -23,7 +23,7 @@ from types import FrameType
 from typing import Any
 
 from optim.errors import DesignError
-from service import strict_json
+from service import logs, strict_json
 from service.checkpoints import Checkpoints, Kept
 from service.jobs import FailureKind, JobFailure, JobOutput, Pace, Piece, Point, RunOn, WarmUp
 from solver.errors import SceneError, SettingError, SolverError
@@ -166,6 +166,7 @@ def main(
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _leave_soon)
     threading.Thread(target=_die_with_parent, name="parent watch", daemon=True).start()
+    logs.configure(pace.log_level, pace.log_format)
     warm_up()
     orders = Orders(numbers)
     connection.send(Ready())
@@ -181,7 +182,8 @@ def main(
             continue
         stop, reply = _Stop(orders, task.token), _replying(connection, task)
         kept = Checkpoints(task.job_id, task.saved, reply, pace)
-        done = _compute(runs, task, Throttle(reply, pace.progress_seconds), stop, kept)
+        with logs.about(job=task.job_id, kind=task.kind):
+            done = _compute(runs, task, Throttle(reply, pace.progress_seconds), stop, kept)
         try:
             connection.send(Reply(task.token, done))
         except (pickle.PicklingError, TypeError, AttributeError) as error:

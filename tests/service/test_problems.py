@@ -180,7 +180,7 @@ def test_a_scene_without_friction_has_nothing_to_choose_by_itself() -> None:
 def test_a_front_has_the_keys_of_a_design_but_its_own() -> None:
     theirs = set(inspect.signature(optim.pareto_front).parameters) - {"scene", "on_progress", "should_stop"}
     keys = set(ParetoRequest.model_fields)
-    assert theirs == keys - {"scene", "set", "fresh", "priority"}
+    assert theirs == keys - {"scene", "set", "fresh", "priority", "max_seconds"}
     body = {**EVERY_KEY, "points": 5}
     for key in ("weights", "max_band_hz", "basins"):
         with pytest.raises(InvalidRequestError, match="is not a known key") as caught:
