@@ -7,10 +7,12 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import httpx
 import pytest
 from service_helpers import pids, until
 
@@ -173,3 +175,59 @@ def test_a_long_sweep_goes_on_after_every_way_to_end_a_service(
     )
     process.terminate()
     assert process.wait(10.0) == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.long)])
+def test_a_stop_waits_for_nobody(port: int, start: Start, client: Client, number: signal.Signals) -> None:
+    """Open streams and waiting requests are sent home, clients that do nothing are left behind."""
+    process = start(port)
+    until(lambda: answers(client))
+    job = client.submit({"kind": "iteration", "seconds": 60.0}).id
+    until(lambda: client.job(job).status is JobState.RUNNING)
+    address = f"http://127.0.0.1:{port}"
+    ended: dict[str, float] = {}
+    began = threading.Barrier(4)
+
+    def follow(name: str) -> None:
+        with httpx.stream("GET", f"{address}/v1/jobs/{job}/events", timeout=60.0) as response:
+            lines = response.iter_lines()
+            next(lines)
+            began.wait()
+            for _ in lines:
+                pass
+        ended[name] = time.monotonic()
+
+    def wait() -> None:
+        began.wait()
+        body = {"kind": "iteration", "seconds": 60.0, "seed": 1}
+        answer = httpx.post(f"{address}/v1/jobs", json=body, headers={"Prefer": "wait=50"}, timeout=60.0)
+        assert answer.status_code == 202, "it is told where its job is"
+        ended["waiting"] = time.monotonic()
+
+    threads = [threading.Thread(target=follow, args=(name,)) for name in ("one", "two")]
+    threads.append(threading.Thread(target=wait))
+    for thread in threads:
+        thread.start()
+    half_said = [
+        b"GET /v1/jobs HTTP/1.1\r\nHost: 127.0.0.1\r\n",
+        b"POST /v1/jobs HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+        b"Content-Length: 1000\r\n\r\n{",
+        b"",
+    ]
+    sockets = [socket.create_connection(("127.0.0.1", port)) for _ in half_said]
+    for one, text in zip(sockets, half_said, strict=True):
+        one.sendall(text)
+    began.wait()
+    time.sleep(0.5)
+    asked = time.monotonic()
+    process.send_signal(number)
+    assert process.wait(20.0) == 0
+    took = time.monotonic() - asked
+    for thread in threads:
+        thread.join(5.0)
+    for one in sockets:
+        one.close()
+    assert set(ended) == {"one", "two", "waiting"}
+    assert max(ended.values()) - asked < 1.5, "who waits is sent home at once"
+    # Settings: 2 s for open requests, 0.5 s of grace for workers.
+    assert took < 2.0 + 0.5 + 2.5
