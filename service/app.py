@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -9,6 +10,9 @@ from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 
 from service import openapi, problems
+from service.access.doorkeeper import Doorkeeper
+from service.access.gate import Gate
+from service.access.seal import Seal
 from service.core import SOLVER_VERSION, Service
 from service.head import Head
 from service.http import HostCheck
@@ -18,6 +22,8 @@ from service.metrics import Measured, Metrics
 from service.request_log import RequestLog
 from service.routes import designs, events, health, jobs, metrics, plan, reference, scenes, sweeps, uploads
 from service.settings import Settings, load_settings
+
+log = logging.getLogger("stickslip.service")
 
 _DESCRIPTION = "Designs friction dampers: jobs, their results, and every frequency response computed."
 
@@ -37,6 +43,7 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         await run_in_threadpool(service.start)
+        await run_in_threadpool(_say_if_nobody_can_come_in, service)
         try:
             yield
         finally:
@@ -54,13 +61,21 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
     )
     app.state.service = service
     app.state.metrics = Metrics(service)
+    # The last one added is the outermost.
     app.add_middleware(Head)
+    app.add_middleware(Gate, doorkeeper=Doorkeeper(service.keys, service.settings, service.jobs.now))
     app.add_middleware(HostCheck, hosts=service.settings.hosts)
     app.add_middleware(Measured, metrics=app.state.metrics)
     app.add_middleware(RequestLog)
     problems.install(app)
+    app.add_middleware(Seal, settings=service.settings)
     events.install(app)
     for module in (jobs, events, designs, sweeps, scenes, uploads, plan, health, metrics, reference):
         app.include_router(module.router)
     openapi.install(app, registry)
     return app
+
+
+def _say_if_nobody_can_come_in(service: Service) -> None:
+    if service.settings.keys_required and not service.keys.usable(service.jobs.now()):
+        log.warning("requests need a key and there is none: `stickslip keys create --owner NAME`")

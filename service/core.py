@@ -33,6 +33,7 @@ from service.repository import (
     SweepRow,
     UploadRepository,
 )
+from service.repository.keys import KeyRepository
 from service.retention import Retention
 from service.scene_store import SceneStore
 from service.settings import Settings
@@ -87,6 +88,7 @@ class Service:
         self.jobs = JobRepository(self.database, now)
         self.sweeps = SweepRepository(self.database)
         self.designs = DesignRepository(self.database)
+        self.keys = KeyRepository(self.database)
         self.uploads = Uploads(UploadRepository(self.database), settings)
         self.scenes = SceneStore(SceneRepository(self.database), self.uploads)
         self.waiters = Waiters()
@@ -150,14 +152,14 @@ class Service:
         ------
         InvalidRequestError
             Lists everything that is wrong with the body.
-        IdempotencyError, QueueFullError
+        IdempotencyError, QueueFullError, TooManyRequestsError
             See `JobRepository.submit`.
         """
         if "kind" not in body:
             raise InvalidRequestError([Issue(pointer="/kind", message="`kind` is missing")])
         kind = self.registry.get(body["kind"])
         request = validated(kind.request, {key: value for key, value in body.items() if key != "kind"})
-        seconds = self._seconds_limit(request)
+        seconds = self._seconds_limit(request, caller)
         resolved = kind.resolve(request, self.scenes.of(caller))
         new = NewJob(
             kind=kind.name,
@@ -174,20 +176,20 @@ class Service:
             owner=caller.owner,
             seconds_limit=seconds,
         )
-        row, inserted = self.jobs.submit(new, self.settings.queue_limit)
+        row, inserted = self.jobs.submit(new, self.settings.queue_limit, caller.limits.waiting)
         if row.state is JobState.ACCEPTED:
             self.queue.wake()
         return row, inserted
 
-    def _seconds_limit(self, request: JobRequest) -> float | None:
-        """The longest time an attempt may take, if the request says so [s]."""
-        asked, most = request.max_seconds, self.settings.job_seconds
+    def _seconds_limit(self, request: JobRequest, caller: Caller) -> float | None:
+        """The longest time an attempt may take, if the request or the key says so [s]."""
+        asked, of_key = request.max_seconds, caller.limits.seconds
+        most = min(self.settings.job_seconds, of_key or math.inf)
         if asked is not None and asked > most:
-            message = (
-                f"`max_seconds` must be at most {most:g}, which is the service's own limit, got {asked!r}"
-            )
+            whose = "the key's limit" if most == of_key else "the service's own limit"
+            message = f"`max_seconds` must be at most {most:g}, which is {whose}, got {asked!r}"
             raise InvalidRequestError([Issue(pointer="/max_seconds", message=message)])
-        return asked
+        return asked if asked is not None else of_key
 
     def job(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:
         """The job.

@@ -79,6 +79,28 @@ class HostRefusedError(ServiceError):
     """A request for a host name this service does not answer to."""
 
 
+class OriginRefusedError(ServiceError):
+    """A change that a web page of another origin asks for."""
+
+
+class UnauthorizedError(ServiceError):
+    """A request without a key that works.
+
+    Attributes
+    ----------
+    presented : bool
+        Whether there was a key.
+    """
+
+    def __init__(self, detail: str, *, presented: bool = False) -> None:
+        self.presented = presented
+        super().__init__(detail)
+
+
+class ForbiddenError(ServiceError):
+    """A request that its key does not allow."""
+
+
 class NotFoundError(ServiceError):
     """Nothing has this id or name, as far as the caller may know.
 
@@ -101,8 +123,8 @@ class IdempotencyError(ServiceError):
     """An `Idempotency-Key` used again for a different request."""
 
 
-class QueueFullError(ServiceError):
-    """The queue takes no more jobs at present.
+class RetryLaterError(ServiceError):
+    """Something that can be asked for again later.
 
     Attributes
     ----------
@@ -113,6 +135,14 @@ class QueueFullError(ServiceError):
     def __init__(self, detail: str, retry_after: int) -> None:
         self.retry_after = retry_after
         super().__init__(detail)
+
+
+class QueueFullError(RetryLaterError):
+    """The queue takes no more jobs at present."""
+
+
+class TooManyRequestsError(RetryLaterError):
+    """More requests, waiting jobs or wrong keys than are allowed."""
 
 
 class JobFailedError(ServiceError):

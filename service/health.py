@@ -10,22 +10,25 @@ from service.core import SOLVER_VERSION, Service
 from service.db import sqlite_note
 
 
-class Health(BaseModel):
+class Readiness(BaseModel):
+    """Whether the service takes and runs jobs, and no more."""
+
+    model_config = ConfigDict(frozen=True)
+
+    ready: bool
+
+
+class Health(Readiness):
     """How the service is.
 
     Attributes
     ----------
-    ready : bool
-        Whether it takes and runs jobs.
     trouble : list of str
         Why not.
     notes : list of str
         What its keeper should know although it works.
     """
 
-    model_config = ConfigDict(frozen=True)
-
-    ready: bool
     trouble: list[str]
     notes: list[str]
     version: str
@@ -70,3 +73,12 @@ def check(service: Service) -> Health:
         workers_busy=workers.busy,
         jobs=counts,
     )
+
+
+def readiness(service: Service) -> Readiness:
+    """Look at database, queue and workers, without counting anything: anybody may ask for this."""
+    try:
+        service.database.version()
+    except SQLAlchemyError:
+        return Readiness(ready=False)
+    return Readiness(ready=service.queue.alive and service.queue.status().ready > 0)

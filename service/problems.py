@@ -25,6 +25,7 @@ log = logging.getLogger("stickslip.http")
 
 MEDIA_TYPE = "application/problem+json"
 _RETRY_SECONDS = 5
+_CHALLENGE = 'Bearer realm="stickslip"'
 
 _STATUS: dict[type[errors.ServiceError], tuple[int, str, str]] = {
     errors.InvalidRequestError: (422, "invalid-request", "The request is not valid"),
@@ -35,6 +36,10 @@ _STATUS: dict[type[errors.ServiceError], tuple[int, str, str]] = {
     errors.NotAcceptableError: (406, "not-acceptable", "Not available in a form you accept"),
     errors.BodyTooLargeError: (413, "body-too-large", "The body is too large"),
     errors.HostRefusedError: (421, "host-refused", "This service does not answer to this host name"),
+    errors.OriginRefusedError: (403, "origin-refused", "A web page elsewhere may not ask for this"),
+    errors.UnauthorizedError: (401, "unauthorized", "A key is needed"),
+    errors.ForbiddenError: (403, "forbidden", "The key does not allow this"),
+    errors.TooManyRequestsError: (429, "too-many-requests", "Too many requests"),
     errors.NotFoundError: (404, "not-found", "Not found"),
     errors.ConflictError: (409, "conflict", "The request does not fit the present state"),
     errors.IdempotencyError: (
@@ -66,6 +71,8 @@ def problem(
         "instance": request.url.path,
         "errors": issues or [],
     }
+    # For the audit line; the outermost layer reads it from the same request.
+    request.state.problem = (slug, detail)
     return JSONResponse(body, status_code=status, headers=headers, media_type=MEDIA_TYPE)
 
 
@@ -97,7 +104,11 @@ def service_problem(request: Request, error: errors.ServiceError) -> JSONRespons
         headers["Connection"] = "close"
     elif isinstance(error, errors.NotAcceptableError):
         headers["Vary"] = "Accept"
-    elif isinstance(error, errors.QueueFullError):
+    elif isinstance(error, errors.UnauthorizedError):
+        headers["WWW-Authenticate"] = _CHALLENGE + (', error="invalid_token"' if error.presented else "")
+    elif isinstance(error, errors.NotFoundError):
+        request.state.withheld = error.withheld
+    elif isinstance(error, errors.RetryLaterError):
         headers["Retry-After"] = str(error.retry_after)
     elif isinstance(error, errors.JobFailedError):
         found = error.error.get("issues")
@@ -108,6 +119,13 @@ def service_problem(request: Request, error: errors.ServiceError) -> JSONRespons
 def _entry(issue: Issue, source: str) -> dict[str, str]:
     entry = {"pointer": issue.pointer, "detail": issue.message}
     return entry if source == "body" else {**entry, "in": source}
+
+
+def answered(request: Request, error: errors.ServiceError | OperationalError) -> JSONResponse:
+    """The problem document of an error that no route raised."""
+    if isinstance(error, errors.ServiceError):
+        return service_problem(request, error)
+    return _no_database(request, error)
 
 
 async def _service_error(request: Request, error: Exception) -> JSONResponse:
@@ -131,6 +149,10 @@ async def _unstorable(request: Request, error: Exception) -> JSONResponse:
 
 async def _database_away(request: Request, error: Exception) -> JSONResponse:
     """The database does not answer, is full or locked: nothing was written."""
+    return _no_database(request, error)
+
+
+def _no_database(request: Request, error: Exception) -> JSONResponse:
     log.error("%s %s: the database failed: %s", request.method, request.url.path, error)
     detail = "the database does not answer at present; nothing was written, try again later"
     headers = {"Retry-After": str(_RETRY_SECONDS)}

@@ -77,8 +77,32 @@ class Settings(BaseSettings):
     port: int = Field(default=8000, ge=0, le=65535, description="Port to listen on; 0 takes any free one.")
     allow_remote: bool = Field(
         default=False,
-        description="Allow a `host` that other machines can reach. There are no keys yet: "
-        "everyone who reaches the port may submit, read and cancel.",
+        description="Allow `require_keys=false` on a `host` that other machines can reach: "
+        "everyone who reaches the port may then submit, read and cancel.",
+    )
+    require_keys: bool | None = Field(
+        default=None,
+        description="Whether requests need a key (`stickslip keys create`). Unset: not on loopback, "
+        "on every other `host`. Behind a proxy on the same machine, set it.",
+    )
+    requests_per_minute: int = Field(
+        default=1200,
+        ge=1,
+        le=1_000_000,
+        description="Requests a minute with one key, unless the key has a limit of its own.",
+    )
+    failed_keys_per_minute: int = Field(
+        default=30, ge=1, le=1_000_000, description="Keys that do not work, a minute and client address."
+    )
+    trusted_proxies: tuple[str, ...] = Field(
+        default=(),
+        description="Addresses or networks of the proxies whose `X-Forwarded-For` and `X-Forwarded-Proto` "
+        "are believed.",
+    )
+    https: bool = Field(
+        default=False,
+        description="Clients reach the service over HTTPS, through a proxy: "
+        "answers tell browsers to keep to it.",
     )
     allowed_hosts: tuple[str, ...] | None = Field(
         default=None,
@@ -195,6 +219,11 @@ class Settings(BaseSettings):
     )
 
     @property
+    def keys_required(self) -> bool:
+        """Whether requests need a key."""
+        return not is_loopback(self.host) if self.require_keys is None else self.require_keys
+
+    @property
     def hosts(self) -> tuple[str, ...]:
         """Host names answered to, `*` for all."""
         if self.allowed_hosts is not None:
@@ -226,12 +255,12 @@ class Settings(BaseSettings):
         return _postgresql_url(parsed)
 
     @model_validator(mode="after")
-    def _loopback_unless_allowed(self) -> Self:
-        if not self.allow_remote and not is_loopback(self.host):
+    def _keys_unless_allowed(self) -> Self:
+        if not (self.keys_required or self.allow_remote or is_loopback(self.host)):
             raise ValueError(
-                f"`host` {self.host!r} can be reached from other machines and the service has no keys yet: "
-                "use 127.0.0.1, or set STICKSLIP_ALLOW_REMOTE=true (`allow_remote`) if everyone "
-                "who can reach it may use it"
+                f"`host` {self.host!r} can be reached from other machines and `require_keys` is off: "
+                "leave it out and make keys (`stickslip keys create`), use 127.0.0.1, or set "
+                "STICKSLIP_ALLOW_REMOTE=true (`allow_remote`) if everyone who can reach it may use it"
             )
         return self
 

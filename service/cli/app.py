@@ -13,6 +13,7 @@ from service.cli import (
     database_commands,
     design_commands,
     import_command,
+    key_commands,
     mistuning_command,
     sensitivity_command,
     service_commands,
@@ -23,6 +24,7 @@ from service.cli import (
 )
 from service.cli.failures import REPORTED, report
 from service.cli.inputs import join_words
+from service.cli.keyed import keyed
 
 app = typer.Typer(
     name="stickslip",
@@ -33,13 +35,14 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 _database = typer.Typer(help="Look after the database.", no_args_is_help=True, rich_markup_mode=None)
+_keys = typer.Typer(help="Make and end keys to the service.", no_args_is_help=True, rich_markup_mode=None)
 _submit = typer.Typer(help="Hand a job to a running service.", no_args_is_help=True, rich_markup_mode=None)
 
 _ALONE: tuple[Callable[..., None], ...] = (
     solver_commands.scenes, solver_commands.plan, solver_commands.solve, solver_commands.sweep,
     solver_commands.accuracy, design_commands.design, design_commands.pareto,
     sensitivity_command.sensitivities, solver_commands.march, service_commands.demo, service_commands.serve,
-    service_commands.worker, submit_commands.watch, submit_commands.results,
+    service_commands.worker, keyed(submit_commands.watch), keyed(submit_commands.results),
 )  # fmt: skip
 _SUBMITTED: tuple[Callable[..., None], ...] = (
     submit_commands.design, submit_commands.pareto, submit_commands.sweep, submit_commands.solve,
@@ -54,8 +57,12 @@ app.command(name="map")(track_commands.response_map)
 app.command()(campbell_command.campbell)
 app.command()(mistuning_command.mistuning)
 for _command in _SUBMITTED:
-    _submit.command()(_command)
-_submit.command(name="map")(submit_studies.response_map)
+    _submit.command()(keyed(_command))
+_submit.command(name="map")(keyed(submit_studies.response_map))
+_keys.command()(key_commands.create)
+_keys.command(name="list")(key_commands.show)
+_keys.command()(key_commands.rotate)
+_keys.command()(key_commands.revoke)
 _database.command()(service_commands.upgrade)
 _database.command()(database_commands.backup)
 _database.command()(database_commands.check)
@@ -63,6 +70,7 @@ _database.command()(database_commands.prune)
 app.command("import")(import_command.import_scene)
 app.add_typer(_submit, name="submit")
 app.add_typer(_database, name="db")
+app.add_typer(_keys, name="keys")
 
 
 def _print_version(wanted: bool) -> None:

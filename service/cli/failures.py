@@ -40,7 +40,7 @@ _STATE = (
     errors.DatabaseInUseError,
     errors.WrongRevisionError,
     errors.ConflictError,
-    errors.QueueFullError,
+    errors.RetryLaterError,
     errors.JobFailedError,
 )
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")

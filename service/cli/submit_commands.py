@@ -13,6 +13,7 @@ import typer
 
 from service.cli import inputs, options, problem_inputs, reports, stored_designs
 from service.cli.failures import BAD_INPUT, FELL_SHORT, InputError, option_name
+from service.cli.keyed import given_key
 from service.cli.output import print_json, print_table, say
 from service.cli.problem_options import NOT_OF_A_FRONT, ProblemFlags, takes_problem
 from service.cli.progress import bar
@@ -214,7 +215,7 @@ def _client(url: str) -> Client:
     from service.client import Client
 
     try:
-        return Client(url)
+        return Client(url, key=given_key())
     except httpx.InvalidURL as error:
         raise InputError(
             f"`--url` must be a web address such as {options.DEFAULT_URL}, got {url!r}"

@@ -25,7 +25,7 @@ from service.repository.checkpoints import (
 from service.repository.designs import insert_design
 from service.repository.listing import met, owner_condition, plain_conditions
 from service.repository.recovery import FREE, change, guard, recover
-from service.repository.room import Room
+from service.repository.room import Room, require_share
 from service.repository.rows import Attempt, JobRow, NewJob, Recovered
 from service.repository.sweeps import insert_sweeps
 
@@ -71,7 +71,7 @@ class JobRepository:
         self.now: Clock = now or (utc_now if database.exclusive else SharedClock(database.time))
         self._room = Room()
 
-    def submit(self, new: NewJob, queue_limit: int) -> tuple[JobRow, bool]:
+    def submit(self, new: NewJob, queue_limit: int, waiting_limit: int | None = None) -> tuple[JobRow, bool]:
         """Insert a job, or find the one this request made before; whether it was inserted.
 
         A job whose spec was computed before, and which is not `fresh`, is inserted as successful with
@@ -83,15 +83,21 @@ class JobRepository:
             The key was used for a different request.
         QueueFullError
             `queue_limit` jobs wait already.
+        TooManyRequestsError
+            `waiting_limit` jobs of this owner wait already.
         """
-        return self._db.grouped(lambda connection: self._submit(connection, new, queue_limit))
+        return self._db.grouped(lambda connection: self._submit(connection, new, queue_limit, waiting_limit))
 
-    def _submit(self, connection: Connection, new: NewJob, queue_limit: int) -> tuple[JobRow, bool]:
+    def _submit(
+        self, connection: Connection, new: NewJob, queue_limit: int, waiting_limit: int | None
+    ) -> tuple[JobRow, bool]:
         known = self._by_key(connection, new)
         if known is not None:
             return known, False
         source = None if new.fresh else self._computed_before(connection, new)
         if source is None:
+            if waiting_limit is not None:
+                require_share(connection, new.owner, waiting_limit)
             self._room.require(connection, queue_limit)
         return self._insert(connection, new, source), True
 

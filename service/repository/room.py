@@ -7,7 +7,7 @@ import time
 from sqlalchemy import Connection, bindparam, func, literal, select
 
 from service import postgresql
-from service.errors import QueueFullError
+from service.errors import QueueFullError, TooManyRequestsError
 from service.models import Job, JobState
 
 _MARGIN = 5000
@@ -15,6 +15,12 @@ _COUNT_SECONDS = 1.0
 _C = Job.metadata.tables["job"].c
 _WAITING = select(literal(1)).where(_C.state == JobState.ACCEPTED).limit(bindparam("most")).subquery()
 _COUNT = select(func.count()).select_from(_WAITING)
+_COUNT_OF_OWNER = select(func.count()).select_from(
+    select(literal(1))
+    .where(_C.state == JobState.ACCEPTED, _C.owner == bindparam("owner"))
+    .limit(bindparam("most"))
+    .subquery()
+)
 
 
 class Room:
@@ -52,3 +58,18 @@ class Room:
                 f"{self._waiting} jobs wait already, the queue takes {limit}: try again later", retry_after=10
             )
         self._waiting += 1
+
+
+def require_share(connection: Connection, owner: str, limit: int) -> None:
+    """Refuse an owner of whose jobs `limit` wait already.
+
+    Raises
+    ------
+    TooManyRequestsError
+        If it is so. Jobs that several services accept at the same moment may exceed it by their number.
+    """
+    waiting = connection.execute(_COUNT_OF_OWNER, {"owner": owner, "most": limit}).scalar_one()
+    if waiting >= limit:
+        raise TooManyRequestsError(
+            f"{waiting} jobs of {owner} wait already, the key allows {limit}: try again later", retry_after=10
+        )

@@ -6,9 +6,10 @@ from typing import Literal
 
 from fastapi import APIRouter, Response
 
+from service.access.callers import Scope
 from service.answers import Answer
-from service.health import Health, check
-from service.http import ServiceDependency
+from service.health import Health, Readiness, check, readiness
+from service.http import CallerDependency, ServiceDependency
 
 router = APIRouter(prefix="/health", tags=["health"])
 
@@ -26,8 +27,10 @@ async def live() -> Alive:
 
 
 @router.get("/ready", responses={503: {"model": Health, "description": "It cannot work now."}})
-def ready(service: ServiceDependency, response: Response) -> Health:
-    """Database, queue and workers are up."""
-    health = check(service)
+def ready(service: ServiceDependency, caller: CallerDependency, response: Response) -> Health | Readiness:
+    """Database, queue and workers are up; the details are for who may see them: where no key is needed, and
+    with the scope `monitor`.
+    """
+    health = check(service) if caller.may(Scope.MONITOR) else readiness(service)
     response.status_code = 200 if health.ready else 503
     return health
