@@ -45,6 +45,7 @@ class ServedClient(httpx.Client):
 
     def __init__(self, app: FastAPI, port: int) -> None:
         super().__init__(base_url=f"http://127.0.0.1:{port}", timeout=60.0)
+        self.application = app
         self.service: Service = app.state.service
 
 

@@ -37,9 +37,12 @@ def test_every_setting_is_described() -> None:
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"host": "0.0.0.0"}, "can be reached from other machines and the service has no keys yet"),
-        ({"host": "::"}, "STICKSLIP_ALLOW_REMOTE=true"),
-        ({"host": "example.org"}, "use 127.0.0.1"),
+        (
+            {"host": "0.0.0.0", "require_keys": False},
+            "can be reached from other machines and `require_keys` is off",
+        ),
+        ({"host": "::", "require_keys": False}, "STICKSLIP_ALLOW_REMOTE=true"),
+        ({"host": "example.org", "require_keys": False}, "make keys (`stickslip keys create`)"),
         ({"database": "mysql://localhost/x"}, "must be an SQLite or PostgreSQL URL"),
         ({"database": "postgresql+psycopg2://localhost/x"}, "with the driver psycopg, postgresql+psycopg://"),
         ({"database": "postgresql://localhost"}, "must name a database"),
@@ -81,10 +84,14 @@ def test_loopback() -> None:
     assert not any(is_loopback(host) for host in ("0.0.0.0", "::", "10.0.0.1", "example.org", ""))
 
 
-def test_another_address_needs_leave_and_answers_to_every_name() -> None:
-    settings = load_settings(host="0.0.0.0", allow_remote=True)
-    assert settings.hosts == ("*",)
-    assert load_settings(allow_remote=True).hosts == ("localhost", "127.0.0.1", "[::1]")
+def test_another_address_needs_keys_or_leave_and_answers_to_every_name() -> None:
+    settings = load_settings(host="0.0.0.0")
+    assert (settings.hosts, settings.keys_required) == (("*",), True)
+    assert load_settings(host="0.0.0.0", allow_remote=True).keys_required, "leave alone does not do"
+    assert not load_settings(host="0.0.0.0", allow_remote=True, require_keys=False).keys_required
+    settings = load_settings()
+    assert (settings.hosts, settings.keys_required) == (("localhost", "127.0.0.1", "[::1]"), False)
+    assert load_settings(require_keys=True).keys_required
 
 
 def test_a_port_in_use_is_told() -> None:

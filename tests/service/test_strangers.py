@@ -1,0 +1,178 @@
+"""Every route against everybody who should not get in, and those who should."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any
+
+import httpx
+import pytest
+from fastapi import FastAPI
+from private_kinds import PRIVATE
+from service_helpers import ServedClient, is_problem, serving
+from sqlalchemy import insert
+
+from service.access import keys
+from service.access.callers import Scope
+from service.clock import utc_now
+from service.ids import new_id
+from service.jobs import DesignRecord
+from service.kinds import SHIPPED
+from service.models import Job, JobResult, JobState
+from service.repository.designs import insert_design
+from solver.scene import load_scene
+
+ROLES = ("none", "wrong", "another", "revoked", "expired", "read", "submit", "admin")
+# What each of them is answered; `another` is a key of another owner, `read` and `submit` are the owner's.
+OPEN = (200, 401, 200, 401, 401, 200, 200, 200)
+MONITOR = (401, 401, 403, 401, 401, 403, 403, 200)
+LISTED = (401, 401, 200, 401, 401, 200, 200, 200)
+OWNED = (401, 401, 404, 401, 401, 200, 200, 200)
+ENDED = (401, 401, 404, 401, 401, 403, 409, 409)
+MADE = (401, 401, 202, 401, 401, 403, 202, 202)
+STORED = (401, 401, 201, 401, 401, 403, 201, 201)
+PLANNED = (401, 401, 200, 401, 401, 403, 200, 200)
+MINE = {**load_scene("two-dof").to_dict(), "name": "mine"}
+NEW = {**MINE, "name": "another-scene"}
+DESIGN = {"scene": "two-dof", "variables": {"damper.N0": [20, 1000]}, "fresh": True}
+
+TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
+    "GET /openapi.json": (OPEN, None),
+    "GET /health/live": (OPEN, None),
+    "GET /health/ready": (OPEN, None),
+    "GET /metrics": (MONITOR, None),
+    "GET /v1/jobs": (LISTED, None),
+    "POST /v1/jobs": (MADE, {"kind": "iteration", "fresh": True, "seconds": 0.1}),
+    "GET /v1/jobs/{job_id}": (OWNED, None),
+    "GET /v1/jobs/{job_id}/results": (OWNED, None),
+    "GET /v1/jobs/{job_id}/events": (OWNED, None),
+    "DELETE /v1/jobs/{job_id}": (ENDED, None),
+    "GET /v1/designs": (LISTED, None),
+    "POST /v1/designs": (MADE, DESIGN),
+    "GET /v1/designs/{design_id}": (OWNED, None),
+    "GET /v1/sweeps": (LISTED, None),
+    "GET /v1/sweeps/{sweep_id}": (OWNED, None),
+    "GET /v1/sweeps/{sweep_id}/plot.svg": (OWNED, None),
+    "GET /v1/sweeps/{sweep_id}/plot.png": (OWNED, None),
+    "GET /v1/scenes": (LISTED, None),
+    "POST /v1/scenes": (STORED, NEW),
+    # A name is one owner's: an admin has no scene of this name.
+    "GET /v1/scenes/{name}": ((401, 401, 404, 401, 401, 200, 200, 404), None),
+    "POST /v1/plan": (PLANNED, {"scene": "two-dof"}),
+}
+
+
+@dataclass(frozen=True)
+class House:
+    """A service that needs keys, and what one owner has there."""
+
+    client: ServedClient
+    tokens: dict[str, str | None]
+    ids: dict[str, str]
+
+    def ask(self, role: str, method: str, path: str, **arguments: Any) -> httpx.Response:
+        token = self.tokens[role]
+        headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+        return self.client.request(
+            method, path, headers={**headers, **arguments.pop("headers", {})}, **arguments
+        )
+
+
+@pytest.fixture(scope="module")
+def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[House]:
+    registry = PRIVATE.extended(SHIPPED["design"])
+    folder, many = tmp_path_factory.mktemp("strangers"), 100_000
+    with serving(folder, registry, require_keys=True, failed_keys_per_minute=many) as client:
+        tokens = make_tokens(client)
+        made = House(client, tokens, {})
+        waiting = {"Prefer": "wait=60"}
+        body = {"kind": "iteration", "sweeps": 1}
+        job = made.ask("submit", "POST", "/v1/jobs", json=body, headers=waiting).json()
+        assert job["status"] == "successful"
+        assert made.ask("submit", "POST", "/v1/scenes", json=MINE).status_code == 201
+        made.ids.update(
+            job_id=job["id"],
+            design_id=add_design(client, "ann"),
+            sweep_id=job["sweeps"][0]["id"],
+            name="mine",
+        )
+        yield made
+
+
+def add_design(client: ServedClient, owner: str) -> str:
+    """A stored design, without the seconds a cold worker takes to find one."""
+    name, now = new_id(), utc_now()
+    record = DesignRecord(
+        **dict.fromkeys(("scene_name", "scene_hash", "method", "status"), "x"),
+        **dict.fromkeys(("objective", "peak", "peak_at", "limit", "band_hz", "work"), 1.0),
+        **dict.fromkeys(("robust", "reached", "feasible"), True),
+        **dict.fromkeys(("harmonics", "evaluations"), 1),
+        seconds=1.0,
+    )
+    job = {
+        "id": name, "owner": owner, "kind": "design", "state": JobState.SUCCESSFUL, "spec_hash": "",
+        "request_hash": "", "max_attempts": 1, "created": now, "request": {}, "spec": {},
+    }  # fmt: skip
+    with client.service.database.writing() as connection:
+        connection.execute(insert(Job).values(**job))
+        connection.execute(insert(JobResult).values(job_id=name, body={}))
+        insert_design(connection, name, record, now, owner)
+    return name
+
+
+def make_tokens(client: ServedClient) -> dict[str, str | None]:
+    repository, now = client.service.keys, utc_now()
+
+    def token(owner: str, *scopes: Scope, **more: Any) -> str:
+        return keys.create(repository, owner, scopes, now, **more).token
+
+    tokens = {
+        "none": None,
+        "wrong": f"stickslip_{'0' * 12}_{'0' * 64}",
+        "another": token("ben", Scope.SUBMIT),
+        "revoked": token("ann", Scope.ADMIN),
+        "expired": token("ann", Scope.ADMIN, expires=now + timedelta(microseconds=1)),
+        "read": token("ann", Scope.READ),
+        "submit": token("ann", Scope.SUBMIT),
+        "admin": token("chief", Scope.ADMIN),
+        "monitor": token("watch", Scope.MONITOR),
+    }
+    keys.revoke(repository, str(keys.id_of(str(tokens["revoked"]))), now)
+    return tokens
+
+
+def routes_of(routes: Any) -> Iterator[str]:
+    """Every method and path that an application answers."""
+    for route in routes:
+        inner = getattr(route, "original_router", None) or getattr(route, "app", None)
+        if hasattr(route, "methods"):
+            yield from (f"{method} {route.path}" for method in route.methods - {"HEAD"})
+        elif hasattr(inner, "routes"):
+            yield from routes_of(inner.routes)
+        else:
+            yield f"GET {route.path}"
+
+
+def test_the_table_knows_every_route(house: House) -> None:
+    app: FastAPI = house.client.application
+    assert sorted(set(routes_of(app.routes))) == sorted(TABLE)
+
+
+@pytest.mark.parametrize("route", TABLE)
+def test_everybody_gets_what_is_theirs(house: House, route: str) -> None:
+    method, path = route.split()
+    expected, body = TABLE[route]
+    got = []
+    for role in ROLES:
+        answer = house.ask(role, method, path.format(**house.ids), json=body)
+        got.append(answer.status_code)
+        assert answer.headers["x-content-type-options"] == "nosniff"
+        assert answer.headers["referrer-policy"] == "no-referrer"
+        assert "default-src 'none'" in answer.headers["content-security-policy"]
+        assert "access-control-allow-origin" not in answer.headers
+        assert ("www-authenticate" in answer.headers) == (answer.status_code == 401)
+        if answer.status_code >= 400:
+            is_problem(answer, answer.status_code)
+    assert dict(zip(ROLES, got, strict=True)) == dict(zip(ROLES, expected, strict=True))
