@@ -20,6 +20,7 @@ from service.errors import ConflictError, InvalidRequestError, JobFailedError, N
 from service.executors import executor_of
 from service.jobs import JobRequest, OnProgress, Registry
 from service.kinds import SHIPPED
+from service.kinds.sizes import work_limited
 from service.models import JobState
 from service.queue import JobQueue
 from service.repository import (
@@ -160,7 +161,8 @@ class Service:
         kind = self.registry.get(body["kind"])
         request = validated(kind.request, {key: value for key, value in body.items() if key != "kind"})
         seconds = self._seconds_limit(request, caller)
-        resolved = kind.resolve(request, self.scenes.of(caller))
+        with work_limited(caller.limits.work):
+            resolved = kind.resolve(request, self.scenes.of(caller))
         new = NewJob(
             kind=kind.name,
             request=dict(body),

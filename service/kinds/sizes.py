@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
 from service.kinds.scenes import refusal
 from solver.errors import Issue
 from solver.scene import CyclicStructure, Scene
@@ -19,6 +23,18 @@ FEWEST_STEPS = 256
 POINTS_OF_A_SWEEP = 20
 """Fewer a frequency response seldom has."""
 
+_most_work: ContextVar[int] = ContextVar("most_work", default=MOST_WORK)
+
+
+@contextmanager
+def work_limited(most: int | None) -> Iterator[None]:
+    """Inside, jobs may ask for no more work than `most`, the limit of a key; None for no such limit."""
+    token = _most_work.set(MOST_WORK if most is None else min(most, MOST_WORK))
+    try:
+        yield
+    finally:
+        _most_work.reset(token)
+
 
 def size_issues(where: str, words: str, points: int, harmonics: int, dofs: int) -> list[Issue]:
     """Refuse what would take longer than a job should, at the pointer `where`.
@@ -32,9 +48,10 @@ def size_issues(where: str, words: str, points: int, harmonics: int, dofs: int) 
     dofs : of the structure that is solved.
     """
     work = points * max(harmonics, 1) * dofs
-    if work <= MOST_WORK:
+    most = _most_work.get()
+    if work <= most:
         return []
-    return [refusal(where, f"{words} × harmonics × DOFs must be at most {MOST_WORK}, got {work}")]
+    return [refusal(where, f"{words} × harmonics × DOFs must be at most {most}, got {work}")]
 
 
 def balance_issues(

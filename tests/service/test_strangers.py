@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 from fastapi import FastAPI
 from private_kinds import PRIVATE
@@ -37,6 +39,7 @@ PLANNED = (401, 401, 200, 401, 401, 403, 200, 200)
 MINE = {**load_scene("two-dof").to_dict(), "name": "mine"}
 NEW = {**MINE, "name": "another-scene"}
 DESIGN = {"scene": "two-dof", "variables": {"damper.N0": [20, 1000]}, "fresh": True}
+FILE = np.eye(2)
 
 TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     "GET /openapi.json": (OPEN, None),
@@ -60,6 +63,11 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     "POST /v1/scenes": (STORED, NEW),
     # A name is one owner's: an admin has no scene of this name.
     "GET /v1/scenes/{name}": ((401, 401, 404, 401, 401, 200, 200, 404), None),
+    "GET /v1/uploads": (LISTED, None),
+    "POST /v1/uploads": (STORED, FILE),
+    "GET /v1/uploads/{upload_id}": (OWNED, None),
+    # Whoever may delete it does so, and it is gone.
+    "DELETE /v1/uploads/{upload_id}": ((401, 401, 404, 401, 401, 403, 204, 404), None),
     "POST /v1/plan": (PLANNED, {"scene": "two-dof"}),
 }
 
@@ -92,13 +100,19 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[House]:
         job = made.ask("submit", "POST", "/v1/jobs", json=body, headers=waiting).json()
         assert job["status"] == "successful"
         assert made.ask("submit", "POST", "/v1/scenes", json=MINE).status_code == 201
-        made.ids.update(
-            job_id=job["id"],
-            design_id=add_design(client, "ann"),
-            sweep_id=job["sweeps"][0]["id"],
-            name="mine",
-        )
+        upload = made.ask("submit", "POST", "/v1/uploads", **arguments_of(FILE, -1)).json()
+        made.ids.update(job_id=job["id"], sweep_id=job["sweeps"][0]["id"], upload_id=upload["id"])
+        made.ids.update(design_id=add_design(client, "ann"), name="mine")
         yield made
+
+
+def arguments_of(body: Any, number: int) -> dict[str, Any]:
+    """The body of a request; a file is never the same twice."""
+    if not isinstance(body, np.ndarray):
+        return {"json": body}
+    file = io.BytesIO()
+    np.save(file, (2.0 + number) * body)
+    return {"content": file.getvalue(), "params": {"name": "K.npy"}}
 
 
 def add_design(client: ServedClient, owner: str) -> str:
@@ -166,7 +180,7 @@ def test_everybody_gets_what_is_theirs(house: House, route: str) -> None:
     expected, body = TABLE[route]
     got = []
     for role in ROLES:
-        answer = house.ask(role, method, path.format(**house.ids), json=body)
+        answer = house.ask(role, method, path.format(**house.ids), **arguments_of(body, len(got)))
         got.append(answer.status_code)
         assert answer.headers["x-content-type-options"] == "nosniff"
         assert answer.headers["referrer-policy"] == "no-referrer"
