@@ -206,7 +206,7 @@ def test_bad_scenes_are_named(run: Run, tmp_path: Path, command: str, case: str)
         ("march two-dof --frequency 1 --max-periods 0", ["--max-periods", "0"]),
         ("serve --port 99999", ["port", "99999"]),
         ("serve --database nothing", ["database", "nothing"]),
-        ("serve --host 0.0.0.0", ["host", "0.0.0.0"]),
+        ("serve --host 192.0.2.1", ["192.0.2.1", "--port"]),
         ("db upgrade --database sqlite:////nowhere/jobs.db", ["/nowhere", "jobs.db"]),
         ("demo --out file", ["--out", "file"]),
         ("submit solve two-dof --frequency inf", ["--frequency", "inf"]),
