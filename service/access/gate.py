@@ -20,7 +20,7 @@ from service.access.keys import id_of
 from service.errors import OriginRefusedError, ServiceError, UnauthorizedError
 from service.problems import answered
 
-OPEN = frozenset({"/health/live", "/health/ready", "/openapi.json", "/docs"})
+OPEN = frozenset({"/health/live", "/health/ready", "/openapi.json", "/docs", "/docs/style.css"})
 """Paths that need no key: whether the service lives, and what its API is."""
 _MONITORED = frozenset({"/metrics"})
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})

@@ -43,6 +43,8 @@ FILE = np.eye(2)
 
 TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     "GET /openapi.json": (OPEN, None),
+    "GET /docs": (OPEN, None),
+    "GET /docs/style.css": (OPEN, None),
     "GET /health/live": (OPEN, None),
     "GET /health/ready": (OPEN, None),
     "GET /metrics": (MONITOR, None),
