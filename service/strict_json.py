@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 from collections.abc import Mapping
 
 from service.errors import InvalidRequestError, MalformedBodyError
@@ -28,6 +29,9 @@ def encoded(value: object) -> JsonText:
         return JsonText(json.dumps(finite(value), separators=(",", ":"), allow_nan=False))
 
 
+_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
+
+
 def pointer(*parts: object) -> str:
     """RFC 6901 pointer from keys and indices."""
     return "".join("/" + str(part).replace("~", "~0").replace("/", "~1") for part in parts)
@@ -39,12 +43,13 @@ def loads(data: bytes) -> object:
     Raises
     ------
     MalformedBodyError
-        Not UTF-8, not JSON, nested too deeply, or a key given twice.
+        Not UTF-8, not JSON, nested too deeply, a key given twice, or half a character (``"\\ud800"``).
     InvalidRequestError
         A number that is not finite (``NaN``, ``Infinity``, ``1e999``), with its pointer.
     """
     try:
-        value: object = json.loads(data.decode("utf-8"), object_pairs_hook=_without_duplicates)
+        text = data.decode("utf-8")
+        value: object = json.loads(text, object_pairs_hook=_without_duplicates)
     except UnicodeDecodeError as error:
         raise MalformedBodyError(f"the body must be UTF-8, byte {error.start} is not") from error
     except json.JSONDecodeError as error:
@@ -55,6 +60,8 @@ def loads(data: bytes) -> object:
         raise MalformedBodyError("the body is nested too deeply") from error
     except ValueError as error:
         raise MalformedBodyError(f"the body is not JSON: {error}") from error
+    if _SURROGATE.search(text) and not _whole_characters(value):
+        raise MalformedBodyError("the body holds half of a character: \\ud800 to \\udfff alone")
     issues = [
         Issue(pointer=where, message=f"`{where}` must be a finite number, got {found!r}")
         for where, found in _not_finite(value)
@@ -71,6 +78,15 @@ def _without_duplicates(pairs: list[tuple[str, object]]) -> dict[str, object]:
             raise MalformedBodyError(f"the key {key!r} is given twice in one object")
         table[key] = value
     return table
+
+
+def _whole_characters(value: object) -> bool:
+    """Whether every text can be encoded; two escapes may well make one character."""
+    try:
+        json.dumps(value, ensure_ascii=False).encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _not_finite(value: object) -> list[tuple[str, float]]:
