@@ -221,7 +221,7 @@ REFUSED = {
     "asymmetric": (lambda M, K: (M, lopsided(K)), "", "row 0 (1.UY), column 2"),
     "negative mass": (lambda M, K: (-M, K), "", "on the diagonal of row 0 (1.UY), where a mass must be"),
     "negative stiffness": (lambda M, K: (M, -K), "", "a stiffness must be >= 0"),
-    "massless": (lambda M, K: (without(M, 3), K), "", "positive definite, but row 3 (2.ROTZ) is without mass"),
+    "massless": (lambda M, K: (without(M, 3), K), "", "but row 3 (2.ROTZ) is without mass"),
     "indefinite": (
         lambda M, K: (3.0 * np.diag(np.diag(M)) - 2.0 * M, K), "", "least eigenvalue",
     ),
@@ -252,7 +252,7 @@ NOTES = {
     "free": (lambda: free_beam(6), "2 rigid-body modes: the body is not held"),
     "slow": (lambda: (beam(6)[0] * 1e6, beam(6)[1]), "are M and K in units that go together?"),
     "light": (lambda: (beam(6)[0] * 1e-9, beam(6)[1] * 1e-9), "give --units mm"),
-    "unstable": (lambda: (beam(6)[0], beam(6)[1] - 200.0 * beam(6)[0]), "not positive semidefinite: 1 negative"),
+    "unstable": (lambda: (beam(6)[0], beam(6)[1] - 200.0 * beam(6)[0]), "semidefinite: 1 negative"),
 }  # fmt: skip
 
 

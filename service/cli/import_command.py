@@ -143,7 +143,7 @@ def import_scene(
         frequencies = [math.sqrt(max(float(value), 0.0)) / (2.0 * math.pi) for value in omega2]
         scene = _write(target, raw.table(band(start, stop, frequencies)), found, written)
         undo.pop_all()
-    _report(scene, target, frequencies, written, _notes(given, omega2), as_json)
+    _report(scene, target, frequencies, written, given, _notes(given, omega2), as_json)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -226,12 +226,14 @@ def _write(target: Path, raw: dict[str, Any], found: Sources, written: Written |
 
 
 def _report(
-    scene: Scene, target: Path, frequencies: Sequence[float], written: Written | None, notes: list[str],
-    as_json: bool,
+    scene: Scene, target: Path, frequencies: Sequence[float], written: Written | None,
+    given: MatrixSet | None, notes: list[str], as_json: bool,
 ) -> None:  # fmt: skip
+    from solver.matrices.checks import total_mass
     from solver.scene_parts import MatricesStructure
 
     structure = scene.structure
+    mass = None if given is None else total_mass(given)
     reduction = structure.reduction if isinstance(structure, MatricesStructure) else None
     if as_json:
         loaded = None if reduction is None else reduction.model_dump()
@@ -239,6 +241,7 @@ def _report(
             {
                 "scene": scene.name, "file": str(target), "dofs": list(structure.dofs),
                 "frequencies_hz": list(frequencies[:10]), "notes": notes,
+                "mass_kg": None if mass is None else mass[1],
                 "reduction": loaded if written is None else written.facts(),
             }
         )  # fmt: skip
@@ -247,6 +250,8 @@ def _report(
         ("DOFs in use", ", ".join(structure.dofs[:10]) + (", …" if len(structure.dofs) > 10 else "")),
         ("first frequencies", ", ".join(f"{f:.5g} Hz" for f in frequencies[:6])),
     ]
+    if mass is not None:
+        pairs.append(("mass", f"{mass[1]:.4g} kg in {mass[0]}, without what is held"))
     if reduction is not None:
         kept = f"{reduction.dofs} DOFs to {len(structure.dofs)} and {reduction.modes} modes"
         pairs.append(("reduced", f"{kept} up to {reduction.highest_hz:.5g} Hz"))

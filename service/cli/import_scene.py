@@ -44,7 +44,9 @@ def toml(raw: Mapping[str, Any], remarks: Sequence[str] = ()) -> str:
     ]
     lines += ["", "[structure.dofs] # rows of the matrices, zero-based, or node and component"]
     lines += [f"{json.dumps(name)} = {json.dumps(row)}" for name, row in structure["dofs"].items()]
-    lines += [_CONTACT.format(dof=force["dof"]).rstrip("\n"), "", "[excitation]"]
+    used = (force["dof"], observe["dof"])
+    rubbing = next((name for name in structure["dofs"] if name not in used), force["dof"])
+    lines += [_CONTACT.format(dof=rubbing).rstrip("\n"), "", "[excitation]"]
     lines += [f"dof = {json.dumps(force['dof'])}", "amplitude = 1.0 # N", "", "[observe]"]
     lines += [f"dof = {json.dumps(observe['dof'])}", f"band = {json.dumps(observe['band'])} # Hz", ""]
     return "\n".join(lines)
