@@ -21,10 +21,10 @@ from service.cli.progress import OnProgress, bars, patience
 from service.embedded import EmbeddedService
 from service.kinds import warm_up
 from service.models import JobState
-from service.plots.curves import Response
-from service.plots.responses import Family, family_figure, peak_figure
-from service.plots.style import save
+from service.plots.stored import response_of
 from service.settings import load_settings
+from solver.plots.responses import Family, family_figure, peak_figure
+from solver.plots.style import save
 
 REMOVED, STUCK = 0.0, 1e9
 """Normal loads [N] at which a contact does nothing, and never slips."""
@@ -195,10 +195,10 @@ def _select(
     low, high = case.bounds
     family = Family(
         variable=case.variable,
-        members=tuple((load, Response.of_stored(by_load[load])) for load in sorted({*case.shown, optimum})),
+        members=tuple((load, response_of(by_load[load])) for load in sorted({*case.shown, optimum})),
         optimum=optimum,
-        free=Response.of_stored(by_load[REMOVED]),
-        stuck=Response.of_stored(by_load[STUCK]),
+        free=response_of(by_load[REMOVED]),
+        stuck=response_of(by_load[STUCK]),
         dof=solver.load_scene(case.scene).observe.dof,
     )
     inside = {load: by_load[load].peak for load in sorted(by_load) if low <= load <= high}

@@ -70,14 +70,14 @@ def sweep_body(row: SweepRow, media: str, repository: SweepRepository) -> bytes:
 
 def sweep_picture(row: SweepRow, suffix: str, repository: SweepRepository) -> bytes:
     """The curve of a stored sweep as `svg` or `png`; its peak is marked, its band shaded."""
-    from service.plots.curves import Response
-    from service.plots.responses import response_figure
-    from service.plots.style import written
+    from service.plots.stored import response_of
+    from solver.plots.responses import response_figure
+    from solver.plots.style import written
 
     sweep = SweepDetail.load(row, repository)
     # Matplotlib's settings belong to the process.
     with _drawing:
-        return written(response_figure(Response.of_stored(sweep)), suffix)
+        return written(response_figure(response_of(sweep)), suffix)
 
 
 def csv_of_items(items: Iterable[Mapping[str, Any]]) -> bytes:

@@ -13,8 +13,8 @@ from matplotlib.colors import to_rgb
 from scene_cases import bladed_disk, loose_mass, oscillator, two_dof
 
 from service.cli import main
-from service.plots.accuracy import accuracy_figure
 from solver import AccuracyRow, AccuracyStudy, SettingError, accuracy_study, solve, sweep
+from solver.plots.accuracy import accuracy_figure
 
 
 @pytest.fixture(scope="module")

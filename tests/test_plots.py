@@ -14,12 +14,12 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 import solver
-from service import units
-from service.files import whole
-from service.plots import SUFFIXES, style
-from service.plots.curves import Response, above, with_peak
-from service.plots.motion import Motion, motion_figure
-from service.plots.responses import Demands, Family, family_figure, peak_figure, response_figure
+from solver import units
+from solver.files import whole
+from solver.plots import SUFFIXES, style
+from solver.plots.curves import Response, above, with_peak
+from solver.plots.motion import Motion, motion_figure
+from solver.plots.responses import Demands, Family, family_figure, peak_figure, response_figure
 
 
 def bump(height: float, at: float = 2.0) -> Response:

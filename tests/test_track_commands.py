@@ -10,7 +10,7 @@ import pytest
 
 import solver
 from service.cli import main
-from service.plots.tracks import ridge_lines
+from solver.plots.tracks import ridge_lines
 
 PEAKS = ["peaks", "two-dof", "--parameter", "damper.N0", "--from", "80", "--to", "130", "--checks", "0"]
 MAP = [

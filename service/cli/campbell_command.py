@@ -11,7 +11,7 @@ from service.cli.failures import FELL_SHORT
 from service.cli.inputs import whole_number
 from service.cli.output import print_json
 from service.cli.progress import bar
-from service.plots import SUFFIXES
+from solver.plots import SUFFIXES
 
 Speeds = Annotated[
     tuple[float, float], typer.Option("--speeds", metavar="LO HI", help="Running speeds [1/min].")
@@ -66,8 +66,8 @@ def campbell(
             on_progress=on_progress,
         )  # fmt: skip
     if picture is not None and any(one.branch.values.size for one in diagram.orders):
-        from service.plots.campbell import campbell_figure
-        from service.plots.style import save
+        from optim.plots.campbell import campbell_figure
+        from solver.plots.style import save
 
         save(campbell_figure(diagram), picture)
     if as_json:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from service import units
 from service.cli.output import print_pairs, print_table
+from solver import units
 
 
 def diagram(found: Mapping[str, Any]) -> None:

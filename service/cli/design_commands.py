@@ -14,7 +14,7 @@ from service.cli.failures import FELL_SHORT
 from service.cli.output import print_json
 from service.cli.problem_options import NOT_OF_A_FRONT, ProblemFlags, takes_problem
 from service.cli.progress import bar
-from service.plots import SUFFIXES
+from solver.plots import SUFFIXES
 
 if TYPE_CHECKING:
     from solver.scene import Scene
@@ -45,8 +45,8 @@ def design(
 
         result = optim.design(scene, **given, on_progress=on_progress)
     if picture is not None and result.sweeps:
-        from service.plots.designs import design_figure
-        from service.plots.style import save
+        from optim.plots.designs import design_figure
+        from solver.plots.style import save
 
         save(design_figure(result), picture)
     if as_json:
@@ -79,8 +79,8 @@ def pareto(
 
         found = optim.pareto_front(scene, **given, on_progress=on_progress)
     if picture is not None and found.points:
-        from service.plots.pareto import pareto_figure
-        from service.plots.style import save
+        from optim.plots.pareto import pareto_figure
+        from solver.plots.style import save
 
         save(pareto_figure(found.to_json()), picture)
     if as_json:
@@ -97,8 +97,8 @@ def _robust(scene: Scene, given: Mapping[str, Any], picture: Path | None, *, as_
 
         result = optim.robust_design(scene, **given, on_progress=on_progress)
     if picture is not None and result.nominal is not None:
-        from service.plots.designs import robust_figure
-        from service.plots.style import save
+        from optim.plots.designs import robust_figure
+        from solver.plots.style import save
 
         save(robust_figure(result), picture)
     if as_json:

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from service import units
 from service.cli.output import print_pairs, print_table, say
+from solver import units
 
 Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]

@@ -18,7 +18,7 @@ from service.cli.import_reduction import Written, reduce, reduced_file
 from service.cli.import_scene import band, toml
 from service.cli.inputs import number, output_path, whole_number
 from service.cli.output import print_json, print_pairs
-from service.files import whole
+from solver.files import whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from service.cli.failures import InputError
 from service.cli.import_files import relative
 from service.cli.inputs import output_path
-from service.files import whole
+from solver.files import whole
 
 if TYPE_CHECKING:
     from solver.matrices.reduction import Reduced

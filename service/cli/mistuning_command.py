@@ -7,12 +7,12 @@ from typing import Annotated, Any
 
 import typer
 
-from service import units
 from service.cli import inputs, options
 from service.cli.failures import FELL_SHORT
 from service.cli.inputs import number, whole_number
 from service.cli.output import print_json, print_pairs
 from service.cli.progress import bar
+from solver import units
 
 Parts = Annotated[
     list[str],

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from service import units
 from service.cli import campbell_reports, design_reports, mistuning_command, robust_reports, track_reports
 from service.cli.output import print_pairs, print_table, say
+from solver import units
 
 if TYPE_CHECKING:
     from solver.scene import Scene

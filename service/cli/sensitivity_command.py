@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from service import units
 from service.cli import inputs, options
 from service.cli.design_commands import end
 from service.cli.output import print_json, print_table, say
 from service.cli.progress import patience
-from service.plots import SUFFIXES
+from solver import units
+from solver.plots import SUFFIXES
 
 
 def sensitivities(
@@ -33,8 +33,8 @@ def sensitivities(
         found = optim.sensitivities(scene, limit=limit, harmonics=harmonics)
     answer: Mapping[str, Any] = found.to_json()
     if picture is not None and any(row["peak_percent"] is not None for row in answer["rows"]):
-        from service.plots.shares import sensitivities_figure
-        from service.plots.style import save
+        from optim.plots.shares import sensitivities_figure
+        from solver.plots.style import save
 
         save(sensitivities_figure(answer), picture)
     if as_json:

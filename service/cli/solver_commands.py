@@ -12,7 +12,7 @@ from service.cli import inputs, options, reports
 from service.cli.failures import FELL_SHORT, InputError
 from service.cli.output import print_json
 from service.cli.progress import bar, patience
-from service.plots import SUFFIXES
+from solver.plots import SUFFIXES
 
 
 def scenes(as_json: options.Json = False) -> None:
@@ -64,8 +64,8 @@ def solve(
             scene, frequency_hz=frequency, harmonics=harmonics, accuracy=accuracy, effects=asked
         )
     if solution.converged and picture is not None:
-        from service.plots.motion import Motion, motion_figure
-        from service.plots.style import save
+        from solver.plots.motion import Motion, motion_figure
+        from solver.plots.style import save
 
         save(motion_figure(Motion.of_solution(solution)), picture)
     if as_json:
@@ -107,9 +107,9 @@ def sweep(
             limit=limit, effects=asked, on_progress=on_progress,
         )  # fmt: skip
     if picture is not None and len(branch.values):
-        from service.plots.curves import Response
-        from service.plots.responses import Demands, response_figure
-        from service.plots.style import save
+        from solver.plots.curves import Response
+        from solver.plots.responses import Demands, response_figure
+        from solver.plots.style import save
 
         save(response_figure(Response.of_branch(branch), asked=Demands(limit=limit)), picture)
     if as_json:
@@ -137,8 +137,8 @@ def accuracy(
     with bar("accuracy", "rows") as on_progress:
         study = solver.accuracy_study(scene, frequency, on_progress=on_progress).to_json()
     if picture is not None:
-        from service.plots.accuracy import accuracy_figure
-        from service.plots.style import save
+        from solver.plots.accuracy import accuracy_figure
+        from solver.plots.style import save
 
         save(accuracy_figure(study), picture)
     if as_json:
@@ -170,8 +170,8 @@ def march(
             on_progress=on_progress,
         )  # fmt: skip
     if picture is not None and marched.converged:
-        from service.plots.motion import Motion, motion_figure
-        from service.plots.style import save
+        from solver.plots.motion import Motion, motion_figure
+        from solver.plots.style import save
 
         save(motion_figure(Motion.of_march(marched, scene.name, scene.observe.dof)), picture)
     if as_json:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service import units
 from service.cli.failures import InputError
 from service.cli.inputs import number, whole_number
 from service.cli.output import print_json, print_table
+from solver import units
 
 if TYPE_CHECKING:
     from service.client import Client

@@ -148,7 +148,7 @@ def results(
     url: options.Url = options.DEFAULT_URL,
 ) -> None:
     """Print what a job computed, or list the stored designs."""
-    from service.plots import SUFFIXES
+    from solver.plots import SUFFIXES
 
     filters = {
         "scene": scene, "variable": variable, "peak_max": peak_max, "band_max": band_max, "reached": reached,
@@ -247,19 +247,19 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
 
 def _draw(client: Client, kind: str, answer: ResultsAnswer, picture: Path) -> None:
     """Draw the sweep with the peak of the result (a design stores many), or the picture of the kind."""
-    from service.plots.curves import Response
-    from service.plots.responses import response_figure
-    from service.plots.style import save
+    from service.plots.stored import response_of
+    from solver.plots.responses import response_figure
+    from solver.plots.style import save
 
     if kind in _NOT_DRAWN:
         raise InputError(f"`--plot`: a job `{kind}` is not drawn from its results: use `stickslip {kind}`")
     if kind == "pareto" and answer.result["points"]:
-        from service.plots.pareto import pareto_figure
+        from optim.plots.pareto import pareto_figure
 
         save(pareto_figure(answer.result), picture)
         return
     if kind == "accuracy":
-        from service.plots.accuracy import accuracy_figure
+        from solver.plots.accuracy import accuracy_figure
 
         save(accuracy_figure(answer.result), picture)
         return
@@ -270,11 +270,11 @@ def _draw(client: Client, kind: str, answer: ResultsAnswer, picture: Path) -> No
     if not answer.sweeps or peak is None:
         raise InputError(f"`--plot`: job {answer.job} stored no sweep to draw")
     best = min(answer.sweeps, key=lambda s: abs(s.peak.value - peak["value"]) if s.peak else float("inf"))
-    save(response_figure(Response.of_stored(client.sweep(best.id))), picture)
+    save(response_figure(response_of(client.sweep(best.id))), picture)
 
 
 def _write(file: Path, answer: Mapping[str, Any]) -> None:
-    from service.files import whole
+    from solver.files import whole
 
     with whole(file) as temporary:
         temporary.write_text(json.dumps(answer, allow_nan=False) + "\n", "utf-8")

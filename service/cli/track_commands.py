@@ -11,7 +11,7 @@ from service.cli.failures import FELL_SHORT
 from service.cli.inputs import number, whole_number
 from service.cli.output import print_json
 from service.cli.progress import bar
-from service.plots import SUFFIXES
+from solver.plots import SUFFIXES
 
 Followed = Annotated[
     str, typer.Option("--parameter", metavar="PATH", help="What changes, for example shroud.N0.")
@@ -61,8 +61,8 @@ def peaks(
             scene, parameter, start, stop, harmonics=harmonics, checks=checks, on_progress=on_progress
         )
     if picture is not None and track.parameter.size:
-        from service.plots.style import save
-        from service.plots.tracks import track_figure
+        from solver.plots.style import save
+        from solver.plots.tracks import track_figure
 
         save(track_figure(track, dof=scene.observe.dof), picture)
     if as_json:
@@ -98,8 +98,8 @@ def response_map(
             ridge=not no_ridge, on_progress=on_progress,
         )  # fmt: skip
     if picture is not None and np.isfinite(found.amplitude).any():
-        from service.plots.style import save
-        from service.plots.tracks import map_figure
+        from solver.plots.style import save
+        from solver.plots.tracks import map_figure
 
         save(map_figure(found, dof=scene.observe.dof), picture)
     if as_json:

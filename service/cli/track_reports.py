@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from service import units
 from service.cli.output import print_pairs
+from solver import units
 
 Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]

@@ -1,6 +1,1 @@
-"""Pictures in one style, fit for reports: ``style``, ``responses``, ``motion``."""
-
-from __future__ import annotations
-
-SUFFIXES = (".png", ".svg", ".pdf")
-"""The formats a picture can have; the suffix of its file chooses."""
+"""Pictures of what is stored, drawn as `solver.plots` and `optim.plots` draw what was just computed."""

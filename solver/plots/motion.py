@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from matplotlib.figure import Figure
 
-from service import units
-from service.plots import style
-from service.plots.curves import FloatArray
+from solver import units
+from solver.plots import style
+from solver.plots.curves import FloatArray
 
 if TYPE_CHECKING:
     from solver.march_result import MarchResult
@@ -90,12 +90,12 @@ class Motion:
         )
 
 
-def motion_figure(motion: Motion) -> Figure:
+def motion_figure(motion: Motion, *, ax: style.Into = None) -> Figure:
     """The time history of the observed DOF; beside it the hysteresis loops of the contacts, three at most."""
     loops = motion.loops[:MOST_LOOPS]
     unit = units.length_unit(float(np.abs(motion.displacement).max()))
     with style.styled():
-        page, (history, *others) = style.figure(3.2 + 2.6 * len(loops), 2.9, columns=1 + len(loops))
+        page, (history, *others) = style.figure(3.2 + 2.6 * len(loops), 2.9, columns=1 + len(loops), into=ax)
         scale, second = (1e3, "ms") if motion.time[-1] < 0.1 else (1.0, "s")
         history.plot(motion.time * scale, motion.displacement * unit.per_metre, color=style.BLUE)
         history.margins(x=0.0)

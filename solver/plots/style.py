@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -15,13 +15,16 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from service import units
-from service.files import whole
+from solver import units
+from solver.errors import SettingError
+from solver.files import whole
 
 # Okabe and Ito's colours, which the colour-blind can tell apart (jfly.uni-koeln.de/color).
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
 SKY = "#56B4E9"
 INK, GREY = "#222222", "#7A7A7A"
+
+Into: TypeAlias = Axes | Sequence[Axes] | None
 
 DOTS_PER_INCH = 200
 _STYLE: dict[Any, Any] = {
@@ -70,12 +73,36 @@ def styled() -> Iterator[None]:
         yield
 
 
-def figure(width: float, height: float, columns: int = 1) -> tuple[Figure, list[Axes]]:
-    """An empty figure of so many inches with axes side by side; call it inside `styled`."""
-    page = Figure(figsize=(width, height), layout="constrained")
+class Picture(Figure):
+    """A figure that notebooks show, though no window system looks after it."""
+
+    def _repr_png_(self) -> bytes:
+        return written(self, "png")
+
+
+def figure(
+    width: float, height: float, columns: int = 1, *, into: Into = None
+) -> tuple[Figure, list[Axes]]:  # fmt: skip
+    """Axes side by side, empty; call it inside `styled`.
+
+    Parameters
+    ----------
+    width, height : inches of a new figure.
+    columns : how many axes.
+    into : axes of the caller's to draw into, instead of a new figure; of a picture with more axes than are
+        given, the first ones are drawn.
+    """
+    page: Figure = Picture(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(page)
-    axes = page.subplots(1, columns, squeeze=False)
-    return page, list(axes[0])
+    axes = list(page.subplots(1, columns, squeeze=False)[0])
+    if into is None:
+        return page, axes
+    given = [into] if isinstance(into, Axes) else list(into)
+    if not given or not all(isinstance(one, Axes) for one in given):
+        raise SettingError("ax", into, "must be an Axes, or several of one figure")
+    mine = given[0].get_figure(root=True)
+    # What does not fit is drawn on the new figure, which nobody sees.
+    return page if mine is None else mine, [*given[:columns], *axes[len(given) :]]
 
 
 def label(axes: Axes, x: str, y: str) -> None:

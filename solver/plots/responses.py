@@ -10,9 +10,9 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from service import units
-from service.plots import style
-from service.plots.curves import FloatArray, Response
+from solver import units
+from solver.plots import style
+from solver.plots.curves import FloatArray, Response
 
 _DOTTED = (0, (1.2, 1.8))
 _DASHED = (0, (5.0, 2.5))
@@ -63,7 +63,9 @@ class Demands:
     forbidden: tuple[tuple[float, float], ...] = ()
 
 
-def response_figure(response: Response, *, asked: Demands | None = None, title: str | None = None) -> Figure:
+def response_figure(
+    response: Response, *, asked: Demands | None = None, title: str | None = None, ax: style.Into = None
+) -> Figure:
     """One response with its peak marked and its band shaded, and what was asked of it.
 
     Parameters
@@ -71,11 +73,12 @@ def response_figure(response: Response, *, asked: Demands | None = None, title: 
     response : the curve.
     asked : limits drawn as lines, forbidden ranges shaded from the limit upwards.
     title : the scene's name if left out.
+    ax : axes to draw into, as `solver.plots.style.figure`.
     """
     asked = asked or Demands()
     unit = units.length_unit(float(response.amplitude.max()))
     with style.styled():
-        page, (axes,) = style.figure(6.0, 3.4)
+        page, (axes,) = style.figure(6.0, 3.4, into=ax)
         for low, high in response.intervals:
             axes.axvspan(low, high, color=style.SKY, alpha=0.18, linewidth=0.0)
         axes.plot(response.values, response.amplitude * unit.per_metre, color=style.BLUE)

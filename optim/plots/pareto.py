@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from service import units
-from service.plots import style
-from service.units import LengthUnit
+from solver import units
+from solver.plots import style
+from solver.units import LengthUnit
 
 Point = Mapping[str, Any]
 _SHOWN = 3  # variables named beside a point
@@ -20,7 +20,7 @@ _PRICED = 0.02  # share of the peak, rounded down to a power of ten, that the pr
 _TANGENT = 0.06  # half length of a tangent, as a share of the front's width and height
 
 
-def pareto_figure(answer: Mapping[str, Any]) -> Figure:
+def pareto_figure(answer: Mapping[str, Any], *, ax: style.Into = None) -> Figure:
     """The front with its slopes and its knee, and beside it the frequencies at risk of every point.
 
     Parameters
@@ -30,7 +30,7 @@ def pareto_figure(answer: Mapping[str, Any]) -> Figure:
     points: Sequence[Point] = answer["points"]
     unit = units.length_unit(min(point["peak"] for point in points))
     with style.styled():
-        page, (front, risk) = style.figure(9.2, 3.7, columns=2)
+        page, (front, risk) = style.figure(9.2, 3.7, columns=2, into=ax)
         _draw_front(front, answer, unit)
         _draw_risk(risk, points, unit)
         dof = answer["dof"]

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from service import units
-from service.plots import style
-from service.plots.curves import Response
-from service.plots.responses import Demands, response_figure
+from solver import units
+from solver.plots import style
+from solver.plots.curves import Response
+from solver.plots.responses import Demands, response_figure
 
 if TYPE_CHECKING:
     from optim.result import DesignResult
     from optim.robust_result import RobustResult, Side
 
 
-def design_figure(result: DesignResult) -> Figure:
+def design_figure(result: DesignResult, *, ax: style.Into = None) -> Figure:
     """The response at the optimum of the case with the highest peak, with its limits and forbidden ranges.
 
     Parameters
@@ -38,10 +38,10 @@ def design_figure(result: DesignResult) -> Figure:
     )
     several = len(result.problem.cases) > 1 and case is not None
     title = f"{result.scene}, {case}" if several and case != result.scene else None
-    return response_figure(Response.of_branch(branch), asked=asked, title=title)
+    return response_figure(Response.of_branch(branch), asked=asked, title=title, ax=ax)
 
 
-def robust_figure(result: RobustResult) -> Figure:
+def robust_figure(result: RobustResult, *, ax: style.Into = None) -> Figure:
     """The highest peak of both optima over the samples of the uncertainty, sorted, with the worst of all.
 
     Parameters
@@ -56,7 +56,7 @@ def robust_figure(result: RobustResult) -> Figure:
     known = [peak for _, side, _ in sides for peak in side.spread.peaks if np.isfinite(peak)]
     unit = units.length_unit(max(known, default=1.0))
     with style.styled():
-        page, (axes,) = style.figure(6.0, 3.4)
+        page, (axes,) = style.figure(6.0, 3.4, into=ax)
         for name, side, color in sides:
             peaks = np.sort([peak for peak in side.spread.peaks if np.isfinite(peak)]) * unit.per_metre
             shares = 100.0 * (np.arange(peaks.size) + 1.0) / max(peaks.size, 1)

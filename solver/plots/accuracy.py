@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from service import units
-from service.plots import style
+from solver import units
+from solver.plots import style
 
 Row = Mapping[str, Any]
 
@@ -22,12 +22,12 @@ _SAMPLED = (
 )  # fmt: skip
 
 
-def accuracy_figure(study: Mapping[str, Any]) -> Figure:
+def accuracy_figure(study: Mapping[str, Any], *, ax: style.Into = None) -> Figure:
     """The rows of an accuracy study, as the JSON object a program reads."""
     rows: Sequence[Row] = study["rows"]
     least = max(study["reference_error"] or 0.0, 1e-15 * study["reference"])
     with style.styled():
-        page, (axes,) = style.figure(6.6, 4.0)
+        page, (axes,) = style.figure(6.6, 4.0, into=ax)
         counts = sorted({row["samples"] for row in rows})
         looks = [_CLOSED if count == 0 else _SAMPLED[i % len(_SAMPLED)] for i, count in enumerate(counts, -1)]
         for count, look in zip(counts, looks, strict=True):

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
-from service import units
-from service.plots import style
-from service.plots.curves import Response
+from solver import units
+from solver.plots import style
+from solver.plots.curves import Response
 
 if TYPE_CHECKING:
     from optim.crossings import CampbellDiagram, OrderResponse
@@ -26,7 +26,7 @@ _DECADES = 0.01  # ratio of the amplitudes below which only powers of ten fit un
 _FAR_DOWN = 1e-3  # share of the highest amplitude at which the amplitude axis ends
 
 
-def campbell_figure(diagram: CampbellDiagram) -> Figure:
+def campbell_figure(diagram: CampbellDiagram, *, ax: style.Into = None) -> Figure:
     """Frequency over speed, and beside it the amplitude of every order over the same frequencies.
 
     Parameters
@@ -36,12 +36,13 @@ def campbell_figure(diagram: CampbellDiagram) -> Figure:
     shown = [one for one in diagram.orders if one.branch.values.size]
     colours = _colours(len(shown))
     with style.styled():
-        page, (speeds, heights) = style.figure(8.6, 4.4, columns=2)
-        grid = speeds.get_gridspec()
-        if grid is not None:
+        page, (speeds, heights) = style.figure(8.6, 4.4, columns=2, into=ax)
+        grid = heights.get_gridspec()
+        if grid is not None and ax is None:
             grid.set_width_ratios([2.2, 1.0])
-        heights.sharey(speeds)
-        heights.tick_params(labelleft=False)
+        if ax is None:
+            heights.sharey(speeds)
+            heights.tick_params(labelleft=False)
         _draw_speeds(speeds, diagram, shown, colours)
         if len({id(one.branch) for one in shown}) == 1:
             # One response for all orders: of a scene without sectors.

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from service import units
-from service.plots import style
-from service.plots.responses import axis_name
+from solver import units
 from solver.fourier import Real
+from solver.plots import style
+from solver.plots.responses import axis_name
 
 if TYPE_CHECKING:
     from solver.maps import ResponseMap
@@ -22,7 +22,7 @@ _LOGARITHMIC_FROM = 5.0  # ratio of the ends from which an axis is logarithmic
 _SAME_FREQUENCY = 2e-3  # relative distance from a tracked peak within which a point lies on it
 
 
-def track_figure(track: PeakTrack, *, dof: str) -> Figure:
+def track_figure(track: PeakTrack, *, dof: str, ax: style.Into = None) -> Figure:
     """The highest peak and its frequency over the parameter, competing peaks thin, the optimum marked.
 
     Parameters
@@ -32,7 +32,7 @@ def track_figure(track: PeakTrack, *, dof: str) -> Figure:
     """
     unit = units.length_unit(float(track.peak.min()))
     with style.styled():
-        page, (heights, places) = style.figure(9.2, 3.6, columns=2)
+        page, (heights, places) = style.figure(9.2, 3.6, columns=2, into=ax)
         for line in track.competing:
             heights.plot(line.parameter, line.peak * unit.per_metre, color=style.GREY, linewidth=0.8)
             places.plot(line.parameter, line.frequency, color=style.GREY, linewidth=0.8)
@@ -60,7 +60,7 @@ def track_figure(track: PeakTrack, *, dof: str) -> Figure:
     return page
 
 
-def map_figure(found: ResponseMap, *, dof: str) -> Figure:
+def map_figure(found: ResponseMap, *, dof: str, ax: style.Into = None) -> Figure:
     """The amplitude in colours over frequency and parameter; the ridge of the highest peak on it.
 
     Parameters
@@ -72,7 +72,7 @@ def map_figure(found: ResponseMap, *, dof: str) -> Figure:
     unit = units.length_unit(float(np.median(known)))
     scale = LogNorm(float(known.min()) * unit.per_metre, float(known.max()) * unit.per_metre)
     with style.styled():
-        page, (axes,) = style.figure(6.8, 4.2)
+        page, (axes,) = style.figure(6.8, 4.2, into=ax)
         mesh = axes.pcolormesh(
             found.frequency, found.parameter, found.amplitude * unit.per_metre, norm=scale, cmap="viridis",
             shading="nearest", rasterized=True,

@@ -1,4 +1,4 @@
-"""What is drawn: amplitude curves, from a branch that was just computed or from a stored sweep."""
+"""What is drawn: amplitude curves and what is marked on them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from service.answers import SweepDetail
     from solver.branch import Branch
 
 FloatArray = NDArray[np.float64]
@@ -62,24 +61,6 @@ class Response:
             peak=peak,
             limit=None if band is None else band.limit,
             intervals=() if band is None else band.intervals,
-        )
-
-    @classmethod
-    def of_stored(cls, sweep: SweepDetail) -> Self:
-        """The curve of a stored sweep with at least one point; its band is that of the polyline."""
-        peak = None if sweep.peak is None else (sweep.peak.at, sweep.peak.value)
-        values = np.asarray(sweep.arrays["parameter"], dtype=np.float64)
-        amplitude = np.asarray(sweep.arrays["amplitude"], dtype=np.float64)
-        values, amplitude = with_peak(values, amplitude, peak)
-        limit = sweep.limit
-        return cls(
-            scene=sweep.scene,
-            parameter=sweep.parameter,
-            values=values,
-            amplitude=amplitude,
-            peak=peak,
-            limit=limit,
-            intervals=() if limit is None else above(values, amplitude, limit),
         )
 
 

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from service import units
-from service.plots import style
+from solver import units
+from solver.plots import style
 
 MOST = 12  # parameters shown, those that matter most
 _LEAST = 1e-3  # per cent below which a bar is not worth a line
 
 
-def sensitivities_figure(answer: Mapping[str, Any]) -> Figure:
+def sensitivities_figure(answer: Mapping[str, Any], *, ax: style.Into = None) -> Figure:
     """Bars of the per cent of the highest peak, and of the band, for one per cent of a parameter.
 
     Parameters
@@ -27,7 +27,7 @@ def sensitivities_figure(answer: Mapping[str, Any]) -> Figure:
     rows = rows[:MOST][::-1]
     places = np.arange(len(rows), dtype=np.float64)
     with style.styled():
-        page, (peaks, bands) = style.figure(9.2, 1.1 + 0.27 * max(len(rows), 3), columns=2)
+        page, (peaks, bands) = style.figure(9.2, 1.1 + 0.27 * max(len(rows), 3), columns=2, into=ax)
         for axes, key, color in ((peaks, "peak_percent", style.BLUE), (bands, "band_percent", style.GREEN)):
             axes.barh(places, [row[key] or 0.0 for row in rows], height=0.62, color=color)
             axes.axvline(0.0, color=style.GREY, linewidth=0.7)

@@ -1,0 +1,6 @@
+"""Pictures in one style, fit for reports: ``style``, ``responses``, ``motion``."""
+
+from __future__ import annotations
+
+SUFFIXES = (".png", ".svg", ".pdf")
+"""The formats a picture can have; the suffix of its file chooses."""
