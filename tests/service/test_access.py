@@ -1,0 +1,233 @@
+"""Keys, limits, refusals and their audit lines."""
+
+from __future__ import annotations
+
+import hmac
+import json
+import logging
+from collections.abc import Iterator
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from private_kinds import PRIVATE
+from service_helpers import ServedClient, is_problem, serving, until
+from sqlalchemy import text
+
+from service.access import keys
+from service.access.buckets import Buckets
+from service.access.callers import KeyLimits, Scope
+from service.access.doorkeeper import _neighbourhood
+from service.cli import main
+from service.client import Client
+from service.clock import utc_now
+from service.db import Database
+from service.errors import InvalidRequestError
+from service.repository.keys import KeyRepository
+
+SLOW = {"kind": "iteration", "seconds": 60.0, "fresh": True}
+
+
+@pytest.fixture(scope="module")
+def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedClient]:
+    folder = tmp_path_factory.mktemp("guarded")
+    with serving(folder, PRIVATE, require_keys=True, failed_keys_per_minute=6, https=True) as client:
+        yield client
+
+
+def token_of(client: ServedClient, *scopes: Scope, owner: str = "ann", **limits: Any) -> str:
+    chosen = scopes or (Scope.SUBMIT,)
+    return keys.create(client.service.keys, owner, chosen, utc_now(), None, KeyLimits(**limits)).token
+
+
+def bearer(token: str) -> dict[str, str]:
+    return {"Authorization": f"Bearer {token}"}
+
+
+def test_only_a_digest_is_kept(database: Database) -> None:
+    repository = KeyRepository(database)
+    made = keys.create(repository, "ann", [Scope.READ], utc_now(), None, KeyLimits(waiting=3))
+    with database.reading() as connection:
+        [row] = connection.execute(text("SELECT * FROM api_key")).all()
+    assert made.token.rpartition("_")[2] not in str(row)
+    assert keys.digest_of(made.token) in row
+    assert made.token not in repr(made)
+    assert keys.matches(made.token, repository.get(made.row.id))
+    other = keys.rotate(repository, made.row.id)
+    assert not keys.matches(made.token, repository.get(made.row.id)), "the old secret ends"
+    assert keys.matches(other.token, repository.get(made.row.id))
+    assert keys.caller_of_row(other.row).limits.waiting == 3
+    assert repository.usable(utc_now())
+    keys.revoke(repository, made.row.id, utc_now())
+    assert not repository.usable(utc_now())
+
+
+def test_an_unknown_key_is_compared_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    compared = []
+    real = hmac.compare_digest
+
+    def watched(a: str, b: str) -> bool:
+        compared.append((len(a), len(b)))
+        return real(a, b)
+
+    monkeypatch.setattr(hmac, "compare_digest", watched)
+    assert not keys.matches("stickslip_000000000000_" + "0" * 64, None)
+    assert compared == [(64, 64)]
+
+
+@pytest.mark.parametrize("owner", ["", " ", "-x", "a\nb", "a" * 101])
+def test_an_owner_is_a_name(database: Database, owner: str) -> None:
+    with pytest.raises(InvalidRequestError, match="`owner` must be"):
+        keys.create(KeyRepository(database), owner, [Scope.READ], utc_now())
+
+
+def test_a_key_expires_and_must_not_have_expired(database: Database) -> None:
+    with pytest.raises(InvalidRequestError, match="in the future"):
+        keys.create(KeyRepository(database), "ann", [Scope.READ], utc_now(), utc_now() - timedelta(seconds=1))
+
+
+def test_the_command_works_beside_a_service_and_a_revoked_key_ends(
+    guarded: ServedClient, capsys: pytest.CaptureFixture[str]
+) -> None:
+    at = ["--database", guarded.service.settings.database]
+    assert main(["keys", "create", "--owner", "eve", "--limit", "waiting=2", "--expires", "1d", *at]) == 0
+    token = capsys.readouterr().out.strip()
+    assert guarded.get("/v1/jobs", headers=bearer(token)).status_code == 200
+    assert guarded.get("/v1/jobs", headers={"X-API-Key": token}).status_code == 200
+    assert main(["keys", "list", "--json", *at]) == 0
+    printed = capsys.readouterr().out
+    [shown] = [key for key in json.loads(printed)["items"] if key["owner"] == "eve"]
+    assert (shown["scopes"], shown["limits"]) == (["submit"], {"waiting": 2})
+    assert shown["last_used"] is not None
+    assert token not in printed
+    assert keys.digest_of(token) not in printed
+    assert main(["keys", "rotate", shown["id"], *at]) == 0
+    rotated = capsys.readouterr().out.strip()
+    until(lambda: guarded.get("/v1/jobs", headers=bearer(rotated)).status_code == 200, seconds=2.0)
+    assert main(["keys", "revoke", shown["id"], *at]) == 0
+    until(lambda: guarded.get("/v1/jobs", headers=bearer(rotated)).status_code in (401, 429), seconds=2.0)
+    assert main(["keys", "revoke", shown["id"], *at]) == 2
+    assert "no key" in capsys.readouterr().err
+
+
+def test_a_stream_ends_with_its_key(guarded: ServedClient) -> None:
+    token = token_of(guarded)
+    job = guarded.post("/v1/jobs", json=SLOW, headers=bearer(token)).json()
+    with guarded.stream("GET", f"{job['links']['self']}/events", headers=bearer(token)) as stream:
+        lines = stream.iter_lines()
+        next(lines)
+        keys.revoke(guarded.service.keys, str(keys.id_of(token)), utc_now())
+        rest = list(lines)
+    assert not any(line.startswith("event: end") for line in rest)
+    admin = bearer(token_of(guarded, Scope.ADMIN))
+    assert guarded.delete(job["links"]["self"], headers=admin).json()["status"] == "dismissed"
+
+
+def test_limits_of_a_key(guarded: ServedClient) -> None:
+    few = bearer(token_of(guarded, requests_per_minute=3))
+    assert [guarded.get("/v1/jobs", headers=few).status_code for _ in range(3)] == [200] * 3
+    refused = guarded.get("/v1/jobs", headers=few)
+    assert "3 requests a minute" in is_problem(refused, 429)["detail"]
+    assert 1 <= int(refused.headers["retry-after"]) <= 20
+    admin = bearer(token_of(guarded, Scope.ADMIN))
+    queue = bearer(token_of(guarded, owner="queue", waiting=1, seconds=5.0))
+    made = [guarded.post("/v1/jobs", json=SLOW, headers=queue) for _ in range(3)]
+    assert made[0].status_code == 202
+    row = guarded.service.jobs.get(made[0].json()["id"])
+    assert row is not None
+    assert row.seconds_limit == 5.0
+    assert "wait already, the key allows 1" in is_problem(made[-1], 429)["detail"]
+    longer = guarded.post("/v1/jobs", json={**SLOW, "max_seconds": 9.0}, headers=queue)
+    assert "the key's limit" in is_problem(longer, 422)["detail"]
+    for job in guarded.get("/v1/jobs", params={"limit": 10}, headers=admin).json()["items"]:
+        if job["status"] in ("accepted", "running"):
+            guarded.delete(job["links"]["self"], headers=admin)
+
+
+def test_wrong_keys_are_limited_and_working_ones_are_not(
+    guarded: ServedClient, caplog: pytest.LogCaptureFixture
+) -> None:
+    good = token_of(guarded)
+    wrong = good[:-1] + ("0" if good[-1] != "0" else "1")
+    with caplog.at_level(logging.DEBUG):
+        got = [guarded.get("/v1/jobs%1b[31m", headers=bearer(wrong)) for _ in range(12)]
+        assert guarded.get("/v1/jobs", headers=bearer(good)).status_code == 200
+    assert got[-1].status_code == 429
+    assert int(got[-1].headers["retry-after"]) >= 1
+    audited = [json.loads(r.message) for r in caplog.records if r.name == "stickslip.audit"]
+    assert len(audited) == 12, "every refusal has its line"
+    line = audited[-1]
+    assert (line["status"], line["reason"], line["method"]) == (429, "too-many-requests", "GET")
+    assert line["address"] == "127.0.0.1"
+    assert line["key"] == keys.id_of(good)
+    assert "\x1b" not in caplog.text
+    assert good not in caplog.text
+    assert wrong not in caplog.text
+
+
+def test_what_answers_with_a_key_carry(guarded: ServedClient) -> None:
+    answer = guarded.get("/v1/jobs", headers=bearer(token_of(guarded)))
+    assert answer.headers["cache-control"] == "no-store"
+    assert "Authorization" in answer.headers["vary"]
+    assert answer.headers["strict-transport-security"].startswith("max-age=")
+    refused = is_problem(guarded.get("/v1/jobs"), 401)
+    assert "Bearer" in refused["detail"]
+    basic = guarded.get("/v1/jobs", headers={"Authorization": "Basic YTpi"})
+    assert basic.headers["www-authenticate"].startswith('Bearer realm="stickslip"')
+
+
+def test_strangers_learn_whether_it_is_ready_and_no_more(guarded: ServedClient) -> None:
+    assert guarded.get("/health/ready").json() == {"ready": True}
+    watch = token_of(guarded, Scope.MONITOR)
+    assert "workers" in guarded.get("/health/ready", headers=bearer(watch)).json()
+    with Client(str(guarded.base_url), key=watch) as client:
+        assert "stickslip_jobs" in client.metrics()
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [{"Sec-Fetch-Site": "cross-site"}, {"Origin": "http://evil.example"}, {"Origin": "null"}],
+)
+def test_a_web_page_elsewhere_may_not_change_anything(http: httpx.Client, headers: dict[str, str]) -> None:
+    refused = is_problem(http.post("/v1/jobs", json=SLOW, headers=headers), 403)
+    assert refused["type"].endswith("origin-refused")
+    assert http.get("/v1/jobs", headers=headers).status_code == 200
+    own = {"Origin": str(http.base_url).rstrip("/")}
+    assert http.post("/v1/jobs", json={"kind": "none"}, headers=own).status_code == 422
+
+
+def test_a_bucket_fills_again_in_bounded_memory() -> None:
+    now = [0.0]
+    buckets = Buckets(most=100, steady=lambda: now[0])
+    assert [buckets.take("a", 2) for _ in range(3)] == [0.0, 0.0, 30.0]
+    now[0] = 30.0
+    assert [buckets.take("a", 2) for _ in range(2)] == [0.0, 30.0]
+    for number in range(1000):
+        buckets.take(str(number), 2)
+    assert len(buckets) == 100
+
+
+def test_addresses_of_one_customer_are_one() -> None:
+    assert _neighbourhood("2001:db8::1") == _neighbourhood("2001:db8::ffff") == "2001:db8::"
+    assert _neighbourhood("::ffff:10.0.0.1") == _neighbourhood("10.0.0.1") == "10.0.0.1"
+    assert _neighbourhood("unknown") == "unknown"
+
+
+def test_the_command_sends_the_key_of_a_file_or_of_the_environment(
+    guarded: ServedClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ask = ["results", "--json", "--url", str(guarded.base_url)]
+    monkeypatch.delenv("STICKSLIP_KEY", raising=False)
+    assert main(ask) != 0
+    assert "needs a key" in capsys.readouterr().err
+    file = tmp_path / "key"
+    file.write_text(token_of(guarded) + "\n")
+    assert main([*ask, "--key-file", str(file)]) == 0
+    monkeypatch.setenv("STICKSLIP_KEY", token_of(guarded))
+    assert main(ask) == 0
+    monkeypatch.setenv("STICKSLIP_KEY", "secret-of-another-kind")
+    assert main(ask) == 2
+    assert "secret-of" not in capsys.readouterr().err
+    assert main([*ask, "--key-file", str(tmp_path / "none")]) == 2
