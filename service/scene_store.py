@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import cache
 
 from service.access.callers import KEYLESS, Caller
 from service.errors import ConflictError, NotFoundError
@@ -109,6 +110,7 @@ class SceneStore:
         return known, added
 
 
+@cache
 def _shipped(name: str) -> KnownScene:
     body = load_scene(name).to_dict()
     return KnownScene(name=name, shipped=True, scene_hash=digest(body), body=body)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
@@ -12,7 +13,7 @@ from service.errors import InvalidRequestError
 from service.jobs import JobRequest, Resolved, SceneSource
 from service.strict_json import digest, pointer
 from solver.errors import Issue, SceneError, SettingError
-from solver.scene import Scene
+from solver.scene import Scene, load_scene, shipped_scenes
 
 MAX_HARMONICS = 200
 LARGEST = 1e15
@@ -91,7 +92,16 @@ def resolve_scene(request: SceneRequest, source: SceneSource) -> Scene:
     return scene
 
 
+@lru_cache(maxsize=64)
+def shipped_scene(name: str) -> Scene | None:
+    """The scene of this name that comes with the package, read once; None for another one."""
+    return load_scene(name) if name in shipped_scenes() else None
+
+
 def _read(reference: object, source: SceneSource) -> Scene:
+    shipped = shipped_scene(reference) if isinstance(reference, str) else None
+    if shipped is not None:
+        return shipped
     body = source.scene_body(reference) if isinstance(reference, str) else reference
     if not isinstance(body, Mapping):
         message = f"`scene` {reference!r} is neither a shipped scene nor a stored one"

@@ -28,7 +28,13 @@ from service.repository.rows import SweepRow
 __all__ = ["SWEEP_SORTS", "SweepFilter", "SweepRepository", "SweepRow", "insert_sweeps"]
 
 _COLUMNS = [getattr(Sweep, item.name) for item in fields(SweepRow)]
-_CHILD_FIELDS = ("contacts", "arrays")
+_OWN_FIELDS = [item.name for item in fields(SweepRecord) if item.name not in ("contacts", "arrays")]
+_CONTACT_FIELDS = [item.name for item in fields(ContactValues)]
+# Built once: building a statement costs more than running it.
+_TABLES = Sweep.metadata.tables
+_INSERT = insert(_TABLES["sweep"])
+_INSERT_CONTACTS = insert(_TABLES["sweep_contact"])
+_INSERT_ARRAYS = insert(_TABLES["sweep_array"])
 _CONTACT_COLUMNS: dict[str, InstrumentedAttribute[float | None]] = {
     "kt": SweepContact.kt,
     "mu": SweepContact.mu,
@@ -132,16 +138,13 @@ def insert_sweeps(
     connection: Connection, job_id: str, sweeps: Sequence[SweepRecord], created: datetime, owner: str = NOBODY
 ) -> None:
     """Write the sweeps of a job inside the transaction that writes its result; `owner` is the job's."""
-    names = [item.name for item in fields(SweepRecord) if item.name not in _CHILD_FIELDS]
     for position, sweep in enumerate(sweeps):
         sweep_id = new_id()
-        values = {name: getattr(sweep, name) for name in names} | {"owner": owner}
-        connection.execute(
-            insert(Sweep).values(id=sweep_id, job_id=job_id, position=position, created=created, **values)
-        )
+        about = {"id": sweep_id, "job_id": job_id, "position": position, "created": created, "owner": owner}
+        connection.execute(_INSERT, about | {name: getattr(sweep, name) for name in _OWN_FIELDS})
         contacts = [
             {"sweep_id": sweep_id, "position": index}
-            | {item.name: getattr(contact, item.name) for item in fields(ContactValues)}
+            | {name: getattr(contact, name) for name in _CONTACT_FIELDS}
             for index, contact in enumerate(sweep.contacts)
         ]
         arrays = [
@@ -149,9 +152,9 @@ def insert_sweeps(
             for name, stored in sweep.arrays.items()
         ]
         if contacts:
-            connection.execute(insert(SweepContact), contacts)
+            connection.execute(_INSERT_CONTACTS, contacts)
         if arrays:
-            connection.execute(insert(SweepArray), arrays)
+            connection.execute(_INSERT_ARRAYS, arrays)
 
 
 def _query(connection: Connection, wanted: SweepFilter, after: Position | None) -> Select[tuple[object, ...]]:
