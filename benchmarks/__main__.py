@@ -8,11 +8,22 @@ from collections.abc import Callable
 
 from benchmarks.harness import WrongResultError
 
-GROUPS = {"chains": ("chain-8", "chain-32", "one-slider")}
+GROUPS = {"chains": ("chain-8", "chain-32", "one-slider"), "service": ("load", "latency", "lists", "scale")}
 
 
 def _cases() -> dict[str, Callable[[], None]]:
-    from benchmarks import against_peers, beam, designing, disk, large, responses, robustness, savings
+    from benchmarks import (
+        against_peers,
+        beam,
+        designing,
+        disk,
+        large,
+        responses,
+        robustness,
+        savings,
+        service_load,
+        service_scale,
+    )  # fmt: skip
 
     return {
         "responses": responses.responses,
@@ -33,6 +44,10 @@ def _cases() -> dict[str, Callable[[], None]]:
         "savings": savings.savings,
         "two-hundred": large.two_hundred_contacts,
         "robustness": robustness.robustness,
+        "load": service_load.load,
+        "latency": service_load.latency,
+        "lists": service_load.lists,
+        "scale": service_scale.scale,
     }
 
 
