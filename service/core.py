@@ -22,6 +22,7 @@ from service.jobs import JobRequest, OnProgress, Registry
 from service.kinds import SHIPPED
 from service.kinds.sizes import work_limited
 from service.models import JobState
+from service.notices import Notices
 from service.queue import JobQueue
 from service.repository import (
     DesignRepository,
@@ -95,8 +96,19 @@ class Service:
         self.waiters = Waiters()
         self.queue = JobQueue(self.jobs, executor_of(settings, registry), settings, self.waiters)
         self.retention = Retention(self.database, settings, self.jobs.now)
+        self._notices = None if self.database.exclusive else self._make_notices()
         self.stopping = threading.Event()
         self._open = False
+
+    def _make_notices(self) -> Notices:
+        made = Notices(
+            self.database.own_connection,
+            accepted=self.queue.wake,
+            ended=self.waiters.ended_elsewhere,
+            cancel=self.queue.cancel_running,
+        )
+        self.waiters.relay = made.tell_ended
+        return made
 
     def open(self) -> None:
         """Lock SQLite's file and check or make the tables; nothing happens if that was done before.
@@ -129,6 +141,8 @@ class Service:
             self.database.close()
             raise
         self.retention.start()
+        if self._notices is not None:
+            self._notices.start()
         log.info("database %s, %d workers", self.database.name, self.settings.workers)
 
     def stop(self) -> None:
@@ -136,6 +150,8 @@ class Service:
         self.stop_waiting()
         self.retention.stop()
         self.queue.stop()
+        if self._notices is not None:
+            self._notices.stop()
         self.database.close()
         self._open = False
 
@@ -181,6 +197,8 @@ class Service:
         row, inserted = self.jobs.submit(new, self.settings.queue_limit, caller.limits.waiting)
         if row.state is JobState.ACCEPTED:
             self.queue.wake()
+            if self._notices is not None:
+                self._notices.tell_accepted()
         return row, inserted
 
     def _seconds_limit(self, request: JobRequest, caller: Caller) -> float | None:
@@ -229,6 +247,8 @@ class Service:
             raise ConflictError(f"job {job_id} ended before ({row.state.value}), there is nothing to dismiss")
         if row.state is JobState.RUNNING:
             self.queue.cancel_running(job_id)
+            if self._notices is not None:
+                self._notices.tell_cancel(job_id)
         else:
             self.waiters.ended(job_id)
         return row

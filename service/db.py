@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from sqlalchemy import Connection, Engine, create_engine, event, func, select, text
 from sqlalchemy.engine import make_url
@@ -228,6 +228,10 @@ class Database:
         """A transaction that sees one snapshot of the database."""
         with self._read.begin() as connection:
             yield connection
+
+    def own_connection(self) -> Any:
+        """A connection to PostgreSQL outside of the pool (`Notices`)."""
+        return postgresql.own_connection(self._write)
 
     def time(self) -> datetime:
         """The time of the PostgreSQL server, for SQLite of this machine."""

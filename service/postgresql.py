@@ -82,6 +82,16 @@ def service_engine(url: str, connections: int) -> Engine:
     return engine
 
 
+def own_connection(engine: Engine) -> Any:
+    """A connection of psycopg outside of the pool, which commits by itself."""
+    # Loaded here: only services on PostgreSQL need the driver.
+    import psycopg
+
+    words, options = engine.dialect.create_connect_args(engine.url)
+    arguments: dict[str, Any] = {**options, **_arguments(engine.url), "autocommit": True}
+    return psycopg.connect(*words, **arguments)
+
+
 def reading(engine: Engine) -> Engine:
     """The same pool for transactions that read one snapshot and cannot write."""
     return engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)

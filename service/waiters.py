@@ -29,6 +29,8 @@ class Waiters:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._listeners: dict[str, list[Listener]] = {}
+        self.relay: Callable[[str], None] | None = None
+        """Told of every job that ended here, for those who wait at other services."""
 
     @contextmanager
     def listening(self, job_id: str, listener: Listener) -> Iterator[None]:
@@ -50,7 +52,13 @@ class Waiters:
         self._tell(job_id, Event(job_id=job_id, ended=False, fraction=fraction, points=points))
 
     def ended(self, job_id: str) -> None:
-        """The job's state changed."""
+        """The job's state changed, here."""
+        self.ended_elsewhere(job_id)
+        if self.relay is not None:
+            self.relay(job_id)
+
+    def ended_elsewhere(self, job_id: str) -> None:
+        """The job's state changed, perhaps at another service."""
         self._tell(job_id, Event(job_id=job_id, ended=True))
 
     def wake_all(self) -> None:
@@ -58,7 +66,7 @@ class Waiters:
         with self._lock:
             ids = list(self._listeners)
         for job_id in ids:
-            self.ended(job_id)
+            self.ended_elsewhere(job_id)
 
     def _tell(self, job_id: str, event: Event) -> None:
         with self._lock:

@@ -234,3 +234,26 @@ def test_names_that_cannot_be_stored_are_refused(start: Start) -> None:
     with pytest.raises(ServiceProblem) as refused:
         list(client.sweeps(scene="a\0b"))
     assert refused.value.status == 422
+
+
+def test_services_tell_each_other_without_polling(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A new job, the end of one and a cancel reach another service long before it would look by itself."""
+    monkeypatch.setattr("service.core._LOOK_AGAIN_SECONDS", 60.0)
+    with ExitStack() as stack:
+        services = [Service(settings_of(url)(poll_seconds=60.0, lease_seconds=300.0), PRIVATE) for _ in "ab"]
+        for service in services:
+            service.start()
+            stack.callback(service.stop)
+        one, other = services
+        until(lambda: all(service.queue.status().ready for service in services))
+        bodies = [{"kind": "iteration", "seconds": seconds, "seed": 1} for seconds in (60.0, 61.0)]
+        long = [one.submit(body)[0].id for body in bodies]
+        until(lambda: all(service.queue.status().busy for service in services))
+        away = next(job for job in long if one.queue.live_progress(job) is None)
+        one.dismiss(away)
+        assert one.wait(away, 20.0).state is JobState.DISMISSED
+        here = next(job for job in long if job != away)
+        job = one.submit({"kind": "iteration", "seconds": 0.2, "seed": 2})[0].id
+        assert one.wait(job, 20.0).state is JobState.SUCCESSFUL
+        assert not other.queue.status().busy
+        one.dismiss(here)
