@@ -18,6 +18,7 @@ _FILE: dict[str, Any] = {"type": "string", "contentMediaType": "application/octe
 _MATRIX = {
     "MatrixMarket": {"value": "%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 1 1.0\n2 2 2.0\n"}
 }
+_KEY = {"type": "http", "scheme": "bearer", "description": "Made by `stickslip keys create`."}
 _PROBLEM: dict[str, Any] = {
     "type": "object",
     "description": "RFC 9457",
@@ -74,6 +75,9 @@ def _complete(description: dict[str, Any], registry: Registry) -> None:
         "required": True,
         "content": {form: {"schema": _FILE, "examples": _MATRIX} for form in UPLOAD_MEDIA},
     }
+    description["components"]["securitySchemes"] = {"key": _KEY}
+    # Either of them: whether a key is needed is a setting.
+    description["security"] = [{"key": []}, {}]
     error_examples.describe(description, _PROBLEM)
 
 
