@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from service.access.gate import OPEN
 from service.problems import MEDIA_TYPE
 
 _BAD = [{"pointer": "/contacts/0/mu", "detail": "`mu` must be >= 0, got -0.1"}]
@@ -13,6 +14,12 @@ _BAD_QUERY = [{"pointer": "/limit", "detail": "`limit` must be >= 1, got 0", "in
 _ERRORS: dict[str, tuple[int, str, str, str, list[dict[str, str]]]] = {
     "MalformedBody": (400, "malformed-body", "The body cannot be read",
                       "the body is not JSON: Expecting value in line 1, column 10", []),
+    "Unauthorized": (401, "unauthorized", "A key is needed",
+                     "this needs a key: send it as `Authorization: Bearer …`", []),
+    "Forbidden": (403, "forbidden", "The key does not allow this",
+                  "this needs a key with the scope submit, this one has read", []),
+    "TooManyRequests": (429, "too-many-requests", "Too many requests",
+                        "the key may make 1200 requests a minute", []),
     "NotFound": (404, "not-found", "Not found", "there is no job '01a2'", []),
     "NotAcceptable": (406, "not-acceptable", "Not available in a form you accept",
                       "there is application/json, text/csv here, `Accept` takes none of it: 'image/gif'", []),
@@ -37,6 +44,7 @@ _ERRORS: dict[str, tuple[int, str, str, str, list[dict[str, str]]]] = {
                      "the database does not answer at present; nothing was written, try again later", []),
 }  # fmt: skip
 _BODY = ("MalformedBody", "BodyTooSlow", "BodyTooLarge", "UnsupportedMedia", "InvalidRequest")
+_KEYED = ("Unauthorized", "Forbidden", "TooManyRequests")
 _LIST = ("NotAcceptable", "InvalidQuery")
 _OF: dict[tuple[str, str], tuple[str, ...]] = {
     ("post", "/v1/jobs"): (*_BODY, "QueueFull"),
@@ -72,6 +80,8 @@ def describe(description: dict[str, Any], problem: dict[str, Any]) -> None:
             names = list(_OF.get((method, path), ()))
             if "{" in path:
                 names.append("NotFound")
+            if path not in OPEN:
+                names += _KEYED
             responses = operation["responses"]
             responses.pop("422", None)
             for name in names:
