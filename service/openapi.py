@@ -79,6 +79,19 @@ def _complete(description: dict[str, Any], registry: Registry) -> None:
     # Either of them: whether a key is needed is a setting.
     description["security"] = [{"key": []}, {}]
     error_examples.describe(description, _PROBLEM)
+    _use_known_patterns(description)
+
+
+def _use_known_patterns(item: Any) -> None:
+    r"""Patterns as JSON Schema has them: its regular expressions (ECMA 262) have no `\z`."""
+    if isinstance(item, dict):
+        if isinstance(item.get("pattern"), str):
+            item["pattern"] = item["pattern"].replace(r"\z", "$")
+        for inner in item.values():
+            _use_known_patterns(inner)
+    elif isinstance(item, list):
+        for inner in item:
+            _use_known_patterns(inner)
 
 
 def _examples(path: str, schema: dict[str, Any], kinds: dict[str, dict[str, Any]]) -> dict[str, Any]:
