@@ -15,6 +15,7 @@ def _cases() -> dict[str, Callable[[], None]]:
     from benchmarks import (
         against_peers,
         beam,
+        cluster,
         designing,
         disk,
         large,
@@ -48,6 +49,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "latency": service_load.latency,
         "lists": service_load.lists,
         "scale": service_scale.scale,
+        "cluster": cluster.mistuning_study,
     }
 
 

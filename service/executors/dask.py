@@ -219,6 +219,10 @@ class DaskExecutor:
             self._end(work, Failed(answer.failure))
         elif answer.retry is not None:
             self._again(work, index, answer.retry)
+        elif answer.output is None and index is not None:
+            # Its worker leaves the cluster in good order; nothing was lost.
+            with self._lock:
+                work.pending.appendleft(index)
         elif answer.output is None:
             self._end(work, Stopped())
         else:

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import shutil
 import signal
+import subprocess
 import sys
+import textwrap
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from dask_cluster import DaskCluster, lives
 from private_kinds import PRIVATE
 from service_helpers import pids, until
@@ -292,3 +297,72 @@ def test_a_scheduler_that_is_not_there(tmp_path: Path) -> None:
         job = embedded.submit("iteration", {})
         until(lambda: "does not answer" in " ".join(check(embedded._service).trouble), 10.0)
         assert embedded.job(job).status is JobState.ACCEPTED
+
+
+def certificates(folder: Path) -> dict[str, Path]:
+    """A certificate authority of one day, and a certificate it signed."""
+    files = {name: folder / f"{name}.pem" for name in ("ca", "ca_key", "cert", "key", "request")}
+    new = ("-newkey", "rsa:2048", "-nodes", "-subj")
+    signed = ("-CA", str(files["ca"]), "-CAkey", str(files["ca_key"]), "-CAcreateserial", "-days", "1")
+    for command in (
+        (
+            "req",
+            "-x509",
+            *new,
+            "/CN=authority",
+            "-days",
+            "1",
+            "-keyout",
+            str(files["ca_key"]),
+            "-out",
+            str(files["ca"]),
+        ),
+        ("req", *new, "/CN=stickslip", "-keyout", str(files["key"]), "-out", str(files["request"])),
+        ("x509", "-req", "-in", str(files["request"]), *signed, "-out", str(files["cert"])),
+    ):
+        subprocess.run(["openssl", *command], check=True, capture_output=True)
+    return files
+
+
+@pytest.mark.long
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not installed")
+def test_certificates_on_all_sides(tmp_path: Path) -> None:
+    files = certificates(tmp_path)
+    flags = [
+        f"--tls-{name}={files[key]}" for name, key in (("ca-file", "ca"), ("cert", "cert"), ("key", "key"))
+    ]
+    with DaskCluster(tmp_path, workers=1, extra=("--protocol", "tls", *flags), scheme="tls") as cluster:
+        names = {f"dask_{name}_file": files[name] for name in ("ca", "cert", "key")}
+        with EmbeddedService(settings_on(tmp_path, cluster, **names), BOTH) as embedded:
+            done = embedded.wait(embedded.submit("iteration", {}), timeout=60.0)
+            assert done.status is JobState.SUCCESSFUL
+        (tmp_path / "others").mkdir()
+        others = certificates(tmp_path / "others")
+        names = {f"dask_{name}_file": others[name] for name in ("ca", "cert", "key")}
+        with EmbeddedService(settings_on(tmp_path, cluster, **names), BOTH) as stranger:
+            until(lambda: "does not answer" in " ".join(check(stranger._service).trouble), 20.0)
+
+
+@pytest.mark.long
+def test_a_thousand_disks_on_two_workers(service: tuple[EmbeddedService, DaskCluster]) -> None:
+    embedded, _ = service
+    body = {**BODIES["mistuning"], "samples": 1000}
+    job = embedded.submit("mistuning", body)
+    assert embedded.wait(job, timeout=900.0).status is JobState.SUCCESSFUL
+    result = embedded.results(job).result
+    assert timeless(result) == computed(embedded, "mistuning", body)[0]
+
+
+def test_the_examples_of_the_page_are_well_formed() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "cluster.md").read_text(encoding="utf-8")
+    blocks = [
+        textwrap.dedent(block) for block in re.findall(r"(?:^(?: {4}.*)?\n)+", page, flags=re.MULTILINE)
+    ]
+    (manifest,) = [yaml.safe_load(block) for block in blocks if "apiVersion" in block]
+    scheduler, worker = manifest["spec"]["scheduler"], manifest["spec"]["worker"]
+    assert scheduler["service"]["selector"]["dask.org/cluster-name"] == manifest["metadata"]["name"]
+    assert worker["spec"]["containers"][0]["env"] == [{"name": "NUMBA_NUM_THREADS", "value": "1"}]
+    (script,) = [block for block in blocks if "SLURMCluster" in block]
+    compile(script, "cluster.md", "exec")
+    named = set(re.findall(r"STICKSLIP_(\w+)", page))
+    assert named <= {name.upper() for name in Settings.model_fields}
