@@ -20,10 +20,10 @@ from service.settings import Settings
 
 log = logging.getLogger("stickslip.retention")
 
-_WANTED_SECONDS = 0.015
-_MOST = 256
+_WANTED_SECONDS = 0.008
+_MOST = 64
 _JOBS = 64
-_JOBS_AT_ONCE = 8
+_JOBS_AT_ONCE = 4
 _ROUND_SECONDS = 600.0
 
 
