@@ -259,11 +259,12 @@ def test_an_old_database_keeps_its_rows(url: str) -> None:
 
 
 def test_a_time_is_the_same_before_and_after(database: Database) -> None:
-    begin = utc_now()
-    row, _ = JobRepository(database).submit(new_job(), queue_limit=10)
-    again = JobRepository(database).get(row.id)
+    jobs = JobRepository(database)
+    begin = jobs.now()
+    row, _ = jobs.submit(new_job(), queue_limit=10)
+    again = jobs.get(row.id)
     assert again is not None
-    assert begin <= again.created == row.created <= utc_now()
+    assert begin <= again.created == row.created <= jobs.now()
     assert again.created.tzinfo is UTC
     assert [found.id for found in JobRepository(database).page()] == [row.id]
 
