@@ -169,6 +169,22 @@ def test_a_damaged_binary_file_names_its_byte(tmp_path: Path) -> None:
             read_matrix(path, "K")
 
 
+def test_changed_bytes_are_refused_or_read_but_never_another_error(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    texts = {**files(), **{name: text.encode() for name, text in BY_HAND.items()}}
+    letters = b"0123456789.,+-eEdD \n*\t$%x\0\xff_"
+    for name, content in texts.items():
+        for _ in range(25):
+            changed, at = bytearray(content), int(rng.integers(len(content)))
+            if rng.integers(2):
+                changed[at] = letters[rng.integers(len(letters))]
+            else:
+                del changed[at : at + int(rng.integers(1, 30))]
+            (tmp_path / name).write_bytes(changed)
+            with suppress(MatrixFileError):
+                read_matrix(tmp_path / name, "K")
+
+
 def test_rows_are_named_by_the_files_that_know(tmp_path: Path) -> None:
     for name in ("k.mtx", "k.pch"):
         (tmp_path / name).write_bytes(files()[name])

@@ -248,6 +248,17 @@ def test_what_is_no_structure_is_refused_with_what_to_do(
     assert {path.name for path in tmp_path.iterdir()} == {"M.mtx", "K.mtx", "M.npz"}
 
 
+def test_a_boundary_condition_by_penalty_is_told_where_rows_have_no_labels(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    M, K = beam(6)
+    Path("M.mtx").write_text(coordinate(M))
+    Path("K.mtx").write_text(coordinate(K + np.diag([1e36] + [0.0] * 11)))
+    status, _, err = command("import M.mtx K.mtx --out s.toml", capsys)
+    assert (status, "row 0 is held by a penalty: leave such DOFs out" in " ".join(err.split())) == (2, True)
+
+
 NOTES = {
     "free": (lambda: free_beam(6), "2 rigid-body modes: the body is not held"),
     "slow": (lambda: (beam(6)[0] * 1e6, beam(6)[1]), "are M and K in units that go together?"),

@@ -18,6 +18,7 @@ _RIGID = 1e-3  # a frequency below this share of the next one counts as zero
 _BODY = 6
 _SLOW, _FAST = 0.1, 3e5  # Hz; a first elastic frequency outside is hardly that of a machine part
 _LIGHT = 1e-3  # kg; less than a gram is more likely tonnes
+_PENALTY = 1e30  # a stiffness that stands for a boundary condition
 _INDEFINITE = 1e-6  # smallest eigenvalue of M scaled to a unit diagonal, negative beyond rounding
 
 
@@ -59,6 +60,12 @@ def refuse(found: MatrixSet, *, reduced: bool) -> None:
         raise ValueError(
             f"`K` has {stiffness[at]:g} on the diagonal of {found.name(at)}: a stiffness must be >= 0 there; "
             "export K at a state of equilibrium, before it buckles"
+        )
+    penalties = np.flatnonzero(stiffness >= _PENALTY)
+    if penalties.size:
+        raise ValueError(
+            f"`K` has {stiffness[penalties[0]]:g} on the diagonal, {_rows(found, penalties)} held by a "
+            "penalty: leave such DOFs out of the export (Abaqus: FORMAT=MATRIX INPUT, which tells them)"
         )
     bare = np.flatnonzero(mass == 0.0)
     if bare.size and not reduced:
