@@ -20,7 +20,21 @@ from service.jobs import Registry
 from service.kinds import SHIPPED
 from service.metrics import Measured, Metrics
 from service.request_log import RequestLog
-from service.routes import designs, events, health, jobs, metrics, plan, reference, scenes, sweeps, uploads
+from service.routes import (
+    designs,
+    events,
+    health,
+    jobs,
+    metrics,
+    page,
+    plan,
+    previews,
+    reference,
+    scene_text,
+    scenes,
+    sweeps,
+    uploads,
+)
 from service.settings import Settings, load_settings
 
 log = logging.getLogger("stickslip.service")
@@ -70,7 +84,10 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
     problems.install(app)
     app.add_middleware(Seal, settings=service.settings)
     events.install(app)
-    for module in (jobs, events, designs, sweeps, scenes, uploads, plan, health, metrics, reference):
+    for module in (
+        jobs, events, designs, sweeps, scene_text, scenes, uploads, plan, previews, health, metrics, reference,
+        page,
+    ):  # fmt: skip
         app.include_router(module.router)
     openapi.install(app, registry)
     return app

@@ -23,6 +23,7 @@ from service.kinds import SHIPPED
 from service.kinds.sizes import work_limited
 from service.models import JobState
 from service.notices import Notices
+from service.previews import Previews
 from service.queue import JobQueue
 from service.repository import (
     DesignRepository,
@@ -94,6 +95,7 @@ class Service:
         self.uploads = Uploads(UploadRepository(self.database), settings)
         self.scenes = SceneStore(SceneRepository(self.database), self.uploads)
         self.waiters = Waiters()
+        self.previews = Previews(settings.preview_seconds)
         self.queue = JobQueue(self.jobs, executor_of(settings, registry), settings, self.waiters)
         self.retention = Retention(self.database, settings, self.jobs.now)
         self._notices = None if self.database.exclusive else self._make_notices()
@@ -148,6 +150,7 @@ class Service:
     def stop(self) -> None:
         """End the workers, give running jobs back to the queue, close the database."""
         self.stop_waiting()
+        self.previews.close()
         self.retention.stop()
         self.queue.stop()
         if self._notices is not None:

@@ -145,6 +145,10 @@ class TooManyRequestsError(RetryLaterError):
     """More requests, waiting jobs or wrong keys than are allowed."""
 
 
+class PreviewError(ServiceError):
+    """A preview that took too long, or whose worker died; a job has more time."""
+
+
 class JobFailedError(ServiceError):
     """The results of a job that failed were asked for.
 

@@ -48,6 +48,7 @@ _STATUS: dict[type[errors.ServiceError], tuple[int, str, str]] = {
         "The idempotency key belongs to another request",
     ),
     errors.QueueFullError: (503, "queue-full", "The queue is full"),
+    errors.PreviewError: (503, "preview", "The preview was not finished"),
     errors.JobFailedError: (409, "job-failed", "The job failed"),
     errors.DatabaseError: (500, "database", "The database cannot be used"),
 }

@@ -181,6 +181,9 @@ class Settings(BaseSettings):
     retention_keep_designs: bool = Field(
         default=True, description="Keep designs with their results for ever, and delete their sweeps alone."
     )
+    preview_seconds: float = Field(
+        default=3.0, ge=0.05, le=60.0, description="Longest time a preview may be computed [s]."
+    )
 
     log_format: Literal["text", "json"] = Field(
         default="text", description="The log on standard error: lines for people, or JSON objects."

@@ -53,6 +53,13 @@ _STATES = {
     TOUCHING: ContactState.TOUCHING,
     DEFORMING: ContactState.DEFORMING,
 }
+
+
+def state_of(code: int) -> ContactState:
+    """The state a compiled loop says by a number, as in `Branch.states`."""
+    return _STATES[code]
+
+
 _OPENS = (ContactState.SEPARATED, ContactState.LIFTING, ContactState.TOUCHING)
 
 

@@ -20,8 +20,9 @@ from service.access.keys import id_of
 from service.errors import OriginRefusedError, ServiceError, UnauthorizedError
 from service.problems import answered
 
-OPEN = frozenset({"/health/live", "/health/ready", "/openapi.json", "/docs", "/docs/style.css"})
-"""Paths that need no key: whether the service lives, and what its API is."""
+OPEN = frozenset({"/health/live", "/health/ready", "/openapi.json", "/docs", "/docs/style.css", "/"})
+"""Paths that need no key: whether the service lives, what its API is, and the page, which asks for a key."""
+_PAGE = "/page/"
 _MONITORED = frozenset({"/metrics"})
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _OURS = frozenset({"same-origin", "none"})
@@ -30,7 +31,7 @@ _BEARER = "bearer "
 
 def scope_of(method: str, path: str) -> callers.Scope | None:
     """The scope that a request needs; None for none."""
-    if path in OPEN and method in _READING:
+    if (path in OPEN or path.startswith(_PAGE)) and method in _READING:
         return None
     if path in _MONITORED:
         return callers.Scope.MONITOR

@@ -9,10 +9,12 @@ from pydantic import ConfigDict, Field
 
 import solver
 from service.jobs import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from service.kinds.periods import history_of
 from service.kinds.scenes import FrequencyHz, SceneRequest, require, resolve_scene, resolved
 from service.kinds.sizes import march_issues
 from solver.scene import Scene
 
+SAMPLES = 512
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2}
 
 
@@ -29,6 +31,8 @@ class MarchRequest(SceneRequest):
         Largest relative change over a period of a motion that repeats.
     max_periods : int
         Periods marched at most.
+    history : bool
+        Whether the last period is in the result, as `history`.
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
@@ -43,6 +47,9 @@ class MarchRequest(SceneRequest):
     max_periods: int = Field(
         default=20_000, strict=True, ge=1, le=1_000_000, description="Periods marched at most."
     )
+    history: bool = Field(
+        default=False, strict=True, description="Give the last period too: motion and loops of the contacts."
+    )
 
 
 def resolve(request: MarchRequest, source: SceneSource) -> Resolved:
@@ -55,6 +62,7 @@ def resolve(request: MarchRequest, source: SceneSource) -> Resolved:
         steps_per_period=request.steps_per_period,
         tolerance=request.tolerance,
         max_periods=request.max_periods,
+        **({"history": True} if request.history else {}),
     )
 
 
@@ -69,7 +77,10 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
         on_progress=progress,
         should_stop=should_stop,
     )
-    return JobOutput(result=marched.to_json(), shortfall=None if marched.converged else marched.status.value)
+    result = marched.to_json()
+    if spec.get("history"):
+        result["history"] = history_of(marched, SAMPLES)
+    return JobOutput(result=result, shortfall=None if marched.converged else marched.status.value)
 
 
 MARCH = JobKind(

@@ -1,0 +1,62 @@
+// What is seen, in the address: a reload goes on, and a link shows another the same.
+
+const JOBS = ["sweep", "design", "map", "pareto", "accuracy", "campbell", "march"];
+
+export const state = {
+  scene: "",
+  set: {},
+  contact: "",
+  range: null,
+  harmonics: 11,
+  at: null,
+  jobs: {},
+  compare: [],
+};
+
+export function read() {
+  const words = new URLSearchParams(location.search);
+  state.scene = words.get("scene") ?? "";
+  state.contact = words.get("contact") ?? "";
+  state.set = pairs(words.get("set") ?? "");
+  state.harmonics = whole(words.get("harmonics"), 11);
+  state.at = positive(words.get("at"));
+  const range = (words.get("range") ?? "").split(":").map(Number);
+  state.range = range.length === 2 && range.every((end) => end > 0) ? range : null;
+  state.compare = (words.get("compare") ?? "").split(",").filter((id) => /^[0-9a-f-]{36}$/.test(id));
+  state.jobs = {};
+  for (const kind of JOBS) {
+    const id = words.get(kind);
+    if (id && /^[0-9a-f-]{36}$/.test(id)) state.jobs[kind] = id;
+  }
+}
+
+export function write() {
+  const words = new URLSearchParams();
+  if (state.scene) words.set("scene", state.scene);
+  const set = Object.entries(state.set).map(([path, value]) => `${path}:${value}`);
+  if (set.length) words.set("set", set.join(","));
+  if (state.contact) words.set("contact", state.contact);
+  if (state.range) words.set("range", state.range.join(":"));
+  if (state.harmonics !== 11) words.set("harmonics", state.harmonics);
+  if (state.at !== null) words.set("at", Number(state.at.toPrecision(9)));
+  for (const kind of JOBS) if (state.jobs[kind]) words.set(kind, state.jobs[kind]);
+  if (state.compare.length) words.set("compare", state.compare.join(","));
+  const text = words.toString().replaceAll("%3A", ":").replaceAll("%2C", ",");
+  const address = `${location.pathname}${text ? `?${text}` : ""}`;
+  if (address !== location.pathname + location.search) history.replaceState(null, "", address + location.hash);
+}
+
+function pairs(text) {
+  const found = {};
+  for (const pair of text.split(",").filter(Boolean)) {
+    const [path, value] = pair.split(":");
+    if (/^[\w@-]+(\.[\w@-]+)?$/.test(path) && value !== "" && Number.isFinite(Number(value))) {
+      found[path] = Number(value);
+    }
+  }
+  return found;
+}
+
+const whole = (text, otherwise) => (/^[1-9]\d{0,2}$/.test(text ?? "") ? Number(text) : otherwise);
+
+const positive = (text) => (text !== null && Number(text) > 0 ? Number(text) : null);

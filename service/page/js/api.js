@@ -1,0 +1,104 @@
+// Requests to the service: problem documents as errors, keys, the state of the connection.
+
+import { tell } from "./events.js";
+
+const KEY = "stickslip-key";
+const BACKOFF = [0.5, 1, 2, 4, 8];
+let offline = false;
+let back = null;
+
+export class Problem extends Error {
+  constructor(status, document) {
+    super(document.detail || document.title || `HTTP status ${status}`);
+    this.status = status;
+    this.errors = document.errors ?? [];
+  }
+}
+
+export class Offline extends Error {
+  constructor() {
+    super("the service does not answer");
+  }
+}
+
+export const key = () => sessionStorage.getItem(KEY) ?? "";
+
+export function setKey(value) {
+  if (value) sessionStorage.setItem(KEY, value);
+  else sessionStorage.removeItem(KEY);
+}
+
+export const pause = (seconds) => new Promise((resolve) => setTimeout(resolve, seconds * 1000));
+
+const authorised = (headers) => (key() ? { ...headers, Authorization: `Bearer ${key()}` } : headers);
+
+// A raw answer of the service; Offline if there is none, Problem if it refuses.
+export async function fetched(path, { method = "GET", body, headers = {}, signal } = {}) {
+  const sent = body === undefined ? {} : { "Content-Type": "application/json" };
+  let answer;
+  try {
+    answer = await fetch(path, {
+      method,
+      headers: authorised({ ...sent, ...headers }),
+      body: body === undefined ? undefined : JSON.stringify(body),
+      signal,
+    });
+  } catch (error) {
+    if (error.name === "AbortError") throw error;
+    lost();
+    throw new Offline();
+  }
+  if (answer.ok) return answer;
+  const problem = new Problem(answer.status, await answer.json().catch(() => ({})));
+  if (answer.status === 401) tell("key-wanted", problem);
+  throw problem;
+}
+
+export async function request(path, options) {
+  const answer = await fetched(path, options);
+  return answer.status === 204 ? null : answer.json();
+}
+
+export const post = (path, body, options = {}) => request(path, { ...options, method: "POST", body });
+
+// The service went away: ask until it is back, ever less often.
+export function lost() {
+  if (offline) return back;
+  offline = true;
+  tell("offline");
+  back = (async () => {
+    for (let turn = 0; offline; turn += 1) {
+      await pause(BACKOFF[Math.min(turn, BACKOFF.length - 1)]);
+      offline = !(await alive());
+    }
+    tell("online");
+  })();
+  return back;
+}
+
+async function alive() {
+  try {
+    return (await fetch("/health/ready", { cache: "no-store" })).ok;
+  } catch {
+    return false;
+  }
+}
+
+// Waits until the service answers again, then tries once more; for reads and for what has an idempotency key.
+export async function patiently(attempt) {
+  for (;;) {
+    try {
+      return await attempt();
+    } catch (error) {
+      if (!(error instanceof Offline)) throw error;
+      await lost();
+    }
+  }
+}
+
+export const isOffline = () => offline;
+
+export async function blobOf(path, accept, options = {}) {
+  const answer = await fetched(path, { ...options, headers: { ...(options.headers ?? {}), Accept: accept } });
+  return answer.blob();
+}

@@ -1,0 +1,245 @@
+// A chart of lines and points in SVG: read by mouse and keyboard, picked by click and Enter, saved as files.
+
+import { el, show, svg } from "./dom.js";
+import { csvText, pngBlob, saveBlob, saveText, svgText } from "./exports.js";
+import { number } from "./format.js";
+import { pathOf, plane, shape } from "./plane.js";
+import { extent } from "./scales.js";
+
+const MARGIN_LEFT = 62;
+const DASHES = { dashed: "7 4", dotted: "2 4" };
+
+// What a chart shows: {x, y: {name, log, zero, low, high}, series: [{name, x, y, colour, dash, width, shape, bare}],
+// bands: [[low, high]], limits: [{y, name}], marks: [{x, y, text, shape, colour}]}.
+export function chart(host, { label, file, height = 300, onPick, legend = true, pickSeries = 0 }) {
+  const read = el("p", { class: "chart-read", "aria-live": "polite" });
+  const drawing = svg("svg", { class: "chart", role: "group", tabindex: 0, "aria-label": label });
+  drawing.setAttribute("aria-roledescription", onPick ? "chart, arrows move along it, Enter picks" : "chart, arrows move along it");
+  const tools = el("div", { class: "chart-tools" });
+  show(host, drawing, el("div", { class: "chart-foot" }, read, tools));
+  const self = { drawing, shown: null, at: null };
+  tools.append(...saving(self, file, label));
+
+  self.draw = (what) => {
+    self.shown = what;
+    paint(self, host, height, legend, label);
+  };
+  self.cursor = (index) => moveCursor(self, index, read, pickSeries);
+  drawing.addEventListener("pointermove", (event) => hover(self, event, pickSeries));
+  drawing.addEventListener("pointerleave", () => self.mark?.replaceChildren());
+  drawing.addEventListener("keydown", (event) => keyed(self, event, onPick, pickSeries));
+  if (onPick) {
+    drawing.addEventListener("click", (event) => {
+      hover(self, event, pickSeries);
+      if (self.at !== null) onPick(pointOf(self, pickSeries), self.at);
+    });
+  }
+  new ResizeObserver(() => {
+    if (self.shown && Math.abs(host.clientWidth - self.width) > 1) paint(self, host, height, legend, label);
+  }).observe(host);
+  return self;
+}
+
+const pointOf = (self, which) => {
+  const line = self.shown.series[which];
+  return { x: line.x[self.at], y: line.y[self.at], series: line };
+};
+
+function ends(axis, lists) {
+  const [low, high] = extent(lists, axis);
+  return { ...axis, low: axis.low ?? low, high: axis.high ?? high };
+}
+
+function paint(self, host, height, legend, label) {
+  const { series, bands = [], limits = [], marks = [] } = self.shown;
+  const width = Math.max(host.clientWidth, 240);
+  self.width = host.clientWidth;
+  const framed = series.filter((line) => !line.bare);
+  const x = ends({ pad: 0, ...self.shown.x }, [...framed.map((line) => line.x), marks.map((m) => m.x)]);
+  const y = ends(self.shown.y, [
+    ...framed.map((line) => line.y),
+    marks.map((m) => m.y),
+    limits.map((limit) => limit.y).filter((v) => v !== undefined),
+  ]);
+  const names = legend ? keyPlaces(series, width) : { entries: [], rows: 0 };
+  const base = plane(width, height, x, y, { above: ROW * names.rows });
+  Object.assign(self, base);
+  const clip = `clip-${label.replace(/\W+/g, "-")}`;
+  const { box, xs, ys } = base;
+  const inside = svg(
+    "g",
+    { "clip-path": `url(#${clip})` },
+    bands.map(([low, high]) =>
+      svg("rect", { class: "band", x: xs.at(low), width: Math.max(xs.at(high) - xs.at(low), 1), y: box.top, height: box.bottom - box.top }),
+    ),
+    limits.map((limit) => limitLine(limit, base)),
+    series.map((line) => curve(line, base)),
+  );
+  self.mark = svg("g", {});
+  drawingOf(self.drawing, width, height, [
+    svg("defs", {}, svg("clipPath", { id: clip }, svg("rect", { x: box.left, y: box.top - 6, width: box.right - box.left, height: box.bottom - box.top + 12 }))),
+    base.frame,
+    inside,
+    marks.map((mark) => marked(mark, base)),
+    key(names),
+    self.mark,
+  ]);
+}
+
+function drawingOf(drawing, width, height, nodes) {
+  drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  drawing.setAttribute("width", width);
+  drawing.setAttribute("height", height);
+  show(drawing, ...nodes);
+}
+
+function bars(line, { box, xs, ys }) {
+  const half = Math.max(0.3 * Math.abs(xs.at(1) - xs.at(0)), 1.5);
+  return line.x.map((value, i) => {
+    if (line.y[i] === null) return null;
+    const top = ys.at(line.y[i]);
+    return svg("rect", { class: `f${line.colour ?? 1}`, x: xs.at(value) - half, width: 2 * half, y: top, height: Math.max(box.bottom - top, 0) });
+  });
+}
+
+function curve(line, base) {
+  const { xs, ys } = base;
+  if (line.bars) return bars(line, base);
+  const nodes = [];
+  if (line.width !== 0) {
+    nodes.push(
+      svg("path", {
+        class: `series ${line.paint ?? `c${line.colour ?? 1}`}`,
+        d: pathOf(xs, ys, line.x, line.y),
+        "stroke-dasharray": DASHES[line.dash],
+        "stroke-width": line.width ?? 2,
+      }),
+    );
+  }
+  if (line.shape) {
+    line.x.forEach((value, i) => {
+      if (value === null || line.y[i] === null || (ys.log && line.y[i] <= 0)) return;
+      nodes.push(shape(line.shape, xs.at(value), ys.at(line.y[i]), line.size ?? 3.2, line.colour ?? 1));
+    });
+  }
+  return nodes;
+}
+
+function limitLine({ x, y, name }, { box, xs, ys }) {
+  if (x !== undefined) {
+    const at = xs.at(x);
+    return [
+      svg("line", { class: "limit", x1: at, x2: at, y1: box.top, y2: box.bottom }),
+      svg("text", { class: "halo", x: at + 4, y: box.top + 12 }, name),
+    ];
+  }
+  const at = ys.at(y);
+  return [
+    svg("line", { class: "limit", x1: box.left, x2: box.right, y1: at, y2: at }),
+    svg("text", { class: "halo", x: box.right - 4, y: at - 5, "text-anchor": "end" }, name),
+  ];
+}
+
+function marked({ x, y, text, shape: kind = "circle", colour = 2 }, { box, xs, ys }) {
+  const [px, py] = [xs.at(x), Math.max(ys.at(y), box.top)];
+  const share = (px - box.left) / (box.right - box.left);
+  const anchor = share < 0.25 ? "start" : share > 0.75 ? "end" : "middle";
+  const above = py - 10 > box.top + 4;
+  return [
+    shape(kind, px, py, 4.5, colour, text),
+    text ? svg("text", { class: "halo", x: px, y: above ? py - 10 : py + 20, "text-anchor": anchor }, text) : null,
+  ];
+}
+
+const LETTER = 6.4;
+const ROW = 17;
+
+// Where the names of the lines go: in rows above the chart, as wide as it is.
+function keyPlaces(series, width) {
+  const named = series.filter((line) => line.name);
+  if (named.length < 2) return { entries: [], rows: 0 };
+  let [x, row] = [MARGIN_LEFT, 0];
+  const entries = named.map((line) => {
+    const wide = 28 + LETTER * line.name.length + 16;
+    if (x + wide > width && x > MARGIN_LEFT) [x, row] = [MARGIN_LEFT, row + 1];
+    const place = { line, x, row };
+    x += wide;
+    return place;
+  });
+  return { entries, rows: row + 1 };
+}
+
+function key({ entries }) {
+  return entries.map(({ line, x, row }) => {
+    const y = 14 + ROW * row;
+    return [
+      line.width === 0
+        ? shape(line.shape ?? "circle", x + 11, y - 4, 3.5, line.colour ?? 1)
+        : svg("path", { class: `series ${line.paint ?? `c${line.colour ?? 1}`}`, d: `M${x} ${y - 4}h22`, "stroke-dasharray": DASHES[line.dash] }),
+      svg("text", { x: x + 28, y }, line.name),
+    ];
+  });
+}
+
+function hover(self, event, which) {
+  const line = self.shown?.series[which];
+  if (!line?.x.length) return;
+  const frame = self.drawing.getBoundingClientRect();
+  const zoom = frame.width / self.drawing.viewBox.baseVal.width || 1;
+  const [px, py] = [(event.clientX - frame.left) / zoom, (event.clientY - frame.top) / zoom];
+  let [best, least] = [0, Infinity];
+  line.x.forEach((value, i) => {
+    if (value === null || line.y[i] === null) return;
+    const far = Math.hypot(self.xs.at(value) - px, 0.35 * (self.ys.at(line.y[i]) - py));
+    if (far < least) [best, least] = [i, far];
+  });
+  self.cursor(best);
+}
+
+function moveCursor(self, index, read, which) {
+  const line = self.shown.series[which];
+  if (!line?.x.length) return;
+  const way = index < (self.at ?? 0) ? -1 : 1;
+  let next = Math.min(Math.max(index, 0), line.x.length - 1);
+  while (line.y[next] === null && line.y[next + way] !== undefined) next += way;
+  if (line.y[next] === null || line.x[next] === null) return;
+  self.at = next;
+  const { x, y } = pointOf(self, which);
+  const [px, py] = [self.xs.at(x), self.ys.at(y)];
+  show(
+    self.mark,
+    svg("path", { class: "cursor", d: `M${px} ${self.box.top}V${self.box.bottom}M${self.box.left} ${py}H${self.box.right}` }),
+    shape("circle", px, py, 4, 7),
+  );
+  read.textContent = self.shown.describe?.(x, y, self.at) ?? `${self.shown.x.name}: ${number(x, 6)} · ${self.shown.y.name}: ${number(y, 5)}`;
+}
+
+function keyed(self, event, onPick, which) {
+  const count = self.shown?.series[which]?.x.length ?? 0;
+  if (!count) return;
+  const at = self.at ?? 0;
+  const moves = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 };
+  if (event.key in moves) self.cursor(at + moves[event.key]);
+  else if (event.key === "Home") self.cursor(0);
+  else if (event.key === "End") self.cursor(count - 1);
+  else if ((event.key === "Enter" || event.key === " ") && onPick) onPick(pointOf(self, which), at);
+  else return;
+  event.preventDefault();
+}
+
+// The buttons that take a chart away.
+export function saving(self, file, label, canvas) {
+  const button = (text, act) =>
+    el("button", { type: "button", "aria-label": `${label}: save as ${text}`, onclick: () => self.shown && act() }, text);
+  return [
+    button("SVG", () => saveText(svgText(self.drawing, canvas?.()), `${file}.svg`, "image/svg+xml")),
+    button("PNG", async () => saveBlob(await pngBlob(self.drawing, canvas?.()), `${file}.png`)),
+    button("CSV", () => saveText(csvText(self.columns?.() ?? columnsOf(self.shown)), `${file}.csv`, "text/csv")),
+  ];
+}
+
+const columnsOf = (shown) =>
+  shown.series.flatMap((line, i) => {
+    const name = line.name || `series ${i + 1}`;
+    return [[`${name}: ${shown.x.name}`, line.x], [`${name}: ${shown.y.name}`, line.y]];
+  });

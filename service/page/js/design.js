@@ -1,0 +1,73 @@
+// The best design, and the plan of the scene.
+
+import { Problem, patiently, post } from "./api.js";
+import { state } from "./address.js";
+import { byId, el, facts, say, show } from "./dom.js";
+import { on, tell } from "./events.js";
+import { length, number, percent, quantity, seconds } from "./format.js";
+import { putAll } from "./live.js";
+import { asked } from "./scenes.js";
+
+let token = 0;
+
+export function startDesign() {
+  on("scene", () => {
+    say("design-status", "Not searched for yet.");
+    show(byId("design-facts"));
+    plan();
+  });
+  on("settled", plan);
+}
+
+export const designView = {
+  waiting: () => say("design-status", "The search waits for a worker."),
+  progress: ({ progress }) => say("design-status", `Searching: ${percent(progress)}.`),
+  result(result, _sweeps) {
+    say("design-status", `Found in ${seconds(result.seconds)} with ${result.evaluations} responses. ${result.status}`);
+    const values = Object.entries(result.optimum ?? {});
+    const others = (result.basins ?? []).slice(1).map((b) => Object.entries(b.values).map(([p, v]) => `${quantity(p, v)}: ${length(b.peak)}`).join(", "));
+    show(
+      byId("design-facts"),
+      facts([
+        ...values.map(([path, v]) => [path, el("strong", {}, quantity(path, v))]),
+        ["highest peak", result.peak ? `${length(result.peak.value)} at ${number(result.peak.at, 6)} Hz` : "–"],
+        ["resonance band", result.band_hz === null ? "–" : `${number(result.band_hz)} Hz above ${length(result.limit)}`],
+        ["held by", (result.active ?? []).join(", ") || "nothing"],
+        ...(others.length ? [["other local optima", others.join("; ")]] : []),
+      ]),
+      values.length ? el("button", { type: "button", onclick: () => load(Object.fromEntries(values)) }, "Load this design") : null,
+    );
+    if (values.length) tell("optimum", { values: Object.fromEntries(values), peak: result.peak });
+  },
+  failed: (text) => say("design-status", text, true),
+};
+
+// Sets the values of a design beside those set before.
+export function load(values) {
+  const set = { ...state.set };
+  for (const path of Object.keys(values)) delete set[path];
+  putAll({ ...set, ...values });
+  byId("live").scrollIntoView({ block: "nearest" });
+}
+
+async function plan() {
+  const mine = (token += 1);
+  try {
+    const found = await patiently(() => post("/v1/plan", asked()));
+    if (mine === token) describe(found);
+  } catch (error) {
+    if (mine === token && error instanceof Problem) show(byId("plan-facts"), el("p", { class: "bad" }, error.message));
+  }
+}
+
+function describe({ effects, unknowns, linear_dofs: dofs, estimated_seconds_a_point: cost }) {
+  const item = ({ name, used, reason }) =>
+    el("li", { class: used ? "used" : "left" },
+      el("span", { class: "sign", "aria-hidden": "true" }, used ? "✓" : "–"),
+      el("strong", {}, name), ` ${used ? "in use" : "left out"}: ${reason}`);
+  show(
+    byId("plan-facts"),
+    el("p", { class: "note" }, `${unknowns} unknowns for ${dofs} linear DOFs; about ${seconds(cost)} a point.`),
+    el("ul", { class: "effects" }, [...effects].sort((a, b) => b.used - a.used).map(item)),
+  );
+}

@@ -1,0 +1,46 @@
+// Numbers and units as people read them.
+
+const LENGTHS = [
+  [0.1, "m", 1],
+  [1e-4, "mm", 1e3],
+  [1e-7, "µm", 1e6],
+  [0, "nm", 1e9],
+];
+const UNITS = { frequency: "Hz", N0: "N", N1: "N", N1_phase: "rad", kt: "N/m", amplitude: "N", phase: "rad" };
+
+export const number = (value, digits = 4) => {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  const size = Math.abs(value);
+  if (size !== 0 && (size >= 1e6 || size < 1e-4)) {
+    const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
+    return `${Number(mantissa)}e${Number(exponent)}`;
+  }
+  return String(Number(value.toPrecision(digits)));
+};
+
+export function lengthUnit(largest) {
+  const size = Math.abs(largest);
+  if (!Number.isFinite(size) || size === 0) return { name: "m", perMetre: 1 };
+  const [, name, perMetre] = LENGTHS.find(([least]) => size >= least);
+  return { name, perMetre };
+}
+
+export const length = (metres) => {
+  if (metres === null || metres === undefined) return "–";
+  const unit = lengthUnit(metres);
+  return `${number(metres * unit.perMetre)} ${unit.name}`;
+};
+
+export const unitOf = (path) => (path.startsWith("structure.") ? "" : (UNITS[path.split(".").pop()] ?? ""));
+
+export const withUnit = (path) => (unitOf(path) ? `${path} [${unitOf(path)}]` : path);
+
+export const quantity = (path, value) => `${number(value, 5)} ${unitOf(path)}`.trim();
+
+export const seconds = (value) => (value < 1 ? `${number(value * 1e3, 3)} ms` : `${number(value, 3)} s`);
+
+export const when = (text) => (text ? new Date(text).toLocaleString() : "–");
+
+export const percent = (share) => `${Math.round(100 * share)} %`;
+
+export const largest = (values) => values.reduce((most, v) => (Math.abs(v) > most ? Math.abs(v) : most), 0);

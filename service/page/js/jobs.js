@@ -1,0 +1,132 @@
+// Jobs of this page: submitted, watched, taken up again after a reload or a restart of the service.
+
+import { Problem, patiently, post, request } from "./api.js";
+import { state, write } from "./address.js";
+import { byId, el, show } from "./dom.js";
+import { tell } from "./events.js";
+import { percent } from "./format.js";
+import { watch } from "./stream.js";
+
+const WORDS = { accepted: "waits", running: "runs", successful: "done", failed: "failed", dismissed: "stopped" };
+const shown = new Map();
+const watching = new Map();
+
+// Submits a job of a kind and follows it: `view` hears {progress, points, result, failed, waiting}.
+export async function run(kind, body, view, priority = 0) {
+  forget(kind);
+  const mine = begin(kind);
+  view.waiting?.();
+  const key = crypto.randomUUID();
+  try {
+    const headers = { "Idempotency-Key": key };
+    const job = await patiently(() => post("/v1/jobs", { kind, priority, ...body }, { headers, signal: mine.signal }));
+    state.jobs[kind] = job.id;
+    write();
+    await follow(kind, job.id, view, mine);
+    return job.id;
+  } catch (error) {
+    refused(kind, error, view, mine);
+    return null;
+  }
+}
+
+// Follows a job that was submitted before, by this page or the one that shared its link.
+export async function resume(kind, view) {
+  const id = state.jobs[kind];
+  if (!id) return;
+  const mine = begin(kind);
+  view.waiting?.();
+  try {
+    await follow(kind, id, view, mine);
+  } catch (error) {
+    if (error instanceof Problem && error.status === 404) {
+      delete state.jobs[kind];
+      write();
+      shown.delete(kind);
+      list();
+      view.gone?.();
+    } else refused(kind, error, view, mine);
+  }
+}
+
+export function forget(kind) {
+  watching.get(kind)?.abort();
+  watching.delete(kind);
+  shown.delete(kind);
+  delete state.jobs[kind];
+  list();
+}
+
+function begin(kind) {
+  watching.get(kind)?.abort();
+  const mine = new AbortController();
+  watching.set(kind, mine);
+  return mine;
+}
+
+function refused(kind, error, view, mine) {
+  if (error.name === "AbortError" || watching.get(kind) !== mine) return;
+  view.failed(error.message, error.errors ?? []);
+}
+
+async function follow(kind, id, view, { signal }) {
+  const first = await patiently(() => request(`/v1/jobs/${id}`, { signal }));
+  enter(kind, first);
+  view.submitted?.(first);
+  const job = ["successful", "failed", "dismissed"].includes(first.status)
+    ? first
+    : await watch(id, {
+        signal,
+        onProgress: (news) => {
+          enter(kind, { ...first, ...news });
+          view.progress?.(news);
+        },
+        onPoints: (news) => view.points?.(news),
+      });
+  enter(kind, job);
+  if (job.status === "dismissed") return view.failed("The job was stopped.", []);
+  const results = await patiently(() => request(`/v1/jobs/${id}/results`, { signal })).catch((error) => {
+    if (error instanceof Problem) return null;
+    throw error;
+  });
+  if (signal.aborted) return undefined;
+  if (results) view.result(results.result, results.sweeps, job);
+  if (job.status === "failed") view.failed(job.error?.detail ?? "The job failed.", job.error?.issues ?? []);
+  tell("job-ended", job);
+  return undefined;
+}
+
+function enter(kind, job) {
+  shown.set(kind, job);
+  list();
+}
+
+function list() {
+  const rows = [...shown].map(([kind, job]) => {
+    const active = job.status === "accepted" || job.status === "running";
+    const name = `${kind} of ${job.scene ?? "a scene"}`;
+    const stop = active
+      ? el("button", { type: "button", "aria-label": `Stop ${name}`, onclick: () => dismiss(job.id) }, "Stop")
+      : null;
+    const done = active ? job.progress : 1;
+    return el(
+      "li",
+      { class: "row" },
+      el("span", { class: "job-name" }, name),
+      el("progress", { class: "bar", max: 1, value: done, "aria-label": `Progress of ${name}` }),
+      el("span", {}, `${WORDS[job.status]}${job.status === "running" ? ` ${percent(job.progress)}` : ""}${job.result_of ? ", was stored" : ""}`),
+      stop,
+    );
+  });
+  show(byId("jobs-list"), rows.length ? el("ul", { class: "plain" }, rows) : el("p", { class: "note" }, "None yet."));
+}
+
+async function dismiss(id) {
+  try {
+    await request(`/v1/jobs/${id}`, { method: "DELETE" });
+  } catch (error) {
+    tell("notice", error.message);
+  }
+}
+
+export const startJobs = list;

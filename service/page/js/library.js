@@ -1,0 +1,160 @@
+// The stored sweeps: filters, files, and several of them side by side.
+
+import { state, write } from "./address.js";
+import { request } from "./api.js";
+import { chart } from "./chart.js";
+import { load } from "./design.js";
+import { byId, el, say, show, table } from "./dom.js";
+import { on } from "./events.js";
+import { saveFrom } from "./exports.js";
+import { length, lengthUnit, number, quantity, when, withUnit } from "./format.js";
+import { current } from "./scenes.js";
+
+const FILTERS = [
+  ["scene", "Scene", "text"], ["parameter", "Parameter", "text"], ["N0_min", "N0 from [N]", "number"], ["N0_max", "N0 to [N]", "number"],
+  ["peak_max", "Peak up to [m]", "number"], ["band_hz_max", "Band up to [Hz]", "number"],
+];
+const SORTS = [["-created", "newest first"], ["peak", "lowest peak first"], ["band_hz", "narrowest band first"], ["-points", "most points first"]];
+const SIZE = 25;
+const DASHES = [undefined, "dashed", "dotted"];
+let plot = null;
+let items = [];
+let next = null;
+const details = new Map();
+
+export function startLibrary() {
+  plot = chart(byId("compare-figure"), { label: "Sweeps side by side", file: "compare", height: 320 });
+  const form = byId("library-form");
+  const inputs = FILTERS.map(([name, words, type]) => [
+    el("label", { for: `filter-${name}` }, words),
+    el("input", { id: `filter-${name}`, name, type, step: "any" }),
+  ]);
+  const sort = el("select", { id: "filter-sort", name: "sort" }, SORTS.map(([value, words]) => el("option", { value }, words)));
+  show(form, inputs.flat(), el("label", { for: "filter-sort" }, "Order"), sort, el("button", { type: "submit" }, "Show"));
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    list();
+  });
+  byId("library-more").addEventListener("click", () => list(next));
+  on("job-ended", () => list());
+  on("online", () => list());
+}
+
+export async function openLibrary() {
+  await list();
+  await compare();
+}
+
+function query() {
+  const words = new URLSearchParams({ limit: SIZE });
+  for (const [name, value] of new FormData(byId("library-form"))) if (String(value).trim()) words.set(name, String(value).trim());
+  return `/v1/sweeps?${words}`;
+}
+
+async function list(address = null) {
+  try {
+    const page = await request(address ?? query());
+    items = address ? [...items, ...page.items] : page.items;
+    next = page.next;
+    byId("library-more").hidden = next === null;
+    say("library-status", items.length ? `${items.length} sweeps${next ? ", there are more" : ""}.` : "No stored sweep meets this.");
+    rows();
+  } catch (error) {
+    say("library-status", error.message, true);
+  }
+}
+
+const loads = (sweep) =>
+  Object.entries(sweep.contacts).map(([name, c]) => (c.N0 === null ? null : `${name} ${number(c.N0)} N`)).filter(Boolean).join(", ");
+
+const titleOf = (sweep) => `${sweep.scene}, ${loads(sweep) || sweep.parameter}`;
+
+function rows() {
+  const line = (sweep) => {
+    const name = titleOf(sweep);
+    const box = el("input", { type: "checkbox", checked: state.compare.includes(sweep.id), "aria-label": `Compare ${name}` });
+    box.addEventListener("change", () => choose(sweep.id, box.checked));
+    return [
+      box,
+      sweep.scene,
+      `${sweep.parameter} ${number(sweep.from)} … ${number(sweep.to)}`,
+      loads(sweep),
+      { text: sweep.peak ? length(sweep.peak.value) : "–", number: true },
+      { text: sweep.peak ? quantity(sweep.parameter, sweep.peak.at) : "–", number: true },
+      { text: sweep.band_hz === null ? "–" : number(sweep.band_hz), number: true },
+      { text: String(sweep.points), number: true },
+      when(sweep.created),
+      actions(sweep, name),
+    ];
+  };
+  const heads = ["compare", "scene", "over", "loads", { text: "peak", number: true }, { text: "at", number: true }, { text: "band [Hz]", number: true }, { text: "points", number: true }, "stored", "take"];
+  show(byId("library-table"), items.length ? table(heads, items.map(line), "Stored sweeps") : null);
+}
+
+function actions(sweep, name) {
+  const file = (words, type, suffix) =>
+    el("button", { type: "button", "aria-label": `${words} of ${name}`, onclick: () => saveFrom(`/v1/sweeps/${sweep.id}`, type, `sweep-${sweep.id}.${suffix}`) }, words);
+  const same = current.body?.name === sweep.scene;
+  const use = same ? el("button", { type: "button", "aria-label": `Load ${name}`, onclick: () => load(valuesOf(sweep)) }, "Load") : null;
+  return el("span", { class: "row tight" }, use, file("CSV", "text/csv", "csv"), file("npz", "application/x-npz", "npz"));
+}
+
+// The values of a sweep that stayed fixed, as paths.
+export function valuesOf(sweep) {
+  const values = {};
+  for (const [name, contact] of Object.entries(sweep.contacts)) {
+    for (const key of ["N0", "N1", "kt", "mu"]) if (contact[key] !== null) values[`${name}.${key}`] = contact[key];
+  }
+  if (sweep.excitation_amplitude !== null) values["excitation.amplitude"] = sweep.excitation_amplitude;
+  return values;
+}
+
+function choose(id, chosen) {
+  state.compare = chosen ? [...state.compare, id] : state.compare.filter((other) => other !== id);
+  write();
+  compare();
+}
+
+async function compare() {
+  const found = [];
+  for (const id of state.compare) {
+    try {
+      if (!details.has(id)) details.set(id, await request(`/v1/sweeps/${id}?format=json`));
+      found.push(details.get(id));
+    } catch (error) {
+      say("library-status", error.message, true);
+    }
+  }
+  byId("compare-note").hidden = found.length > 0;
+  if (!found.length) {
+    plot.shown = null;
+    show(plot.drawing);
+    show(byId("compare-facts"));
+    return;
+  }
+  drawCompared(found);
+}
+
+function drawCompared(found) {
+  const highest = Math.max(...found.map((s) => s.peak?.value ?? 0));
+  const unit = lengthUnit(highest);
+  plot.draw({
+    x: { name: withUnit(found[0].parameter) },
+    y: { name: `amplitude [${unit.name}]`, zero: true },
+    series: found.map((sweep, i) => ({
+      name: titleOf(sweep), x: sweep.arrays.parameter, y: sweep.arrays.amplitude.map((v) => v * unit.perMetre), colour: 1 + (i % 7), dash: DASHES[i % 3],
+    })),
+  });
+  const row = (name, of) => [name, ...found.map((sweep) => ({ text: of(sweep), number: true }))];
+  show(
+    byId("compare-facts"),
+    table(["", ...found.map((sweep) => ({ text: titleOf(sweep), number: true }))], [
+      row("highest peak", (s) => (s.peak ? length(s.peak.value) : "–")),
+      row("at", (s) => (s.peak ? quantity(s.parameter, s.peak.at) : "–")),
+      row("band [Hz]", (s) => (s.band_hz === null ? "–" : number(s.band_hz))),
+      row("force [N]", (s) => number(s.excitation_amplitude)),
+      row("harmonics", (s) => String(s.harmonics)),
+      row("points", (s) => String(s.points)),
+    ], "Sweeps side by side"),
+  );
+}

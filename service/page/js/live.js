@@ -1,0 +1,164 @@
+// Sliders of the contact and the force, and the response that follows them.
+
+import { state, write } from "./address.js";
+import { chart } from "./chart.js";
+import { byId, el, show } from "./dom.js";
+import { on, tell } from "./events.js";
+import { length, lengthUnit, number, quantity, unitOf } from "./format.js";
+import { previewer } from "./previews.js";
+import { asked, current, frictionContacts, ownValue, value } from "./scenes.js";
+
+const STEPS = 400;
+const RATE_WINDOW = 20;
+const times = [];
+let plot = null;
+let ask = null;
+
+export const rate = () => (times.length > 1 ? (1000 * (times.length - 1)) / (times[times.length - 1] - times[0]) : 0);
+
+export function startLive() {
+  plot = chart(byId("live-figure"), {
+    label: "Live frequency response",
+    file: "live-response",
+    height: 260,
+    onPick: ({ x }) => tell("point", x),
+  });
+  ask = previewer("sweep", drawn, (error) => {
+    byId("live-status").textContent = error.message;
+  });
+  on("scene", () => {
+    buildSliders();
+    refresh();
+  });
+  on("values", () => {
+    fillSliders();
+    refresh();
+  });
+}
+
+export function refresh() {
+  if (current.body) ask({ kind: "sweep", ...asked() }, state.scene);
+}
+
+function drawn(answer, { milliseconds, token }) {
+  if (token !== state.scene) return;
+  const now = performance.now();
+  times.push(now);
+  if (times.length > RATE_WINDOW) times.shift();
+  const shown = responseOf(answer);
+  plot.draw(shown);
+  tell("states", { states: answer.states, at: answer.peak?.at });
+  const peak = answer.peak ? `peak ${length(answer.peak.value)} at ${number(answer.peak.at, 5)} Hz` : answer.status;
+  const band = answer.band_hz === null ? "" : `, band ${number(answer.band_hz)} Hz`;
+  byId("live-status").textContent = `${peak}${band} · ${answer.points} points in ${number(answer.seconds * 1e3, 2)} ms, ${number(milliseconds, 2)} ms with the way here`;
+  performance.mark("live-drawn");
+  document.documentElement.dataset.live = String(Number(document.documentElement.dataset.live ?? 0) + 1);
+}
+
+// A response as a chart: curve, peak, band. `more` are further curves.
+export function responseOf(answer, more = []) {
+  const scale = lengthUnit(answer.peak?.value ?? 1);
+  const up = (values) => values.map((v) => v * scale.perMetre);
+  const { dof } = current.body.observe;
+  return {
+    x: { name: "frequency [Hz]" },
+    y: { name: `max |${dof}| [${scale.name}]`, zero: true, low: 0, pad: 0.14 },
+    series: [
+      { name: more.length ? "with friction" : "", x: answer.parameter, y: up(answer.amplitude), colour: 1 },
+      ...more.map((line) => ({ ...line, y: up(line.y) })),
+    ],
+    bands: answer.band_intervals_hz ?? [],
+    marks: answer.peak ? [{ x: answer.peak.at, y: answer.peak.value * scale.perMetre, text: `${length(answer.peak.value)} at ${number(answer.peak.at, 5)} Hz` }] : [],
+    describe: (x, y) => `${number(x, 6)} Hz: ${number(y, 5)} ${scale.name}`,
+  };
+}
+
+function ranges() {
+  const c = state.contact;
+  const logs = (path) => {
+    const middle = Math.abs(ownValue(path)) || 1;
+    return { path, log: true, low: middle / 20, high: middle * 20 };
+  };
+  const found = [];
+  if (c) {
+    const load = Math.abs(ownValue(`${c}.N0`)) || 1;
+    found.push(
+      { ...logs(`${c}.N0`), text: `N0 of ${c}` },
+      { path: `${c}.N1`, low: 0, high: 4 * load, text: `N1 of ${c}` },
+      { ...logs(`${c}.kt`), text: `kt of ${c}` },
+      { path: `${c}.mu`, low: 0, high: 1, text: `μ of ${c}` },
+    );
+  }
+  found.push({ ...logs("excitation.amplitude"), text: "f0, the force" });
+  return found;
+}
+
+const toStep = ({ log, low, high }, number) =>
+  Math.round(STEPS * (log ? Math.log(Math.max(number, low) / low) / Math.log(high / low) : (number - low) / (high - low)));
+
+const fromStep = ({ log, low, high }, step) =>
+  Number((log ? low * (high / low) ** (step / STEPS) : low + ((high - low) * step) / STEPS).toPrecision(4));
+
+let sliders = [];
+
+function buildSliders() {
+  sliders = ranges().map((range) => {
+    const id = `slide-${range.path.replace(".", "-")}`;
+    const slide = el("input", { type: "range", id, min: 0, max: STEPS, step: 1, "aria-describedby": "live-status" });
+    const box = el("input", { type: "number", step: "any", "aria-label": `${range.text}, number` });
+    slide.addEventListener("input", () => put(range, fromStep(range, Number(slide.value)), true));
+    box.addEventListener("change", () => box.value !== "" && Number.isFinite(box.valueAsNumber) && put(range, box.valueAsNumber));
+    const node = el("div", { class: "slider" }, el("label", { for: id }, range.text), el("span", { class: "pair" }, box, el("span", {}, unitOf(range.path))), slide);
+    return { range, slide, box, node };
+  });
+  const reset = el("button", { type: "button", onclick: () => putAll({}) }, "Values of the scene");
+  const chooser = contactChooser();
+  show(byId("sliders"), chooser, sliders.map((each) => each.node), el("div", {}, reset));
+  fillSliders();
+}
+
+function contactChooser() {
+  const names = frictionContacts().map((c) => c.name);
+  if (names.length < 2) return null;
+  const choose = el("select", { id: "contact" }, names.map((name) => el("option", { value: name, selected: name === state.contact }, name)));
+  choose.addEventListener("change", () => {
+    state.contact = choose.value;
+    state.range = null;
+    write();
+    tell("contact");
+    buildSliders();
+    refresh();
+  });
+  return el("div", { class: "row" }, el("label", { for: "contact" }, "Contact"), choose);
+}
+
+function fillSliders() {
+  for (const { range, slide, box } of sliders) {
+    const now = value(range.path);
+    slide.value = String(toStep(range, now));
+    slide.setAttribute("aria-valuetext", quantity(range.path, now));
+    if (document.activeElement !== box) box.value = String(Number(now.toPrecision(6)));
+  }
+}
+
+let writing = 0;
+
+function put({ path }, number) {
+  delete state.set[path];
+  state.set[path] = number;
+  fillSliders();
+  refresh();
+  // Browsers refuse to have the address rewritten at every position of a slider.
+  clearTimeout(writing);
+  writing = setTimeout(() => {
+    write();
+    tell("settled");
+  }, 250);
+}
+
+export function putAll(values) {
+  state.set = { ...values };
+  write();
+  tell("values");
+  tell("settled");
+}

@@ -1,0 +1,179 @@
+// The page of stickslip: one scene, one button, everything that is known of it.
+
+import { read, state, write } from "./address.js";
+import { Problem, patiently } from "./api.js";
+import { byId, el, say, show } from "./dom.js";
+import { designView, startDesign } from "./design.js";
+import { edit, editCurrent, openText } from "./editor.js";
+import { on, tell } from "./events.js";
+import { frontView, startFront } from "./front.js";
+import { forget, resume, run, startJobs } from "./jobs.js";
+import { openLibrary, startLibrary } from "./library.js";
+import { startLive } from "./live.js";
+import { mapView, startMap } from "./map.js";
+import { startNotices } from "./notices.js";
+import { referee, startPoint } from "./point.js";
+import { startResponse, sweepView } from "./response.js";
+import { asked, current, defaultRange, frictionContacts, listScenes, loadScene, shownScene, variable } from "./scenes.js";
+import { drawStructure } from "./structure.js";
+import { accuracyView, campbellBody, campbellView, startStudies } from "./studies.js";
+import { startTheme } from "./theme.js";
+import { saveToml } from "./toml.js";
+
+const FIRST = "bladed-disk";
+const VIEWS = { sweep: sweepView, design: designView, map: mapView, pareto: frontView, accuracy: accuracyView, campbell: campbellView };
+let states = { states: null, at: null };
+
+function sections() {
+  const links = [...document.querySelectorAll("main > section")].slice(1).map((section) =>
+    el("li", {}, el("a", { href: `#${section.id}` }, section.querySelector("h2").textContent)));
+  show(byId("sections"), links);
+}
+
+async function scenes() {
+  const known = await listScenes();
+  show(byId("scene"), known.map(({ name, shipped }) => el("option", { value: name }, shipped ? name : `${name} (stored)`)));
+  if (!known.some(({ name }) => name === state.scene)) {
+    state.scene = known.some(({ name }) => name === FIRST) ? FIRST : known[0].name;
+  }
+  byId("scene").value = state.scene;
+}
+
+async function open() {
+  await loadScene(state.scene);
+  const names = frictionContacts().map((c) => c.name);
+  if (!names.includes(state.contact)) state.contact = names[0] ?? "";
+  fillDesign(names);
+  write();
+  states = { states: null, at: null };
+  drawScene();
+  tell("scene");
+  for (const [kind, view] of Object.entries(VIEWS)) resume(kind, view);
+}
+
+function fillDesign(names) {
+  show(byId("variable"), names.map((name) => el("option", { value: name }, `${name}.N0`)));
+  byId("variable").value = state.contact;
+  byId("study").disabled = names.length === 0;
+  if (!names.length) say("study-status", "The scene has no friction contact to design.");
+  state.range ??= names.length ? defaultRange() : null;
+  if (state.range) [byId("low").value, byId("high").value] = state.range.map(String);
+  byId("harmonics").value = String(state.harmonics);
+}
+
+function drawScene() {
+  show(byId("structure-states"), drawStructure(byId("structure-figure"), shownScene(), states.states, states.at));
+}
+
+async function change(name) {
+  for (const kind of [...Object.keys(VIEWS), "march"]) forget(kind);
+  Object.assign(state, { scene: name, set: {}, contact: "", range: null, at: null, jobs: {} });
+  say("study-status", "");
+  await open().catch(failed);
+}
+
+// The one button: every study of the scene, the most wanted first.
+function study() {
+  const [low, high] = [byId("low").valueAsNumber, byId("high").valueAsNumber];
+  const harmonics = byId("harmonics").valueAsNumber;
+  if (!(low > 0 && high > low)) return say("study-status", "The range of the load must have 0 < from < to.", true);
+  if (!(harmonics >= 1 && harmonics <= 200)) return say("study-status", "Harmonics must be a whole number from 1 to 200.", true);
+  Object.assign(state, { range: [low, high], harmonics, at: null });
+  write();
+  const body = asked();
+  const { scene, set } = body;
+  const path = variable();
+  const ranged = { parameter: path, from: low, to: high };
+  say("study-status", "The jobs are under way: response, design, map, front, accuracy, Campbell diagram.");
+  const all = [
+    run("sweep", body, sweepView, 6).then(() => referee(5)),
+    run("design", { ...body, variables: { [path]: [low, high] } }, designView, 5),
+    run("map", { ...body, ...ranged, steps: 60, frequencies: 400 }, mapView, 4),
+    run("accuracy", { scene, set }, accuracyView, 3),
+    run("campbell", { ...body, ...campbellBody() }, campbellView, 3),
+    run("pareto", { ...body, variables: { [path]: [low, high] } }, frontView, 2),
+  ];
+  Promise.all(all).then(() => say("study-status", "Everything is there."));
+  return undefined;
+}
+
+function controls() {
+  byId("scene").addEventListener("change", () => change(byId("scene").value));
+  byId("study").addEventListener("click", study);
+  byId("variable").addEventListener("change", () => {
+    Object.assign(state, { contact: byId("variable").value, range: null });
+    fillDesign(frictionContacts().map((c) => c.name));
+    write();
+    tell("scene-contact");
+    tell("values");
+  });
+  byId("open-file").addEventListener("click", () => byId("file").click());
+  byId("file").addEventListener("change", async () => {
+    const [file] = byId("file").files;
+    if (file) await openText(await file.text(), file.name.toLowerCase().endsWith(".json") ? "json" : "toml");
+    byId("file").value = "";
+  });
+  byId("edit-scene").addEventListener("click", editCurrent);
+  byId("save-toml").addEventListener("click", () => saveToml(`${state.scene}.toml`));
+  byId("share").addEventListener("click", share);
+}
+
+async function share() {
+  write();
+  try {
+    await navigator.clipboard.writeText(location.href);
+    byId("share").textContent = "Link copied";
+  } catch {
+    byId("share").textContent = "Copy it from the address";
+  }
+  setTimeout(() => { byId("share").textContent = "Copy link"; }, 4000);
+}
+
+function failed(error) {
+  if (error instanceof Problem && error.status === 401) return;
+  tell("notice", error.message);
+}
+
+async function begin() {
+  try {
+    await patiently(scenes);
+    await patiently(open);
+    await openLibrary();
+  } catch (error) {
+    failed(error);
+  }
+  document.documentElement.dataset.ready = "yes";
+}
+
+function start() {
+  startTheme();
+  startNotices();
+  read();
+  sections();
+  startJobs();
+  startDesign();
+  startLive();
+  startResponse();
+  startMap();
+  startPoint();
+  startFront();
+  startStudies();
+  startLibrary();
+  controls();
+  on("states", (found) => {
+    states = found;
+    drawScene();
+  });
+  on("contact", () => fillDesign(frictionContacts().map((c) => c.name)));
+  on("scene-stored", async (name) => {
+    await scenes().catch(failed);
+    byId("scene").value = name;
+    await change(name);
+    byId("study").focus();
+  });
+  on("key", begin);
+  return begin();
+}
+
+export { current, edit };
+await start();

@@ -1,0 +1,79 @@
+// The frame of a chart: paper, grid, axes with their names, and the box inside.
+
+import { svg } from "./dom.js";
+import { scale } from "./scales.js";
+
+const MARGIN = { left: 62, right: 14, top: 12, bottom: 44 };
+const PIXELS_A_TICK = { x: 85, y: 42 };
+
+export function plane(width, height, x, y, { paper = true, above = 0 } = {}) {
+  const box = {
+    left: MARGIN.left,
+    right: Math.max(width - MARGIN.right, MARGIN.left + 20),
+    top: MARGIN.top + above,
+    bottom: height - MARGIN.bottom,
+  };
+  const xs = scale(x.log, x.low, x.high, box.left, box.right);
+  const ys = scale(y.log, y.low, y.high, box.bottom, box.top);
+  const frame = svg(
+    "g",
+    {},
+    paper ? svg("rect", { class: "paper", x: 0, y: 0, width, height }) : null,
+    gridLines(box, xs, ys),
+    svg("path", { class: "axis", d: `M${box.left} ${box.top}V${box.bottom}H${box.right}` }),
+    svg("text", { x: (box.left + box.right) / 2, y: height - 8, "text-anchor": "middle" }, x.name),
+    svg(
+      "text",
+      { transform: `translate(14 ${(box.top + box.bottom) / 2}) rotate(-90)`, "text-anchor": "middle" },
+      y.name,
+    ),
+  );
+  return { box, xs, ys, frame };
+}
+
+function gridLines(box, xs, ys) {
+  const nodes = [];
+  for (const { value, text } of xs.ticks((box.right - box.left) / PIXELS_A_TICK.x)) {
+    const at = xs.at(value);
+    nodes.push(svg("line", { class: "grid", x1: at, x2: at, y1: box.top, y2: box.bottom }));
+    nodes.push(svg("text", { class: "soft", x: at, y: box.bottom + 16, "text-anchor": "middle" }, text));
+  }
+  for (const { value, text } of ys.ticks((box.bottom - box.top) / PIXELS_A_TICK.y)) {
+    const at = ys.at(value);
+    nodes.push(svg("line", { class: "grid", x1: box.left, x2: box.right, y1: at, y2: at }));
+    nodes.push(svg("text", { class: "soft", x: box.left - 6, y: at + 4, "text-anchor": "end" }, text));
+  }
+  return nodes;
+}
+
+// A path through points; gaps where a number is missing.
+export function pathOf(xs, ys, x, y) {
+  let d = "";
+  let pen = "M";
+  for (let i = 0; i < x.length; i += 1) {
+    const bad = x[i] === null || y[i] === null || (ys.log && y[i] <= 0) || (xs.log && x[i] <= 0);
+    if (bad || !Number.isFinite(x[i]) || !Number.isFinite(y[i])) {
+      pen = "M";
+      continue;
+    }
+    d += `${pen}${xs.at(x[i]).toFixed(1)} ${ys.at(y[i]).toFixed(1)}`;
+    pen = "L";
+  }
+  return d;
+}
+
+const SHAPES = {
+  circle: (x, y, r) => svg("circle", { cx: x, cy: y, r }),
+  square: (x, y, r) => svg("rect", { x: x - r, y: y - r, width: 2 * r, height: 2 * r }),
+  diamond: (x, y, r) => svg("path", { d: `M${x} ${y - 1.4 * r}L${x + 1.4 * r} ${y}L${x} ${y + 1.4 * r}L${x - 1.4 * r} ${y}Z` }),
+  triangle: (x, y, r) => svg("path", { d: `M${x} ${y - 1.3 * r}L${x + 1.2 * r} ${y + r}L${x - 1.2 * r} ${y + r}Z` }),
+  cross: (x, y, r) => svg("path", { d: `M${x - r} ${y - r}L${x + r} ${y + r}M${x - r} ${y + r}L${x + r} ${y - r}` }),
+};
+
+export function shape(kind, x, y, r, colour, title) {
+  const node = SHAPES[kind](x, y, r);
+  node.setAttribute("class", kind === "cross" ? `c${colour}` : `f${colour}`);
+  if (kind === "cross") node.setAttribute("stroke-width", 2);
+  if (title) node.append(svg("title", {}, title));
+  return node;
+}

@@ -1,0 +1,168 @@
+// One point: loops, a period against the time march, harmonics.
+
+import { state, write } from "./address.js";
+import { chart } from "./chart.js";
+import { byId, el, facts, say, show } from "./dom.js";
+import { on, tell } from "./events.js";
+import { largest, length, lengthUnit, number, percent } from "./format.js";
+import { resume, run } from "./jobs.js";
+import { previewer } from "./previews.js";
+import { asked, current } from "./scenes.js";
+
+const MARCH_EVERY = 16;
+const MOTIONS = [["stick", "sticks", undefined], ["slip", "slips", "dashed"], ["apart", "open", "dotted"]];
+let plots = null;
+let found = null;
+let march = null;
+let chosen = 0;
+let ask = null;
+
+export function startPoint() {
+  plots = {
+    loops: chart(byId("loops-figure"), { label: "Hysteresis loop", file: "loop", height: 280 }),
+    history: chart(byId("history-figure"), { label: "One period", file: "period", height: 280 }),
+    harmonics: chart(byId("harmonics-figure"), { label: "Amplitude of each harmonic", file: "harmonics", height: 280, legend: false }),
+  };
+  ask = previewer("point", (answer, { token }) => token === wish() && arrived(answer), (error) => say("point-status", error.message, true));
+  byId("point-show").addEventListener("click", () => go(byId("point-at").valueAsNumber));
+  byId("point-at").addEventListener("keydown", (event) => event.key === "Enter" && go(byId("point-at").valueAsNumber));
+  on("point", go);
+  on("peak", (at) => state.at === null && go(at));
+  on("settled", () => state.at !== null && go(state.at));
+  on("scene", () => {
+    found = march = null;
+    say("point-status", "Click on a response or on the map, or enter a frequency.");
+    say("march-status", "");
+    show(byId("point-facts"));
+    show(byId("loops-more"));
+    for (const plot of Object.values(plots)) {
+      plot.shown = null;
+      show(plot.drawing);
+    }
+    if (state.at !== null) go(state.at, true);
+  });
+}
+
+const wish = () => JSON.stringify([state.scene, state.set, state.harmonics, state.at]);
+
+function go(frequency, again = false) {
+  if (!(frequency > 0)) return say("point-status", "The frequency must be a number above 0.", true);
+  if (state.at !== frequency) again = false;
+  state.at = frequency;
+  write();
+  byId("point-at").value = String(Number(frequency.toPrecision(7)));
+  march = null;
+  say("march-status", "");
+  ask({ kind: "point", ...asked(), frequency_hz: frequency }, wish());
+  if (again && state.jobs.march) resume("march", marchView);
+  return undefined;
+}
+
+function arrived(answer) {
+  found = answer;
+  if (!answer.converged) return say("point-status", answer.status, true);
+  say("point-status", `${number(answer.frequency_hz, 6)} Hz: ${length(answer.max_abs)}, error about ${length(answer.error_estimate)}.`);
+  const flags = answer.flags.length ? [["flags", answer.flags.join(", ").replaceAll("_", " ")]] : [];
+  const states = answer.period.contacts.map((c) => [c.name, c.shares ? `${c.state}: ${shares(c.shares)}` : c.state]);
+  show(
+    byId("point-facts"),
+    facts([["max |x|", length(answer.max_abs)], ["half peak to peak", length(answer.half_peak_to_peak)], ["mean", length(answer.mean)], ...states, ...flags]),
+    el("button", { type: "button", onclick: () => referee() }, "Compare with the time march"),
+  );
+  tell("states", { states: Object.fromEntries(answer.period.contacts.map((c) => [c.name, c.state])), at: answer.frequency_hz });
+  draw();
+  judged();
+  if (!byId("march-status").textContent && !state.jobs.march) say("march-status", "The time march, which shares nothing with the balance, has not been asked.");
+  return undefined;
+}
+
+const shares = ({ stick, slip, separation }) =>
+  [["sticks", stick], ["slips", slip], ["open", separation]].filter(([, s]) => s > 0).map(([w, s]) => `${w} ${percent(s)}`).join(", ");
+
+export function referee(priority = 0) {
+  if (state.at === null) return null;
+  const { scene, set } = asked();
+  return run("march", { scene, set, frequency_hz: state.at, history: true }, marchView, priority);
+}
+
+function judged() {
+  if (!march) return;
+  const apart = found?.max_abs ? `, ${number(100 * Math.abs(march.max_abs / found.max_abs - 1), 2)} % apart` : "";
+  say("march-status", `Time march: ${length(march.max_abs)} after ${march.periods} periods${apart}.`);
+}
+
+const marchView = {
+  waiting: () => say("march-status", "The time march waits for a worker."),
+  progress: () => say("march-status", "The time march runs."),
+  result(result, _sweeps, job) {
+    if (Math.abs(job.request.frequency_hz - state.at) > 1e-9 * state.at) return;
+    march = result;
+    judged();
+    if (found?.period) draw();
+  },
+  failed: (text) => say("march-status", text, true),
+  gone: () => undefined,
+};
+
+function draw() {
+  drawHistory();
+  drawLoop();
+  drawHarmonics();
+}
+
+function drawHistory() {
+  const { time, displacement } = found.period;
+  const unit = lengthUnit(largest(displacement));
+  const [per, word] = time[time.length - 1] < 0.1 ? [1e3, "ms"] : [1, "s"];
+  const line = (x, y) => ({ x: x.map((t) => t * per), y: y.map((v) => v * unit.perMetre) });
+  const series = [{ name: "balance", ...line(time, displacement), colour: 1 }];
+  const other = march?.history;
+  if (other) {
+    const some = (values) => values.filter((_, i) => i % MARCH_EVERY === 0);
+    series.push({ name: "time march", ...line(some(other.time), some(other.displacement)), colour: 2, width: 0, shape: "circle", size: 3 });
+  }
+  plots.history.draw({
+    x: { name: `time [${word}]` },
+    y: { name: `${current.body.observe.dof} [${unit.name}]`, pad: 0.06 },
+    series,
+  });
+}
+
+function drawLoop() {
+  const contacts = found.period.contacts;
+  if (!contacts.length) return;
+  chosen = Math.min(chosen, contacts.length - 1);
+  const contact = contacts[chosen];
+  const unit = lengthUnit(largest(contact.slip));
+  const x = contact.slip.map((v) => v * unit.perMetre);
+  const pieces = contact.motion
+    ? MOTIONS.map(([paint, name, dash], code) => piece(contact, x, code, { paint, name, dash })).filter(Boolean)
+    : [{ name: "", x, y: contact.force, colour: 1 }];
+  const other = march?.history?.contacts.find((c) => c.name === contact.name);
+  if (other) pieces.push({ name: "time march", x: other.slip.map((v) => v * unit.perMetre), y: other.force, colour: 7, width: 1, dash: "dotted" });
+  plots.loops.draw({ x: { name: `slip motion of ${contact.name} [${unit.name}]`, pad: 0.06 }, y: { name: "friction force [N]", pad: 0.06 }, series: pieces });
+  const choose = contacts.length > 1
+    ? contacts.map((c, i) => el("button", { type: "button", "aria-pressed": String(i === chosen), onclick: () => { chosen = i; drawLoop(); } }, c.name))
+    : [];
+  show(byId("loops-more"), el("div", { class: "row" }, choose));
+}
+
+// The stretches of a loop in which the contact does one thing; gaps elsewhere.
+function piece({ motion, force }, x, code, line) {
+  if (!motion.includes(code)) return null;
+  const inside = (i) => motion[i % motion.length] === code || motion[(i - 1 + motion.length) % motion.length] === code;
+  const cut = (values) => values.map((v, i) => (inside(i) ? v : null));
+  return { ...line, x: cut(x), y: cut(force), width: 2.4 };
+}
+
+function drawHarmonics() {
+  const heights = found.harmonics.map((v) => (v > 0 ? v : null));
+  const unit = lengthUnit(largest(found.harmonics));
+  const least = 1e-6 * largest(found.harmonics);
+  const shown = heights.map((v) => (v !== null && v > least ? v * unit.perMetre : null));
+  plots.harmonics.draw({
+    x: { name: "harmonic (0 is the mean)", low: -0.5, high: found.harmonics.length - 0.5 },
+    y: { name: `amplitude [${unit.name}]`, log: true, pad: 0.08 },
+    series: [{ name: "amplitude", x: found.harmonics.map((_, i) => i), y: shown, colour: 1, bars: true, width: 0 }],
+  });
+}

@@ -1,0 +1,33 @@
+// Previews: one at a time under way for each purpose, the newest wish next; what is overtaken is never sent.
+
+import { patiently, post } from "./api.js";
+
+const session = Math.random().toString(36).slice(2, 10);
+
+export function previewer(purpose, onAnswer, onError) {
+  const client = `${session}-${purpose}`;
+  let wanted = null;
+  let busy = false;
+
+  async function turn() {
+    if (busy) return;
+    busy = true;
+    while (wanted) {
+      const { body, token } = wanted;
+      wanted = null;
+      try {
+        const begun = performance.now();
+        const answer = await patiently(() => post("/v1/previews", { ...body, client }));
+        onAnswer(answer, { milliseconds: performance.now() - begun, token });
+      } catch (error) {
+        onError(error, token);
+      }
+    }
+    busy = false;
+  }
+
+  return (body, token) => {
+    wanted = { body, token };
+    turn();
+  };
+}

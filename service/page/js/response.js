@@ -1,0 +1,106 @@
+// The frequency response of the study: points as they come, then peak, band, linear limits, files.
+
+import { chart } from "./chart.js";
+import { byId, el, facts, say, show } from "./dom.js";
+import { on, tell } from "./events.js";
+import { saveFrom } from "./exports.js";
+import { length, number, percent, seconds } from "./format.js";
+import { responseOf } from "./live.js";
+import { previewer } from "./previews.js";
+import { current } from "./scenes.js";
+import { state } from "./address.js";
+import { saveToml } from "./toml.js";
+
+const FORMS = [["CSV", "text/csv", "csv"], ["npz", "application/x-npz", "npz"], ["Parquet", "application/vnd.apache.parquet", "parquet"]];
+let plot = null;
+let limits = null;
+let last = null;
+let asking = null;
+let points = [];
+
+export function startResponse() {
+  plot = chart(byId("response-figure"), {
+    label: "Frequency response",
+    file: "response",
+    height: 320,
+    onPick: ({ x }) => tell("point", x),
+  });
+  asking = previewer("limits", (answer, { token }) => {
+    if (token !== state.scene) return;
+    limits = answer;
+    redraw();
+    if (last) describe();
+  }, () => undefined);
+  on("scene", () => {
+    [limits, last, points] = [null, null, []];
+    say("response-status", "Press the button above: the sweep arrives here point by point.");
+    show(byId("response-facts"));
+    show(plot.drawing);
+    plot.shown = null;
+  });
+}
+
+export const sweepView = {
+  submitted(job) {
+    points = [];
+    const { scene, set, harmonics } = job.request;
+    asking({ kind: "limits", scene, set: set ?? {}, harmonics: harmonics ?? 11, contact: state.contact || null }, state.scene);
+  },
+  waiting: () => say("response-status", "The sweep waits for a worker."),
+  progress: ({ progress, points: count }) => say("response-status", `Sweep: ${percent(progress)}, ${count} points.`),
+  points({ start, points: more }) {
+    points.length = Math.min(points.length, start);
+    points.push(...more);
+    partly();
+  },
+  result(result, sweeps) {
+    last = { result, sweep: sweeps[0] };
+    say("response-status", `${result.points} points in ${seconds(result.seconds)}. ${result.status}`);
+    redraw();
+    describe();
+    if (result.peak) tell("peak", result.peak.at);
+  },
+  failed: (text) => say("response-status", text, true),
+};
+
+function partly() {
+  if (points.length < 2) return;
+  const amplitude = points.map((p) => p[1]);
+  const highest = Math.max(...amplitude);
+  const at = points[amplitude.indexOf(highest)][0];
+  plot.draw({ ...responseOf({ parameter: points.map((p) => p[0]), amplitude, peak: { value: highest, at } }), marks: [] });
+}
+
+// The linear limits rise far above: the frame stays with the response with friction.
+function redraw() {
+  if (!last || !current.body) return;
+  const { result } = last;
+  const more = limits
+    ? [
+        { name: "removed (linear)", x: limits.free.parameter, y: limits.free.amplitude, colour: 7, dash: "dotted", bare: true },
+        { name: "stuck (linear)", x: limits.stuck.parameter, y: limits.stuck.amplitude, colour: 3, dash: "dashed", bare: true },
+      ]
+    : [];
+  const shown = responseOf(result, more);
+  const top = shown.series[0].y.reduce((a, b) => Math.max(a, b), 0) * (more.length ? 1.7 : 1.15);
+  plot.draw({ ...shown, y: { ...shown.y, high: top } });
+}
+
+function describe() {
+  const { result, sweep } = last;
+  const linearPeak = (name) => (limits?.[name]?.peak ? `${length(limits[name].peak.value)} at ${number(limits[name].peak.at, 5)} Hz` : "–");
+  const rows = [
+    ["highest peak", result.peak ? `${length(result.peak.value)} at ${number(result.peak.at, 6)} Hz` : "–"],
+    ["resonance band", result.band_hz === null ? "–" : `${number(result.band_hz)} Hz above ${length(result.band_limit)}`],
+    ["error estimate", result.error_estimate === null ? "–" : length(result.error_estimate)],
+    ["removed, linear", linearPeak("free")],
+    ["stuck, linear", linearPeak("stuck")],
+  ];
+  const files = sweep
+    ? el("div", { class: "row" }, el("span", { class: "note" }, "Sweep with all its arrays:"),
+        FORMS.map(([name, type, suffix]) =>
+          el("button", { type: "button", onclick: () => saveFrom(`/v1/sweeps/${sweep.id}`, type, `sweep-${sweep.id}.${suffix}`) }, name)),
+        el("button", { type: "button", onclick: () => saveToml(`sweep-${sweep.id}.toml`) }, "TOML that reproduces it"))
+    : null;
+  show(byId("response-facts"), facts(rows), files);
+}

@@ -1,0 +1,227 @@
+// The drawing of a scene: masses, springs, contacts with what they do.
+
+import { el, show, svg, table } from "./dom.js";
+import { number } from "./format.js";
+import { GROUND, chain, ownName, partsOf, ring } from "./layout.js";
+
+export const STATES = {
+  "stuck": ["is-stick", "sticks"],
+  "closed": ["is-stick", "closed"],
+  "stick and slip": ["is-slip", "sticks and slips"],
+  "deforms": ["is-slip", "deforms"],
+  "stick, slip and separation": ["is-apart", "sticks, slips and opens"],
+  "opens and closes": ["is-apart", "opens and closes"],
+  "separated": ["is-apart", "open"],
+};
+const CHAIN = { width: 560, height: 250 };
+
+const classOf = (state) => STATES[state]?.[0] ?? "is-unknown";
+const wordsOf = (state) => STATES[state]?.[1] ?? "not computed yet";
+
+// Draws `scene`; `states` are those of its contacts by name, at the frequency `at` [Hz].
+export function drawStructure(host, scene, states, at) {
+  const parts = partsOf(scene);
+  const names = parts.contacts.map((c) => `${c.name} ${wordsOf(states?.[c.name])}`).join(", ");
+  const label = `${scene.name}: ${parts.cyclic ? `${parts.sectors} sectors of ` : ""}${parts.dofs.length} masses, ${parts.springs.length} springs; ${names || "no contacts"}`;
+  const drawing = svg("svg", { role: "img", "aria-label": label }, pattern());
+  if (parts.cyclic) disk(drawing, scene, parts, states);
+  else lumped(drawing, scene, parts, states);
+  show(host, drawing, legend());
+  return contactTable(parts, states, at);
+}
+
+const pattern = () =>
+  svg(
+    "defs",
+    {},
+    svg(
+      "pattern",
+      { id: "hatch-slip", width: 5, height: 5, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" },
+      svg("rect", { class: "hatch-ground", width: 5, height: 5 }),
+      svg("rect", { class: "hatch-line", width: 2.4, height: 5 }),
+    ),
+  );
+
+function legend() {
+  const entry = (state, words) =>
+    el(
+      "li",
+      {},
+      svg("svg", { width: 30, height: 16, "aria-hidden": "true" }, plates({ x: 4, y: 8 }, { x: 26, y: 8 }, 11, classOf(state))),
+      ` ${words}`,
+    );
+  return el("ul", { class: "legend" }, entry("stuck", "sticks"), entry("stick and slip", "sticks and slips"),
+    entry("separated", "opens"), el("li", {}, "double ring: observed · arrow: force"));
+}
+
+function contactTable(parts, states, at) {
+  if (!parts.contacts.length) return el("p", { class: "note" }, "The scene has no contacts: it is linear.");
+  const rows = parts.contacts.map((c) => [
+    c.name,
+    c.between.join(" – "),
+    wordsOf(states?.[c.name]),
+    { text: c.N0 === undefined ? (c.law ?? "") : `${number(c.N0)} N`, number: true },
+    { text: c.kt === undefined ? "" : `${number(c.kt)} N/m`, number: true },
+    { text: c.mu === undefined ? "" : number(c.mu), number: true },
+  ]);
+  const where = at ? `Contacts at ${number(at, 5)} Hz` : "Contacts";
+  return table(
+    ["contact", "between", at ? `at ${number(at, 5)} Hz` : "state", { text: "N0", number: true }, { text: "kt", number: true }, { text: "μ", number: true }],
+    rows,
+    where,
+  );
+}
+
+// Two plates that rub, across the way from a to b.
+function plates(a, b, size, state, title) {
+  const angle = (Math.atan2(b.y - a.y, b.x - a.x) * 180) / Math.PI;
+  const length = Math.hypot(b.x - a.x, b.y - a.y);
+  const long = Math.min(1.5 * size, 0.7 * length);
+  const node = svg(
+    "g",
+    { transform: `translate(${(a.x + b.x) / 2} ${(a.y + b.y) / 2}) rotate(${angle})` },
+    svg("path", { class: "earth", d: `M${-length / 2} 0H${-long / 2}M${long / 2} 0H${length / 2}` }),
+    svg("rect", { class: `contact ${state}`, x: -long / 2, y: -size * 0.62, width: long, height: size * 0.5 }),
+    svg("rect", { class: `contact ${state}`, x: -long / 2, y: size * 0.12, width: long, height: size * 0.5 }),
+  );
+  if (title) node.append(svg("title", {}, title));
+  return node;
+}
+
+function zigzag(a, b, size) {
+  const [dx, dy] = [b.x - a.x, b.y - a.y];
+  const length = Math.hypot(dx, dy) || 1;
+  const [ux, uy, px, py] = [dx / length, dy / length, -dy / length, dx / length];
+  const lead = Math.min(0.25 * length, 8);
+  const turns = Math.max(3, Math.min(7, Math.round((length - 2 * lead) / 7)));
+  let d = `M${a.x.toFixed(1)} ${a.y.toFixed(1)}L${(a.x + lead * ux).toFixed(1)} ${(a.y + lead * uy).toFixed(1)}`;
+  for (let i = 0; i < turns; i += 1) {
+    const along = lead + ((i + 0.5) / turns) * (length - 2 * lead);
+    const side = (i % 2 ? -1 : 1) * size;
+    d += `L${(a.x + along * ux + side * px).toFixed(1)} ${(a.y + along * uy + side * py).toFixed(1)}`;
+  }
+  return `${d}L${(b.x - lead * ux).toFixed(1)} ${(b.y - lead * uy).toFixed(1)}L${b.x.toFixed(1)} ${b.y.toFixed(1)}`;
+}
+
+const spring = (a, b, size, title) =>
+  svg("path", { class: "spring", d: zigzag(a, b, size) }, title ? svg("title", {}, title) : null);
+
+function mass(place, size, name, observed, text) {
+  return [
+    svg("circle", { class: observed ? "mass observed" : "mass", cx: place.x, cy: place.y, r: size }, svg("title", {}, name)),
+    observed ? svg("circle", { class: "mass", cx: place.x, cy: place.y, r: Math.max(size - 4, 1.5) }) : null,
+    text ? svg("text", { class: "halo", x: place.x, y: place.y + text.dy, "text-anchor": "middle" }, name) : null,
+  ];
+}
+
+function arrow(place, size) {
+  const { x, y } = place;
+  const top = y - size - 3;
+  return [
+    svg("path", { class: "force", d: `M${x} ${top - 26}V${top - 6}` }),
+    svg("path", { class: "force", d: `M${x - 4} ${top - 8}H${x + 4}L${x} ${top}Z` }),
+    svg("text", { class: "halo", x: x + 8, y: top - 15 }, "force"),
+  ];
+}
+
+const hatched = (x, y, wide) => {
+  let d = `M${x - wide} ${y}H${x + wide}`;
+  for (let i = -wide; i < wide; i += 6) d += `M${x + i + 6} ${y}l-6 7`;
+  return svg("path", { class: "earth", d });
+};
+
+const forcesOf = (scene) => (Array.isArray(scene.excitation) ? scene.excitation : [scene.excitation]);
+
+function lumped(drawing, scene, parts, states) {
+  const { width, height } = CHAIN;
+  const { places, size, ground } = chain(parts, width, height);
+  drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  const end = (name, other, count) =>
+    name === GROUND ? { x: ground.x, y: (places.get(ownName(other)) ?? { y: 0 }).y + 10 * count } : places.get(ownName(name));
+  const wall = [...places.values()].map((p) => p.y);
+  const [low, high] = [Math.min(...wall) - 26, Math.max(...wall) + 26];
+  drawing.append(svg("g", { transform: `rotate(90 ${ground.x} ${(low + high) / 2})` }, hatched(ground.x, (low + high) / 2, (high - low) / 2)));
+  parts.springs.forEach((s) => {
+    const [a, b] = [end(s.between[0], s.between[1], 0), end(s.between[1], s.between[0], 0)];
+    if (a && b) drawing.append(spring(a, b, 6, `${s.name ?? "spring"}: ${number(s.k)} N/m`));
+  });
+  parts.contacts.forEach((c, i) => {
+    const free = c.between.find((name) => name !== GROUND);
+    const grounded = c.between.includes(GROUND);
+    const a = places.get(ownName(free));
+    const b = grounded ? { x: a.x, y: height - 42 } : places.get(ownName(c.between[1]));
+    if (!a || !b) return;
+    const lift = grounded ? 0 : 34 + 20 * i;
+    const [p, q] = grounded ? [{ x: a.x, y: a.y + size }, b] : [{ x: a.x, y: a.y + lift }, { x: b.x, y: b.y + lift }];
+    const words = `${c.name} ${wordsOf(states?.[c.name])}`;
+    if (!grounded) drawing.append(svg("path", { class: "earth", d: `M${a.x} ${a.y}V${p.y}M${b.x} ${b.y}V${q.y}` }));
+    drawing.append(plates(p, q, 20, classOf(states?.[c.name]), words));
+    if (grounded) drawing.append(hatched(b.x, b.y, 18));
+    const side = (p.x + q.x) / 2 > width / 2;
+    drawing.append(svg("text", { class: "halo", x: (p.x + q.x) / 2 + (grounded ? (side ? -18 : 18) : 0), y: (p.y + q.y) / 2 + (grounded ? 4 : 24), "text-anchor": grounded ? (side ? "end" : "start") : "middle" }, words));
+  });
+  for (const dof of parts.dofs) {
+    drawing.append(...mass(places.get(dof), size, dof, dof === ownName(scene.observe.dof), { dy: 4 }).filter(Boolean));
+  }
+  for (const force of forcesOf(scene)) {
+    const place = places.get(ownName(force.dof));
+    if (place) drawing.append(...arrow(place, size));
+  }
+}
+
+function disk(drawing, scene, parts, states) {
+  const radius = 190;
+  const { place, hub, shown, closed, size } = ring(parts, radius);
+  const pad = 34;
+  const depth = closed ? 2 * (radius + pad) : radius + 2 * pad;
+  drawing.setAttribute("viewBox", `${-radius - pad - 40} ${-radius - pad} ${2 * (radius + pad + 40)} ${depth}`);
+  drawing.append(svg("circle", { class: "earth", r: radius * 0.12, "stroke-dasharray": "3 3" }), svg("text", { class: "soft", y: 4, "text-anchor": "middle" }, "hub"));
+  const end = (name, j) => {
+    const next = name.endsWith("@next") ? 1 : 0;
+    return name === GROUND ? hub(j) : place(ownName(name), j + next);
+  };
+  const sectors = Array.from({ length: shown }, (_, j) => j);
+  const reach = (between, j) => closed || j + 1 < shown || !between.some((name) => name.endsWith("@next"));
+  for (const j of sectors) {
+    for (const s of parts.springs) {
+      if (reach(s.between, j)) drawing.append(spring(end(s.between[0], j), end(s.between[1], j), 3.2, j ? null : `${s.name ?? "spring"}: ${number(s.k)} N/m`));
+    }
+  }
+  for (const j of sectors) {
+    for (const c of parts.contacts) {
+      if (!reach(c.between, j)) continue;
+      const words = `${c.name} ${wordsOf(states?.[c.name])}`;
+      const ends = [end(c.between[0], j), end(c.between[1], j)];
+      const [a, b] = beside(...ends, size);
+      if (a !== ends[0]) drawing.append(svg("path", { class: "earth", d: `M${ends[0].x} ${ends[0].y}L${a.x} ${a.y}M${ends[1].x} ${ends[1].y}L${b.x} ${b.y}` }));
+      drawing.append(plates(a, b, Math.max(size * 0.95, 8), classOf(states?.[c.name]), words));
+    }
+  }
+  const observed = ownName(scene.observe.dof);
+  const pushed = forcesOf(scene).map((force) => ownName(force.dof));
+  for (const j of sectors) {
+    for (const dof of parts.dofs) {
+      const here = place(dof, j);
+      drawing.append(...mass(here, size, dof, dof === observed, null).filter(Boolean));
+      if (pushed.includes(dof)) drawing.append(push(here, size));
+      if (j === 0) drawing.append(svg("text", { class: "halo", x: here.x + size + 5, y: here.y + 4 }, dof));
+    }
+  }
+}
+
+// A contact between two rings of the same blade is drawn beside the spring there.
+function beside(a, b, size) {
+  const across = Math.abs(Math.sin((a.angle ?? 0) - (b.angle ?? 0))) > 1e-6;
+  if (across) return [a, b];
+  const shift = 1.35 * size;
+  const [px, py] = [-Math.sin(a.angle) * shift, Math.cos(a.angle) * shift];
+  return [{ x: a.x - px, y: a.y - py }, { x: b.x - px, y: b.y - py }];
+}
+
+function push({ x, y, angle }, size) {
+  const [tx, ty] = [-Math.sin(angle), Math.cos(angle)];
+  const [bx, by] = [x + tx * (size + 2), y + ty * (size + 2)];
+  const [fx, fy] = [bx + tx * 14, by + ty * 14];
+  const [nx, ny] = [Math.cos(angle) * 3, Math.sin(angle) * 3];
+  return svg("path", { class: "force", d: `M${fx} ${fy}L${bx} ${by}M${bx} ${by}l${tx * 6 + nx} ${ty * 6 + ny}l${-2 * nx} ${-2 * ny}Z` });
+}

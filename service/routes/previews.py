@@ -1,0 +1,36 @@
+"""``/v1/previews``: small responses at once, nothing stored."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter, Response
+from starlette.concurrency import run_in_threadpool
+
+from service.access.callers import Caller
+from service.core import Service
+from service.http import CallerDependency, JsonBody, ServiceDependency
+from service.jobs import Resolved
+from service.validation import validated
+
+router = APIRouter(prefix="/v1/previews", tags=["previews"])
+
+
+@router.post("", response_class=Response, responses={200: {"content": {"application/json": {}}}})
+async def preview(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> Response:
+    """Compute `sweep`, `limits` or `point` within seconds. Nothing is stored, and sizes are limited.
+
+    Of several previews with the same `client` only the newest is computed: the others are answered 409.
+    """
+    kind = service.previews.registry.get(body.get("kind"))
+    client = body.get("client") or ""
+    resolved = await run_in_threadpool(_resolved, service, caller, kind.name, body)
+    asking = f"{caller.owner} {client}" if client else ""
+    answer = await service.previews.compute(kind.name, resolved.spec, asking)
+    return Response(answer, media_type="application/json", headers={"Cache-Control": "no-store"})
+
+
+def _resolved(service: Service, caller: Caller, name: str, body: dict[str, Any]) -> Resolved:
+    kind = service.previews.registry[name]
+    request = validated(kind.request, {key: value for key, value in body.items() if key != "kind"})
+    return kind.resolve(request, service.scenes.of(caller))

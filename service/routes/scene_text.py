@@ -1,0 +1,68 @@
+"""``/v1/scenes/read`` and ``/v1/scenes/text``: scenes from and to the text of a file."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Response
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.concurrency import run_in_threadpool
+
+from service.http import CallerDependency, JsonBody, ServiceDependency
+from service.kinds.scenes import SceneRequest, resolve_scene
+from service.scene_text import issues_of_scene, read_text, toml_text
+from service.validation import validated
+
+router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
+
+MOST_CHARACTERS = 4_000_000
+
+
+class ReadRequest(BaseModel):
+    """The text of a scene file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    text: str = Field(max_length=MOST_CHARACTERS)
+    form: Literal["toml", "json"] = "toml"
+
+
+class TextRequest(SceneRequest):
+    """A scene with its values set, and what to say above it."""
+
+    comments: list[Annotated[str, Field(max_length=2000)]] = Field(default=[], max_length=50)
+
+
+class SceneIssue(BaseModel):
+    """Something wrong: an RFC 6901 pointer into the scene, and a sentence."""
+
+    pointer: str
+    detail: str
+
+
+class SceneRead(BaseModel):
+    """The tables of a scene file and everything wrong with them."""
+
+    scene: dict[str, Any]
+    issues: list[SceneIssue]
+
+
+@router.post("/read")
+async def read(body: JsonBody) -> SceneRead:
+    """Read the text of a scene file and list everything that is wrong with it; nothing is stored."""
+    request = validated(ReadRequest, body)
+    return await run_in_threadpool(_read, request)
+
+
+@router.post("/text", response_class=Response, responses={200: {"content": {"application/toml": {}}}})
+async def text(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> Response:
+    """The TOML of a scene with its values set: the file that reproduces what was computed."""
+    request = validated(TextRequest, body)
+    scene = await run_in_threadpool(resolve_scene, request, service.scenes.of(caller))
+    return Response(toml_text(scene.to_dict(), tuple(request.comments)), media_type="application/toml")
+
+
+def _read(request: ReadRequest) -> SceneRead:
+    raw = read_text(request.text, request.form)
+    issues = [SceneIssue(pointer=issue.pointer, detail=issue.message) for issue in issues_of_scene(raw)]
+    return SceneRead(scene=raw, issues=issues)
