@@ -225,6 +225,21 @@ class Client:
         answer: dict[str, Any] = self._transport.json("POST", "/v1/plan", json=dict(body))
         return answer
 
+    def preview(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        """A small response at once, nothing stored: the body of ``POST /v1/previews``."""
+        answer: dict[str, Any] = self._transport.json("POST", "/v1/previews", json=dict(body))
+        return answer
+
+    def read_scene(self, text: str, form: Literal["toml", "json"] = "toml") -> dict[str, Any]:
+        """The tables in the text of a scene file (`scene`), and everything wrong with them (`issues`)."""
+        body = {"text": text, "form": form}
+        answer: dict[str, Any] = self._transport.json("POST", "/v1/scenes/read", json=body)
+        return answer
+
+    def scene_text(self, body: Mapping[str, Any]) -> str:
+        """A scene with its values set, as TOML: the body of ``POST /v1/scenes/text``."""
+        return self._transport.send("POST", "/v1/scenes/text", json=dict(body)).text
+
     def upload(self, file: Path | bytes, name: str | None = None, format: str | None = None) -> NewUpload:
         """Upload a file of matrices or modes, given by its path or its bytes.
 

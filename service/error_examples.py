@@ -27,6 +27,8 @@ _ERRORS: dict[str, tuple[int, str, str, str, list[dict[str, str]]]] = {
                     "the body did not arrive within 30 s", []),
     "Conflict": (409, "conflict", "The request does not fit the present state",
                  "job 01a2 is running, it has no results yet", []),
+    "Overtaken": (409, "conflict", "The request does not fit the present state",
+                  "a newer preview of the same client took its place", []),
     "JobFailed": (409, "job-failed", "The job failed", "job 01a2 failed: `mu` must be >= 0, got -0.1", _BAD),
     "BodyTooLarge": (413, "body-too-large", "The body is too large",
                      "the body may have 4194304 bytes, this one has more", []),
@@ -40,6 +42,8 @@ _ERRORS: dict[str, tuple[int, str, str, str, list[dict[str, str]]]] = {
                          "'upload.npz' must hold a square matrix, got 3 x 4", []),
     "QueueFull": (503, "queue-full", "The queue is full",
                   "1000 jobs wait already, the queue takes 1000: try again later", []),
+    "Preview": (503, "preview", "The preview was not finished",
+                "the preview took longer than 3 s: submit it as a job", []),
     "DatabaseAway": (503, "database-away", "The database does not answer",
                      "the database does not answer at present; nothing was written, try again later", []),
 }  # fmt: skip
@@ -51,6 +55,9 @@ _OF: dict[tuple[str, str], tuple[str, ...]] = {
     ("post", "/v1/designs"): (*_BODY, "QueueFull"),
     ("post", "/v1/scenes"): (*_BODY, "Conflict"),
     ("post", "/v1/plan"): _BODY,
+    ("post", "/v1/previews"): (*_BODY, "Overtaken", "Preview"),
+    ("post", "/v1/scenes/read"): _BODY,
+    ("post", "/v1/scenes/text"): _BODY,
     ("post", "/v1/uploads"): (
         "BodyTooSlow", "BodyTooLarge", "UnsupportedMedia", "UnreadableUpload", "QueueFull",
     ),

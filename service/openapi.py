@@ -9,7 +9,9 @@ from pydantic import BaseModel
 
 from service import error_examples
 from service.jobs import Registry
+from service.kinds.previews import PREVIEWS
 from service.routes.plan import PlanRequest
+from service.routes.scene_text import ReadRequest, TextRequest
 from service.routes.uploads import UPLOAD_MEDIA
 from solver.scene import Scene, load_scene
 
@@ -61,15 +63,20 @@ def install(app: FastAPI, registry: Registry) -> None:
 def _complete(description: dict[str, Any], registry: Registry) -> None:
     schemas = description.setdefault("components", {}).setdefault("schemas", {})
     kinds = {kind.name: _with_kind(_schema(kind.request, schemas), kind.name) for kind in registry}
+    previews = {kind.name: _with_kind(_schema(kind.request, schemas), kind.name) for kind in PREVIEWS}
+    named = {"/v1/jobs": kinds, "/v1/previews": previews}
     bodies: dict[str, dict[str, Any]] = {
         "/v1/jobs": {"oneOf": list(kinds.values())},
         "/v1/plan": _schema(PlanRequest, schemas),
         "/v1/scenes": {**_schema(Scene, schemas), "examples": [load_scene("two-dof").to_dict()]},
+        "/v1/scenes/read": _schema(ReadRequest, schemas),
+        "/v1/scenes/text": _schema(TextRequest, schemas),
+        "/v1/previews": {"oneOf": list(previews.values())},
     }
     if "design" in kinds:
         bodies["/v1/designs"] = _schema(registry["design"].request, schemas)
     for path, schema in bodies.items():
-        content = {"application/json": {"schema": schema, "examples": _examples(path, schema, kinds)}}
+        content = {"application/json": {"schema": schema, "examples": _examples(path, schema, named)}}
         description["paths"][path]["post"]["requestBody"] = {"required": True, "content": content}
     description["paths"]["/v1/uploads"]["post"]["requestBody"] = {
         "required": True,
@@ -94,9 +101,11 @@ def _use_known_patterns(item: Any) -> None:
             _use_known_patterns(inner)
 
 
-def _examples(path: str, schema: dict[str, Any], kinds: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """Examples by name: those of every kind of job, or those of the one body."""
-    named = kinds if path == "/v1/jobs" else {path.rpartition("/")[2]: schema}
+def _examples(
+    path: str, schema: dict[str, Any], kinds: dict[str, dict[str, dict[str, Any]]]
+) -> dict[str, Any]:
+    """Examples by name: those of every kind of job or preview, or those of the one body."""
+    named = kinds.get(path, {path.rpartition("/")[2]: schema})
     return {
         f"{name} {number}" if number > 1 else name: {"value": example}
         for name, one in named.items()

@@ -28,6 +28,7 @@ log = logging.getLogger("stickslip.previews")
 MOST_WAITING = 16
 _RETRY_SECONDS = 1
 _GRACE_SECONDS = 0.5
+_LONGEST_WAIT_SECONDS = 120.0
 _SILENT = Pace(progress_seconds=3600.0, checkpoint_seconds=3600.0, checkpoint_bytes=0)
 _SUPERSEDED = "a newer preview of the same client took its place"
 
@@ -97,7 +98,9 @@ class Previews:
         asked = _Asked(attempt, client, loop, loop.create_future())
         self._add(asked)
         try:
-            return await asked.answer
+            return await asyncio.wait_for(asked.answer, _LONGEST_WAIT_SECONDS)
+        except TimeoutError as error:
+            raise PreviewError(f"no worker was free for it within {_LONGEST_WAIT_SECONDS:g} s") from error
         finally:
             self._drop(asked)
 
@@ -127,6 +130,7 @@ class Previews:
             asked, self._running = self._running, None
         if asked is not None and asked.attempt is attempt:
             asked.settle(asked.stopped or _answer(outcome))
+        self.room()
 
     def room(self) -> None:
         """Compute the next one."""

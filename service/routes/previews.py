@@ -11,12 +11,13 @@ from service.access.callers import Caller
 from service.core import Service
 from service.http import CallerDependency, JsonBody, ServiceDependency
 from service.jobs import Resolved
+from service.preview_answers import LimitsPreview, PointPreview, SweepPreview
 from service.validation import validated
 
 router = APIRouter(prefix="/v1/previews", tags=["previews"])
 
 
-@router.post("", response_class=Response, responses={200: {"content": {"application/json": {}}}})
+@router.post("", response_model=SweepPreview | LimitsPreview | PointPreview)
 async def preview(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> Response:
     """Compute `sweep`, `limits` or `point` within seconds. Nothing is stored, and sizes are limited.
 

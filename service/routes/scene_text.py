@@ -10,6 +10,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.http import CallerDependency, JsonBody, ServiceDependency
 from service.kinds.scenes import SceneRequest, resolve_scene
+from service.routes.described import TEXT, media
 from service.scene_text import issues_of_scene, read_text, toml_text
 from service.validation import validated
 
@@ -21,7 +22,10 @@ MOST_CHARACTERS = 4_000_000
 class ReadRequest(BaseModel):
     """The text of a scene file."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True,
+        json_schema_extra={"examples": [{"text": 'name = "half a scene"', "form": "toml"}]},
+    )  # fmt: skip
 
     text: str = Field(max_length=MOST_CHARACTERS)
     form: Literal["toml", "json"] = "toml"
@@ -29,6 +33,12 @@ class ReadRequest(BaseModel):
 
 class TextRequest(SceneRequest):
     """A scene with its values set, and what to say above it."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"scene": "two-dof", "set": {"damper.N0": 80}, "comments": ["as set"]}]
+        }
+    )
 
     comments: list[Annotated[str, Field(max_length=2000)]] = Field(default=[], max_length=50)
 
@@ -54,7 +64,7 @@ async def read(body: JsonBody) -> SceneRead:
     return await run_in_threadpool(_read, request)
 
 
-@router.post("/text", response_class=Response, responses={200: {"content": {"application/toml": {}}}})
+@router.post("/text", response_class=Response, responses={200: media({"application/toml": TEXT})})
 async def text(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> Response:
     """The TOML of a scene with its values set: the file that reproduces what was computed."""
     request = validated(TextRequest, body)

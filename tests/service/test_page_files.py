@@ -1,0 +1,66 @@
+"""The page as files: its policy, what is kept for how long, nothing from elsewhere, nothing dangerous."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import httpx
+import pytest
+from service_helpers import is_problem
+
+from service.routes import page
+
+FOLDER = Path(page.__file__).resolve().parent.parent / "page"
+MODULES = sorted((FOLDER / "js").glob("*.js"))
+LONGEST_FILE = 400
+
+
+def test_the_page_and_its_files_are_served_under_a_strict_policy(shipped: httpx.Client) -> None:
+    found = shipped.get("/")
+    assert found.headers["content-type"] == "text/html; charset=utf-8"
+    assert found.headers["cache-control"] == "no-cache"
+    policy = dict(part.strip().split(" ", 1) for part in found.headers["content-security-policy"].split(";"))
+    assert policy["default-src"] == "'self'"
+    assert "unsafe" not in found.headers["content-security-policy"]
+    addresses = re.findall(r'(?:href|src)="([^"#]+)"', found.text)
+    assert all(address.startswith("/") for address in addresses)
+    files = [address for address in addresses if address.startswith("/page/")]
+    assert {address.rpartition("/")[2] for address in files} >= {path.name for path in MODULES}
+    for address in files:
+        answer = shipped.get(address)
+        assert answer.status_code == 200
+        assert "immutable" in answer.headers["cache-control"]
+        again = shipped.get(address, headers={"If-None-Match": answer.headers["etag"]})
+        assert again.status_code == 304
+
+
+def test_a_file_of_another_version_is_not_kept(shipped: httpx.Client) -> None:
+    answer = shipped.get("/page/0123/js/main.js")
+    assert answer.status_code == 200
+    assert answer.headers["cache-control"] == "no-cache"
+
+
+@pytest.mark.parametrize(
+    "path", ["js/none.js", "index.html", "..%2froutes%2fpage.py", "js%2f..%2f..%2fcore.py", "js"]
+)
+def test_nothing_else_is_served(shipped: httpx.Client, path: str) -> None:
+    is_problem(shipped.get(f"/page/0123/{path}"), 404)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.name)
+def test_modules_are_short_and_put_no_data_into_markup(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= LONGEST_FILE
+    assert text.startswith("// ")
+    for word in ("innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval(", "new Function"):
+        assert word not in text
+    assert not re.search(r"https?://(?!www\.w3\.org/)", text)
+
+
+def test_markup_has_no_inline_scripts_or_styles() -> None:
+    text = (FOLDER / "index.html").read_text(encoding="utf-8")
+    assert "<style" not in text
+    assert " style=" not in text
+    assert not re.search(r"\son[a-z]+=", text)
+    assert not re.search(r"<script(?![^>]*\ssrc=)", text)

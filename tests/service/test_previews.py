@@ -1,0 +1,209 @@
+"""Previews: computed at once, nothing stored, the newest of each client first."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+from service_helpers import is_problem, until
+
+import solver
+from service.errors import ConflictError, InvalidRequestError, JobFailedError, PreviewError, QueueFullError
+from service.jobs import JobKind, JobOutput, JobRequest, Progress, Registry, Resolved, SceneSource, ShouldStop
+from service.previews import MOST_WAITING, Previews
+from solver.errors import SettingError, SolverError
+
+TWO_DOF = {"scene": "two-dof"}
+
+
+def post(http: httpx.Client, **body: object) -> httpx.Response:
+    return http.post("/v1/previews", json={**TWO_DOF, **body})
+
+
+def test_a_sweep_is_that_of_the_solver_and_nothing_is_stored(shipped: httpx.Client) -> None:
+    before = shipped.get("/v1/jobs").json()["items"], shipped.get("/v1/sweeps").json()["items"]
+    answer = post(shipped, kind="sweep", set={"damper.N0": 80}, client="a")
+    assert answer.status_code == 200
+    assert answer.headers["cache-control"] == "no-store"
+    found = answer.json()
+    branch = solver.sweep(solver.load_scene("two-dof").with_values({"damper.N0": 80.0}))
+    assert np.allclose(found["amplitude"], branch.amplitude, rtol=1e-9)
+    assert branch.peak is not None
+    assert found["peak"] == pytest.approx({"value": branch.peak.value, "at": branch.peak.at})
+    assert found["states"] == {"damper": "stick and slip"}
+    after = shipped.get("/v1/jobs").json()["items"], shipped.get("/v1/sweeps").json()["items"]
+    assert after == before
+
+
+def test_limits_are_the_linear_responses(shipped: httpx.Client) -> None:
+    found = post(shipped, kind="limits", contact="damper").json()
+    free, stuck = (found[name]["peaks"][0]["at"] for name in ("free", "stuck"))
+    # Natural frequencies of the chain without and with the contact's stiffness.
+    for stiffness, at in ((0.0, free), (30.0, stuck)):
+        k1, k2 = (4 * np.pi) ** 2, (2 * np.pi) ** 2
+        lowest = np.sqrt(np.linalg.eigvalsh([[k1 + k2, -k2], [-k2, k2 + stiffness]])[0]) / (2 * np.pi)
+        assert at == pytest.approx(lowest, rel=2e-3)
+
+
+def test_a_point_has_loops_and_what_the_contact_does_when(shipped: httpx.Client) -> None:
+    found = post(shipped, kind="point", frequency_hz=1.05).json()
+    period, (contact,) = found["period"], found["period"]["contacts"]
+    assert max(map(abs, period["displacement"])) == pytest.approx(found["max_abs"], rel=1e-3)
+    assert period["displacement"][0] == pytest.approx(period["displacement"][-1])
+    force, load, motion = (np.array(contact[name]) for name in ("force", "load", "motion"))
+    slipping = motion == 1
+    assert slipping.any()
+    assert (motion == 0).any()
+    assert np.allclose(np.abs(force[:-1][slipping]), 0.3 * load[:-1][slipping], rtol=1e-6)
+    assert sum(contact["shares"].values()) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("body", "pointer"),
+    [
+        ({"kind": "map"}, "/kind"),
+        ({"kind": "sweep", "harmonics": 42}, "/harmonics"),
+        ({"kind": "sweep", "set": {"damper.N9": 1}}, "/set/damper.N9"),
+        ({"kind": "limits", "contact": "shroud"}, "/contact"),
+        ({"kind": "point"}, "/frequency_hz"),
+        ({"kind": "sweep", "client": 5}, "/client"),
+        ({"kind": "sweep", "scene": {"name": "x"}}, "/scene/structure"),
+    ],
+)
+def test_what_is_wrong_is_named(shipped: httpx.Client, body: dict, pointer: str) -> None:
+    problem = is_problem(post(shipped, **body), 422)
+    assert pointer in [issue["pointer"] for issue in problem["errors"]]
+
+
+def test_large_structures_are_jobs(shipped: httpx.Client) -> None:
+    masses = {f"m{i}": 1.0 for i in range(900)}
+    springs = [{"between": [f"m{i}", f"m{i + 1}"], "k": 10.0} for i in range(899)]
+    scene = {
+        "name": "long", "structure": {"kind": "lumped", "masses": masses, "springs": springs},
+        "excitation": {"dof": "m0", "amplitude": 1.0}, "observe": {"dof": "m0", "band": [0.1, 1.0]},
+    }  # fmt: skip
+    answer = shipped.post("/v1/plan", json={"scene": "two-dof"})
+    assert answer.status_code == 200
+    response = shipped.post("/v1/previews", json={"kind": "sweep", "scene": scene})
+    if response.status_code != 413:
+        assert "submit a job" in is_problem(response, 422)["detail"]
+
+
+def test_a_march_gives_its_last_period_on_request(shipped: httpx.Client) -> None:
+    body = {"kind": "march", "scene": "two-dof", "frequency_hz": 1.05, "history": True}
+    result = shipped.post("/v1/jobs", json=body, headers={"Prefer": "wait=60"}).json()["result"]
+    history = result["history"]
+    assert max(map(abs, history["displacement"])) == pytest.approx(result["max_abs"], rel=1e-2)
+    assert [contact["name"] for contact in history["contacts"]] == ["damper"]
+    assert len(history["time"]) == len(history["contacts"][0]["slip"])
+
+
+class WaitRequest(JobRequest):
+    """Seconds to spend."""
+
+    seconds: float = 0.0
+
+
+def _resolve(request: WaitRequest, _source: SceneSource) -> Resolved:
+    return Resolved(spec={"seconds": request.seconds})
+
+
+def spend(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldStop) -> JobOutput:
+    end = time.monotonic() + spec["seconds"]
+    while time.monotonic() < end and not should_stop():
+        time.sleep(0.005)
+    return JobOutput(result={"spent": spec["seconds"]})
+
+
+def refuse(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    raise SettingError("value", 3, "must be something else")
+
+
+def fail(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    raise SolverError("there is no answer")
+
+
+def die(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    import os
+
+    os._exit(3)
+
+
+KINDS = Registry(
+    JobKind(name=name, summary=name, request=WaitRequest, resolve=_resolve, run=run)
+    for name, run in (("spend", spend), ("refuse", refuse), ("fail", fail), ("die", die))
+)
+
+
+def together(previews: Previews, *asked: tuple[str, float, str]) -> list[bytes | BaseException]:
+    """The answers to (kind, seconds, client), asked one after the other within moments."""
+
+    async def ask() -> list[bytes | BaseException]:
+        tasks = []
+        for kind, seconds, client in asked:
+            tasks.append(asyncio.ensure_future(previews.compute(kind, {"seconds": seconds}, client)))
+            await asyncio.sleep(0.02)
+        return await asyncio.gather(*tasks, return_exceptions=True)
+
+    return asyncio.run(ask())
+
+
+@pytest.fixture(scope="module")
+def previews() -> Any:
+    made = Previews(1.0, KINDS)
+    together(made, ("spend", 0.0, ""))
+    yield made
+    made.close()
+
+
+def test_the_newest_of_a_client_takes_the_place_of_its_older_ones(previews: Previews) -> None:
+    one, two, other, three = together(
+        previews, ("spend", 0.9, "a"), ("spend", 0.9, "a"), ("spend", 0.01, "b"), ("spend", 0.02, "a")
+    )
+    assert isinstance(one, ConflictError)
+    assert isinstance(two, ConflictError)
+    assert other == b'{"spent":0.01}'
+    assert three == b'{"spent":0.02}'
+
+
+def test_one_that_takes_too_long_is_ended_and_the_next_goes_on(previews: Previews) -> None:
+    slow, quick = together(previews, ("spend", 30.0, "a"), ("spend", 0.0, "b"))
+    assert isinstance(slow, PreviewError)
+    assert "longer than 1 s" in str(slow)
+    assert quick == b'{"spent":0.0}'
+
+
+def test_few_wait(previews: Previews) -> None:
+    answers = together(previews, *[("spend", 0.02, "")] * (MOST_WAITING + 20))
+    assert any(isinstance(answer, bytes) for answer in answers)
+    waits: Callable[[object], bool] = lambda answer: isinstance(answer, QueueFullError)  # noqa: E731
+    assert all(isinstance(answer, bytes) or waits(answer) for answer in answers)
+    slow = [("spend", 0.5, "")] + [("spend", 0.0, "")] * (MOST_WAITING + 1)
+    assert any(waits(answer) for answer in together(previews, *slow))
+
+
+def test_what_cannot_be_computed_says_why(previews: Previews) -> None:
+    refused, failed, died, after = together(
+        previews, ("refuse", 0.0, ""), ("fail", 0.0, ""), ("die", 0.0, ""), ("spend", 0.0, "")
+    )
+    assert isinstance(refused, InvalidRequestError)
+    assert isinstance(failed, JobFailedError)
+    assert isinstance(died, PreviewError)
+    assert after == b'{"spent":0.0}'
+
+
+def test_closing_tells_those_who_wait() -> None:
+    closing = Previews(5.0, KINDS)
+    together(closing, ("spend", 0.0, ""))
+    with ThreadPoolExecutor(1) as pool:
+        answers = pool.submit(together, closing, ("spend", 4.0, "a"), ("spend", 4.0, "b"))
+        until(lambda: closing._waiting)
+        closing.close()
+        assert all(isinstance(answer, PreviewError) for answer in answers.result())
+    assert isinstance(together(closing, ("spend", 0.0, ""))[0], PreviewError)

@@ -1,0 +1,65 @@
+"""Scenes from and to the text of a file."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+
+import httpx
+import pytest
+from service_helpers import is_problem
+
+import solver
+from service.scene_text import toml_text
+
+
+@pytest.mark.parametrize("name", solver.shipped_scenes())
+def test_a_scene_comes_back_from_its_toml(shipped: httpx.Client, name: str) -> None:
+    path = {"two-dof": "damper.N0", "bladed-disk": "shroud.N0"}[name]
+    answer = shipped.post("/v1/scenes/text", json={"scene": name, "set": {path: 150}, "comments": ["a\nb"]})
+    assert answer.headers["content-type"].startswith("application/toml")
+    assert answer.text.startswith("# a\n# b\n")
+    wanted = solver.load_scene(name).with_values({path: 150.0})
+    assert solver.Scene.from_dict(tomllib.loads(answer.text)) == wanted
+    read = shipped.post("/v1/scenes/read", json={"text": answer.text}).json()
+    assert read["issues"] == []
+    assert solver.Scene.from_dict(read["scene"]) == wanted
+
+
+def test_every_value_of_a_table_can_be_written() -> None:
+    raw = {
+        "name": "a \"b\" \\ é", "list": [1, 2.5, True, "x"], "empty": {}, "none": [],
+        "structure": {"odd key": {"deep": [{"a": 1e-300}]}, "long": [["m" * 40, "n" * 40, "o" * 40]]},
+        "contacts": [{"name": "c", "pair": ["a", "b"]}, {"name": "d"}],
+    }  # fmt: skip
+    assert tomllib.loads(toml_text(raw, ("first", "second"))) == raw
+
+
+def test_everything_wrong_is_listed_with_its_pointer(shipped: httpx.Client) -> None:
+    raw = solver.load_scene("two-dof").to_dict()
+    raw["contacts"][0]["mu"] = -1.0
+    raw["observe"]["dof"] = "m9"
+    read = shipped.post("/v1/scenes/read", json={"text": json.dumps(raw), "form": "json"}).json()
+    assert {issue["pointer"] for issue in read["issues"]} == {"/contacts/0/mu", "/observe/dof"}
+    assert read["scene"] == raw
+
+
+@pytest.mark.parametrize(
+    ("text", "form", "words"),
+    [
+        ('name = "x"\nmu = = 3\n', "toml", "line 2"),
+        ('{"name": }', "json", "line 1"),
+        ("[1]", "json", "must be a table"),
+        ("[" * 100_000, "json", ""),
+    ],
+)
+def test_a_text_that_cannot_be_read_says_where(
+    shipped: httpx.Client, text: str, form: str, words: str
+) -> None:
+    answer = shipped.post("/v1/scenes/read", json={"text": text[:15_000], "form": form})
+    assert words in is_problem(answer, 400)["detail"]
+
+
+def test_dates_and_numbers_that_are_none(shipped: httpx.Client) -> None:
+    read = shipped.post("/v1/scenes/read", json={"text": "name = 2020-01-01\nx = nan\n"}).json()
+    assert {"/x", "/structure"} <= {issue["pointer"] for issue in read["issues"]}
