@@ -85,8 +85,8 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
     app.add_middleware(Seal, settings=service.settings)
     events.install(app)
     for module in (
-        jobs, events, designs, sweeps, scene_text, scenes, uploads, plan, previews, health, metrics, reference,
-        page,
+        jobs, events, designs, sweeps, scene_text, scenes, uploads, plan, previews, health, metrics,
+        reference, page,
     ):  # fmt: skip
         app.include_router(module.router)
     openapi.install(app, registry)

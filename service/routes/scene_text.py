@@ -16,6 +16,7 @@ from service.validation import validated
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
 
+_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "set": {"damper.N0": 80}, "comments": ["as set"]}
 MOST_CHARACTERS = 4_000_000
 
 
