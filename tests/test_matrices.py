@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 from matrix_cases import beam, beam_scene, chain_raw, hb_text, inline, write_scene
 from scipy import sparse
-from scipy.io import mmwrite, savemat
+from scipy.io import mmread, mmwrite, savemat
 
 import solver
 from solver.errors import SceneError, SettingError
 from solver.matrices.files import MatrixFileError, read_matrix, read_modes
+from solver.matrices.matrix_market import read_matrix_market
+from solver.matrices.text import FormatError
 from solver.scene import Scene, load_scene
 
 A = np.array([[4.0, -1.5, 0.0], [-1.5, 3.0, 0.25], [0.0, 0.25, 2.0]])
@@ -285,3 +287,43 @@ def test_modes_answer_as_their_matrices_do(tmp_path: Path) -> None:
     np.savez(tmp_path / "bad.npz", modes=phi)
     with pytest.raises(MatrixFileError, match="`modes` and one of"):
         read_modes(tmp_path / "bad.npz")
+
+
+@pytest.mark.parametrize("symmetry", ["general", "symmetric", "skew-symmetric", "hermitian"])
+@pytest.mark.parametrize("dense", [True, False])
+def test_matrix_market_is_read_as_scipy_reads_it(symmetry: str, dense: bool, tmp_path: Path) -> None:
+    matrix = np.random.default_rng(1).standard_normal((5, 5)) * (
+        1.0 if symmetry != "hermitian" else 1.0 + 0.5j
+    )
+    matrix[0, 3] = 0.0
+    matrix = {"general": matrix, "symmetric": matrix + matrix.T, "skew-symmetric": matrix - matrix.T,
+              "hermitian": matrix + matrix.conj().T}[symmetry]  # fmt: skip
+    path = tmp_path / "A.mtx"
+    mmwrite(path, matrix if dense else sparse.coo_array(matrix), comment="a\nb", symmetry=symmetry)
+    assert symmetry in path.read_text()
+    expected = mmread(path, spmatrix=False)
+    found = read_matrix_market(path).toarray()
+    assert np.array_equal(found, expected if dense else expected.toarray())
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "line 1 must be '%%MatrixMarket matrix"),
+        ("%%MatrixMarket matrix coordinate real\n", "line 1 must be"),
+        ("%%MatrixMarket matrix coordinate real round\n1 1 1\n1 1 1\n", "line 1 must name"),
+        ("%%MatrixMarket matrix array real general\n% a\n\n", "line 4 is missing"),
+        ("%%MatrixMarket matrix array real general\n% a\n2 x\n", "line 3 must hold the numbers"),
+        ("%%MatrixMarket matrix array real general\n1000000 1000000\n1\n", "ends after 1 numbers"),
+        ("%%MatrixMarket matrix array real symmetric\n2 3\n1\n", "line 2: a symmetric matrix is square"),
+        ("%%MatrixMarket matrix coordinate real general\n2 2 1\n% c\n1 3 1.0\n", "line 4: a row or column"),
+        ("%%MatrixMarket matrix coordinate real general\n2 2 1\n1.5 1 1.0\n", "line 3: a row or column"),
+        ("%%MatrixMarket matrix coordinate real general\n2 2 1\n1 1 1.0\n1 1 1.0\n", "sizes says 3"),
+    ],
+)  # fmt: skip
+def test_a_damaged_matrix_market_file_names_its_line(text: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "A.mtx"
+    path.write_text(text)
+    with pytest.raises(FormatError) as caught:
+        read_matrix_market(path)
+    assert message in str(caught.value)
