@@ -122,12 +122,12 @@ DAMAGED = {
     "h.mtx": ("1 99999999 3.0\n", "may have 10000000 rows"),
     "a.sti": ("1 1 3.0\n1 2\n", "line 2 must hold row, column and value"),
     "a.pch": (BY_HAND["k.pch"].replace("-1.500000000D+00", " -1.5zz"), "line 2: '-1.5zz' is not a number"),
-    "b.pch": (BY_HAND["k.pch"].replace("  6  ", "  2  ", 1), "line 1: the form must be 1"),
+    "b.pch": (BY_HAND["k.pch"].replace("  6  ", "  2  ", 1), "line 1: 'KAAX' must have the form 1"),
     "c.pch": ("\n".join(BY_HAND["k.pch"].splitlines()[1:]), "line 1: a column of 'KAAX' stands before"),
     "d.pch": ("GRID,1\n", "holds no DMIG entry"),
     "e.pch": (BY_HAND["k.pch"].splitlines()[0] + "\n", "'KAAX' has a heading but no entries"),
     "f.pch": (BY_HAND["k.pch"].replace("2               1", "2               9", 1), "a component must be"),
-    "g.pch": (BY_HAND["k.pch"].replace("KAAX    ", "KAAX    ").replace("  2       0", "  3       0"), "real"),
+    "g.pch": (BY_HAND["k.pch"].replace("  2       0", "  3       0"), "type 1 or 2 (real)"),
     "a.op4": (OP4.replace("2KAA", "xKAA"), "line 1 must hold columns, rows, form and type"),
     "b.op4": (OP4.replace("1P,3E23.16", "nothing"), "line 1: 'nothing' is no format"),
     "c.op4": (OP4.replace("       1       1       4", "       1       9       4"), "line 2: rows 9 to 10"),
@@ -249,6 +249,25 @@ def test_units_are_brought_to_si_with_angles_apart(tmp_path: Path) -> None:
     inch = in_si(found, "in").matrices["K"].toarray()
     assert inch[0, 0] == pytest.approx(4 * 175.12683524)
     assert inch[3, 3] == pytest.approx(7 * 0.11298482902)
+
+
+def test_what_stands_beside_the_matrices_of_nastran_is_passed_over(tmp_path: Path) -> None:
+    """PARAM,EXTOUT writes loads (form 9) and structural damping (K4AAX) into the same punch file."""
+    loads = (
+        "DMIG    PAX            0       9       2       0                       1\n"
+        "DMIG*   PAX                            1               0\n"
+        "*                      3               1 1.000000000D+00\n"
+    )
+    text = "TITLE = BLADE\nSUBCASE 1\n" + dmig("K4AAX", np.eye(5), NODES) + loads + dmig("KAAX", A, NODES)
+    (tmp_path / "k.pch").write_text(text)
+    assert read_matrix(tmp_path / "k.pch", "K").toarray() == pytest.approx(A)
+    (tmp_path / "k.op4").write_text(op4_text({"K4AA": np.eye(5), "KRECT": A[:, :2], "KAA": A}))
+    assert np.array_equal(read_matrix(tmp_path / "k.op4", "K").toarray(), A)
+    wide = BY_HAND["k.op4"].splitlines()
+    wide[0] = "".join(f"{n:16d}" for n in (2, 2, 6, 2)) + "KAA     1P,3E23.16"
+    wide[1] = "".join(f"{n:16d}" for n in (1, 1, 4))
+    (tmp_path / "wide.op4").write_text("\n".join(wide))
+    assert np.array_equal(read_matrix(tmp_path / "wide.op4", "K").toarray(), [[3.0, -1.5], [-1.5, 2.5]])
 
 
 def test_a_file_of_several_matrices_tells_their_names(tmp_path: Path) -> None:

@@ -259,6 +259,25 @@ def test_a_boundary_condition_by_penalty_is_told_where_rows_have_no_labels(
     assert (status, "row 0 is held by a penalty: leave such DOFs out" in " ".join(err.split())) == (2, True)
 
 
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        (slice(0, 10), "M has 12 rows, K has 10 rows: export all of them from one analysis"),
+        (slice(0, 12), "row 4 is empty in M and K: these DOFs belong to no element"),
+    ],
+)
+def test_rows_of_no_element_and_sizes_that_differ_are_refused(
+    rows: slice, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    M, K = (without(A, 4) for A in beam(6))
+    for name, A in (("M", M), ("K", K[rows, rows])):
+        sparse.save_npz(f"{name}.npz", sparse.csr_array(A))
+    status, _, err = command("import M.npz K.npz --out s.toml --dof tip=8", capsys)
+    assert (status, message in " ".join(err.split())) == (2, True)
+
+
 NOTES = {
     "free": (lambda: free_beam(6), "2 rigid-body modes: the body is not held"),
     "slow": (lambda: (beam(6)[0] * 1e6, beam(6)[1]), "are M and K in units that go together?"),

@@ -19,8 +19,10 @@ MOST_UNNAMED = 200
 _LABELS = (".mapping", ".dof")
 _BY_SUFFIX = {".mas": "M", ".sti": "K"}
 _WORDS = {
-    "M": ("M", "MASS", "MASSE"), "K": ("K", "STIF", "STIFF", "STIFFNESS"), "C": ("C", "DAMP", "DAMPING"),
-}  # fmt: skip
+    "M": ("M", "MASS", "MASSE"),
+    "K": ("K", "STIF", "STIFF", "STIFFNESS"),
+    "C": ("C", "DAMP", "DAMPING", "DMPV"),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -47,7 +47,7 @@ class _Entries:
 
 
 def read_dmig(path: Path) -> dict[str, Labelled]:
-    """Read all matrices of a file, by name; other entries are passed over.
+    """Read all square real matrices of a file, by name; other entries are passed over.
 
     Raises
     ------
@@ -56,23 +56,30 @@ def read_dmig(path: Path) -> dict[str, Labelled]:
     OSError
         The file cannot be read.
     """
-    found: dict[str, _Entries] = {}
+    found: dict[str, _Entries | None] = {}
+    others: list[str] = []
     for line, fields in _entries(ascii_lines(path, "a file of DMIG entries")):
         name = fields[1].strip().upper()
         if fields[2].strip() == "0":
             if name in found:
                 raise FormatError(f"line {line}: the file holds two matrices {name!r}")
-            found[name] = _Entries(form=_form(fields, line))
+            why = _passed_over(fields)
+            found[name] = None if why else _Entries(form=int(fields[3]))
+            if why:
+                others.append(f"line {line}: {name!r} {why}")
             continue
         if name not in found:
             raise FormatError(f"line {line}: a column of {name!r} stands before its heading")
-        _column(found[name], fields, line)
-    if not found:
-        raise FormatError("line 1: the file holds no DMIG entry")
-    for name, entries in found.items():
+        entries = found[name]
+        if entries is not None:
+            _column(entries, fields, line)
+    kept = {name: entries for name, entries in found.items() if entries is not None}
+    if not kept:
+        raise FormatError("; ".join(others[:3]) or "line 1: the file holds no DMIG entry")
+    for name, entries in kept.items():
         if not entries.values:
             raise FormatError(f"the matrix {name!r} has a heading but no entries")
-    return {name: entries.matrix() for name, entries in found.items()}
+    return {name: entries.matrix() for name, entries in kept.items()}
 
 
 def _entries(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
@@ -106,15 +113,14 @@ def _fields(text: str) -> list[str]:
     return [text[:8], *(text[at : at + width] for at in range(8, min(len(text), 72), width))]
 
 
-def _form(fields: list[str], line: int) -> int:
+def _passed_over(fields: list[str]) -> str:
+    """Why a matrix is none of M, K and C: loads are rectangular, some are complex; empty if it may be one."""
     form, kind = fields[3].strip(), fields[4].strip()
     if form not in ("1", "6"):
-        raise FormatError(
-            f"line {line}: the form must be {SQUARE} (square) or {SYMMETRIC} (symmetric), got {form!r}"
-        )
+        return f"must have the form {SQUARE} (square) or {SYMMETRIC} (symmetric), got {form!r}"
     if kind not in ("1", "2"):
-        raise FormatError(f"line {line}: the type must be 1 or 2 (real), got {kind!r}")
-    return int(form)
+        return f"must be of the type 1 or 2 (real), got {kind!r}"
+    return ""
 
 
 def _column(entries: _Entries, fields: list[str], line: int) -> None:

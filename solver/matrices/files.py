@@ -245,8 +245,9 @@ def _wanted(names: list[str], key: str, path: Path) -> list[str]:
 
 
 def _alike(names: list[str], key: str) -> list[str]:
-    """The names that begin as those of the matrix `key` do; none if it is none of M, K and C."""
-    return [name for name in names if name.upper().startswith(_NAMES.get(key, ()))]
+    """The names that begin as those of the matrix `key` do (K4…: structural damping); none for other keys."""
+    starts = _NAMES.get(key, ())
+    return [name for name in names if name.upper().startswith(starts) and not name.upper().startswith("K4")]
 
 
 def _chosen(arrays: Mapping[str, Any], key: str, path: Path) -> Any:
@@ -254,6 +255,10 @@ def _chosen(arrays: Mapping[str, Any], key: str, path: Path) -> Any:
 
 
 def _of_nastran(arrays: Mapping[str, Any], key: str, path: Path) -> Any:
+    """A matrix by Nastran's names, of the square ones: loads and recovery matrices stand beside them."""
+    shapes = {name: getattr(found, "matrix", found).shape for name, found in arrays.items()}
+    square = {name: found for name, found in arrays.items() if shapes[name][0] == shapes[name][1]}
+    arrays = square or arrays
     alike = _alike(list(arrays), key)
     return arrays[alike[0]] if len(alike) == 1 else _chosen(arrays, key, path)
 
