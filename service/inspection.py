@@ -10,6 +10,7 @@ import contextlib
 import json
 import multiprocessing as mp
 import os
+import signal
 import threading
 from collections.abc import Iterator, Mapping
 from multiprocessing.connection import Connection
@@ -71,9 +72,7 @@ def _ask(task: str, folder: Path, argument: Any, seconds: float, most_bytes: int
             answer = json.loads(ours.recv_bytes(most_bytes))
         except EOFError as error:
             process.join(1.0)
-            raise UnreadableUploadError(
-                "reading it takes more memory or time than there is for it"
-            ) from error
+            raise UnreadableUploadError(_end(process.exitcode)) from error
         except OSError as error:
             message = f"what it holds takes more than {most_bytes} bytes as text"
             raise UnreadableUploadError(message) from error
@@ -86,6 +85,13 @@ def _ask(task: str, folder: Path, argument: Any, seconds: float, most_bytes: int
     if "error" in answer:
         raise UnreadableUploadError(answer["error"])
     return answer["found"]
+
+
+def _end(code: int | None) -> str:
+    """What is said of a file whose reader ended without an answer."""
+    if code is not None and -code in (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE):
+        return "it is damaged: its reader ended at it"
+    return "reading it takes more memory or time than there is for it"
 
 
 @contextlib.contextmanager

@@ -233,7 +233,7 @@ SMUGGLED = {
     "a chunk of no size": post("/v1/jobs", CHUNKED, b"zz\r\n{}\r\n", length=-1),
     "no HTTP": b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + bytes(300),
     "HTTP/0.9": b"GET /\r\n\r\n",
-    "HTTP/9.9": b"GET / HTTP/9.9\r\nHost: localhost\r\n\r\n",
+    "HTTP/9.9": b"GET /none HTTP/9.9\r\nHost: localhost\r\n\r\n",
     "a method of 10 kB": b"A" * 10_000 + b" / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n",
     "a path of 100 kB": b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\nHost: localhost\r\n\r\n",
     "no host": b"GET /health/live HTTP/1.1\r\n\r\n",

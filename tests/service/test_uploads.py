@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import signal
 import threading
 import zipfile
 import zlib
@@ -248,6 +249,8 @@ def test_a_reader_that_takes_too_long_or_dies_is_ended(
         inspection.contents(tmp_path / "M.npz", 0.01)
     monkeypatch.setattr(inspection, "_AT_ONCE", threading.BoundedSemaphore(1))
     assert inspection.contents(tmp_path / "M.npz", 30.0)[0]["rows"] == len(M), "its place is free again"
+    assert "damaged" in inspection._end(-signal.SIGSEGV)
+    assert "memory or time" in inspection._end(-signal.SIGKILL)
     with pytest.raises(UnreadableUploadError, match="more than 10 bytes"):
         inspection.resolved_structure({"kind": "matrices", "M": "M.npz"}, tmp_path, 30.0, 10)
 
