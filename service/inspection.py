@@ -153,7 +153,11 @@ def _answer(task: str, argument: Any) -> dict[str, Any]:
 
 def _describe(file: Path) -> list[dict[str, Any]]:
     from solver.matrices.files import array_names, read_matrix, read_modes
+    from solver.matrices.labels import LABEL_SUFFIXES
+    from solver.matrices.sets import labels_of
 
+    if file.suffix in LABEL_SUFFIXES:
+        return [{"name": "mapping", "rows": len(labels_of(file)), "columns": 1, "entries": None}]
     names = array_names(file)
     if "modes" in names:
         modes = read_modes(file)

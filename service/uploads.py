@@ -20,7 +20,7 @@ from service.settings import Settings
 from service.strict_json import digest, pointer
 from solver.errors import Issue
 
-_KEYS = ("M", "K", "C", "modes")
+_KEYS = ("M", "K", "C", "modes", "mapping")
 _KEPT = 4
 _LARGEST_STRUCTURE = 16 * 1024 * 1024
 
@@ -34,6 +34,9 @@ class UploadFormat(enum.StrEnum):
     MTX = "mtx"
     OUTPUT4 = "op4"
     DMIG = "pch"
+    CALCULIX = "sti"
+    ANSYS_LABELS = "mapping"
+    CALCULIX_LABELS = "dof"
     HARWELL_BOEING = "hb"
 
 
@@ -66,6 +69,7 @@ def format_of(asked: UploadFormat | None, name: str, content_type: str) -> Uploa
     InvalidRequestError
         If none of them says it.
     """
+    from solver.matrices.calculix import CALCULIX
     from solver.matrices.dmig import DMIG
     from solver.matrices.files import HARWELL_BOEING
 
@@ -76,6 +80,8 @@ def format_of(asked: UploadFormat | None, name: str, content_type: str) -> Uploa
         return UploadFormat.HARWELL_BOEING
     if suffix in DMIG:
         return UploadFormat.DMIG
+    if suffix in CALCULIX:
+        return UploadFormat.CALCULIX
     by_suffix = {f".{known.value}": known for known in UploadFormat}
     found = by_suffix.get(suffix) or MEDIA.get(content_type)
     if found is not None:

@@ -101,14 +101,21 @@ def put_together(
     found = mapping or next((name for name in map(labels_beside, paths.values()) if name), None)
     labels = next((part.labels for part in parts.values() if part.labels is not None), None)
     if found is not None:
-        labels = _labels(found)
+        labels = labels_of(found)
         size = next(iter(sizes.values()))
         if len(labels) != size:
             raise MatrixFileError(f"{str(found)!r} names {len(labels)} rows, the matrices have {size}")
     return MatrixSet(matrices=matrices, labels=labels)
 
 
-def _labels(path: Path) -> tuple[Label, ...]:
+def labels_of(path: Path) -> tuple[Label, ...]:
+    """Read a file of labels.
+
+    Raises
+    ------
+    MatrixFileError
+        It cannot be read, or names no rows.
+    """
     try:
         return read_labels(path)
     except FormatError as error:

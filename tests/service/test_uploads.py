@@ -14,6 +14,7 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+from fe_files import coordinate
 from matrix_cases import beam, hb_text, write_scene
 from scipy.io import mmwrite, savemat
 from scipy.sparse import coo_array, save_npz
@@ -47,6 +48,8 @@ FILES: dict[str, bytes] = {
     "M.mat": saved(lambda file: savemat(file, {"M": M})),
     "M.mtx": saved(lambda file: mmwrite(file, coo_array(M))),
     "M.rsa": hb_text(M, "RSA").encode(),
+    "M.sti": coordinate(M).encode(),
+    "M.dof": "".join(f"{row + 1}.2\n" for row in range(len(M))).encode(),
     "modes.npz": npz(modes=np.eye(3), omega2=np.arange(1.0, 4.0)),
 }
 
@@ -61,7 +64,8 @@ def test_every_format_is_described(name: str, tmp_path: Path, monkeypatch: pytes
     Path(name).write_bytes(FILES[name])
     found = inspection._answer("describe", name)["found"]
     sizes = {(one["rows"], one["columns"]) for one in found}
-    assert sizes == ({(3, 3)} if name == "modes.npz" else {M.shape})
+    others = {"modes.npz": (3, 3), "M.dof": (len(M), 1)}
+    assert sizes == {others.get(name, M.shape)}
 
 
 def test_a_file_comes_in_once(http: httpx.Client) -> None:
@@ -142,6 +146,9 @@ def test_what_does_not_fit_is_refused_with_pointers(shipped: httpx.Client, tmp_p
     assert pointers(M=f"upload:{mass}", modes=f"upload:{mass}") == ["/scene/structure/modes"]
     for path in ("M.npz", str(tmp_path / "M.npz"), "upload:../../M.npz", "upload:", "upload:none", "file:x"):
         assert "/scene/structure/M" in pointers(M=path, K=f"upload:{small}")
+    files = {"M": f"upload:{mass}", "K": f"upload:{mass}"}
+    for path in ("/etc/passwd", "rows.dof", "upload:none", f"upload:{mass}"):
+        assert pointers(**files, mapping=path) == ["/scene/structure/mapping"]
     many = {"M": f"upload:{mass}", "K": f"upload:{mass}", "keep_modes": 10**9}
     assert pointers(**many) == ["/scene/structure/keep_modes"]
 
