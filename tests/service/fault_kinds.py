@@ -12,7 +12,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import httpx
+import psutil
 import psycopg
+from dask_cluster import DaskCluster
 from fault_site import LEASE, Program, Site
 from postgresql_cluster import Cluster
 
@@ -127,5 +129,43 @@ def connections_cut(cluster: Cluster, url: str) -> Fault:
         query = "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = %s"
         with psycopg.connect(cluster.conninfo("postgres"), autocommit=True) as connection:
             connection.execute(query, (url.rsplit("/", 1)[1],))
+
+    return happen
+
+
+def cluster_worker_killed(dask: DaskCluster) -> Fault:
+    """Kill -9 of a worker's computing process, or of all of it; a worker is there again afterwards."""
+
+    def happen(_site: Site, generator: random.Random) -> None:
+        nanny = generator.choice(dask.workers)
+        family = dask.family(nanny)
+        whole = generator.random() < 0.5
+        for process in family if whole else family[1:]:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                process.kill()
+        if whole:
+            nanny.wait(10)
+            dask.workers.remove(nanny)
+            dask.add_worker()
+
+    return happen
+
+
+def scheduler_killed(dask: DaskCluster) -> Fault:
+    """Kill -9 of the scheduler; its workers end too, and all are started again."""
+
+    def happen(_site: Site, generator: random.Random) -> None:
+        dask.kill_scheduler()
+        time.sleep(generator.uniform(0.0, 1.0))
+        for nanny in dask.workers:
+            for process in dask.family(nanny):
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    process.kill()
+            nanny.wait(10)
+        number = len(dask.workers)
+        dask.workers.clear()
+        dask.start_scheduler()
+        for _ in range(number):
+            dask.add_worker()
 
     return happen

@@ -15,16 +15,19 @@ from pathlib import Path
 
 import httpx
 import pytest
+from dask_cluster import DaskCluster
 from fault_kinds import (
     Fault,
     child_killed,
     child_paused,
+    cluster_worker_killed,
     connections_cut,
     disk_full,
     program_killed,
     program_paused,
     program_stopped,
     queue_full,
+    scheduler_killed,
     server_restarted,
 )
 from fault_site import Site, clients, free_port
@@ -133,3 +136,18 @@ def test_services_and_a_dispatcher_on_postgresql(cluster: Cluster, tmp_path: Pat
             "connections cut": connections_cut(cluster, url),
         }
         undergo(site, {**own, **COMMON}, number, seed=number)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("number", [30])
+def test_a_service_on_a_cluster(tmp_path: Path, number: int) -> None:
+    with DaskCluster(tmp_path, workers=2) as dask:
+        extra = {"STICKSLIP_EXECUTOR": "dask", "STICKSLIP_DASK_SCHEDULER": dask.address}
+        site = Site(f"sqlite:///{tmp_path}/jobs.db", tmp_path, [free_port()], extra)
+        names = ("service killed", "service stopped", "service paused past the lease")
+        faults = {
+            "cluster's worker killed": cluster_worker_killed(dask),
+            "cluster's scheduler killed": scheduler_killed(dask),
+            **{name: COMMON[name] for name in names},
+        }
+        undergo(site, faults, number, seed=number)
