@@ -5,9 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from solver.branch import Branch
 from solver.scene import Scene
+from solver.shown import Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.dataset import Dataset
+    from solver.plots.style import Into
+
 
 Ranges = tuple[tuple[float, float], ...]
 
@@ -109,8 +118,8 @@ class OrderResponse:
         }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CampbellDiagram:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class CampbellDiagram(Shown):
     """Orders of a running speed against the resonances of a scene.
 
     Attributes
@@ -155,6 +164,24 @@ class CampbellDiagram:
         else:
             meets = any(one.exceeded_running_rpm for one in self.orders)
         return False if meets else True if self.completed else None
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from optim.summaries import of_campbell
+
+        return of_campbell(self)
+
+    def to_dataset(self) -> Dataset:
+        """A crossing a row, and the responses."""
+        from optim.datasets import campbell_dataset
+
+        return campbell_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the diagram, and the responses beside it; `ax`: axes to draw into, else a new figure."""
+        from optim.plots.campbell import campbell_figure
+
+        return campbell_figure(self, ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the diagram as one JSON object."""

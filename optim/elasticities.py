@@ -12,6 +12,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,6 +29,14 @@ from solver.savings import Effects, even_harmonics_reason
 from solver.scene import Scene
 from solver.scene_paths import PHASE
 from solver.sectors import check_in_annulus
+from solver.shown import Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.dataset import Dataset
+    from solver.plots.style import Into
+
 
 _ANGLES = (".N1_phase", PHASE)
 
@@ -72,8 +81,8 @@ class ParameterSensitivity:
     band: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SensitivityResult:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class SensitivityResult(Shown):
     """Sensitivities of a design.
 
     Attributes
@@ -126,6 +135,24 @@ class SensitivityResult:
     def band_elasticity(self, row: ParameterSensitivity) -> float:
         """Return the per cent of the band for one per cent of a parameter; NaN where none."""
         return row.band * row.value / self.band_hz if row.relative and self.band_hz > 0.0 else math.nan
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from optim.summaries import of_sensitivities
+
+        return of_sensitivities(self)
+
+    def to_dataset(self) -> Dataset:
+        """A parameter a row."""
+        from optim.datasets import sensitivities_dataset
+
+        return sensitivities_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw what matters most as bars; `ax`: axes to draw into, else a new figure."""
+        from optim.plots.shares import sensitivities_figure
+
+        return sensitivities_figure(self.to_json(), ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the result as one JSON object."""

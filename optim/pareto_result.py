@@ -6,9 +6,18 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from optim.problem import Problem
 from optim.result import DesignResult
+from solver.shown import Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.dataset import Dataset
+    from solver.plots.style import Into
+
 
 SAME = 1e-7  # relative distance within which two points are one
 
@@ -92,8 +101,8 @@ class ParetoPoint:
         }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ParetoResult:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class ParetoResult(Shown):
     """The front of peak against band.
 
     Attributes
@@ -138,6 +147,24 @@ class ParetoResult:
         below = [1.0 - (p.band_hz - last.band_hz) / wide - (p.peak - first.peak) / tall for p in self.points]
         place = max(range(len(below)), key=below.__getitem__)
         return place if below[place] > 0.0 else None
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from optim.summaries import of_front
+
+        return of_front(self)
+
+    def to_dataset(self) -> Dataset:
+        """A point of the front a row."""
+        from optim.datasets import front_dataset
+
+        return front_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the front and the frequencies at risk; `ax`: axes to draw into, else a new figure."""
+        from optim.plots.pareto import pareto_figure
+
+        return pareto_figure(self.to_json(), ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the result as one JSON object."""

@@ -6,11 +6,20 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from optim.model import Conditions
 from optim.problem import Method, Problem
 from optim.rows import UNITS, Evaluation, Quantity, Row
 from solver.branch import Branch
+from solver.shown import Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.dataset import Dataset
+    from solver.plots.style import Into
+
 
 SAME_HEIGHT = 1e-5  # relative distance within which rows count as equally high
 AT_LIMIT = 1e-4  # relative distance from a bound within which a limited row holds the design
@@ -83,8 +92,8 @@ class Basin:
     proven: bool
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignResult:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class DesignResult(Shown):
     """The best design found.
 
     Attributes
@@ -205,6 +214,24 @@ class DesignResult:
         others = [evaluation for evaluation in self.history if evaluation is not self.evaluation]
         last = [] if self.evaluation is None else [self.evaluation]
         return [(e.values, response.branch) for e in [*others, *last] for response in e.responses]
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from optim.summaries import of_design
+
+        return of_design(self)
+
+    def to_dataset(self) -> Dataset:
+        """A design that was tried a row, the optimum marked."""
+        from optim.datasets import design_dataset
+
+        return design_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the response of the optimum; `ax`: axes to draw into, else a new figure."""
+        from optim.plots.designs import design_figure
+
+        return design_figure(self, ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the result as one JSON object."""

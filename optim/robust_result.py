@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,14 @@ from optim.result import DesignResult
 from optim.rows import Quantity
 from optim.scenarios import Outcome
 from optim.uncertain import Scenario, UncertainSet
+from solver.shown import Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.dataset import Dataset
+    from solver.plots.style import Into
+
 
 QUANTILES = (0.05, 0.5, 0.95)
 
@@ -170,8 +179,8 @@ class Cut:
     multiplier: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RobustResult:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class RobustResult(Shown):
     """The nominal and the robust optimum side by side.
 
     Attributes
@@ -238,6 +247,24 @@ class RobustResult:
         if self.nominal is None or self.robust is None:
             return math.nan
         return 1.0 - self.robust.worst_peak / self.nominal.worst_peak
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from optim.summaries import of_robust
+
+        return of_robust(self)
+
+    def to_dataset(self) -> Dataset:
+        """A sample of the uncertainty a row."""
+        from optim.datasets import robust_dataset
+
+        return robust_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the peaks of both optima over the uncertainty; `ax`: axes to draw into, else a new figure."""
+        from optim.plots.designs import robust_figure
+
+        return robust_figure(self, ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the result as one JSON object."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import importlib.util
 import io
 import threading
@@ -19,6 +18,7 @@ from service.errors import NotAcceptableError
 from service.jobs import StoredArray
 from service.negotiation import preferred
 from service.repository import SweepRepository, SweepRow
+from solver.csv_text import csv_text
 
 JSON, CSV = "application/json", "text/csv"
 NPZ, ZIP, PARQUET = "application/x-npz", "application/zip", "application/vnd.apache.parquet"
@@ -104,24 +104,7 @@ def _csv_of_sweep(stored: Mapping[str, StoredArray]) -> bytes:
 
 
 def _csv(columns: Sequence[str], rows: Iterable[Iterable[Any]]) -> bytes:
-    """RFC 4180. Numbers as Python writes them, which is exact; empty where there is none."""
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(columns)
-    for row in rows:
-        writer.writerow([_cell(value) for value in row])
-    return text.getvalue().encode()
-
-
-def _cell(value: Any) -> Any:
-    if value is None or (isinstance(value, float) and not np.isfinite(value)):
-        return ""
-    if isinstance(value, bool):
-        return str(value).lower()
-    # A spreadsheet takes such a text for a formula.
-    if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t", "\r"):
-        return "'" + value
-    return value
+    return csv_text(columns, rows).encode()
 
 
 def _npz(about: SweepAnswer, stored: Mapping[str, StoredArray]) -> bytes:

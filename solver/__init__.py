@@ -15,9 +15,10 @@ if TYPE_CHECKING:
     from solver.continuation import ContinuationSettings, Predictor, sweep
     from solver.corners import PeakGradient, PeakKind, peak_gradient
     from solver.curvature import AmplitudeHessian, EdgeHessian, PeakHessian
+    from solver.dataset import Dataset, Variable
     from solver.effects import Plan, plan
     from solver.energy import PowerBalance, power_balance
-    from solver.errors import Issue, SceneError, SettingError, SolverError
+    from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
     from solver.floquet import Growth, Stability, branch_stability, stability
     from solver.histories import hysteresis_loop, motion, time_history
     from solver.least import least_peak
@@ -27,11 +28,13 @@ if TYPE_CHECKING:
     from solver.mistuning import BladeAmplitudes, BladePeaks, blade_amplitudes, blade_peaks, mistuned
     from solver.peak_tracks import Basin, LeastPeak, PeakTrack, TrackStatus
     from solver.response import Solution, SolutionStatus, solve
+    from solver.saving import load, save
     from solver.savings import Effects
     from solver.scene import Scene, load_scene, shipped_scenes
     from solver.sectors import Extent, annulus, sectors_needed
     from solver.segments_of import Shares
     from solver.sensitivity import Gradient, Sensitivities
+    from solver.shown import Shown, Summary, progress_bar
     from solver.stretches import Stretch, joined
     from solver.tracking import track_peak
     from solver.wear import ContactWear, Measured, WearSensitivity, contact_wear
@@ -43,6 +46,9 @@ _HOME = {
     "ErrorEstimate": "accuracy", "branch_errors": "accuracy",
     "Band": "branch", "Branch": "branch", "BranchStatus": "branch", "Peak": "branch",
     "ContinuationSettings": "continuation", "Predictor": "continuation", "sweep": "continuation",
+    "Dataset": "dataset", "Variable": "dataset", "Shown": "shown", "Summary": "shown",
+    "progress_bar": "shown", "load": "saving", "save": "saving",
+    "MissingExtraError": "errors", "ResultFileError": "errors",
     "Issue": "errors", "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
     "Effects": "savings", "Plan": "effects", "plan": "effects",
     "Scene": "scene", "load_scene": "scene", "shipped_scenes": "scene",
@@ -78,6 +84,7 @@ __all__ = [
     "BranchStatus",
     "ContactWear",
     "ContinuationSettings",
+    "Dataset",
     "EdgeHessian",
     "Effects",
     "ErrorEstimate",
@@ -89,6 +96,7 @@ __all__ = [
     "MapStatus",
     "Measure",
     "Measured",
+    "MissingExtraError",
     "MistunedDisk",
     "MistuningStatus",
     "MistuningStudy",
@@ -101,17 +109,21 @@ __all__ = [
     "PowerBalance",
     "Predictor",
     "ResponseMap",
+    "ResultFileError",
     "Scene",
     "SceneError",
     "Sensitivities",
     "SettingError",
     "Shares",
+    "Shown",
     "Solution",
     "SolutionStatus",
     "SolverError",
     "Stability",
     "Stretch",
+    "Summary",
     "TrackStatus",
+    "Variable",
     "WearSensitivity",
     "WorstWear",
     "accuracy_study",
@@ -124,6 +136,7 @@ __all__ = [
     "hysteresis_loop",
     "joined",
     "least_peak",
+    "load",
     "load_scene",
     "march",
     "mistuned",
@@ -132,7 +145,9 @@ __all__ = [
     "peak_gradient",
     "plan",
     "power_balance",
+    "progress_bar",
     "response_map",
+    "save",
     "sectors_needed",
     "shipped_scenes",
     "solve",

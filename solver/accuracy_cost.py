@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,8 +19,16 @@ from solver.errors import SettingError
 from solver.fourier import Real
 from solver.kernels.observe import MAX_ABS
 from solver.scene import Scene
+from solver.shown import Shown, Summary
 from solver.widening import more_harmonics, pad
 from solver.workspace import Workspace
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.dataset import Dataset
+    from solver.plots.style import Into
+
 
 CLOSED_FORM, SAMPLED = "closed form", "sampled"
 HARMONICS = (1, 3, 5, 7, 11, 15, 21, 31, 41)
@@ -76,8 +85,8 @@ class AccuracyRow:
     pareto: bool = False
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AccuracyStudy:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class AccuracyStudy(Shown):
     """Rows of `accuracy_study` with what they are measured against.
 
     Attributes
@@ -107,6 +116,24 @@ class AccuracyStudy:
     def completed(self) -> bool:
         """Whether no way was left out."""
         return self.status is AccuracyStatus.COMPLETED
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.summaries import of_accuracy
+
+        return of_accuracy(self)
+
+    def to_dataset(self) -> Dataset:
+        """A way to compute the point a row."""
+        from solver.datasets import accuracy_dataset
+
+        return accuracy_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw error against time; `ax`: axes to draw into, else a new figure."""
+        from solver.plots.accuracy import accuracy_figure
+
+        return accuracy_figure(self.to_json(), ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the study as one JSON object."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,13 @@ from solver.balance import Balance
 from solver.fourier import Integer, Real
 from solver.kernels.observe import HALF_RANGE, MAX_ABS, MEAN, RESIDUAL, SLOPE
 from solver.kernels.walk import FINISHED, LEFT_RANGE, NO_START, STALLED
+from solver.shown import Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.dataset import Dataset
+    from solver.plots.style import Into
 
 
 class BranchStatus(Enum):
@@ -102,8 +110,8 @@ class Band:
     edges: tuple[Edge, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Branch:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Branch(Shown):
     """A branch of periodic responses over one parameter, P points in the order they were found.
 
     Attributes
@@ -199,6 +207,25 @@ class Branch:
     def folds(self) -> int:
         """How often the branch turned back in its parameter."""
         return int(np.count_nonzero(np.diff(np.sign(np.diff(self.values)))))
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.summaries import of_branch
+
+        return of_branch(self)
+
+    def to_dataset(self) -> Dataset:
+        """A point a row, with harmonics and contact states; SI units."""
+        from solver.datasets import branch_dataset
+
+        return branch_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the response, its peak and its band; `ax`: axes to draw into, else a new figure."""
+        from solver.plots.curves import Response
+        from solver.plots.responses import response_figure
+
+        return response_figure(Response.of_branch(self), ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the branch as one JSON object."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,7 +23,12 @@ from solver.scene import (
 )
 from solver.scene_parts import CyclicStructure, MatricesStructure
 from solver.sectors import sectors_needed
+from solver.shown import Shown, Summary
 from solver.workspace import Workspace
+
+if TYPE_CHECKING:
+    from solver.dataset import Dataset
+
 
 # Fitted to responses of the shipped scenes at 11 harmonics on one core of a server: seconds of a Newton
 # iteration, of one contact with n coefficients (times n²), and of a solve with n unknowns (times n³).
@@ -58,8 +64,8 @@ class Effect:
     reason: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Plan(Shown):
     """What solving a scene will take.
 
     Attributes
@@ -81,6 +87,18 @@ class Plan:
     contacts: int
     harmonics: int
     seconds_a_point: float
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.summaries import of_plan
+
+        return of_plan(self)
+
+    def to_dataset(self) -> Dataset:
+        """An effect a row."""
+        from solver.datasets import plan_dataset
+
+        return plan_dataset(self)
 
     def to_json(self) -> dict[str, object]:
         """Return the plan as one JSON object."""

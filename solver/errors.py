@@ -44,3 +44,14 @@ class SettingError(SolverError):
         self.name = name
         self.value = value
         super().__init__(f"`{name}` {wanted}, got {value!r}{hint}")
+
+
+class MissingExtraError(SolverError):
+    """A package that comes with an extra of the installation is needed and not there."""
+
+    def __init__(self, package: str, extra: str) -> None:
+        super().__init__(f"this needs {package}, which is not installed: pip install 'stickslip[{extra}]'")
+
+
+class ResultFileError(SolverError):
+    """A file of results that cannot be written or read; the message names it and says what would be right."""

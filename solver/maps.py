@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,8 +20,16 @@ from solver.ridges import check_laws
 from solver.savings import Effects
 from solver.scale import Scale, scale_of
 from solver.scene import Scene
+from solver.shown import Shown, Summary
 from solver.tracking import track_peak
 from solver.workspace import Workspace
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.dataset import Dataset
+    from solver.plots.style import Into
+
 
 MOST_POINTS = 4_000_000
 OF_THE_GRID = 0.7  # share of the progress, where the peaks are tracked too
@@ -36,8 +45,8 @@ class MapStatus(Enum):
     STOPPED = "The map was stopped by the caller: what is empty was not reached."
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ResponseMap:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class ResponseMap(Shown):
     """max|x| of the observed DOF over a parameter and the frequency.
 
     Attributes
@@ -54,6 +63,8 @@ class ResponseMap:
         The tracked peaks over the same range, if asked for.
     largest_residual : float
         Of all points that are solved.
+    given : Scene or None
+        What it is of, with the values that stayed fixed; None if it was read from a file.
     """
 
     scene: str
@@ -69,11 +80,30 @@ class ResponseMap:
     newton_iterations: int
     status: MapStatus
     seconds: float
+    given: Scene | None = None
 
     @property
     def completed(self) -> bool:
         """Whether every point is a solution."""
         return self.status is MapStatus.COMPLETED
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.summaries import of_map
+
+        return of_map(self)
+
+    def to_dataset(self) -> Dataset:
+        """The grid, and the ridge; SI units."""
+        from solver.datasets import map_dataset
+
+        return map_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the map with its ridge; `ax`: axes to draw into, else a new figure."""
+        from solver.plots.tracks import map_figure
+
+        return map_figure(self, dof="x" if self.given is None else self.given.observe.dof, ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the map as one JSON object."""
@@ -272,7 +302,7 @@ class MapGrid:
             amplitude=table[:, :, MAX_ABS].copy(), half_peak_to_peak=table[:, :, 1].copy(), ridge=ridge,
             n_harmonics=self.harmonics, largest_residual=float(solved.max(initial=0.0)),
             newton_iterations=sum(strip.newton_iterations for strip in strips),
-            status=MapStatus.COMPLETED if whole else MapStatus.HOLES, seconds=seconds,
+            status=MapStatus.COMPLETED if whole else MapStatus.HOLES, seconds=seconds, given=self.scene,
         )  # fmt: skip
 
 

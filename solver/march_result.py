@@ -5,11 +5,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.kernels.march_state import Record
+from solver.shown import Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.dataset import Dataset
+    from solver.plots.style import Into
+
 
 FloatArray = NDArray[np.float64]
 N_HARMONICS = 10
@@ -31,8 +40,8 @@ class MarchStatus(Enum):
     NOT_FINITE = "The motion grows without bound: use more steps per period."
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MarchResult:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class MarchResult(Shown):
     """The last period of a time march, from the run with the smaller step.
 
     Attributes
@@ -90,6 +99,24 @@ class MarchResult:
     def converged(self) -> bool:
         """The motion repeats within the tolerance."""
         return self.status is MarchStatus.CONVERGED
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.summaries import of_march
+
+        return of_march(self)
+
+    def to_dataset(self) -> Dataset:
+        """The last period; SI units."""
+        from solver.datasets import march_dataset
+
+        return march_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the last period and its hysteresis loops; `ax`: axes to draw into, else a new figure."""
+        from solver.plots.motion import Motion, motion_figure
+
+        return motion_figure(Motion.of_march(self), ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """The result without its histories, for JSON; a number that does not exist is None."""

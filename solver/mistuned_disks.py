@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +21,14 @@ from solver.fourier import Real
 from solver.mistuning import BladePeaks, blade_peaks, mistuned, with_mistuning
 from solver.scene import CyclicStructure, Scene
 from solver.scene_parts import Mistuning
+from solver.shown import Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.dataset import Dataset
+    from solver.plots.style import Into
+
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
 MOST_SAMPLES = 1_000_000
@@ -79,8 +88,8 @@ class MistunedDisk:
         }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MistuningStudy:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class MistuningStudy(Shown):
     """What becomes of the highest peak when blades are not quite equal.
 
     Attributes
@@ -123,6 +132,24 @@ class MistuningStudy:
     def worst(self) -> MistunedDisk | None:
         """The disk with the highest peak."""
         return max((d for d in self.disks if d.known), key=lambda disk: disk.magnification, default=None)
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.summaries import of_mistuning
+
+        return of_mistuning(self)
+
+    def to_dataset(self) -> Dataset:
+        """A disk a row."""
+        from solver.datasets import mistuning_dataset
+
+        return mistuning_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the magnifications and the worst disk; `ax`: axes to draw into, else a new figure."""
+        from solver.plots.disks import mistuning_figure
+
+        return mistuning_figure(self.to_json(), ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the study as one JSON object."""

@@ -5,9 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from solver.branch import Branch
 from solver.fourier import Real
+from solver.shown import Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.dataset import Dataset
+    from solver.plots.style import Into
+    from solver.scene import Scene
 
 
 class TrackStatus(Enum):
@@ -142,8 +151,8 @@ class CompetingPeak:
     at_band_end: bool
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PeakTrack:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class PeakTrack(Shown):
     """The highest peak over a parameter.
 
     Attributes
@@ -163,6 +172,8 @@ class PeakTrack:
         The sweeps that were made on the way, in the order they were made.
     status : TrackStatus
         How it ended.
+    given : Scene or None
+        What it is of, with the values that stayed fixed; None if it was read from a file.
     """
 
     scene: str
@@ -180,11 +191,30 @@ class PeakTrack:
     sweeps: int
     status: TrackStatus
     seconds: float
+    given: Scene | None = None
 
     @property
     def completed(self) -> bool:
         """Whether the whole range was covered and checked."""
         return self.status is TrackStatus.TRACKED
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.summaries import of_track
+
+        return of_track(self)
+
+    def to_dataset(self) -> Dataset:
+        """The highest peak over the parameter; SI units."""
+        from solver.datasets import track_dataset
+
+        return track_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the peak and its frequency over the parameter; `ax`: axes to draw into, else a new figure."""
+        from solver.plots.tracks import track_figure
+
+        return track_figure(self, dof="x" if self.given is None else self.given.observe.dof, ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the track as one JSON object."""

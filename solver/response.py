@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,7 +23,15 @@ from solver.kernels.observe import HALF_RANGE, MAX_ABS, MEAN
 from solver.kernels.system import evaluation_by_value
 from solver.savings import Effects
 from solver.scene import AnyContact, ElasticNormalContact, FrictionContact, PlanarContact, Scene
+from solver.shown import Shown, Summary
 from solver.workspace import PointSolution, Workspace
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.dataset import Dataset
+    from solver.plots.style import Into
+
 
 # A stuck contact below this share of its friction limit cannot have slipped while the vibration built up from
 # rest: a suddenly started linear vibration overshoots its steady amplitude at most twofold.
@@ -119,8 +128,8 @@ class ContactResponse:
         return (self.force,) if self.second_force is None else (self.force, self.second_force)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Solution:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Solution(Shown):
     """A periodic response at one frequency.
 
     Attributes
@@ -170,6 +179,24 @@ class Solution:
     def reached(self) -> bool:
         """Whether they are, with the accuracy asked for."""
         return self.status is SolutionStatus.CONVERGED
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.summaries import of_solution
+
+        return of_solution(self)
+
+    def to_dataset(self) -> Dataset:
+        """One period in time, and the harmonics; SI units."""
+        from solver.datasets import solution_dataset
+
+        return solution_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw a period, its hysteresis loops and harmonics; `ax`: axes to draw into, else a new figure."""
+        from solver.plots.motion import Motion, motion_figure
+
+        return motion_figure(Motion.of_solution(self), ax=ax)
 
     def to_json(self, *, with_stability: bool = False) -> dict[str, object]:
         """Return the answer as one JSON object; on request with what `solver.stability` says, which costs."""

@@ -121,7 +121,7 @@ def _result(tracker: Tracker, best: LeastPeak, status: TrackStatus, forward: boo
         competing=tuple(_competing(tracker, line, forward) for line in tracker.lines), exchanges=exchanges,
         branches=tuple(look.branch for look in tracker.looks), n_harmonics=balance.n_harmonics,
         sweeps=len(tracker.looks), status=status,
-        seconds=time.perf_counter() - begun,
+        seconds=time.perf_counter() - begun, given=balance.scene,
     )  # fmt: skip
 
 

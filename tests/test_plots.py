@@ -118,7 +118,7 @@ def test_motions_of_balance_and_march_agree(scene: str, frequency_hz: float) -> 
         areas = [np.sum(0.5 * (w.force[1:] + w.force[:-1]) * np.diff(w.slip)) for w in (one, other)]
         assert areas[0] == pytest.approx(areas[1], abs=1e-2 * scale)
     page = motion_figure(balance)
-    assert [axes.get_xlabel()[:4] for axes in page.axes] == ["time", *["slip"] * len(balance.loops)]
+    assert [axes.get_xlabel()[:4] for axes in page.axes] == ["time", *["slip"] * len(balance.loops), "harm"]
 
 
 def test_a_picture_has_at_most_three_loops() -> None:

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from solver import units
 from solver.plots import style
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 
 MOST_LOOPS = 3
 _SAMPLES = 1000
+_FAR_DOWN = 1e-8  # share of the largest harmonic below which there is no bar
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +48,8 @@ class Motion:
         Of the observed DOF [m].
     loops : tuple of Loop
         One for each contact; of a cyclic scene, those of one sector.
+    harmonics : (H + 1,) array or None
+        |mean| and the amplitudes of the observed DOF [m].
     """
 
     title: str
@@ -52,6 +57,7 @@ class Motion:
     time: FloatArray
     displacement: FloatArray
     loops: tuple[Loop, ...]
+    harmonics: FloatArray | None = None
 
     @classmethod
     def of_solution(cls, solution: Solution) -> Self:
@@ -70,16 +76,17 @@ class Motion:
                 _loop(contact.name, *hysteresis_loop(solution, contact.name, samples=_SAMPLES))
                 for contact in solution.contacts
             ),
+            harmonics=solution.harmonics,
         )
 
     @classmethod
-    def of_march(cls, march: MarchResult, scene: str, dof: str) -> Self:
-        """The last period of a time march."""
+    def of_march(cls, march: MarchResult, scene: str = "", dof: str = "x") -> Self:
+        """The last period of a time march; it does not know what it is of."""
         period = 1.0 / march.frequency_hz
         # Of the whole annulus only the first sector is drawn: the others do the same later.
         first = [i for i, name in enumerate(march.contacts) if name.partition("@")[2] in ("", "0")]
         return cls(
-            title=f"{scene} at {march.frequency_hz:g} Hz, time march",
+            title=f"{scene or 'time march'} at {march.frequency_hz:g} Hz{', time march' if scene else ''}",
             dof=dof,
             time=np.append(march.time, period),
             displacement=_closed(march.displacement),
@@ -91,22 +98,45 @@ class Motion:
 
 
 def motion_figure(motion: Motion, *, ax: style.Into = None) -> Figure:
-    """The time history of the observed DOF; beside it the hysteresis loops of the contacts, three at most."""
+    """The time history; beside it the hysteresis loops of the contacts, three at most, and the harmonics.
+
+    Parameters
+    ----------
+    motion : what is drawn.
+    ax : axes to draw into, as `solver.plots.style.figure`.
+    """
     loops = motion.loops[:MOST_LOOPS]
+    bars = motion.harmonics is not None
     unit = units.length_unit(float(np.abs(motion.displacement).max()))
     with style.styled():
-        page, (history, *others) = style.figure(3.2 + 2.6 * len(loops), 2.9, columns=1 + len(loops), into=ax)
+        columns = 1 + len(loops) + bars
+        page, (history, *others) = style.figure(0.6 + 2.6 * columns, 2.9, columns=columns, into=ax)
         scale, second = (1e3, "ms") if motion.time[-1] < 0.1 else (1.0, "s")
         history.plot(motion.time * scale, motion.displacement * unit.per_metre, color=style.BLUE)
         history.margins(x=0.0)
         history.set_title(motion.title)
         style.label(history, f"time [{second}]", f"displacement of {motion.dof} [{unit.name}]")
-        for axes, loop in zip(others, loops, strict=True):
+        for axes, loop in zip(others, loops, strict=False):
             slip = units.length_unit(float(np.abs(loop.slip).max()))
             axes.plot(loop.slip * slip.per_metre, loop.force, color=style.VERMILION)
             axes.set_title(f"contact {loop.contact}")
             style.label(axes, f"slip motion [{slip.name}]", "friction force [N]")
+        if motion.harmonics is not None:
+            _draw_harmonics(others[-1], motion.harmonics, motion.dof, unit)
     return page
+
+
+def _draw_harmonics(axes: Axes, heights: FloatArray, dof: str, unit: units.LengthUnit) -> None:
+    """Bars on a logarithmic scale; what is far below the largest is not drawn."""
+    shown = np.where(heights >= _FAR_DOWN * heights.max(), heights, np.nan) * unit.per_metre
+    axes.bar(np.arange(heights.size), shown, color=style.BLUE, width=0.7)
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(numticks=6))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.grid(visible=False, axis="x")
+    axes.set_xlim(-0.7, heights.size - 0.3)
+    style.label(axes, "harmonic (0: mean)", f"amplitude of {dof} [{unit.name}]")
 
 
 def _loop(contact: str, slip: FloatArray, force: FloatArray) -> Loop:
