@@ -7,7 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from matrix_cases import write_scene
+from fe_files import coordinate
+from matrix_cases import beam, write_scene
 
 import solver
 from service.cli import main
@@ -214,3 +215,17 @@ def test_files_of_matrices_beside_a_scene_are_uploaded(run: Run, tmp_path: Path)
     status, _, errors = run(f"submit {arguments}")
     assert status == 2
     assert "not a .npz file" in errors
+
+
+def test_files_that_name_the_rows_go_with_the_matrices(run: Run, tmp_path: Path) -> None:
+    """CalculiX: the file of labels stands beside the matrices under their name."""
+    for suffix, A in zip(("mas", "sti"), beam(8), strict=True):
+        (tmp_path / f"job.{suffix}").write_text(coordinate(A))
+    (tmp_path / "job.dof").write_text("".join(f"{node}.{dof}\n" for node in range(1, 9) for dof in (2, 6)))
+    assert run("import job.sti job.mas --out scene.toml --dof tip=8.UY --units mm")[0] == 0
+    arguments = "solve scene.toml --frequency 1 --harmonics 3 --json"
+    status, here, _ = run(arguments)
+    assert status == 0
+    status, there, errors = run(f"submit {arguments} --wait")
+    assert status == 0, errors
+    assert json.loads(there)["result"]["max_abs"] == pytest.approx(json.loads(here)["max_abs"], rel=1e-12)

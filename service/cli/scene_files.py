@@ -13,7 +13,7 @@ from service.kinds.scenes import UPLOAD
 if TYPE_CHECKING:
     from service.client import Client
 
-_KEYS = ("M", "K", "C", "modes")
+_KEYS = ("M", "K", "C", "modes", "mapping")
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +58,28 @@ def uploaded(client: Client, body: Mapping[str, Any]) -> dict[str, Any]:
         return dict(body)
     structure = dict(scene.tables["structure"])
     known: dict[str, str] = {}
+    labels = _labels_beside(structure, scene.folder)
+    if labels is not None:
+        structure["mapping"] = str(labels)
     for key in _KEYS:
         name = structure.get(key)
         if isinstance(name, str) and not name.startswith(UPLOAD):
             known[name] = known.get(name) or _sent(client, scene.folder / name, key)
             structure[key] = known[name]
     return {**body, "scene": {**scene.tables, "structure": structure}}
+
+
+def _labels_beside(structure: Mapping[str, Any], folder: Path) -> Path | None:
+    """The file that names the rows, where DOFs are named by node and only its place says so."""
+    from solver.matrices.labels import labels_beside
+
+    dofs = structure.get("dofs")
+    by_node = isinstance(dofs, Mapping) and any(isinstance(row, str) for row in dofs.values())
+    if not by_node or "mapping" in structure:
+        return None
+    files = [folder / structure[key] for key in ("M", "K", "C") if isinstance(structure.get(key), str)]
+    found = next(filter(None, map(labels_beside, files)), None)
+    return None if found is None else found.absolute()
 
 
 def _sent(client: Client, file: Path, key: str) -> str:
