@@ -123,6 +123,7 @@ def labelled_files(folder: Path, elements: int) -> None:
         (folder / f"Job_{word}2.mtx").write_text(abaqus_input(A, pairs))
         (folder / f"{word.lower()}.matrix").write_text(hbmat(A))
         (folder / f"job.{'mas' if key == 'M' else 'sti'}").write_text(coordinate(A))
+        (folder / f"{word.lower()}_mat.matrix").write_text(hbmat(A))
     (folder / "stif.mapping").write_text(ansys_mapping(names))
     (folder / "job.dof").write_text("".join(f"{node}.{dof}\n" for node, dof in pairs))
     (folder / "job.pch").write_text(dmig("KAAX", K, pairs) + dmig("MAAX", M, pairs))
@@ -131,7 +132,8 @@ def labelled_files(folder: Path, elements: int) -> None:
 
 CALLS = {
     "abaqus": "Job_MASS2.mtx Job_STIF2.mtx", "abaqus swapped": "Job_STIF2.mtx Job_MASS2.mtx",
-    "ansys": "mass.matrix stif.matrix", "calculix": "job.sti job.mas", "dmig": "job.pch",
+    "ansys": "mass.matrix stif.matrix",
+    "words": "stif_mat.matrix mass_mat.matrix stif.mapping", "calculix": "job.sti job.mas", "dmig": "job.pch",
     "op4": "job.op4 job.dof", "op4 mapping": "job.op4 --mapping stif.mapping",
 }  # fmt: skip
 

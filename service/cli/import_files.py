@@ -86,7 +86,7 @@ def sources(files: Sequence[str], mapping: str | None, units: str) -> Sources:
 
 
 def _assigned(files: Sequence[str]) -> dict[str, str]:
-    """Files by their role: as the last word or the suffix of all names tells, else in the order M, K, C."""
+    """Files by their role: as the last word that tells, or the suffix; else in the order M, K, C."""
     told = [_role(Path(name)) for name in files]
     known = [role for role in told if role is not None]
     if len(set(known)) == len(files) and {"M", "K"} <= set(known):
@@ -97,9 +97,9 @@ def _assigned(files: Sequence[str]) -> dict[str, str]:
 def _role(path: Path) -> str | None:
     if path.suffix.lower() in _BY_SUFFIX:
         return _BY_SUFFIX[path.suffix.lower()]
-    words = re.findall("[A-Za-z]+", path.stem)
-    last = words[-1].upper() if words else ""
-    return next((role for role, known in _WORDS.items() if last in known), None)
+    words = [word.upper() for word in reversed(re.findall("[A-Za-z]+", path.stem))]
+    roles = (role for word in words for role, known in _WORDS.items() if word in known)
+    return next(roles, None)
 
 
 def _roles_of_one(path: Path) -> tuple[str, ...]:

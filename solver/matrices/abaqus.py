@@ -1,7 +1,7 @@
 """Matrices that Abaqus writes as text (``*MATRIX OUTPUT`` after ``*MATRIX GENERATE``), files ``.mtx``.
 
 The formats, from the Abaqus Analysis User's Guide ("Generating matrices", and ``*MATRIX INPUT`` in the
-Keywords Guide): MATRIX INPUT (and LABELS) has ``node, DOF, node, DOF, value`` a line, COORDINATE has row,
+Keywords Guide): MATRIX INPUT has ``node, DOF, node, DOF, value`` a line, COORDINATE has row,
 column (from 1) and value. Of a symmetric matrix one triangle or all is there. A DOF that a boundary condition
 holds has 1e36 on the diagonal of the stiffness; nodes below 0 are internal ones of Abaqus.
 """

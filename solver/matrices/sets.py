@@ -104,7 +104,12 @@ def put_together(
         labels = labels_of(found)
         size = next(iter(sizes.values()))
         if len(labels) != size:
-            raise MatrixFileError(f"{str(found)!r} names {len(labels)} rows, the matrices have {size}")
+            twice = (
+                ": the real and imaginary parts of a cyclic step; store the sector without *CYCLIC SYMMETRY"
+                if size == 2 * len(labels)
+                else ""
+            )
+            raise MatrixFileError(f"{str(found)!r} names {len(labels)} rows, the matrices have {size}{twice}")
     return MatrixSet(matrices=matrices, labels=labels)
 
 
