@@ -23,6 +23,7 @@ from service.ids import new_id
 from service.jobs import DesignRecord
 from service.models import Job, JobResult, JobState
 from service.repository.designs import insert_design
+from service.routes import page
 from solver.scene import load_scene
 
 ROLES = ("none", "wrong", "another", "revoked", "expired", "read", "submit", "admin")
@@ -70,7 +71,18 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     # Whoever may delete it does so, and it is gone.
     "DELETE /v1/uploads/{upload_id}": ((401, 401, 404, 401, 401, 403, 204, 404), None),
     "POST /v1/plan": (PLANNED, {"scene": "two-dof"}),
+    "POST /v1/previews": (
+        PLANNED,
+        {"kind": "point", "scene": "two-dof", "frequency_hz": 1.0, "harmonics": 1},
+    ),
+    # A scene's name is one owner's.
+    "POST /v1/scenes/text": ((401, 401, 422, 401, 401, 403, 200, 422), {"scene": "mine"}),
+    "POST /v1/scenes/read": (PLANNED, {"text": "name = 'mine'"}),
+    # The page itself, which asks for a key.
+    "GET /": (OPEN, None),
+    "GET /page/{hashed}/{path:path}": (OPEN, None),
 }
+PAGE = ("GET /", "GET /page/{hashed}/{path:path}")
 
 
 @dataclass(frozen=True)
@@ -103,6 +115,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[House]:
         upload = made.ask("submit", "POST", "/v1/uploads", **arguments_of(FILE, -1)).json()
         made.ids.update(job_id=job["id"], sweep_id=job["sweeps"][0]["id"], upload_id=upload["id"])
         made.ids.update(design_id=add_design(client, "ann"), name="mine")
+        made.ids.update(hashed=page.version(), path="icon.svg")
         yield made
 
 
@@ -178,13 +191,17 @@ def test_the_table_knows_every_route(house: House) -> None:
 def test_everybody_gets_what_is_theirs(house: House, route: str) -> None:
     method, path = route.split()
     expected, body = TABLE[route]
-    got = []
+    address, got = path.replace(":path", "").format(**house.ids), []
     for role in ROLES:
-        answer = house.ask(role, method, path.format(**house.ids), **arguments_of(body, len(got)))
+        answer = house.ask(role, method, address, **arguments_of(body, len(got)))
         got.append(answer.status_code)
         assert answer.headers["x-content-type-options"] == "nosniff"
         assert answer.headers["referrer-policy"] == "no-referrer"
-        assert "default-src 'none'" in answer.headers["content-security-policy"]
+        allowed = "'self'" if answer.status_code == 200 and route in PAGE else "'none'"
+        policy = answer.headers["content-security-policy"].split("; ")
+        assert f"default-src {allowed}" in policy
+        # A picture has a style sheet inside, and is shut up in a sandbox for it.
+        assert not any("unsafe" in word for word in policy if "sandbox" not in policy)
         assert "access-control-allow-origin" not in answer.headers
         assert ("www-authenticate" in answer.headers) == (answer.status_code == 401)
         if answer.status_code >= 400:
