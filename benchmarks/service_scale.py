@@ -39,7 +39,7 @@ from service.worker import Throttle, checked
 
 TIMES = 100
 CORES = os.cpu_count() or 1
-_JOBS = 3000
+_JOBS = 2000
 _THREADS = 16
 _BODY = {"kind": "sweep", "scene": "two-dof", "fresh": True}
 

@@ -29,8 +29,9 @@ from service.waiters import Waiters
 log = logging.getLogger("stickslip.queue")
 
 _TROUBLE_SECONDS = 1.0
-# Progress is told here as it comes, and written for other services and the time after a crash.
-_WRITE_SECONDS = 1.0
+# Progress is told here as it comes. For other services and the time after a crash it is written: at most once
+# a second of each job, and ten times a second of all that run here.
+_WRITE_SECONDS, _WRITES_A_SECOND = 1.0, 10.0
 _MOST_POINTS = 50_000
 
 
@@ -190,7 +191,8 @@ class JobQueue:
             return
         entry.fraction, entry.points = fraction, points
         now = time.monotonic()
-        if now - entry.written < min(_WRITE_SECONDS, self._settings.lease_seconds / 3.0):
+        pause = max(_WRITE_SECONDS, len(self._running) / _WRITES_A_SECOND)
+        if now - entry.written < min(pause, self._settings.lease_seconds / 3.0):
             self._waiters.progress(attempt.job_id, fraction, points)
             return
         entry.written = now
