@@ -28,6 +28,9 @@ INITIAL: dict[str, Any] = {
 INSERT_JOB = insert(_JOB)
 INSERT_RESULT = insert(_RESULT)
 
+BY_ID = select(*(_C[name] for name in ROW)).where(_C.id == bindparam("job"))
+RESULT = select(_RESULT.c.body).where(_RESULT.c.job_id == bindparam("job"))
+
 COMPUTED_BEFORE = (
     select(_C.id)
     .where(_C.spec_hash == bindparam("hash"), _C.state == JobState.SUCCESSFUL, _C.result_of.is_(None))

@@ -14,7 +14,7 @@ from service.db import Database
 from service.errors import IdempotencyError
 from service.ids import new_id
 from service.jobs import JobFailure, JobOutput, Piece
-from service.models import NOBODY, Job, JobResult, JobState
+from service.models import NOBODY, Job, JobState
 from service.repository import job_statements as statements
 from service.repository.checkpoints import (
     as_far_as_kept,
@@ -109,7 +109,8 @@ class JobRepository:
     def get(self, job_id: str) -> JobRow | None:
         """The job, or None."""
         with self._db.reading() as connection:
-            return _one(connection, Job.id == job_id)
+            row = connection.execute(statements.BY_ID, {"job": job_id}).mappings().one_or_none()
+        return None if row is None else JobRow(**row)
 
     def page(
         self,
@@ -138,9 +139,7 @@ class JobRepository:
     def result(self, job_id: str) -> dict[str, Any] | None:
         """The result of a job, or None if it has none."""
         with self._db.reading() as connection:
-            return connection.execute(
-                select(JobResult.body).where(JobResult.job_id == job_id)
-            ).scalar_one_or_none()
+            return connection.execute(statements.RESULT, {"job": job_id}).scalar_one_or_none()
 
     def count(self) -> dict[JobState, int]:
         """How many jobs are in each state."""

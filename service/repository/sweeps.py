@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 
-from sqlalchemy import ColumnElement, Connection, Select, insert, select
+from sqlalchemy import ColumnElement, Connection, Select, bindparam, insert, select
 from sqlalchemy.orm import InstrumentedAttribute
 
 from service.db import Database
@@ -35,6 +35,12 @@ _TABLES = Sweep.metadata.tables
 _INSERT = insert(_TABLES["sweep"])
 _INSERT_CONTACTS = insert(_TABLES["sweep_contact"])
 _INSERT_ARRAYS = insert(_TABLES["sweep_array"])
+_OF_JOB = select(*_COLUMNS).where(Sweep.job_id == bindparam("job")).order_by(Sweep.position)
+_CONTACTS = (
+    select(SweepContact.sweep_id, *(getattr(SweepContact, name) for name in _CONTACT_FIELDS))
+    .where(SweepContact.sweep_id.in_(bindparam("sweeps", expanding=True)))
+    .order_by(SweepContact.sweep_id, SweepContact.position)
+)
 _CONTACT_COLUMNS: dict[str, InstrumentedAttribute[float | None]] = {
     "kt": SweepContact.kt,
     "mu": SweepContact.mu,
@@ -103,24 +109,15 @@ class SweepRepository:
 
     def of_job(self, job_id: str) -> list[SweepRow]:
         """The sweeps of a job in the order they were computed."""
-        query = select(*_COLUMNS).where(Sweep.job_id == job_id).order_by(Sweep.position)
         with self._db.reading() as connection:
-            return [SweepRow(**row) for row in connection.execute(query).mappings()]
+            return [SweepRow(**row) for row in connection.execute(_OF_JOB, {"job": job_id}).mappings()]
 
     def contacts(self, sweep_ids: Sequence[str]) -> dict[str, list[ContactValues]]:
         """The contact values of several sweeps, by sweep."""
-        columns = [getattr(SweepContact, item.name) for item in fields(ContactValues)]
-        query = (
-            select(SweepContact.sweep_id, *columns)
-            .where(SweepContact.sweep_id.in_(sweep_ids))
-            .order_by(SweepContact.sweep_id, SweepContact.position)
-        )
         found: dict[str, list[ContactValues]] = {sweep_id: [] for sweep_id in sweep_ids}
         with self._db.reading() as connection:
-            for row in connection.execute(query):
-                found[row.sweep_id].append(
-                    ContactValues(**{item.name: getattr(row, item.name) for item in fields(ContactValues)})
-                )
+            for sweep_id, *values in connection.execute(_CONTACTS, {"sweeps": list(sweep_ids)}):
+                found[sweep_id].append(ContactValues(**dict(zip(_CONTACT_FIELDS, values, strict=True))))
         return found
 
     def arrays(self, sweep_id: str) -> dict[str, StoredArray]:
