@@ -85,7 +85,7 @@ class DesignRepository:
             conditions = _conditions(wanted)
             leads = column is None and not wanted.equal
             conditions += owner_condition(connection, Design.job_id, Design.owner, wanted.owner, leads=leads)
-            query = met(connection, select(*_COLUMNS), Design.job_id, conditions)
+            query = met(connection, select(*_COLUMNS), Design.job_id, conditions, column)
             query = ordered(query, Design.job_id, column, descending=wanted.descending, after=after)
             return [DesignRow(**row) for row in connection.execute(query.limit(limit)).mappings()]
 

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, Select, func, literal, select, tuple_
+from sqlalchemy import Column, ColumnElement, Connection, Select, func, literal, select, tuple_
 from sqlalchemy.orm import InstrumentedAttribute
-from sqlalchemy.sql.elements import UnaryExpression
+from sqlalchemy.sql import operators
+from sqlalchemy.sql.elements import BinaryExpression, UnaryExpression
 from sqlalchemy.sql.operators import custom_op
 
 Range = tuple[float | None, float | None]
@@ -72,8 +73,12 @@ def met(
     query: Select[Any],
     identity: InstrumentedAttribute[str],
     conditions: Sequence[Condition],
+    column: InstrumentedAttribute[Any] | None = None,
 ) -> Select[Any]:
     """The query with every condition, on SQLite led by one that few rows meet if there is one.
+
+    Without such a one the rows are read in the order of `column` (None: of the ids), which finds a page of
+    those that many rows meet after a few of them; see `_in_order`.
 
     SQLite does not know how many rows a condition leaves and would read the whole table in the order of
     the ids for four rows with a low peak. So each condition with an index is counted first, up to
@@ -85,9 +90,33 @@ def met(
         lead = next((condition for condition in conditions if _is_few(connection, condition)), None)
     else:
         connection.exec_driver_sql("SET LOCAL plan_cache_mode = force_custom_plan")
+    in_order = connection.dialect.name == "sqlite" and lead is None
     for condition in conditions:
-        query = query.where(identity.in_(condition.ids) if condition is lead else condition.holds)
+        holds = _in_order(condition.holds, column) if in_order else condition.holds
+        query = query.where(identity.in_(condition.ids) if condition is lead else holds)
     return query
+
+
+def _in_order(holds: ColumnElement[bool], column: InstrumentedAttribute[Any] | None) -> ColumnElement[bool]:
+    """The condition such that SQLite does not take its index where it would have to sort what that finds.
+
+    An index of the column and the ids serves an equality in the order of the ids; one of the column and
+    the column of the order serves that order.
+    """
+    if not isinstance(holds, BinaryExpression) or not isinstance(holds.left, Column):
+        return holds
+    if holds.operator is operators.eq and _serves(holds.left, column):
+        return holds
+    aside = holds._clone()
+    aside.left = UnaryExpression(holds.left, operator=custom_op("+"), type_=holds.left.type)
+    return aside
+
+
+def _serves(left: Column[Any], column: InstrumentedAttribute[Any] | None) -> bool:
+    if column is None:
+        return True
+    wanted = [left.name, column.key]
+    return any([part.name for part in index.columns][:2] == wanted for index in left.table.indexes)
 
 
 def _is_few(connection: Connection, condition: Condition) -> bool:

@@ -161,7 +161,7 @@ def _query(connection: Connection, wanted: SweepFilter, after: Position | None) 
     conditions = _conditions(wanted)
     leads = column is None and not wanted.equal
     conditions += owner_condition(connection, Sweep.id, Sweep.owner, wanted.owner, leads=leads)
-    query = met(connection, query, Sweep.id, conditions)
+    query = met(connection, query, Sweep.id, conditions, column)
     return ordered(query, Sweep.id, column, descending=wanted.descending, after=after)
 
 
