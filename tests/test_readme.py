@@ -85,7 +85,14 @@ def test_commands_run(
 
 
 @pytest.mark.parametrize("code", blocks("python"))
-def test_python_runs(code: str, request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str]) -> None:
+def test_python_runs(
+    code: str,
+    request: pytest.FixtureRequest,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
     if ADDRESS in code:
         code = code.replace(ADDRESS, request.getfixturevalue("server"))
     exec(compile(code, "README.md", "exec"), {"__name__": "readme"})

@@ -1,0 +1,72 @@
+"""What editors show of a scene's keys, where the docstrings of the models say nothing of their own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+WORDS: dict[str, dict[str, str]] = {
+    "*": {
+        "between": "The two ends: names of DOFs, or \"ground\"; \"tip@next\" is the tip of the "
+        "next sector of a cyclic structure.",
+        "k": "Stiffness [N/m].",
+        "c": "Damping [N s/m].",
+        "m": "Mass [kg].",
+        "kind": "lumped: point masses; cyclic: one sector of a disk; matrices: from files.",
+        "law": "coulomb (also if left out), elastic-normal, coulomb-2d, gap or polynomial.",
+        "masses": "DOF to its mass [kg], or to a table with m, name, group and factor.",
+        "springs": "Springs, each with `between` and `k` [N/m], and `c` [N s/m] of a dashpot beside it.",
+        "dampers": "Dashpots, each with `between` and `c` [N s/m].",
+        "sectors": "Number of sectors of the disk.",
+        "mistuning": "Factors that make the blades differ.",
+        "stiffness_proportional_damping": "C gains this many times K [s].",
+        "kt": "Tangential contact stiffness [N/m].",
+        "mu": "Friction coefficient.",
+        "N0": "Mean normal load [N].",
+        "N1": "Amplitude of the normal load [N]; in place of N1_ratio.",
+        "N1_ratio": "Amplitude of the normal load as a multiple of N0; in place of N1.",
+        "N1_phase": "Phase of the normal load [rad]: N0 + N1 cos(ωt + N1_phase).",
+        **{f"a{j}": f"Coefficient of u^{j} [N/m^{j}]." for j in range(1, 10)},
+    },
+    "ElasticNormalContact": {"N0": "Load [N] at v = 0; -kn times the gap for an initial gap."},
+    "Scene": {
+        "name": "Name of the scene: letters, digits, - and _.",
+        "structure": "What vibrates; `kind` says how it is given.",
+        "contacts": "Where friction, gaps and nonlinear springs act.",
+        "excitation": "The force, or several.",
+        "observe": "The DOF whose amplitude counts, and the band of frequencies.",
+    },
+    "Observe": {
+        "dof": "The DOF whose amplitude counts; \"tip@3\" is the tip of sector 3.",
+        "band": "Frequencies of interest [low, high] [Hz].",
+    },
+    "MatricesStructure": {
+        "M": "Mass matrix [kg]: a file (.npz, .mat, .mtx, Harwell-Boeing, …) or its rows.",
+        "K": "Stiffness matrix [N/m]: a file or its rows.",
+        "C": "Damping matrix [N s/m]: a file or its rows; may be left out.",
+        "modes": "Mass-normalised modes in place of the matrices: a file or a table.",
+        "dofs": "Name of a DOF to its row (zero-based) or to a label such as 1203.UX; or all names.",
+        "keep_modes": "Reduce a large model onto the DOFs named, with so many modes beside them.",
+        "units": "Units of the files.",
+        "mapping": "File that says which row is which node and component.",
+        "damping_ratio": "Damping ratio of every mode, added to the rest.",
+        "mass_proportional_damping": "C gains this many times M [1/s].",
+        "reduction": "What a model was before it was reduced; set when it is.",
+    },
+}  # fmt: skip
+
+EXAMPLES: dict[str, list[Any]] = {
+    "name": ["bladed-disk"],
+    "between": [["tip", "tip@next"], ["damper", "ground"]],
+    "masses": [{"tip": 0.02, "disk": 0.12}],
+    "kt": [5.53e6],
+    "mu": [0.3],
+    "N0": [200.0],
+    "N1_ratio": [0.3],
+    "band": [[500.0, 900.0]],
+    "amplitude": [50.0],
+    "engine_order": [1],
+    "sectors": [8],
+    "M": ["model-M.mtx"],
+    "K": ["model-K.mtx"],
+    "dofs": [{"tip": 98, "root": "1203.UX"}],
+}
