@@ -1,0 +1,35 @@
+"""Figure 3: a contact that separates, its response over frequency and the harmonics in it."""
+
+from look import FREE, STUCK, figure, finish, harmonic, highest, letters, linear_limits, say, shades
+
+import solver
+
+scene = solver.load_scene("two-dof").with_values({"damper.N0": 100.0, "damper.N1": 200.0})
+branch = solver.sweep(scene)
+free, stuck = linear_limits(scene, "damper")
+points = {"a": 2.328, "b": 1.198, "c": 0.769, "d": 0.346}  # Hz
+solved = {letter: solver.solve(scene, frequency_hz=at) for letter, at in points.items()}
+
+with figure("figure03") as (left, right):
+    left.plot(free.values, free.amplitude, label="removed", **FREE)
+    left.plot(stuck.values, stuck.amplitude, label="stuck", **STUCK)
+    left.plot(branch.values, branch.amplitude, label="N1 = 200 N")
+    letters(left, [(letter, points[letter], found.max_abs) for letter, found in solved.items()])
+    left.set_ylim(0.0, 6.0)
+    finish(left, "frequency [Hz]", "max |m2| [m]", legend="contact")
+    for k, color in zip(range(1, 6), shades(5), strict=True):
+        right.semilogy(branch.values, harmonic(branch, k), color=color, label=f"{k}")
+    right.set_ylim(1e-3, 5.0)
+    finish(right, "frequency [Hz]", "amplitude of m2 [m]", legend="harmonic")
+
+peaks = [peak for peak in branch.peaks if peak.interior]
+main = [peak.at for peak in peaks if peak.at > 0.7]
+low = sorted(peak.at for peak in peaks if 0.3 < peak.at < 0.7)
+below = branch.values < 0.6
+say("highest peak", f"{highest(branch).value:.3f} m at {highest(branch).at:.3f} Hz")
+say("resonance near a", f"{max(main):.3f} Hz")
+say("resonance near b", f"{highest(branch).at:.3f} Hz")
+say("super-harmonic resonances", " and ".join(f"{at:.3f}" for at in low) + " Hz")
+for k in (2, 3):
+    ratio = (harmonic(branch, k) / harmonic(branch, 1))[below].max()
+    say(f"largest ratio of harmonic {k} to 1 below 0.6 Hz", f"{ratio:.2f}")
