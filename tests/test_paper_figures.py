@@ -25,6 +25,13 @@ def quoted(script: Path) -> dict[str, str]:
     return {first.strip().replace("\\|", "|"): last.strip() for first, _, last in cells}
 
 
+def test_the_commands_of_the_page_name_scripts() -> None:
+    lines = re.findall(r"^python (.*)$", PAGE, flags=re.MULTILINE)
+    assert lines
+    assert [line for line in lines if DOCS.parent / line not in SCRIPTS] == []
+    assert len(re.findall("^```", PAGE, flags=re.MULTILINE)) == 2
+
+
 def test_every_figure_has_a_script() -> None:
     assert [script.stem for script in SCRIPTS] == [
         f"figure{number:02d}" for number in (*range(3, 9), *range(10, 14))

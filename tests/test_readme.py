@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import shutil
@@ -26,7 +27,8 @@ ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 ADDRESS = "http://127.0.0.1:8000"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-ELSEWHERE = {"fe-example.md"}  # its lines need each other: tests/test_fe_example.py
+# Pages whose lines need each other, or draw pictures: tests that run them.
+ELSEWHERE = {"fe-example.md": "test_fe_example.py", "paper.md": "test_paper_figures.py"}
 BLOCKS = [
     block
     for page in PAGES
@@ -50,7 +52,20 @@ def matrix_files(folder: Path) -> set[str]:
 
 
 def test_every_language_is_looked_at() -> None:
-    assert {language for language, _ in BLOCKS} == {"sh", "python", "toml"}
+    """A block in another language needs a test of its own."""
+    assert {language for language, _ in BLOCKS} <= {"sh", "python", "toml", "json"}
+
+
+def test_json_and_toml_are_read() -> None:
+    """Descriptions of scenes, problems and jobs; what a table of TOML is part of, a test below knows."""
+    assert all(json.loads(text) for text in blocks("json"))
+    assert all(tomllib.loads(text) for text in blocks("toml"))
+    assert {text.split()[0] for text in blocks("toml")} <= {
+        "name",
+        "scene",
+        "[structure.mistuning]",
+        "[[contacts]]",
+    }
 
 
 @pytest.mark.parametrize("line", [line for line in COMMANDS if line.startswith("make ")])
@@ -96,7 +111,27 @@ def test_python_runs(
     if ADDRESS in code:
         code = code.replace(ADDRESS, request.getfixturevalue("server"))
     exec(compile(code, "README.md", "exec"), {"__name__": "readme"})
-    assert len(capsys.readouterr().out.splitlines()) >= 2
+    assert len(capsys.readouterr().out.splitlines()) >= len(re.findall(r"^ *print\(", code, re.MULTILINE))
+    named = set(re.findall(r'"([\w-]+\.(?:png|svg|nc|npz|csv|parquet|mat|toml))"', code))
+    assert {file.name for file in tmp_path.iterdir()} == named
+
+
+def test_every_page_that_is_run_elsewhere_is() -> None:
+    for page, test in ELSEWHERE.items():
+        assert f'"{page}"' in (ROOT / "tests" / test).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_no_block_hides_from_the_tests(page: Path) -> None:
+    """Fences say their language; what is indented instead is for another machine, not ours to run."""
+    text = page.read_text(encoding="utf-8")
+    fences = re.findall(r"^ *(```.*)$", text, re.MULTILINE)
+    assert all(re.fullmatch(r"```\w+", fence) for fence in fences[::2])
+    assert set(fences[1::2]) <= {"```"}
+    outside = re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+    assert not re.findall(
+        r"^ {4,}(?:import solver|import optim|stickslip (?!serve)).*$", outside, re.MULTILINE
+    )
 
 
 @pytest.mark.parametrize("text", [text for text in blocks("toml") if text.startswith("name =")])
@@ -151,9 +186,16 @@ def test_links_and_pictures_exist(page: Path) -> None:
     assert [t for t in targets if not t.startswith("http") and not (page.parent / t).is_file()] == []
 
 
-def test_the_readme_is_short_and_knows_every_page_and_command() -> None:
+def test_the_index_lists_every_page_once_and_the_readme_knows_it() -> None:
+    listed = re.findall(
+        r"^- \[[^]]+\]\(([\w-]+\.md)\):", (ROOT / "docs/index.md").read_text("utf-8"), re.MULTILINE
+    )
+    assert sorted(listed) == [page.name for page in PAGES[1:] if page.name != "index.md"]
+    assert "(docs/index.md)" in README
+
+
+def test_the_readme_is_short_and_knows_every_command() -> None:
     assert len(README.splitlines()) <= LONGEST_README
-    assert [page.name for page in PAGES[1:] if f"(docs/{page.name})" not in README] == []
     names = [command.name or command.callback.__name__ for command in app.registered_commands]  # type: ignore[union-attr]
     groups = [group.name for group in app.registered_groups]
     assert [

@@ -29,7 +29,7 @@ MARCHED: dict[str, Any] = {
 def figure(
     name: str, columns: int = 2, rows: int = 1, height: float = 3.3, width: float = 9.6
 ) -> Iterator[list[Axes]]:
-    """Panels to draw into, row by row; then the picture, in the folder given to the script or docs/img/paper."""
+    """Panels to draw into, row by row; then the picture, in the folder given or docs/img/paper."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent.parent / "img" / "paper"
     with styled():
         page = Figure(figsize=(width, height * rows), layout="constrained")
