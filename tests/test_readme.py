@@ -177,10 +177,22 @@ def test_parts_of_scenes_are_read() -> None:
     assert laws == ["elastic-normal", "coulomb-2d", "gap", "polynomial"]
 
 
+def anchors(page: Path) -> set[str]:
+    """The names by which headings of a page can be linked to."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_links_and_pictures_exist(page: Path) -> None:
     targets = re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8"))
-    assert [t for t in targets if not t.startswith("http") and not (page.parent / t).is_file()] == []
+    missing = []
+    for target in targets:
+        name, _, anchor = target.partition("#")
+        file = page.parent / name if name else page
+        if not target.startswith("http") and not (file.is_file() and (not anchor or anchor in anchors(file))):
+            missing.append(target)
+    assert missing == []
 
 
 def test_the_index_lists_every_page_once_and_the_readme_knows_it() -> None:
