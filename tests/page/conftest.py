@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import pytest
+from page_site import Site, Watch, opened
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, BrowserContext
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """A real Chromium."""
+    api = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+    program = shutil.which("chromium")
+    if program is None:
+        pytest.skip("chromium is not installed (Debian's package `chromium`)")
+    # The first preview waits for its worker, on a machine that may have other work.
+    api.expect.set_options(timeout=30_000)
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """A service that begins with an empty database, shared by all tests of the page."""
+    made = Site(tmp_path_factory.mktemp("page"))
+    made.start()
+    yield made
+    made.stop()
+
+
+@pytest.fixture
+def profile(browser: Browser, site: Site) -> Iterator[tuple[BrowserContext, Watch]]:
+    """A fresh profile, checked for complaints and requests elsewhere at the end."""
+    with opened(browser, site) as made:
+        yield made

@@ -1,0 +1,193 @@
+"""The page in a real browser: the newcomer's way from an empty database to files in hand."""
+
+from __future__ import annotations
+
+import csv
+import io
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import httpx
+import numpy as np
+import pytest
+from page_site import Site, Watch
+
+import solver
+
+expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
+
+if TYPE_CHECKING:
+    from playwright.sync_api import BrowserContext, Page
+
+Profile = tuple["BrowserContext", Watch]
+LONG_MS = 120_000
+BAD_SCENE = """
+name = "my-damper"
+[structure]
+kind = "lumped"
+masses = { blade = 0.05, disk = 0.4 }
+springs = [
+  { name = "airfoil", between = ["blade", "disk"], k = 4.0e5, c = 2.0 },
+  { name = "web", between = ["disk", "ground"], k = 3.0e6, c = 2.0 },
+]
+[[contacts]]
+name = "damper"
+between = ["blade", "disk"]
+kt = 5.0e5
+mu = -0.3
+N0 = 40.0
+[excitation]
+dof = "wing"
+amplitude = 5.0
+[observe]
+dof = "blade"
+band = [300.0, 900.0]
+"""
+
+
+def visit(context: BrowserContext, site: Site, words: str = "") -> Page:
+    page = context.new_page()
+    page.goto(f"{site.url}/{words}")
+    page.locator("html[data-ready]").wait_for(state="attached")
+    return page
+
+
+def downloaded(page: Page, selector: str) -> bytes:
+    with page.expect_download() as found:
+        page.click(selector)
+    return Path(found.value.path()).read_bytes()
+
+
+def paths(page: Page, figure: str) -> int:
+    return page.locator(f"#{figure} svg.chart g[clip-path] > path.series").count()
+
+
+def test_a_newcomer_presses_one_button_and_takes_results_away(profile: Profile, site: Site) -> None:
+    assert httpx.get(f"{site.url}/v1/jobs").json()["items"] == []
+    context, _ = profile
+    page = visit(context, site)
+    expect(page.locator("#structure-figure svg[role=img] circle.mass").first).to_be_visible()
+    assert page.locator("#structure-figure circle.mass").count() >= 32
+    page.select_option("#scene", "two-dof")
+    expect(page.locator("#plan-facts")).to_contain_text("condensation")
+    page.click("#study")
+    expect(page.locator("#study-status")).to_have_text("Everything is there.", timeout=LONG_MS)
+    for status in ("response", "design", "map", "front", "accuracy", "campbell"):
+        expect(page.locator(f"#{status}-status")).not_to_have_class("bad")
+    expect(page.locator("#response-facts")).to_contain_text("highest peak2.35 m at 1.0372")
+    expect(page.locator("#response-facts")).to_contain_text("resonance band")
+    expect(page.locator("#design-facts")).to_contain_text("104.79 N")
+    expect(page.locator("#plan-facts")).to_contain_text("left out")
+    expect(page.locator("#march-status")).to_contain_text("% apart")
+    expect(page.locator("#map-facts")).to_contain_text("least peak2.346 m at 104.79 N")
+    assert paths(page, "response-figure") == 3
+    assert paths(page, "front-figure") == 1
+    assert page.locator("#loops-figure g[clip-path] > path.series").count() >= 3
+    assert page.locator("#campbell-figure path.f7").count() >= 2
+    assert page.locator("#accuracy-figure circle.f1").count() >= 5
+    assert float(page.get_attribute("#map-figure", "data-milliseconds") or "inf") < 500.0
+    check_files(page)
+    check_clicks(page)
+    assert page.locator("#library-table tbody tr").count() >= 10
+
+
+def check_files(page: Page) -> None:
+    rows = list(
+        csv.DictReader(io.StringIO(downloaded(page, "#response-facts button:text-is('CSV')").decode()))
+    )
+    branch = solver.sweep(solver.load_scene("two-dof"))
+    assert [float(row["amplitude"]) for row in rows] == pytest.approx(branch.amplitude.tolist(), rel=1e-9)
+    with np.load(io.BytesIO(downloaded(page, "#response-facts button:text-is('npz')"))) as arrays:
+        assert np.allclose(arrays["amplitude"], branch.amplitude)
+    assert downloaded(page, "#response-facts button:text-is('Parquet')").startswith(b"PAR1")
+    scene = tomllib.loads(downloaded(page, "#response-facts button:has-text('TOML')").decode())
+    assert solver.Scene.from_dict(scene) == solver.load_scene("two-dof")
+    drawing = downloaded(page, "#response-figure button:text-is('SVG')")
+    assert b"<svg" in drawing
+    assert b"class=" not in drawing
+    for figure in ("response", "map"):
+        png = downloaded(page, f"#{figure}-figure button:text-is('PNG')")
+        assert png.startswith(b"\x89PNG")
+        assert len(png) > 10_000
+    assert len(downloaded(page, "#map-figure button:text-is('CSV')").splitlines()) == 60 * 400 + 1
+
+
+def check_clicks(page: Page) -> None:
+    """A click on the map and on the front loads the design there."""
+    before = page.input_value("#slide-damper-N0")
+    page.locator("#map-figure svg.chart").click(position={"x": 300, "y": 60})
+    expect(page.locator("#slide-damper-N0")).not_to_have_value(before)
+    expect(page.locator("#point-facts")).to_contain_text("max |x|")
+    loaded = page.input_value("#slide-damper-N0")
+    page.locator("#front-figure svg.chart circle.f1").last.click(force=True)
+    expect(page.locator("#slide-damper-N0")).not_to_have_value(loaded)
+    assert "set=damper.N0:" in page.url
+
+
+def test_sweeps_are_filtered_compared_and_shared(profile: Profile, site: Site) -> None:
+    for load in (50, 80, 120):
+        body = {"kind": "sweep", "scene": "two-dof", "set": {"damper.N0": load}}
+        assert httpx.post(f"{site.url}/v1/jobs", json=body, headers={"Prefer": "wait=30"}).status_code == 200
+    context, _ = profile
+    page = visit(context, site, "?scene=two-dof")
+    page.fill("#filter-N0_min", "79")
+    page.fill("#filter-N0_max", "121")
+    page.fill("#filter-parameter", "frequency")
+    page.press("#filter-parameter", "Enter")
+    expect(page.locator("#library-table tbody")).not_to_contain_text("damper 50 N")
+    page.get_by_label("Compare two-dof, damper 80 N").check()
+    page.get_by_label("Compare two-dof, damper 120 N").check()
+    expect(page.locator("#compare-facts thead")).to_contain_text("two-dof, damper 80 N")
+    assert paths(page, "compare-figure") == 2
+    other = visit(context, site, page.url.removeprefix(f"{site.url}/"))
+    expect(other.locator("#compare-facts thead")).to_contain_text("two-dof, damper 120 N")
+
+
+def test_the_response_follows_the_sliders_and_nothing_is_stored(profile: Profile, site: Site) -> None:
+    context, _ = profile
+    page = visit(context, site, "?scene=two-dof")
+    expect(page.locator("#live-status")).to_contain_text("peak 2.35 m")
+    jobs = httpx.get(f"{site.url}/v1/jobs").json()["items"]
+    for name in ("N0", "N1", "kt", "mu"):
+        before = page.inner_text("#live-status").split("·")[0]
+        page.focus(f"#slide-damper-{name}")
+        page.keyboard.press("PageDown")
+        expect(page.locator("#live-status")).not_to_contain_text(before)
+    page.get_by_label("f0, the force, number").fill("0.1")
+    page.keyboard.press("Enter")
+    expect(page.locator("#live-status")).to_contain_text("mm at")
+    expect(page.locator("#structure-states")).to_contain_text("sticks")
+    assert httpx.get(f"{site.url}/v1/jobs").json()["items"] == jobs
+    page.get_by_role("button", name="Values of the scene").click()
+    expect(page.locator("#live-status")).to_contain_text("peak 2.35 m")
+
+
+def test_what_is_wrong_with_a_scene_is_said_beside_its_field(profile: Profile, site: Site) -> None:
+    context, _ = profile
+    page = visit(context, site)
+    file = {"name": "mine.toml", "mimeType": "application/toml", "buffer": BAD_SCENE.encode()}
+    page.set_input_files("#file", [file])
+    friction = page.get_by_label("0 › mu")
+    expect(friction).to_be_focused()
+    expect(friction).to_have_attribute("aria-invalid", "true")
+    expect(page.locator("#field-contacts-0-mu-message")).to_contain_text("`mu` must be >= 0, got -0.3")
+    expect(page.locator("#field-excitation-dof-message")).to_contain_text("wing")
+    friction.fill("0.3")
+    page.locator("#field-excitation-dof").fill("blade")
+    page.get_by_role("button", name="Use this scene").click()
+    expect(page.locator("#scene")).to_have_value("my-damper")
+    expect(page.locator("#editor")).to_be_hidden()
+    expect(page.locator("#live-status")).to_contain_text("peak")
+    assert httpx.get(f"{site.url}/v1/scenes/my-damper").status_code == 200
+
+
+@pytest.mark.parametrize("text", ["name = = 3", "{", "<script>alert(1)</script>"])
+def test_a_file_that_is_no_scene_is_refused(profile: Profile, site: Site, text: str) -> None:
+    context, watch = profile
+    watch.allowed = ("status of 400",)
+    page = visit(context, site)
+    page.set_input_files("#file", [{"name": "a.toml", "mimeType": "text/plain", "buffer": text.encode()}])  # type: ignore[list-item]
+    expect(page.locator("#editor [role=alert]")).to_contain_text(
+        "The file cannot be read: this is not valid TOML"
+    )

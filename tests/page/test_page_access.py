@@ -1,0 +1,128 @@
+"""The page for everybody: by keyboard alone, at 200 %, narrow, in light and dark, for screen readers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+from page_site import Site, Watch, opened
+
+expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
+axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, BrowserContext, Page
+
+Profile = tuple["BrowserContext", Watch]
+SERIOUS = ("serious", "critical")
+NEXT = """() => {
+  const now = document.activeElement;
+  if (now === document.body || window.__seen.has(now)) return false;
+  if (getComputedStyle(now).outlineStyle === "none") throw new Error(`no outline: ${now.outerHTML}`);
+  window.__seen.add(now);
+  return true;
+}"""
+CUT_OFF = """() => [...document.querySelectorAll("button, label, dd, p, h2, svg.chart")]
+  .filter((node) => node.checkVisibility() && !node.closest(".scroll, .unseen, .skip"))
+  .filter((node) => node.getBoundingClientRect().right > innerWidth + 1)
+  .map((node) => node.outerHTML.slice(0, 120))
+"""
+FOCUSABLE = "a[href], button:not([disabled]), select, input:not([tabindex='-1']), [tabindex='0']"
+
+
+def visit(context: BrowserContext, site: Site, words: str = "?scene=two-dof") -> Page:
+    page = context.new_page()
+    page.goto(f"{site.url}/{words}")
+    page.locator("html[data-ready]").wait_for(state="attached")
+    expect(page.locator("#live-status")).to_contain_text("peak")
+    return page
+
+
+@pytest.fixture(scope="module")
+def studied(browser: Browser, site: Site) -> str:
+    """The address of a page with everything on it."""
+    with opened(browser, site) as (context, _):
+        page = visit(context, site)
+        page.click("#study")
+        expect(page.locator("#study-status")).to_have_text("Everything is there.", timeout=120_000)
+        return page.url.removeprefix(f"{site.url}/")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_serious(browser: Browser, site: Site, studied: str, scheme: str) -> None:
+    with opened(browser, site, color_scheme=scheme) as (context, _):
+        page = visit(context, site, studied)
+        expect(page.locator("#front-facts tbody tr").first).to_be_visible()
+        page.click("#edit-scene")
+        expect(page.locator("#editor form")).to_be_visible()
+        found = axe.Axe().run(page).response["violations"]
+        serious = [
+            f"{one['id']}: {node['target']} {node['failureSummary']}"
+            for one in found
+            if one["impact"] in SERIOUS
+            for node in one["nodes"]
+        ]
+        assert serious == []
+
+
+def test_by_keyboard_alone(profile: Profile, site: Site, studied: str) -> None:
+    context, _ = profile
+    page = visit(context, site, studied)
+    expect(page.locator("#front-facts tbody tr").first).to_be_visible()
+    reached = tab_through(page)
+    assert reached == page.locator(FOCUSABLE).evaluate_all(
+        "all => all.filter(e => e.checkVisibility()).length"
+    )
+    page.locator("#response-figure svg.chart").focus()
+    page.keyboard.press("End")
+    expect(page.locator("#response-figure .chart-read")).to_contain_text("2.6 Hz")
+    page.keyboard.press("Enter")
+    expect(page.locator("#point-at")).to_have_value("2.6")
+    page.locator("#map-figure svg.chart").focus()
+    before = page.input_value("#slide-damper-N0")
+    for press in ("ArrowUp", "ArrowRight", "Enter"):
+        page.keyboard.press(press)
+    expect(page.locator("#slide-damper-N0")).not_to_have_value(before)
+    page.locator("#front-figure svg.chart").focus()
+    page.keyboard.press("End")
+    loaded = page.input_value("#slide-damper-N0")
+    page.keyboard.press("Enter")
+    expect(page.locator("#slide-damper-N0")).not_to_have_value(loaded)
+
+
+def tab_through(page: Page) -> int:
+    """How many elements Tab reaches, each with a visible outline."""
+    page.evaluate("document.activeElement.blur(); window.scrollTo(0, 0); window.__seen = new Set()")
+    for _ in range(400):
+        page.keyboard.press("Tab")
+        more = page.evaluate(NEXT)
+        if not more:
+            break
+    return int(page.evaluate("window.__seen.size"))
+
+
+@pytest.mark.parametrize(("width", "height"), [(640, 450), (320, 600)])
+def test_zoomed_and_narrow_nothing_is_cut_off(
+    browser: Browser, site: Site, studied: str, width: int, height: int
+) -> None:
+    """A window of 1280 pixels at 200 % has 640 of them, at 400 % 320."""
+    with opened(browser, site) as (context, _):
+        page = visit(context, site, studied)
+        page.set_viewport_size({"width": width, "height": height})
+        expect(page.locator("#front-facts tbody tr").first).to_be_visible()
+        wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        assert wide <= 0
+        page.locator("#study").scroll_into_view_if_needed()
+        expect(page.locator("#study")).to_be_in_viewport()
+        cut = page.evaluate(CUT_OFF)
+        assert cut == []
+
+
+def test_the_theme_can_be_chosen_and_stays(profile: Profile, site: Site) -> None:
+    context, _ = profile
+    page = visit(context, site)
+    light = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    page.select_option("#theme", "dark")
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") != light
+    page.reload()
+    expect(page.locator("html")).to_have_attribute("data-theme", "dark")

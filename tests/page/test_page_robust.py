@@ -1,0 +1,129 @@
+"""The page when things happen under it: a reload, the service stopped and started, several tabs, keys."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import httpx
+import pytest
+from launch import COMMAND
+from page_site import Site, Watch, opened
+
+expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, BrowserContext, Page
+
+Profile = tuple["BrowserContext", Watch]
+AWAY = ("ERR_CONNECTION_REFUSED", "ERR_EMPTY_RESPONSE", "ERR_INCOMPLETE_CHUNKED_ENCODING",
+        "ERR_CONNECTION_RESET", "ERR_SOCKET_NOT_CONNECTED", "status of 503")  # fmt: skip
+# Seconds of work that end by themselves.
+LONG_MAP: dict[str, Any] = {
+    "kind": "map", "scene": "two-dof", "parameter": "damper.N0", "from": 20, "to": 1000, "steps": 200,
+    "frequencies": 2000, "harmonics": 15, "ridge": False, "fresh": True,
+}  # fmt: skip
+
+
+def visit(context: BrowserContext, site: Site, words: str = "") -> Page:
+    page = context.new_page()
+    page.goto(f"{site.url}/{words}")
+    page.locator("html[data-ready]").wait_for(state="attached")
+    return page
+
+
+def submit(site: Site, **changes: object) -> str:
+    job: str = httpx.post(f"{site.url}/v1/jobs", json={**LONG_MAP, **changes}).json()["id"]
+    return job
+
+
+def test_a_reload_goes_on_watching_and_two_tabs_do_not_disturb_each_other(
+    profile: Profile, site: Site
+) -> None:
+    context, _ = profile
+    job = submit(site)
+    page = visit(context, site, f"?scene=two-dof&map={job}")
+    expect(page.locator("#jobs-list")).to_contain_text("map of two-dof")
+    expect(page.locator("#map-status")).to_contain_text("%")
+    page.reload()
+    expect(page.locator("#map-status")).to_contain_text("%")
+    assert f"map={job}" in page.url
+    other = visit(context, site, "?scene=bladed-disk")
+    expect(other.locator("#live-status")).to_contain_text("0.1016 mm")
+    expect(other.locator("#jobs-list")).to_have_text("None yet.")
+    expect(page.locator("#live-status")).to_contain_text("2.35 m")
+    twin = visit(context, site, f"?scene=two-dof&map={job}")
+    expect(twin.locator("#map-status")).to_contain_text("%")
+    page.get_by_role("button", name="Stop map of two-dof").click()
+    for tab in (page, twin):
+        expect(tab.locator("#jobs-list")).to_contain_text("stopped")
+        expect(tab.locator("#map-status")).to_contain_text("The job was stopped.")
+
+
+def test_the_service_stopped_and_started_under_the_page(profile: Profile, site: Site) -> None:
+    context, watch = profile
+    watch.allowed = AWAY
+    job = submit(site, steps=60, frequencies=400)
+    page = visit(context, site, f"?scene=two-dof&map={job}")
+    expect(page.locator("#map-status")).to_contain_text("Map")
+    site.stop()
+    expect(page.locator("#banner")).to_contain_text("The service does not answer")
+    # A wish made meanwhile is kept.
+    page.focus("#slide-damper-N0")
+    page.keyboard.press("PageUp")
+    site.start()
+    expect(page.locator("#banner")).to_be_hidden(timeout=30_000)
+    expect(page.locator("#map-status")).to_contain_text("Every point is a solution", timeout=60_000)
+    expect(page.locator("#live-status")).not_to_contain_text("2.35 m")
+    assert httpx.get(f"{site.url}/v1/jobs/{job}").json()["status"] == "successful"
+
+
+def test_a_link_to_what_is_gone_opens_all_the_same(profile: Profile, site: Site) -> None:
+    context, watch = profile
+    watch.allowed = ("status of 404",)
+    page = visit(context, site, "?scene=none&set=x:1e999,y&range=1&map=01a20065-53fc-74ea-b480-fc88aa1910b2")
+    expect(page.locator("#scene")).to_have_value("bladed-disk")
+    expect(page.locator("#jobs-list")).to_have_text("None yet.")
+    assert "map=" not in page.url
+
+
+@pytest.fixture(scope="module")
+def locked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """A service that wants a key."""
+    made = Site(tmp_path_factory.mktemp("locked"), STICKSLIP_REQUIRE_KEYS="true")
+    made.start()
+    yield made
+    made.stop()
+
+
+@pytest.mark.long
+def test_a_service_with_keys_asks_for_one(browser: Browser, locked: Site) -> None:
+    command = [
+        *COMMAND,
+        "keys",
+        "create",
+        "--owner",
+        "ann",
+        "--scope",
+        "submit",
+        "--database",
+        locked.database,
+    ]
+    key = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()[0]
+    with opened(browser, locked) as (context, watch):
+        watch.allowed = ("status of 401",)
+        page = visit(context, locked)
+        expect(page.locator("#key-form")).to_be_visible()
+        page.fill("#key", "stickslip_wrong")
+        page.press("#key", "Enter")
+        expect(page.locator("#key-status")).to_contain_text("key")
+        expect(page.locator("#key-form")).to_be_visible()
+        page.fill("#key", key)
+        page.press("#key", "Enter")
+        expect(page.locator("#live-status")).to_contain_text("0.1016 mm")
+        expect(page.locator("#key-form")).to_be_hidden()
+        page.get_by_role("button", name="Find the best damper").click()
+        expect(page.locator("#design-facts")).to_contain_text("185.46 N")
+        page.reload()
+        expect(page.locator("#design-facts")).to_contain_text("185.46 N")
