@@ -181,7 +181,7 @@ def test_what_is_no_json_object_is_refused(http: httpx.Client, content: bytes) -
 
 def test_other_refusals(http: httpx.Client) -> None:
     is_problem(http.get("/v2/jobs"), 404)
-    is_problem(http.get("/"), 404)
+    is_problem(http.get("/nothing"), 404)
     is_problem(http.get("/v1/jobs/none"), 404)
     is_problem(http.delete("/v1/jobs/none"), 404)
     is_problem(http.get("/v1/jobs/none/results"), 404)
