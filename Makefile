@@ -7,9 +7,11 @@ STAMP := .venv/.up-to-date
 PYTEST ?=
 # Which benchmarks: all when empty; `python -m benchmarks --help` lists them.
 BENCH ?=
+# What the reference describes: the names that users import.
+REFERENCE := solver optim service.client service.answers
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-long lint bench serve clean
+.PHONY: help setup demo test test-long lint bench docs serve clean
 
 help:
 	@echo "make setup      set up .venv; the command is then $(BIN)/stickslip"
@@ -18,6 +20,7 @@ help:
 	@echo "make test-long  run the long studies"
 	@echo "make lint       check the code: ruff, mypy, import-linter"
 	@echo "make bench      measure the solver and print tables; some of them: make bench BENCH='case-a chains'"
+	@echo "make docs       build the reference from the docstrings; it goes to site/"
 	@echo "make serve      start the service on http://127.0.0.1:8000"
 	@echo "make clean      remove .venv, caches and demo-output/"
 
@@ -53,9 +56,12 @@ lint: setup
 bench: setup
 	$(BIN)/python -m benchmarks $(BENCH)
 
+docs: setup
+	$(BIN)/python -m pdoc --docformat numpy --no-show-source --output-directory site $(REFERENCE)
+
 serve: setup
 	$(BIN)/stickslip serve
 
 clean:
-	rm -rf .venv demo-output build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf .venv demo-output site build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find solver optim service migrations tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
