@@ -180,8 +180,11 @@ class CampbellDiagram(Shown):
     def plot(self, ax: Into = None) -> Figure:
         """Draw the diagram, and the responses beside it; `ax`: axes to draw into, else a new figure."""
         from optim.plots.campbell import campbell_figure
+        from solver.plots.curves import Response
 
-        return campbell_figure(self, ax=ax)
+        # One object for each branch: orders that share theirs are told by it.
+        curves = {id(one.branch): Response.of_branch(one.branch) for one in self.orders}
+        return campbell_figure(self.to_json(), [curves[id(one.branch)] for one in self.orders], ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the diagram as one JSON object."""

@@ -220,12 +220,18 @@ class Branch(Shown):
 
         return branch_dataset(self)
 
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw the response, its peak and its band; `ax`: axes to draw into, else a new figure."""
-        from solver.plots.curves import Response
-        from solver.plots.responses import response_figure
+    def plot(self, ax: Into = None, *, limit: float | None = None) -> Figure:
+        """Draw the response, its peak and its band.
 
-        return response_figure(Response.of_branch(self), ax=ax)
+        Parameters
+        ----------
+        ax : axes to draw into, else a new figure.
+        limit : amplitude [m] drawn as a line.
+        """
+        from solver.plots.curves import Response
+        from solver.plots.responses import Demands, response_figure
+
+        return response_figure(Response.of_branch(self), asked=Demands(limit=limit), ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the branch as one JSON object."""

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from solver.dataset import Dataset
     from solver.plots.style import Into
+    from solver.scene import Scene
 
 
 FloatArray = NDArray[np.float64]
@@ -112,11 +113,20 @@ class MarchResult(Shown):
 
         return march_dataset(self)
 
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw the last period and its hysteresis loops; `ax`: axes to draw into, else a new figure."""
+    def plot(self, ax: Into = None, *, scene: Scene | None = None) -> Figure:
+        """Draw the last period and its hysteresis loops.
+
+        Parameters
+        ----------
+        ax : axes to draw into, else a new figure.
+        scene : what was marched, for the title.
+        """
         from solver.plots.motion import Motion, motion_figure
 
-        return motion_figure(Motion.of_march(self), ax=ax)
+        motion = Motion.of_march(self)
+        if scene is not None:
+            motion = Motion.of_march(self, scene.name, scene.observe.dof)
+        return motion_figure(motion, ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """The result without its histories, for JSON; a number that does not exist is None."""

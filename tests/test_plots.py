@@ -126,7 +126,7 @@ def test_a_picture_has_at_most_three_loops() -> None:
     scene = solver.load_scene("two-dof")
     motion = Motion.of_solution(solver.solve(scene, frequency_hz=1.2, harmonics=3))
     many = Motion(title="many", dof="x", time=tau, displacement=np.sin(tau), loops=motion.loops * 5)
-    assert len(motion_figure(many).axes) == 4
+    assert sum(axes.has_data() for axes in motion_figure(many).axes) == 4
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -15,8 +17,7 @@ from solver import units
 from solver.plots import style
 from solver.plots.curves import Response
 
-if TYPE_CHECKING:
-    from optim.crossings import CampbellDiagram, OrderResponse
+Json = Mapping[str, Any]
 
 _COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.SKY)
 _DOTTED, _DASHED = (0, (1.2, 1.8)), (0, (5.0, 2.5))
@@ -26,15 +27,34 @@ _DECADES = 0.01  # ratio of the amplitudes below which only powers of ten fit un
 _FAR_DOWN = 1e-3  # share of the highest amplitude at which the amplitude axis ends
 
 
-def campbell_figure(diagram: CampbellDiagram, *, ax: style.Into = None) -> Figure:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Order:
+    """One order as it is drawn: its part of the answer, its response, its colour."""
+
+    answer: Json
+    curve: Response
+    colour: str
+
+    @property
+    def number(self) -> int:
+        return int(self.answer["order"])
+
+
+def campbell_figure(answer: Json, curves: Sequence[Response], *, ax: style.Into = None) -> Figure:
     """Frequency over speed, and beside it the amplitude of every order over the same frequencies.
 
     Parameters
     ----------
-    diagram : with at least one response that has a point.
+    answer : the JSON of `optim.CampbellDiagram`.
+    curves : the response of each of its orders, the same object for all without sectors; at least one has a
+        point.
+    ax : axes to draw into, as `solver.plots.style.figure`.
     """
-    shown = [one for one in diagram.orders if one.branch.values.size]
-    colours = _colours(len(shown))
+    known = [(o, c) for o, c in zip(answer["orders"], curves, strict=True) if c.values.size]
+    shown = [
+        _Order(answer=order, curve=curve, colour=colour)
+        for (order, curve), colour in zip(known, _colours(len(known)), strict=True)
+    ]
     with style.styled():
         page, (speeds, heights) = style.figure(8.6, 4.4, columns=2, into=ax)
         grid = heights.get_gridspec()
@@ -43,49 +63,48 @@ def campbell_figure(diagram: CampbellDiagram, *, ax: style.Into = None) -> Figur
         if ax is None:
             heights.sharey(speeds)
             heights.tick_params(labelleft=False)
-        _draw_speeds(speeds, diagram, shown, colours)
-        if len({id(one.branch) for one in shown}) == 1:
+        _draw_speeds(speeds, answer, shown)
+        if len({id(one.curve) for one in shown}) == 1:
             # One response for all orders: of a scene without sectors.
-            shown, colours = shown[:1], [style.INK]
-        _draw_responses(heights, diagram, shown, colours)
+            shown = [replace(shown[0], colour=style.INK)]
+        _draw_responses(heights, answer, shown)
         speeds.set_ylim(*_frequencies(shown))
-        speeds.set_title(diagram.scene.name)
+        speeds.set_title(answer["scene"])
     return page
 
 
-def _draw_speeds(
-    axes: Axes, diagram: CampbellDiagram, shown: list[OrderResponse], colours: list[str]
-) -> None:
+def _draw_speeds(axes: Axes, answer: Json, shown: list[_Order]) -> None:
     """Lines of the orders, natural frequencies, peaks, and where the limit is exceeded."""
-    low, high = diagram.speeds_rpm[0][0], diagram.speeds_rpm[-1][1]
+    low, high = answer["speeds_rpm"][0][0], answer["speeds_rpm"][-1][1]
     beside = _BESIDE * (high - low)
     left, right = max(low - beside, 0.0), high + beside
-    for first, last in diagram.speeds_rpm:
+    for first, last in answer["speeds_rpm"]:
         axes.axvspan(first, last, color=style.SKY, alpha=0.18, linewidth=0.0)
-    above = "half power" if diagram.limit is None else f"above {units.length(diagram.limit)}"
-    alike = len({id(one.branch) for one in shown}) == 1
-    highest = max((crossing.amplitude for one in shown for crossing in one.crossings), default=0.0)
-    for one, colour in zip(shown, colours, strict=True):
-        per_rpm = one.order / 60.0
+    limit = answer["limit"]
+    above = "half power" if limit is None else f"above {units.length(limit)}"
+    alike = len({id(one.curve) for one in shown}) == 1
+    highest = max((c["amplitude"] for one in shown for c in one.answer["crossings"]), default=0.0)
+    for one in shown:
+        colour, per_rpm = one.colour, one.number / 60.0
         axes.plot([left, right], [left * per_rpm, right * per_rpm], color=colour, linewidth=1.0)
-        for values, dashes in ((one.stuck_hz, _DASHED), (one.open_hz, _DOTTED)):
-            for value in values:
+        for key, dashes in (("stuck_hz", _DASHED), ("open_hz", _DOTTED)):
+            for value in one.answer[key]:
                 lines = style.GREY if alike else colour
                 axes.axhline(value, color=lines, linewidth=0.7, linestyle=dashes, alpha=0.7)
-        for first, last in one.exceeded_rpm:
+        for first, last in one.answer["exceeded_rpm"]:
             axes.plot(
                 [first, last], [first * per_rpm, last * per_rpm], color=colour, linewidth=5.0, alpha=0.45,
                 solid_capstyle="butt",
             )  # fmt: skip
-        for crossing in one.crossings:
-            if crossing.amplitude >= _SMALL * highest:
-                filled = colour if crossing.inside else "white"
+        for crossing in one.answer["crossings"]:
+            if crossing["amplitude"] >= _SMALL * highest:
+                filled = colour if crossing["inside"] else "white"
                 axes.plot(
-                    [crossing.speed_rpm], [crossing.frequency_hz], color=colour, marker="o", markersize=5.0,
-                    markerfacecolor=filled, linestyle="none", zorder=5,
+                    [crossing["speed_rpm"]], [crossing["frequency_hz"]], color=colour, marker="o",
+                    markersize=5.0, markerfacecolor=filled, linestyle="none", zorder=5,
                 )  # fmt: skip
     axes.set_xlim(left, right)
-    _name_lines(axes, shown, colours, right)
+    _name_lines(axes, shown, right)
     style.label(axes, "speed [rpm]", "frequency [Hz]")
     keys = [
         Line2D([], [], color=style.GREY, linewidth=0.9, linestyle=_DASHED, label="all stuck"),
@@ -95,37 +114,35 @@ def _draw_speeds(
     axes.legend(handles=keys, loc="upper right", bbox_to_anchor=(1.0, 1.14), ncols=3)
 
 
-def _name_lines(axes: Axes, shown: list[OrderResponse], colours: list[str], right: float) -> None:
+def _name_lines(axes: Axes, shown: list[_Order], right: float) -> None:
     """The number of each order where its line leaves the picture."""
     bottom, top = _frequencies(shown)
     left = axes.get_xlim()[0]
-    for one, colour in zip(shown, colours, strict=True):
-        per_rpm = one.order / 60.0
+    for one in shown:
+        colour, per_rpm = one.colour, one.number / 60.0
         speed = min(right, top / per_rpm)
         if speed <= left or speed * per_rpm < bottom:
             continue
         above = speed < right
         axes.annotate(
-            str(one.order), (speed, speed * per_rpm), xytext=(0, 3) if above else (3, 0),
+            str(one.number), (speed, speed * per_rpm), xytext=(0, 3) if above else (3, 0),
             textcoords="offset points", ha="center" if above else "left", va="bottom" if above else "center",
             color=colour, annotation_clip=False,
         )  # fmt: skip
 
 
-def _draw_responses(
-    axes: Axes, diagram: CampbellDiagram, shown: list[OrderResponse], colours: list[str]
-) -> None:
+def _draw_responses(axes: Axes, answer: Json, shown: list[_Order]) -> None:
     """The amplitude of every order, sideways."""
-    curves = [Response.of_branch(one.branch) for one in shown]
+    curves = [one.curve for one in shown]
     top = max(float(curve.amplitude.max()) for curve in curves)
     unit = units.length_unit(top)
-    for one, curve, colour in zip(shown, curves, colours, strict=True):
+    for one in shown:
         axes.plot(
-            curve.amplitude * unit.per_metre, curve.values, color=colour, linewidth=1.1,
-            label=f"order {one.order}",
+            one.curve.amplitude * unit.per_metre, one.curve.values, color=one.colour, linewidth=1.1,
+            label=f"order {one.number}",
         )  # fmt: skip
-    if diagram.limit is not None:
-        axes.axvline(diagram.limit * unit.per_metre, color=style.INK, linewidth=0.9, linestyle=_DASHED)
+    if answer["limit"] is not None:
+        axes.axvline(answer["limit"] * unit.per_metre, color=style.INK, linewidth=0.9, linestyle=_DASHED)
     axes.set_xscale("log")
     least = min(float(curve.amplitude.min()) for curve in curves)
     if top > 0.0:
@@ -134,14 +151,14 @@ def _draw_responses(
     style.plain_log(axes.xaxis)
     if least < _DECADES * top:
         axes.xaxis.set_major_locator(LogLocator())
-    axes.set_xlabel(f"max |{diagram.scene.observe.dof}| [{unit.name}]")
+    axes.set_xlabel(f"max |{shown[0].curve.dof}| [{unit.name}]")
     if len(shown) > 1:
         axes.legend(loc="best")
 
 
-def _frequencies(shown: list[OrderResponse]) -> tuple[float, float]:
+def _frequencies(shown: list[_Order]) -> tuple[float, float]:
     """The frequencies of the picture: those the responses cover."""
-    values = np.concatenate([one.branch.values for one in shown])
+    values = np.concatenate([one.curve.values for one in shown])
     return float(values.min()), float(values.max())
 
 

@@ -10,8 +10,8 @@ from service.cli import campbell_reports, inputs, options
 from service.cli.failures import FELL_SHORT
 from service.cli.inputs import whole_number
 from service.cli.output import print_json
+from service.cli.outputs import Outputs
 from service.cli.progress import bar
-from solver.plots import SUFFIXES
 
 Speeds = Annotated[
     tuple[float, float], typer.Option("--speeds", metavar="LO HI", help="Running speeds [1/min].")
@@ -49,6 +49,7 @@ def campbell(
     band: BandHz = None,
     harmonics: options.Harmonics = 11,
     plot: options.Plot = None,
+    out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
     """Find the speeds at which orders of the running speed meet resonances.
@@ -58,18 +59,15 @@ def campbell(
     """
     import optim
 
-    picture = inputs.output_path("--plot", plot, SUFFIXES)
+    outputs = Outputs.asked(plot, out)
     scene = inputs.scene(name, values)
     with bar("campbell") as on_progress:
         diagram = optim.campbell_diagram(
             scene, speeds_rpm=speeds, orders=order, limit=limit, band_hz=band, harmonics=harmonics,
             on_progress=on_progress,
         )  # fmt: skip
-    if picture is not None and any(one.branch.values.size for one in diagram.orders):
-        from optim.plots.campbell import campbell_figure
-        from solver.plots.style import save
-
-        save(campbell_figure(diagram), picture)
+    drawn = any(one.branch.values.size for one in diagram.orders)
+    outputs.write(diagram, diagram.plot if drawn else None)
     if as_json:
         print_json(diagram.to_json())
     else:

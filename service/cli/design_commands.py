@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from service.cli import design_reports, inputs, options, problem_inputs, robust_reports
+from service.cli import design_reports, options, problem_inputs, robust_reports
 from service.cli.failures import FELL_SHORT
 from service.cli.output import print_json
+from service.cli.outputs import Outputs
 from service.cli.problem_options import NOT_OF_A_FRONT, ProblemFlags, takes_problem
 from service.cli.progress import bar
-from solver.plots import SUFFIXES
 
 if TYPE_CHECKING:
     from solver.scene import Scene
@@ -25,6 +24,7 @@ def design(
     flags: ProblemFlags,
     name: options.AnyScene = None,
     plot: options.Plot = None,
+    out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
     """Find the best damper.
@@ -34,21 +34,17 @@ def design(
     """
     from service.kinds.design import UNCERTAIN, DesignRequest, design_issues
 
-    picture = inputs.output_path("--plot", plot, SUFFIXES)
+    outputs = Outputs.asked(plot, out)
     told = problem_inputs.description(name, flags, "design")
     scene, given = problem_inputs.posed(told, DesignRequest, design_issues)
     if UNCERTAIN in given:
-        _robust(scene, given, picture, as_json=as_json)
+        _robust(scene, given, outputs, as_json=as_json)
         return
     with bar("design", "designs") as on_progress:
         import optim
 
         result = optim.design(scene, **given, on_progress=on_progress)
-    if picture is not None and result.sweeps:
-        from optim.plots.designs import design_figure
-        from solver.plots.style import save
-
-        save(design_figure(result), picture)
+    outputs.write(result, result.plot if result.sweeps else None)
     if as_json:
         print_json(result.to_json())
     else:
@@ -62,6 +58,7 @@ def pareto(
     name: options.AnyScene = None,
     points: options.Points = None,
     plot: options.Plot = None,
+    out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
     """Find the front of peak against resonance band.
@@ -71,18 +68,14 @@ def pareto(
     """
     from service.kinds.pareto import ParetoRequest, pareto_issues
 
-    picture = inputs.output_path("--plot", plot, SUFFIXES)
+    outputs = Outputs.asked(plot, out)
     told = problem_inputs.description(name, flags, "pareto", points=("--points", points))
     scene, given = problem_inputs.posed(told, ParetoRequest, pareto_issues)
     with bar("pareto", "designs") as on_progress:
         import optim
 
         found = optim.pareto_front(scene, **given, on_progress=on_progress)
-    if picture is not None and found.points:
-        from optim.plots.pareto import pareto_figure
-        from solver.plots.style import save
-
-        save(pareto_figure(found.to_json()), picture)
+    outputs.write(found, found.plot if found.points else None)
     if as_json:
         print_json(found.to_json())
     else:
@@ -90,17 +83,13 @@ def pareto(
     end(found.reached, found.status.value)
 
 
-def _robust(scene: Scene, given: Mapping[str, Any], picture: Path | None, *, as_json: bool) -> None:
+def _robust(scene: Scene, given: Mapping[str, Any], outputs: Outputs, *, as_json: bool) -> None:
     """A design with uncertain parameters: the nominal and the robust optimum side by side."""
     with bar("robust design", "responses") as on_progress:
         import optim
 
         result = optim.robust_design(scene, **given, on_progress=on_progress)
-    if picture is not None and result.nominal is not None:
-        from optim.plots.designs import robust_figure
-        from solver.plots.style import save
-
-        save(robust_figure(result), picture)
+    outputs.write(result, result.plot if result.nominal is not None else None)
     if as_json:
         print_json(result.to_json())
     else:

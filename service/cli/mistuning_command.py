@@ -11,6 +11,7 @@ from service.cli import inputs, options
 from service.cli.failures import FELL_SHORT
 from service.cli.inputs import number, whole_number
 from service.cli.output import print_json, print_pairs
+from service.cli.outputs import Outputs
 from service.cli.progress import bar
 from solver import units
 
@@ -48,6 +49,8 @@ def mistuning(
     stop: options.To = None,
     values: options.Values = None,
     harmonics: options.Harmonics = 11,
+    plot: options.Plot = None,
+    out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
     """Study disks whose blades are not quite equal.
@@ -56,12 +59,14 @@ def mistuning(
     """
     import solver
 
+    outputs = Outputs.asked(plot, out)
     scene = inputs.scene(name, values)
     with bar("mistuning", "disks") as on_progress:
         study = solver.mistuning_study(
             scene, of=of, spread=spread, samples=samples, seed=seed, dof=dof, start=start, stop=stop,
             harmonics=harmonics, on_progress=on_progress,
         )  # fmt: skip
+    outputs.write(study, study.plot if study.worst is not None else None, scene=scene)
     if as_json:
         print_json(study.to_json())
     else:

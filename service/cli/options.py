@@ -90,8 +90,16 @@ MaxPeriods = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Plot = Annotated[
-    str | None, typer.Option("--plot", metavar="F", help="Draw a picture: F ends in .png, .svg or .pdf.")
+    str | None,
+    typer.Option("--plot", metavar="F", help="Draw a picture: .png, .svg, .pdf or .html."),
 ]
+Out = Annotated[
+    str | None,
+    typer.Option(
+        "--out", metavar="F",
+        help="Write the numbers: F ends in .csv, .parquet, .nc, .npz, .mat or .json.",
+    ),
+]  # fmt: skip
 Database = Annotated[
     str | None,
     typer.Option(

@@ -8,9 +8,9 @@ from typing import Any
 from service.cli import inputs, options
 from service.cli.design_commands import end
 from service.cli.output import print_json, print_table, say
+from service.cli.outputs import Outputs
 from service.cli.progress import patience
 from solver import units
-from solver.plots import SUFFIXES
 
 
 def sensitivities(
@@ -19,24 +19,22 @@ def sensitivities(
     limit: options.Limit = None,
     harmonics: options.Harmonics = 11,
     plot: options.Plot = None,
+    out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
     """Say what matters: per cent of the peaks and the band for one per cent of each parameter.
 
     Exact derivatives through the whole solve; what matters most for the highest peak comes first.
     """
-    picture = inputs.output_path("--plot", plot, SUFFIXES)
+    outputs = Outputs.asked(plot, out)
     scene = inputs.scene(name, values)
     with patience():
         import optim
 
         found = optim.sensitivities(scene, limit=limit, harmonics=harmonics)
     answer: Mapping[str, Any] = found.to_json()
-    if picture is not None and any(row["peak_percent"] is not None for row in answer["rows"]):
-        from optim.plots.shares import sensitivities_figure
-        from solver.plots.style import save
-
-        save(sensitivities_figure(answer), picture)
+    drawn = any(row["peak_percent"] is not None for row in answer["rows"])
+    outputs.write(found, found.plot if drawn else None)
     if as_json:
         print_json(answer)
     else:

@@ -6,13 +6,15 @@ service.
 
 from __future__ import annotations
 
+from functools import partial
+
 import typer
 
 from service.cli import inputs, options, reports
 from service.cli.failures import FELL_SHORT, InputError
 from service.cli.output import print_json
+from service.cli.outputs import Outputs
 from service.cli.progress import bar, patience
-from solver.plots import SUFFIXES
 
 
 def scenes(as_json: options.Json = False) -> None:
@@ -52,22 +54,20 @@ def solve(
     accuracy: options.Accuracy = None,
     effects: options.Effects = "auto",
     plot: options.Plot = None,
+    out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
     """Compute one periodic response."""
     import solver
 
-    picture = inputs.output_path("--plot", plot, SUFFIXES)
+    outputs = Outputs.asked(plot, out)
     scene, asked = inputs.scene(name, values), solver.Effects.read(effects)
     with patience():
         solution = solver.solve(
             scene, frequency_hz=frequency, harmonics=harmonics, accuracy=accuracy, effects=asked
         )
-    if solution.converged and picture is not None:
-        from solver.plots.motion import Motion, motion_figure
-        from solver.plots.style import save
-
-        save(motion_figure(Motion.of_solution(solution)), picture)
+    if solution.converged:
+        outputs.write(solution, solution.plot)
     if as_json:
         print_json(solution.to_json())
     else:
@@ -87,6 +87,7 @@ def sweep(
     accuracy: options.Accuracy = None,
     effects: options.Effects = "auto",
     plot: options.Plot = None,
+    out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
     """Follow the response over a parameter.
@@ -95,7 +96,7 @@ def sweep(
     """
     import solver
 
-    picture = inputs.output_path("--plot", plot, SUFFIXES)
+    outputs = Outputs.asked(plot, out)
     if parameter == "frequency" and frequency is not None:
         raise InputError(
             f"`--frequency` is for sweeps of another --parameter, got {frequency!r}: try --from, --to"
@@ -106,12 +107,7 @@ def sweep(
             scene, parameter, start, stop, harmonics=harmonics, accuracy=accuracy, frequency_hz=frequency,
             limit=limit, effects=asked, on_progress=on_progress,
         )  # fmt: skip
-    if picture is not None and len(branch.values):
-        from solver.plots.curves import Response
-        from solver.plots.responses import Demands, response_figure
-        from solver.plots.style import save
-
-        save(response_figure(Response.of_branch(branch), asked=Demands(limit=limit)), picture)
+    outputs.write(branch, partial(branch.plot, limit=limit) if len(branch.values) else None)
     if as_json:
         print_json(branch.to_json())
     else:
@@ -124,6 +120,7 @@ def accuracy(
     frequency: options.StudyFrequency = None,
     values: options.Values = None,
     plot: options.Plot = None,
+    out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
     """Measure what accuracy costs.
@@ -132,19 +129,15 @@ def accuracy(
     """
     import solver
 
-    picture = inputs.output_path("--plot", plot, SUFFIXES)
+    outputs = Outputs.asked(plot, out)
     scene = inputs.scene(name, values)
     with bar("accuracy", "rows") as on_progress:
-        study = solver.accuracy_study(scene, frequency, on_progress=on_progress).to_json()
-    if picture is not None:
-        from solver.plots.accuracy import accuracy_figure
-        from solver.plots.style import save
-
-        save(accuracy_figure(study), picture)
+        study = solver.accuracy_study(scene, frequency, on_progress=on_progress)
+    outputs.write(study, study.plot, scene=scene)
     if as_json:
-        print_json(study)
+        print_json(study.to_json())
     else:
-        reports.accuracy(study)
+        reports.accuracy(study.to_json())
 
 
 def march(
@@ -154,6 +147,7 @@ def march(
     steps: options.Steps = None,
     max_periods: options.MaxPeriods = 20_000,
     plot: options.Plot = None,
+    out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
     """March in time until the motion repeats.
@@ -162,18 +156,15 @@ def march(
     """
     import solver
 
-    picture = inputs.output_path("--plot", plot, SUFFIXES)
+    outputs = Outputs.asked(plot, out)
     scene = inputs.scene(name, values)
     with bar("march", "periods") as on_progress:
         marched = solver.march(
             scene, frequency_hz=frequency, steps_per_period=steps, max_periods=max_periods,
             on_progress=on_progress,
         )  # fmt: skip
-    if picture is not None and marched.converged:
-        from solver.plots.motion import Motion, motion_figure
-        from solver.plots.style import save
-
-        save(motion_figure(Motion.of_march(marched, scene.name, scene.observe.dof)), picture)
+    if marched.converged:
+        outputs.write(marched, partial(marched.plot, scene=scene), scene=scene)
     if as_json:
         print_json(marched.to_json())
     else:

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from service.client import Client
 
 _INPUT_FAILURES = ("scene", "setting")
-# What their pictures show beyond numbers is not part of a result.
-_NOT_DRAWN = ("map", "peaks", "campbell")
 
 
 @takes_problem
@@ -246,31 +244,14 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
 
 
 def _draw(client: Client, kind: str, answer: ResultsAnswer, picture: Path) -> None:
-    """Draw the sweep with the peak of the result (a design stores many), or the picture of the kind."""
-    from service.plots.stored import response_of
-    from solver.plots.responses import response_figure
+    from service.plots.results import NothingToDrawError, result_figure
     from solver.plots.style import save
 
-    if kind in _NOT_DRAWN:
-        raise InputError(f"`--plot`: a job `{kind}` is not drawn from its results: use `stickslip {kind}`")
-    if kind == "pareto" and answer.result["points"]:
-        from optim.plots.pareto import pareto_figure
-
-        save(pareto_figure(answer.result), picture)
-        return
-    if kind == "accuracy":
-        from solver.plots.accuracy import accuracy_figure
-
-        save(accuracy_figure(answer.result), picture)
-        return
-    # Of a robust design, the sweeps are those of the search without uncertainty.
-    peak = answer.result.get("peak") or (answer.result.get("nominal") or {}).get("peak")
-    if kind == "mistuning" and answer.result["worst"]:
-        peak = {"value": answer.result["worst"]["largest"]}
-    if not answer.sweeps or peak is None:
-        raise InputError(f"`--plot`: job {answer.job} stored no sweep to draw")
-    best = min(answer.sweeps, key=lambda s: abs(s.peak.value - peak["value"]) if s.peak else float("inf"))
-    save(response_figure(response_of(client.sweep(best.id))), picture)
+    try:
+        page = result_figure(kind, answer.result, answer.sweeps, client.sweep)
+    except NothingToDrawError as error:
+        raise InputError(f"`--plot`: job {answer.job} has no picture: {error}") from error
+    save(page, picture)
 
 
 def _write(file: Path, answer: Mapping[str, Any]) -> None:

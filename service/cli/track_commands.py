@@ -10,8 +10,8 @@ from service.cli import inputs, options, track_reports
 from service.cli.failures import FELL_SHORT
 from service.cli.inputs import number, whole_number
 from service.cli.output import print_json
+from service.cli.outputs import Outputs
 from service.cli.progress import bar
-from solver.plots import SUFFIXES
 
 Followed = Annotated[
     str, typer.Option("--parameter", metavar="PATH", help="What changes, for example shroud.N0.")
@@ -46,6 +46,7 @@ def peaks(
     checks: Checks = 3,
     harmonics: options.Harmonics = 11,
     plot: options.Plot = None,
+    out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
     """Track the highest peak over a parameter.
@@ -54,17 +55,13 @@ def peaks(
     """
     import solver
 
-    picture = inputs.output_path("--plot", plot, SUFFIXES)
+    outputs = Outputs.asked(plot, out)
     scene = inputs.scene(name, values)
     with inputs.path_of("--parameter"), bar("peaks", "sweeps") as on_progress:
         track = solver.track_peak(
             scene, parameter, start, stop, harmonics=harmonics, checks=checks, on_progress=on_progress
         )
-    if picture is not None and track.parameter.size:
-        from solver.plots.style import save
-        from solver.plots.tracks import track_figure
-
-        save(track_figure(track, dof=scene.observe.dof), picture)
+    outputs.write(track, track.plot if track.parameter.size else None)
     if as_json:
         print_json(track.to_json())
     else:
@@ -83,6 +80,7 @@ def response_map(
     harmonics: options.Harmonics = 11,
     no_ridge: NoRidge = False,
     plot: options.Plot = None,
+    out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
     """Map the response over frequency and a parameter, with the ridge of its peaks."""
@@ -90,18 +88,14 @@ def response_map(
 
     import solver
 
-    picture = inputs.output_path("--plot", plot, SUFFIXES)
+    outputs = Outputs.asked(plot, out)
     scene = inputs.scene(name, values)
     with inputs.path_of("--parameter"), bar("map") as on_progress:
         found = solver.response_map(
             scene, parameter, start, stop, steps=steps, frequencies=frequencies, harmonics=harmonics,
             ridge=not no_ridge, on_progress=on_progress,
         )  # fmt: skip
-    if picture is not None and np.isfinite(found.amplitude).any():
-        from solver.plots.style import save
-        from solver.plots.tracks import map_figure
-
-        save(map_figure(found, dof=scene.observe.dof), picture)
+    outputs.write(found, found.plot if np.isfinite(found.amplitude).any() else None)
     if as_json:
         print_json(found.to_json())
     else:

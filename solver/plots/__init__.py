@@ -2,5 +2,5 @@
 
 from __future__ import annotations
 
-SUFFIXES = (".png", ".svg", ".pdf")
+SUFFIXES = (".png", ".svg", ".pdf", ".html")
 """The formats a picture can have; the suffix of its file chooses."""

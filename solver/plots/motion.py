@@ -109,8 +109,14 @@ def motion_figure(motion: Motion, *, ax: style.Into = None) -> Figure:
     bars = motion.harmonics is not None
     unit = units.length_unit(float(np.abs(motion.displacement).max()))
     with style.styled():
-        columns = 1 + len(loops) + bars
-        page, (history, *others) = style.figure(0.6 + 2.6 * columns, 2.9, columns=columns, into=ax)
+        panels = 1 + len(loops) + bars
+        # Four side by side would be too small in a column of text.
+        rows, columns = (1, panels) if panels < 4 else (2, (panels + 1) // 2)
+        page, (history, *others) = style.figure(
+            0.6 + 2.6 * columns, 2.9 * rows, columns, rows=rows, into=ax
+        )  # fmt: skip
+        for unused in others[panels - 1 :]:
+            unused.set_axis_off()
         scale, second = (1e3, "ms") if motion.time[-1] < 0.1 else (1.0, "s")
         history.plot(motion.time * scale, motion.displacement * unit.per_metre, color=style.BLUE)
         history.margins(x=0.0)
@@ -122,13 +128,30 @@ def motion_figure(motion: Motion, *, ax: style.Into = None) -> Figure:
             axes.set_title(f"contact {loop.contact}")
             style.label(axes, f"slip motion [{slip.name}]", "friction force [N]")
         if motion.harmonics is not None:
-            _draw_harmonics(others[-1], motion.harmonics, motion.dof, unit)
+            _draw_harmonics(others[panels - 2], motion.harmonics, motion.dof, unit)
+    return page
+
+
+def harmonics_figure(heights: FloatArray, title: str, *, dof: str = "x", ax: style.Into = None) -> Figure:
+    """The harmonics alone, of a response whose motion is not known.
+
+    Parameters
+    ----------
+    heights : (H + 1,) |mean| and the amplitudes [m].
+    title : what it is of.
+    dof : the observed DOF.
+    ax : axes to draw into, as `solver.plots.style.figure`.
+    """
+    with style.styled():
+        page, (axes,) = style.figure(5.0, 3.2, into=ax)
+        _draw_harmonics(axes, heights, dof, units.length_unit(float(np.nanmax(heights))))
+        axes.set_title(title)
     return page
 
 
 def _draw_harmonics(axes: Axes, heights: FloatArray, dof: str, unit: units.LengthUnit) -> None:
     """Bars on a logarithmic scale; what is far below the largest is not drawn."""
-    shown = np.where(heights >= _FAR_DOWN * heights.max(), heights, np.nan) * unit.per_metre
+    shown = np.where(heights >= _FAR_DOWN * np.nanmax(heights), heights, np.nan) * unit.per_metre
     axes.bar(np.arange(heights.size), shown, color=style.BLUE, width=0.7)
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(LogLocator(numticks=6))

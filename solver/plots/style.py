@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from solver import units
+from solver.dataset import Dataset
 from solver.errors import SettingError
 from solver.files import whole
 
@@ -81,20 +82,20 @@ class Picture(Figure):
 
 
 def figure(
-    width: float, height: float, columns: int = 1, *, into: Into = None
+    width: float, height: float, columns: int = 1, *, rows: int = 1, into: Into = None
 ) -> tuple[Figure, list[Axes]]:  # fmt: skip
-    """Axes side by side, empty; call it inside `styled`.
+    """Axes side by side or in rows, empty; call it inside `styled`.
 
     Parameters
     ----------
     width, height : inches of a new figure.
-    columns : how many axes.
+    columns, rows : how many axes.
     into : axes of the caller's to draw into, instead of a new figure; of a picture with more axes than are
         given, the first ones are drawn.
     """
     page: Figure = Picture(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(page)
-    axes = list(page.subplots(1, columns, squeeze=False)[0])
+    axes = list(page.subplots(rows, columns, squeeze=False).ravel())
     if into is None:
         return page, axes
     given = [into] if isinstance(into, Axes) else list(into)
@@ -102,7 +103,7 @@ def figure(
         raise SettingError("ax", into, "must be an Axes, or several of one figure")
     mine = given[0].get_figure(root=True)
     # What does not fit is drawn on the new figure, which nobody sees.
-    return page if mine is None else mine, [*given[:columns], *axes[len(given) :]]
+    return page if mine is None else mine, [*given[: len(axes)], *axes[len(given) :]]
 
 
 def label(axes: Axes, x: str, y: str) -> None:
@@ -123,9 +124,21 @@ def plain_log(axis: Axis) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def save(page: Figure, path: Path) -> None:
-    """Write a picture, whole or not at all; the suffix chooses the format."""
+def save(page: Figure, path: Path, data: Dataset | None = None) -> None:
+    """Write a picture, whole or not at all; the suffix chooses the format.
+
+    Parameters
+    ----------
+    page : what was drawn.
+    path : ends in one of `solver.plots.SUFFIXES`.
+    data : the numbers behind it, which a page of HTML lists.
+    """
     with whole(path) as temporary:
+        if path.suffix.lower() == ".html":
+            from solver.plots.html import picture_page
+
+            temporary.write_text(picture_page(page, data), "utf-8")
+            return
         _write(page, temporary, path.suffix.lower().removeprefix("."))
 
 

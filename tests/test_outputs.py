@@ -1,0 +1,92 @@
+"""``--plot`` and ``--out`` of every command that computes, and the pictures of stored results."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import optim
+import solver
+from service.cli import main
+from service.plots.results import NothingToDrawError, result_figure
+
+COMMANDS = {
+    "solve": "two-dof --frequency 1.2 --harmonics 3",
+    "sweep": "two-dof --from 0.8 --to 1.4 --harmonics 3",
+    "march": "two-dof --frequency 1.2",
+    "peaks": "two-dof --parameter damper.N0 --from 50 --to 200 --harmonics 3",
+    "map": "two-dof --parameter damper.N0 --from 50 --to 200 --steps 3 --frequencies 5 --harmonics 3",
+    "mistuning": "bladed-disk --of tip --samples 2 --harmonics 1 --from 740 --to 780",
+    "campbell": "two-dof --speeds 50 80 --harmonics 3",
+    "sensitivities": "two-dof --harmonics 3",
+    "design": "two-dof --variable damper.N0 20 500 --harmonics 3",
+    "pareto": "two-dof --variable damper.N0 20 500 --limit 2 --points 3 --harmonics 3",
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_draws_and_writes(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture, file = tmp_path / "picture.html", tmp_path / "numbers.json"
+    words = [command, *COMMANDS[command].split(), "--json", "--plot", str(picture), "--out", str(file)]
+    assert main(words) == 0
+    assert capsys.readouterr().out.startswith("{")
+    page, data = picture.read_text("utf-8"), solver.load(file)
+    assert page.startswith("<!DOCTYPE html>")
+    assert "data:image/svg+xml;base64," in page
+    assert not re.search(r"""(src|href)=["']?(https?:|//)""", page)
+    assert "<script" not in page
+    name = COMMANDS[command].split()[0]
+    assert f'name = "{name}"' in data.attributes["scene"]  # type: ignore[operator]
+    assert data.attributes["source"] in page  # type: ignore[operator]
+    assert "<pre>" in page
+
+
+@pytest.mark.parametrize(
+    ("option", "file"), [("--plot", "p.jpg"), ("--out", "p.xlsx"), ("--out", "no/p.csv")]
+)
+def test_a_file_that_cannot_be_written_is_refused_first(
+    option: str, file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["sweep", "two-dof", option, str(tmp_path / file)]) == 2
+    assert f"`{option}`" in capsys.readouterr().err
+
+
+def results() -> dict[str, Any]:
+    scene = solver.load_scene("two-dof")
+    return {
+        "solve": solver.solve(scene, frequency_hz=1.2, harmonics=3),
+        "march": solver.march(scene, frequency_hz=1.2),
+        "map": solver.response_map(scene, "damper.N0", 50, 200, steps=3, frequencies=5, harmonics=3),
+        "peaks": solver.track_peak(scene, "damper.N0", 50, 200, harmonics=3),
+        "mistuning": solver.mistuning_study(
+            solver.load_scene("bladed-disk"), of=["tip"], samples=2, harmonics=1, start=740, stop=780
+        ),
+        "pareto": optim.pareto_front(
+            scene, variables={"damper.N0": (20, 500)}, limit=2.0, points=3, harmonics=3
+        ),
+    }
+
+
+def test_a_stored_result_is_drawn_as_the_computed_one() -> None:
+    for kind, computed in results().items():
+        page = result_figure(kind, computed.to_json(), [], lambda _: pytest.fail("no sweep is needed"))
+        axes, wanted = page.axes[0], computed.plot().axes[0]
+        if kind in ("solve", "march"):
+            assert axes.get_xlabel() == "harmonic (0: mean)"
+            continue
+        assert axes.get_xlabel() == wanted.get_xlabel()
+        assert [len(line.get_xdata()) for line in axes.lines] == [
+            len(line.get_xdata()) for line in wanted.lines
+        ]
+
+
+@pytest.mark.parametrize("kind", ["sweep", "design", "campbell", "accuracy", "pareto", "solve", "mistuning"])
+def test_nothing_to_draw_is_said(kind: str) -> None:
+    empty = {"peak": None, "orders": [], "rows": [], "points": [], "harmonics": None, "worst": None}
+    with pytest.raises(NothingToDrawError):
+        result_figure(kind, empty, [], lambda _: pytest.fail("no sweep is read"))
