@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import re
 import shlex
@@ -175,6 +176,30 @@ def test_parts_of_scenes_are_read() -> None:
     raw["observe"] = {"dof": dofs[0], "band": [10.0, 20.0]}
     laws = [contact.law for contact in solver.Scene.from_dict(raw).contacts]
     assert laws == ["elastic-normal", "coulomb-2d", "gap", "polynomial"]
+
+
+def known(path: str) -> bool:
+    """Whether a dotted path is a module, or a name of a module or of a class."""
+    owner: object = importlib.import_module(path.partition(".")[0])
+    for at, word in enumerate(path.split(".")[1:], 2):
+        if not hasattr(owner, word):
+            try:
+                importlib.import_module(".".join(path.split(".")[:at]))
+            except ModuleNotFoundError:
+                return False
+        owner = getattr(owner, word)
+    return True
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_modules_and_tests_that_a_page_names_exist(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    paths = re.findall(r"`((?:solver|optim|service)(?:\.[a-zA-Z_]\w*)+)(?=[(`\[])", text)
+    assert [path for path in paths if not known(path)] == []
+    tests = "".join(file.read_text("utf-8") for file in (ROOT / "tests").rglob("test_*.py"))
+    assert [name for name in re.findall(r"`(test_\w+)`", text) if f"def {name}(" not in tests] == []
+    files = re.findall(r"`((?:tests|benchmarks|deploy|docs)/[\w/.-]+)`", text)
+    assert [file for file in files if not (ROOT / file).exists()] == []
 
 
 def anchors(page: Path) -> set[str]:
