@@ -15,6 +15,7 @@ from service.cli import (
     import_command,
     key_commands,
     mistuning_command,
+    report_command,
     schema_command,
     sensitivity_command,
     service_commands,
@@ -69,6 +70,7 @@ _database.command()(database_commands.backup)
 _database.command()(database_commands.check)
 _database.command()(database_commands.prune)
 app.command()(schema_command.schema)
+app.command()(report_command.report)
 app.command("import")(import_command.import_scene)
 app.add_typer(_submit, name="submit")
 app.add_typer(_database, name="db")

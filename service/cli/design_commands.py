@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli import design_reports, options, problem_inputs, robust_reports
-from service.cli.failures import FELL_SHORT
+from service.cli import design_reports, inputs, options, problem_inputs, robust_reports
+from service.cli.failures import FELL_SHORT, InputError
 from service.cli.output import print_json
 from service.cli.outputs import Outputs
 from service.cli.problem_options import NOT_OF_A_FRONT, ProblemFlags, takes_problem
 from service.cli.progress import bar
+from service.cli.report_command import SUFFIXES, write
 
 if TYPE_CHECKING:
     from solver.scene import Scene
+
+
+Report = Annotated[
+    str | None, typer.Option("--report", metavar="F", help="Write a design report: .html or .pdf.")
+]
 
 
 @takes_problem
@@ -25,6 +31,7 @@ def design(
     name: options.AnyScene = None,
     plot: options.Plot = None,
     out: options.Out = None,
+    report: Report = None,
     as_json: options.Json = False,
 ) -> None:
     """Find the best damper.
@@ -35,9 +42,12 @@ def design(
     from service.kinds.design import UNCERTAIN, DesignRequest, design_issues
 
     outputs = Outputs.asked(plot, out)
+    page = inputs.output_path("--report", report, SUFFIXES)
     told = problem_inputs.description(name, flags, "design")
     scene, given = problem_inputs.posed(told, DesignRequest, design_issues)
     if UNCERTAIN in given:
+        if page is not None:
+            raise InputError("`--report`: a design with uncertain parameters has no report yet")
         _robust(scene, given, outputs, as_json=as_json)
         return
     with bar("design", "designs") as on_progress:
@@ -45,6 +55,10 @@ def design(
 
         result = optim.design(scene, **given, on_progress=on_progress)
     outputs.write(result, result.plot if result.sweeps else None)
+    if page is not None:
+        from service.report.design import Designed
+
+        write(Designed(scene=scene, problem=given, result=result.to_json()), page)
     if as_json:
         print_json(result.to_json())
     else:

@@ -32,10 +32,15 @@ def design(found: Json) -> None:
     """The best design: what it reaches, what holds it, what it must keep, and the other optima."""
     title = f"Best damper of {found['scene']}"
     print_pairs(title if _kept(found) else f"{title}: not all limits can be kept", _pairs(found))
-    for table in (_limits(found), _active(found), _basins(found)):
-        if table is not None:
-            say("")
-            print_table(table.heading, table.columns, table.rows, right=table.right)
+    for table in design_tables(found)[1]:
+        say("")
+        print_table(table.heading, table.columns, table.rows, right=table.right)
+
+
+def design_tables(found: Json) -> tuple[Pairs, list[Table]]:
+    """What a design came to, and its tables: limits, what is active, local optima."""
+    tables = (_limits(found), _active(found), _basins(found))
+    return _pairs(found), [table for table in tables if table is not None]
 
 
 def _kept(found: Json) -> bool:

@@ -118,7 +118,7 @@ def march(
 
 def watch(job: options.Job, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL) -> None:
     """Follow a job until it has ended."""
-    with _client(url) as client:
+    with client_of(url) as client:
         ended = _follow(client, job)
     if as_json:
         print_json(ended.model_dump(mode="json"))
@@ -157,14 +157,14 @@ def results(
     if job is None:
         if picture is not None:
             raise InputError("`--plot` needs a JOB: a list is not drawn")
-        with _client(url) as client:
+        with client_of(url) as client:
             listed = stored_designs.listed(client, filters)
         if file is not None:
             _write(file, listed)
         stored_designs.show(listed, as_json=as_json)
         return
     stored_designs.refuse_filters(filters)
-    with _client(url) as client:
+    with client_of(url) as client:
         ended = client.job(job)
         answer = client.results(job)
         if picture is not None:
@@ -189,7 +189,7 @@ def body_of(kind: str, name: str, values: list[str] | None, **fields: Any) -> di
 
 def hand_in(url: str, body: Mapping[str, Any], *, wait: bool, as_json: bool) -> None:
     """Submit a job; print its id, or wait for its end and print what came out."""
-    with _client(url) as client:
+    with client_of(url) as client:
         job = client.submit(uploaded(client, body))
         if not wait:
             _announce(job, as_json=as_json)
@@ -207,7 +207,8 @@ def _announce(job: JobAnswer, *, as_json: bool) -> None:
         say(job.id)
 
 
-def _client(url: str) -> Client:
+def client_of(url: str) -> Client:
+    """A client of the service at an address."""
     import httpx
 
     from service.client import Client

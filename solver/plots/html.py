@@ -24,6 +24,7 @@ figcaption, .quiet { color: #555; font-size: .9rem; }
 table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .2rem .7rem .2rem 0; text-align: left; vertical-align: top; }
 thead th { border-bottom: 1px solid #999; } td.number { text-align: right; }
+td:nth-child(2):not(:last-child) { white-space: nowrap; }
 tbody tr + tr > * { border-top: 1px solid #eee; }
 pre { background: #f5f5f5; padding: .8rem; overflow-x: auto; font-size: .8rem; white-space: pre-wrap; }
 @page { size: A4; margin: 18mm; }

@@ -113,7 +113,7 @@ def motion_figure(motion: Motion, *, ax: style.Into = None) -> Figure:
         # Four side by side would be too small in a column of text.
         rows, columns = (1, panels) if panels < 4 else (2, (panels + 1) // 2)
         page, (history, *others) = style.figure(
-            0.6 + 2.6 * columns, 2.9 * rows, columns, rows=rows, into=ax
+            0.6 + (2.6 if rows == 1 else 3.1) * columns, 2.9 * rows, columns, rows=rows, into=ax
         )  # fmt: skip
         for unused in others[panels - 1 :]:
             unused.set_axis_off()

@@ -1,0 +1,1 @@
+"""Design reports: pages that need nothing else, to be read, printed and kept."""
