@@ -19,6 +19,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         designing,
         disk,
         large,
+        page,
         reduction,
         responses,
         robustness,
@@ -51,6 +52,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "latency": service_load.latency,
         "lists": service_load.lists,
         "scale": service_scale.scale,
+        "page": page.page,
         "cluster": cluster.mistuning_study,
     }
 

@@ -102,7 +102,17 @@ function read(text, before) {
   return trimmed !== "" && Number.isFinite(Number(trimmed)) ? Number(trimmed) : trimmed;
 }
 
-const nameOf = (pointer) => pointer.split("/").slice(2).join(" › ") || pointer.slice(1);
+// "/structure/springs/0/k" is "springs 1 › k" in its group, "/contacts/0/mu" is "mu".
+function nameOf(pointer) {
+  const [top, ...parts] = pointer.split("/").slice(1);
+  const inside = /^\d+$/.test(parts[0] ?? "") && parts.length > 1 ? parts.slice(1) : parts;
+  const words = [];
+  for (const part of inside) {
+    if (/^\d+$/.test(part) && words.length) words[words.length - 1] += ` ${Number(part) + 1}`;
+    else words.push(part.replaceAll("~1", "/").replaceAll("~0", "~"));
+  }
+  return words.join(" › ") || top;
+}
 
 function groupsOf(scene) {
   const groups = new Map();

@@ -6,25 +6,32 @@ const SHOWN_OF_MANY = 3;
 
 export const ownName = (end) => end.split("@")[0];
 
-// Distance of every DOF from the ground over springs and contacts; DOFs that hang on nothing come last.
-export function layersOf(dofs, joints) {
-  const layers = new Map();
-  let front = [GROUND];
-  const known = new Set(front);
-  for (let layer = 0; front.length; layer += 1) {
-    for (const name of front) layers.set(name, layer);
-    const next = new Set();
-    for (const { between } of joints) {
-      const [a, b] = between.map(ownName);
-      if (front.includes(a) && !known.has(b)) next.add(b);
-      if (front.includes(b) && !known.has(a)) next.add(a);
-    }
-    next.forEach((name) => known.add(name));
-    front = [...next];
-  }
-  let last = Math.max(0, ...layers.values());
+// Distance of every DOF from the ground over the springs; what hangs on contacts alone is one farther than its
+// neighbour, and what hangs on nothing comes last.
+export function layersOf(dofs, springs, contacts) {
+  const layers = new Map([[GROUND, 0]]);
+  spread(layers, springs);
+  spread(layers, [...springs, ...contacts]);
+  let last = Math.max(...layers.values());
   for (const dof of dofs) if (!layers.has(dof)) layers.set(dof, (last += 1));
   return layers;
+}
+
+function spread(layers, joints) {
+  for (let more = true; more; ) {
+    more = false;
+    const found = new Map();
+    for (const { between } of joints) {
+      const [a, b] = between.map(ownName);
+      for (const [from, to] of [[a, b], [b, a]]) {
+        if (layers.has(from) && !layers.has(to)) found.set(to, Math.min(layers.get(from) + 1, found.get(to) ?? Infinity));
+      }
+    }
+    for (const [name, layer] of found) {
+      layers.set(name, layer);
+      more = true;
+    }
+  }
 }
 
 // What a scene's structure consists of, whatever its kind.
@@ -43,7 +50,7 @@ export function partsOf(scene) {
 }
 
 export function chain(parts, width, height) {
-  const layers = layersOf(parts.dofs, [...parts.springs, ...parts.contacts]);
+  const layers = layersOf(parts.dofs, parts.springs, parts.contacts);
   const columns = new Map();
   for (const dof of parts.dofs) {
     const layer = layers.get(dof);
@@ -63,7 +70,7 @@ export function chain(parts, width, height) {
 
 // The places of sector j's DOFs on their rings; of very many sectors only the first few, widely fanned.
 export function ring(parts, radius) {
-  const layers = layersOf(parts.dofs, [...parts.springs, ...parts.contacts]);
+  const layers = layersOf(parts.dofs, parts.springs, parts.contacts);
   const last = Math.max(...layers.values(), 1);
   const all = parts.sectors <= MOST_SECTORS;
   const shown = all ? parts.sectors : SHOWN_OF_MANY;

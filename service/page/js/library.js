@@ -11,11 +11,12 @@ import { length, lengthUnit, number, quantity, when, withUnit } from "./format.j
 import { current } from "./scenes.js";
 
 const FILTERS = [
-  ["scene", "Scene", "text"], ["parameter", "Parameter", "text"], ["N0_min", "N0 from [N]", "number"], ["N0_max", "N0 to [N]", "number"],
+  ["scene", "Scene", "text"], ["parameter", "Parameter", "text"], ["contact", "Contact", "text"], ["N0_min", "N0 from [N]", "number"], ["N0_max", "N0 to [N]", "number"],
   ["peak_max", "Peak up to [m]", "number"], ["band_hz_max", "Band up to [Hz]", "number"],
 ];
 const SORTS = [["-created", "newest first"], ["peak", "lowest peak first"], ["band_hz", "narrowest band first"], ["-points", "most points first"]];
 const SIZE = 25;
+const FAR_APART = 4;
 const DASHES = [undefined, "dashed", "dotted"];
 let plot = null;
 let items = [];
@@ -25,12 +26,10 @@ const details = new Map();
 export function startLibrary() {
   plot = chart(byId("compare-figure"), { label: "Sweeps side by side", file: "compare", height: 320 });
   const form = byId("library-form");
-  const inputs = FILTERS.map(([name, words, type]) => [
-    el("label", { for: `filter-${name}` }, words),
-    el("input", { id: `filter-${name}`, name, type, step: "any" }),
-  ]);
+  const inputs = FILTERS.map(([name, words, type]) =>
+    el("span", { class: "pair" }, el("label", { for: `filter-${name}` }, words), el("input", { id: `filter-${name}`, name, type, step: "any" })));
   const sort = el("select", { id: "filter-sort", name: "sort" }, SORTS.map(([value, words]) => el("option", { value }, words)));
-  show(form, inputs.flat(), el("label", { for: "filter-sort" }, "Order"), sort, el("button", { type: "submit" }, "Show"));
+  show(form, inputs, el("span", { class: "pair" }, el("label", { for: "filter-sort" }, "Order"), sort), el("button", { type: "submit" }, "Show"));
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     list();
@@ -136,11 +135,13 @@ async function compare() {
 }
 
 function drawCompared(found) {
-  const highest = Math.max(...found.map((s) => s.peak?.value ?? 0));
+  const peaks = found.map((s) => s.peak?.value ?? 0);
+  const highest = Math.max(...peaks);
   const unit = lengthUnit(highest);
+  const far = highest > FAR_APART * Math.min(...peaks.filter((peak) => peak > 0));
   plot.draw({
     x: { name: withUnit(found[0].parameter) },
-    y: { name: `amplitude [${unit.name}]`, zero: true },
+    y: { name: `amplitude [${unit.name}]`, zero: !far, log: far },
     series: found.map((sweep, i) => ({
       name: titleOf(sweep), x: sweep.arrays.parameter, y: sweep.arrays.amplitude.map((v) => v * unit.perMetre), colour: 1 + (i % 7), dash: DASHES[i % 3],
     })),

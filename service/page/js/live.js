@@ -50,7 +50,7 @@ function drawn(answer, { milliseconds, token }) {
   tell("states", { states: answer.states, at: answer.peak?.at });
   const peak = answer.peak ? `peak ${length(answer.peak.value)} at ${number(answer.peak.at, 5)} Hz` : answer.status;
   const band = answer.band_hz === null ? "" : `, band ${number(answer.band_hz)} Hz`;
-  byId("live-status").textContent = `${peak}${band} · ${answer.points} points in ${number(answer.seconds * 1e3, 2)} ms, ${number(milliseconds, 2)} ms with the way here`;
+  byId("live-status").textContent = `${peak}${band} · ${answer.points} points in ${number(answer.seconds * 1e3, 2)} ms, answered after ${number(milliseconds, 2)} ms`;
   performance.mark("live-drawn");
   document.documentElement.dataset.live = String(Number(document.documentElement.dataset.live ?? 0) + 1);
 }

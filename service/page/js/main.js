@@ -15,7 +15,7 @@ import { startNotices } from "./notices.js";
 import { referee, startPoint } from "./point.js";
 import { startResponse, sweepView } from "./response.js";
 import { asked, current, defaultRange, frictionContacts, listScenes, loadScene, shownScene, variable } from "./scenes.js";
-import { drawStructure } from "./structure.js";
+import { contactTable, drawStructure } from "./structure.js";
 import { accuracyView, campbellBody, campbellView, startStudies } from "./studies.js";
 import { startTheme } from "./theme.js";
 import { saveToml } from "./toml.js";
@@ -61,8 +61,15 @@ function fillDesign(names) {
   byId("harmonics").value = String(state.harmonics);
 }
 
+let drawn = "";
+
+// The drawing changes with the scene and the states alone; under a slider that is seldom.
 function drawScene() {
-  show(byId("structure-states"), drawStructure(byId("structure-figure"), shownScene(), states.states, states.at));
+  const scene = shownScene();
+  const now = JSON.stringify([state.scene, states.states]);
+  if (now !== drawn) drawStructure(byId("structure-figure"), scene, states.states);
+  drawn = now;
+  show(byId("structure-states"), contactTable(scene, states.states, states.at));
 }
 
 async function change(name) {
@@ -143,6 +150,7 @@ async function begin() {
     failed(error);
   }
   document.documentElement.dataset.ready = "yes";
+  performance.mark("page-ready");
 }
 
 function start() {

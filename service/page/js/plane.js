@@ -19,7 +19,7 @@ export function plane(width, height, x, y, { paper = true, above = 0 } = {}) {
     "g",
     {},
     paper ? svg("rect", { class: "paper", x: 0, y: 0, width, height }) : null,
-    gridLines(box, xs, ys),
+    gridLines(box, xs, ys, paper),
     svg("path", { class: "axis", d: `M${box.left} ${box.top}V${box.bottom}H${box.right}` }),
     svg("text", { x: (box.left + box.right) / 2, y: height - 8, "text-anchor": "middle" }, x.name),
     svg(
@@ -31,16 +31,16 @@ export function plane(width, height, x, y, { paper = true, above = 0 } = {}) {
   return { box, xs, ys, frame };
 }
 
-function gridLines(box, xs, ys) {
+function gridLines(box, xs, ys, lines) {
   const nodes = [];
   for (const { value, text } of xs.ticks((box.right - box.left) / PIXELS_A_TICK.x)) {
     const at = xs.at(value);
-    nodes.push(svg("line", { class: "grid", x1: at, x2: at, y1: box.top, y2: box.bottom }));
+    nodes.push(svg("line", { class: lines ? "grid" : "axis", x1: at, x2: at, y1: lines ? box.top : box.bottom + 4, y2: box.bottom }));
     nodes.push(svg("text", { class: "soft", x: at, y: box.bottom + 16, "text-anchor": "middle" }, text));
   }
   for (const { value, text } of ys.ticks((box.bottom - box.top) / PIXELS_A_TICK.y)) {
     const at = ys.at(value);
-    nodes.push(svg("line", { class: "grid", x1: box.left, x2: box.right, y1: at, y2: at }));
+    nodes.push(svg("line", { class: lines ? "grid" : "axis", x1: lines ? box.left : box.left - 4, x2: lines ? box.right : box.left, y1: at, y2: at }));
     nodes.push(svg("text", { class: "soft", x: box.left - 6, y: at + 4, "text-anchor": "end" }, text));
   }
   return nodes;

@@ -139,7 +139,10 @@ function drawLoop() {
     ? MOTIONS.map(([paint, name, dash], code) => piece(contact, x, code, { paint, name, dash })).filter(Boolean)
     : [{ name: "", x, y: contact.force, colour: 1 }];
   const other = march?.history?.contacts.find((c) => c.name === contact.name);
-  if (other) pieces.push({ name: "time march", x: other.slip.map((v) => v * unit.perMetre), y: other.force, colour: 7, width: 1, dash: "dotted" });
+  if (other) {
+    const some = (values) => values.filter((_, i) => i % MARCH_EVERY === 0);
+    pieces.push({ name: "time march", x: some(other.slip).map((v) => v * unit.perMetre), y: some(other.force), colour: 7, width: 0, shape: "circle", size: 2.6 });
+  }
   plots.loops.draw({ x: { name: `slip motion of ${contact.name} [${unit.name}]`, pad: 0.06 }, y: { name: "friction force [N]", pad: 0.06 }, series: pieces });
   const choose = contacts.length > 1
     ? contacts.map((c, i) => el("button", { type: "button", "aria-pressed": String(i === chosen), onclick: () => { chosen = i; drawLoop(); } }, c.name))

@@ -18,8 +18,8 @@ const CHAIN = { width: 560, height: 250 };
 const classOf = (state) => STATES[state]?.[0] ?? "is-unknown";
 const wordsOf = (state) => STATES[state]?.[1] ?? "not computed yet";
 
-// Draws `scene`; `states` are those of its contacts by name, at the frequency `at` [Hz].
-export function drawStructure(host, scene, states, at) {
+// Draws `scene`; `states` are those of its contacts by name.
+export function drawStructure(host, scene, states) {
   const parts = partsOf(scene);
   const names = parts.contacts.map((c) => `${c.name} ${wordsOf(states?.[c.name])}`).join(", ");
   const label = `${scene.name}: ${parts.cyclic ? `${parts.sectors} sectors of ` : ""}${parts.dofs.length} masses, ${parts.springs.length} springs; ${names || "no contacts"}`;
@@ -27,7 +27,6 @@ export function drawStructure(host, scene, states, at) {
   if (parts.cyclic) disk(drawing, scene, parts, states);
   else lumped(drawing, scene, parts, states);
   show(host, drawing, legend());
-  return contactTable(parts, states, at);
 }
 
 const pattern = () =>
@@ -54,7 +53,9 @@ function legend() {
     entry("separated", "opens"), el("li", {}, "double ring: observed · arrow: force"));
 }
 
-function contactTable(parts, states, at) {
+// The contacts as a table, with what they do at the frequency `at` [Hz].
+export function contactTable(scene, states, at) {
+  const parts = partsOf(scene);
   if (!parts.contacts.length) return el("p", { class: "note" }, "The scene has no contacts: it is linear.");
   const rows = parts.contacts.map((c) => [
     c.name,
@@ -204,7 +205,7 @@ function disk(drawing, scene, parts, states) {
       const here = place(dof, j);
       drawing.append(...mass(here, size, dof, dof === observed, null).filter(Boolean));
       if (pushed.includes(dof)) drawing.append(push(here, size));
-      if (j === 0) drawing.append(svg("text", { class: "halo", x: here.x + size + 5, y: here.y + 4 }, dof));
+      if (j === 0) drawing.append(svg("text", { class: "halo", x: here.x + size + (pushed.includes(dof) ? 21 : 5), y: here.y + 4 }, dof));
     }
   }
 }

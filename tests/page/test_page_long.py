@@ -1,0 +1,99 @@
+"""The page at length: every study of the bladed disk, a picture of each view, the rate of the sliders."""
+
+from __future__ import annotations
+
+import io
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from page_site import Site, opened
+from PIL import Image
+from test_page import BAD_SCENE
+
+from benchmarks.page import OPENED, SLIDE
+
+expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Locator, Page
+
+pytestmark = pytest.mark.long
+
+COLOURS = 256
+VIEWS = ("structure", "live", "response", "design", "map", "front", "point", "accuracy", "campbell")
+
+
+def folder(tmp_path: Path) -> Path:
+    """Where pictures go: a temporary folder, or the one of the documentation when they are to be renewed."""
+    named = os.environ.get("STICKSLIP_PAGE_PICTURES")
+    return Path(named) if named else tmp_path
+
+
+def keep(view: Page | Locator, file: Path) -> None:
+    """A picture, small by few colours; a map needs them all."""
+    picture = Image.open(io.BytesIO(view.screenshot(animations="disabled"))).convert("RGB")
+    if file.stem != "map":
+        picture = picture.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    picture.save(file, optimize=True)
+    assert 4_000 < file.stat().st_size < 200_000
+
+
+def studied(page: Page, site: Site, words: str = "") -> None:
+    page.goto(f"{site.url}/{words}")
+    page.locator("html[data-ready][data-live]").wait_for(state="attached")
+    page.click("#study")
+    expect(page.locator("#study-status")).to_have_text("Everything is there.", timeout=300_000)
+    expect(page.locator("#march-status")).to_contain_text("% apart", timeout=60_000)
+
+
+def test_every_view_of_the_bladed_disk(browser: Browser, site: Site, tmp_path: Path) -> None:
+    where = folder(tmp_path)
+    where.mkdir(parents=True, exist_ok=True)
+    with opened(browser, site) as (context, _):
+        page = context.new_page()
+        studied(page, site)
+        expect(page.locator("#design-facts")).to_contain_text("185.46 N")
+        assert float(page.get_attribute("#map-figure", "data-milliseconds") or "inf") < 500.0
+        page.mouse.move(0, 0)
+        for view in VIEWS:
+            keep(page.locator(f"#{view}"), where / f"{view}.png")
+        page.fill("#filter-contact", "shroud")
+        page.fill("#filter-N0_min", "60")
+        page.press("#filter-N0_min", "Enter")
+        boxes = page.locator("#library-table input[type=checkbox]")
+        for index in (0, 3, 6):
+            boxes.nth(index).check()
+        expect(page.locator("#compare-facts thead th")).to_have_count(4)
+        page.locator("#library-table").evaluate("node => { node.style.maxHeight = '18rem'; }")
+        page.locator("#library-table").evaluate("node => { node.style.overflowY = 'hidden'; }")
+        keep(page.locator("#library"), where / "library.png")
+        page.evaluate("window.scrollTo(0, 0)")
+        keep(page, where / "page.png")
+        file = {"name": "mine.toml", "mimeType": "application/toml", "buffer": BAD_SCENE.encode()}
+        page.set_input_files("#file", [file])
+        expect(page.locator("#field-contacts-0-mu-message")).to_be_visible()
+        keep(page.locator("#start"), where / "editor.png")
+
+
+def test_the_two_masses_in_the_dark(browser: Browser, site: Site, tmp_path: Path) -> None:
+    where = folder(tmp_path)
+    where.mkdir(parents=True, exist_ok=True)
+    with opened(browser, site, color_scheme="dark") as (context, _):
+        page = context.new_page()
+        studied(page, site, "?scene=two-dof")
+        keep(page, where / "dark.png")
+
+
+def test_the_page_opens_and_sliders_are_followed_in_time(browser: Browser, site: Site) -> None:
+    with opened(browser, site) as (context, _):
+        page = context.new_page()
+        page.goto(f"{site.url}/?scene=two-dof")
+        page.locator("html[data-ready][data-live]").wait_for(state="attached")
+        page.reload()
+        page.locator("html[data-ready][data-live]").wait_for(state="attached")
+        _, ready, _ = page.evaluate(OPENED)
+        rate = page.evaluate(SLIDE, [5.0, "damper-N0"])
+        assert ready < 1000.0, f"the page was ready after {ready:.0f} ms"
+        assert rate >= 15.0, f"{rate:.1f} responses a second"
