@@ -46,7 +46,10 @@ MAKERS: dict[str, Callable[[], Any]] = {
 _made: dict[str, Any] = {}
 
 
-@pytest.fixture(params=MAKERS)
+_SLOW = ("mistuning", "robust", "accuracy", "sensitivities")
+
+
+@pytest.fixture(params=[pytest.param(k, marks=pytest.mark.long if k in _SLOW else ()) for k in MAKERS])
 def result(request: pytest.FixtureRequest) -> Any:
     """One of every kind of result, computed once."""
     if request.param not in _made:

@@ -27,7 +27,12 @@ COMMANDS = {
 }
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+_QUICK = ("solve", "sweep", "march", "design")
+
+
+@pytest.mark.parametrize(
+    "command", [pytest.param(c, marks=() if c in _QUICK else pytest.mark.long) for c in COMMANDS]
+)
 def test_every_command_draws_and_writes(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -66,7 +66,7 @@ def test_a_report_has_everything_and_gives_the_same_again(
     assert numbers[0].groups() == numbers[1].groups()
 
 
-@pytest.mark.parametrize("kind", ["design", "pareto"])
+@pytest.mark.parametrize("kind", ["design", pytest.param("pareto", marks=pytest.mark.long)])
 def test_a_job_has_a_report(
     kind: str, server: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -91,6 +91,7 @@ def test_a_report_of_another_kind_is_refused(server: str, capsys: pytest.Capture
     assert "must be a design or a pareto job" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_pdf_is_printed_by_a_browser(tmp_path: Path) -> None:
     if not any(shutil.which(name) for name in BROWSERS):
         pytest.skip("no Chromium or Chrome is installed")
@@ -107,6 +108,7 @@ def test_without_a_browser_a_pdf_is_refused_in_words(
     assert not (tmp_path / "report.pdf").exists()
 
 
+@pytest.mark.long
 def test_a_report_without_linear_limits() -> None:
     """A law without a load to remove: the responses alone."""
     from service.report.design import Designed, design_report

@@ -11,8 +11,9 @@ from starlette.concurrency import run_in_threadpool
 from service.http import CallerDependency, JsonBody, ServiceDependency
 from service.kinds.scenes import SceneRequest, resolve_scene
 from service.routes.described import TEXT, media
-from service.scene_text import issues_of_scene, read_text, toml_text
+from service.scene_text import issues_of_scene, read_text
 from service.validation import validated
+from solver.toml_text import toml_text
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
 
