@@ -73,6 +73,7 @@ def pareto(
     points: options.Points = None,
     plot: options.Plot = None,
     out: options.Out = None,
+    report: Report = None,
     as_json: options.Json = False,
 ) -> None:
     """Find the front of peak against resonance band.
@@ -83,6 +84,7 @@ def pareto(
     from service.kinds.pareto import ParetoRequest, pareto_issues
 
     outputs = Outputs.asked(plot, out)
+    page = inputs.output_path("--report", report, SUFFIXES)
     told = problem_inputs.description(name, flags, "pareto", points=("--points", points))
     scene, given = problem_inputs.posed(told, ParetoRequest, pareto_issues)
     with bar("pareto", "designs") as on_progress:
@@ -90,6 +92,10 @@ def pareto(
 
         found = optim.pareto_front(scene, **given, on_progress=on_progress)
     outputs.write(found, found.plot if found.points else None)
+    if page is not None:
+        from service.report.design import Designed
+
+        write(Designed(scene=scene, problem=given, result=found.to_json()), page)
     if as_json:
         print_json(found.to_json())
     else:
