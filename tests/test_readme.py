@@ -22,6 +22,7 @@ from service.cli.app import app
 from service.cli.problem_inputs import OPTIONS
 from service.kinds.design import DesignRequest, design_issues
 from service.kinds.problem import arguments
+from service.settings import Settings
 from service.validation import validated
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -37,6 +38,7 @@ BLOCKS = [
     for block in re.findall(r"^```(\w+)\n(.*?)^```$", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
 ]
 COMMANDS = dict.fromkeys(line for language, text in BLOCKS if language == "sh" for line in text.splitlines())
+ELSEWISE = ("make ", "export ", "curl ")  # beginnings of lines that are no command of ours
 LONGEST_README = 250
 
 
@@ -74,7 +76,27 @@ def test_make_knows_the_targets(line: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("line", [line for line in COMMANDS if not line.startswith("make ")])
+@pytest.mark.parametrize("line", [line for line in COMMANDS if line.startswith("export ")])
+def test_exports_are_settings(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = dict(word.split("=", 1) for word in shlex.split(line)[1:])
+    for name, value in given.items():
+        monkeypatch.setenv(name, value)
+    read = Settings().model_fields_set
+    assert {f"STICKSLIP_{name.upper()}" for name in read} >= set(given)
+
+
+@pytest.mark.parametrize("line", [line for line in COMMANDS if line.startswith("curl ")])
+def test_requests_are_answered(line: str, server: str, tmp_path: Path) -> None:
+    if shutil.which("curl") is None:
+        pytest.skip("curl is not installed")
+    matrix_files(tmp_path)
+    words = [*shlex.split(line.replace(ADDRESS, server)), "--fail", "--silent", "--show-error"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("line", [line for line in COMMANDS if not line.startswith(ELSEWISE)])
 def test_commands_run(
     line: str, request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -87,6 +109,8 @@ def test_commands_run(
     if words[1] == "submit":
         monkeypatch.setenv("STICKSLIP_URL", request.getfixturevalue("server"))
     given = matrix_files(tmp_path) if words[1] == "import" else set()
+    if words[1] == "keys":
+        given |= {"stickslip.db"}
     if "--reduce" in words:
         given |= {f"{Path(words[words.index('--out') + 1]).stem}-reduced.npz"}
     if "--problem" in words:
