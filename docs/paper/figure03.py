@@ -1,6 +1,6 @@
 """Figure 3: a contact that separates, its response over frequency and the harmonics in it."""
 
-from look import FREE, STUCK, figure, finish, harmonic, highest, letters, linear_limits, say, shades
+from look import FREE, STUCK, curve, figure, finish, harmonic, highest, letters, linear_limits, say, shades
 
 import solver
 
@@ -11,9 +11,9 @@ points = {"a": 2.328, "b": 1.198, "c": 0.769, "d": 0.346}  # Hz
 solved = {letter: solver.solve(scene, frequency_hz=at) for letter, at in points.items()}
 
 with figure("figure03") as (left, right):
-    left.plot(free.values, free.amplitude, label="removed", **FREE)
-    left.plot(stuck.values, stuck.amplitude, label="stuck", **STUCK)
-    left.plot(branch.values, branch.amplitude, label="N1 = 200 N")
+    left.plot(*curve(free), label="removed", **FREE)
+    left.plot(*curve(stuck), label="stuck", **STUCK)
+    left.plot(*curve(branch), label="N1 = 200 N")
     letters(left, [(letter, points[letter], found.max_abs) for letter, found in solved.items()])
     left.set_ylim(0.0, 6.0)
     finish(left, "frequency [Hz]", "max |m2| [m]", legend="contact")

@@ -1,6 +1,6 @@
 """Figure 5: effect of the excitation level f0."""
 
-from look import FOUR, FREE, STUCK, figure, finish, highest, linear_limits, say, shades
+from look import FOUR, FREE, STUCK, curve, figure, finish, highest, linear_limits, say, shades
 
 import solver
 
@@ -11,14 +11,14 @@ free, stuck = linear_limits(scene, "damper")
 
 with figure("figure05") as (left, right):
     for (f0, branch), color in zip(responses.items(), shades(len(levels)), strict=True):
-        left.semilogy(branch.values, branch.amplitude, color=color, label=f"{f0}")
+        left.semilogy(*curve(branch), color=color, label=f"{f0}")
     left.axvline(highest(free).at, **FREE)
     left.axvline(highest(stuck).at, **STUCK)
     left.set_xlim(0.2, 2.6)
     finish(left, "frequency [Hz]", "max |m2| [m]", legend="f0 [N]")
     for (letter, color), at in zip(FOUR.items(), (2.328, 1.198, 0.769, 0.346), strict=True):
         branch = solver.sweep(scene, "excitation.amplitude", 1.0, 300.0, frequency_hz=at)
-        right.plot(branch.values, branch.amplitude, color=color, label=f"{letter}: {at} Hz")
+        right.plot(*curve(branch), color=color, label=f"{letter}: {at} Hz")
     finish(right, "f0 [N]", "max |m2| [m]", legend="")
 
 say("resonance, contact stuck", f"{highest(stuck).at:.3f} Hz")

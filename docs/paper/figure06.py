@@ -1,6 +1,6 @@
 """Figure 6: effect of the tangential stiffness kt."""
 
-from look import FOUR, figure, finish, say, shades
+from look import FOUR, curve, figure, finish, say, shades
 
 import solver
 
@@ -12,12 +12,12 @@ first = track.frequency < 2.0  # Hz; beyond it the peak of the second mode is hi
 
 with figure("figure06") as (left, right):
     for (kt, branch), color in zip(responses.items(), shades(len(values)), strict=True):
-        left.plot(branch.values, branch.amplitude, color=color, label=f"{kt}")
+        left.plot(*curve(branch), color=color, label=f"{kt}")
     left.plot(track.frequency[first], track.peak[first], color="black", linestyle="--", label="peaks")
     finish(left, "frequency [Hz]", "max |m2| [m]", legend="kt [N/m]")
     for (letter, color), at in zip(FOUR.items(), (2.328, 1.198, 0.769, 0.346), strict=True):
         branch = solver.sweep(scene, "damper.kt", 1.0, 100.0, frequency_hz=at)
-        right.plot(branch.values, branch.amplitude, color=color, label=f"{letter}: {at} Hz")
+        right.plot(*curve(branch), color=color, label=f"{letter}: {at} Hz")
     finish(right, "kt [N/m]", "max |m2| [m]", legend="")
 
 for kt in (5, 10, 30, 60):

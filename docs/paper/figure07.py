@@ -1,6 +1,6 @@
 """Figure 7: effect of the normal load N0, with N1 = 0.3 N0."""
 
-from look import FOUR, FREE, STUCK, figure, finish, highest, linear_limits, say, shades
+from look import FOUR, FREE, STUCK, curve, figure, finish, highest, linear_limits, say, shades
 
 import optim
 import solver
@@ -12,16 +12,16 @@ free, stuck = linear_limits(scene, "damper")
 best = optim.design(scene, variables={"damper.N0": (10.0, 500.0)})
 
 with figure("figure07") as (left, right):
-    left.plot(free.values, free.amplitude, label="removed", **FREE)
-    left.plot(stuck.values, stuck.amplitude, label="stuck", **STUCK)
+    left.plot(*curve(free), label="removed", **FREE)
+    left.plot(*curve(stuck), label="stuck", **STUCK)
     for (N0, branch), color in zip(responses.items(), shades(len(loads)), strict=True):
-        left.plot(branch.values, branch.amplitude, color=color, label=f"{N0}")
+        left.plot(*curve(branch), color=color, label=f"{N0}")
     left.plot([best.peak.at], [best.peak.value], "o", color="black", markersize=4.5)
     left.set_ylim(0.0, 7.0)
     finish(left, "frequency [Hz]", "max |m2| [m]", legend="N0 [N]")
     for (letter, color), at in zip(FOUR.items(), (2.328, 1.198, 0.769, 0.346), strict=True):
         branch = solver.sweep(scene, "damper.N0", 1.0, 500.0, frequency_hz=at)
-        right.plot(branch.values, branch.amplitude, color=color, label=f"{letter}: {at} Hz")
+        right.plot(*curve(branch), color=color, label=f"{letter}: {at} Hz")
     finish(right, "N0 [N]", "max |m2| [m]", legend="")
 
 say("best of the loads drawn", f"{min(loads, key=lambda N0: highest(responses[N0]).value)} N")

@@ -1,6 +1,6 @@
 """Figure 8: effect of the fluctuation N1 of the normal load, N0 = 100 N."""
 
-from look import FOUR, figure, finish, highest, say, shades
+from look import FOUR, curve, figure, finish, highest, say, shades
 
 import solver
 
@@ -10,11 +10,11 @@ responses = {N1: solver.sweep(scene.with_values({"damper.N1": N1})) for N1 in va
 
 with figure("figure08") as (left, right):
     for (N1, branch), color in zip(responses.items(), shades(len(values)), strict=True):
-        left.plot(branch.values, branch.amplitude, color=color, label=f"{N1}")
+        left.plot(*curve(branch), color=color, label=f"{N1}")
     finish(left, "frequency [Hz]", "max |m2| [m]", legend="N1 [N]")
     for (letter, color), at in zip(FOUR.items(), (2.328, 1.198, 0.769, 0.346), strict=True):
         branch = solver.sweep(scene, "damper.N1", 0.0, 500.0, frequency_hz=at)
-        right.plot(branch.values, branch.amplitude, color=color, label=f"{letter}: {at} Hz")
+        right.plot(*curve(branch), color=color, label=f"{letter}: {at} Hz")
     finish(right, "N1 [N]", "max |m2| [m]", legend="")
 
 for N1 in (0, 50, 100, 200, 500):

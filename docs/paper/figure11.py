@@ -1,6 +1,6 @@
 """Figure 11: the disk under different normal loads N0 of the shrouds, N1 = 0.3 N0."""
 
-from look import FOUR, FREE, STUCK, figure, finish, highest, linear_limits, say, shades
+from look import FOUR, FREE, STUCK, curve, figure, finish, highest, linear_limits, say, shades
 
 import optim
 import solver
@@ -12,15 +12,15 @@ free, stuck = linear_limits(scene, "shroud")
 best = optim.design(scene, variables={"shroud.N0": (20.0, 3000.0)})
 
 with figure("figure11") as (left, right):
-    left.semilogy(free.values, 1e3 * free.amplitude, label="removed", **FREE)
-    left.semilogy(stuck.values, 1e3 * stuck.amplitude, label="stuck", **STUCK)
+    left.semilogy(*curve(free, 1e3), label="removed", **FREE)
+    left.semilogy(*curve(stuck, 1e3), label="stuck", **STUCK)
     for (N0, branch), color in zip(responses.items(), shades(len(loads)), strict=True):
-        left.semilogy(branch.values, 1e3 * branch.amplitude, color=color, label=f"{N0}")
+        left.semilogy(*curve(branch, 1e3), color=color, label=f"{N0}")
     left.set_ylim(4e-3, 10.0)
     finish(left, "frequency [Hz]", "max |tip| [mm]", legend="N0 [N]")
     for (letter, color), at in zip(FOUR.items(), (575.0, 700.0, 755.0, 785.0), strict=True):
         branch = solver.sweep(scene, "shroud.N0", 20.0, 3000.0, frequency_hz=at)
-        right.loglog(branch.values, 1e3 * branch.amplitude, color=color, label=f"{letter}: {at:.0f} Hz")
+        right.loglog(*curve(branch, 1e3), color=color, label=f"{letter}: {at:.0f} Hz")
     finish(right, "N0 [N]", "max |tip| [mm]", legend="")
 
 say("resonance, shroud removed", f"{highest(free).at:.1f} Hz")

@@ -1,6 +1,6 @@
 """Figure 12: the disk under different fluctuations N1 of the normal load of the shrouds, N0 = 200 N."""
 
-from look import FOUR, figure, finish, highest, say, shades
+from look import FOUR, curve, figure, finish, highest, say, shades
 
 import solver
 
@@ -10,11 +10,11 @@ responses = {N1: solver.sweep(scene.with_values({"shroud.N1": N1}), limit=0.08e-
 
 with figure("figure12") as (left, right):
     for (N1, branch), color in zip(responses.items(), shades(len(values)), strict=True):
-        left.plot(branch.values, 1e3 * branch.amplitude, color=color, label=f"{N1}")
+        left.plot(*curve(branch, 1e3), color=color, label=f"{N1}")
     finish(left, "frequency [Hz]", "max |tip| [mm]", legend="N1 [N]")
     for (letter, color), at in zip(FOUR.items(), (530.0, 700.0, 755.0, 785.0), strict=True):
         branch = solver.sweep(scene, "shroud.N1", 0.0, 500.0, frequency_hz=at)
-        right.plot(branch.values, 1e3 * branch.amplitude, color=color, label=f"{letter}: {at:.0f} Hz")
+        right.plot(*curve(branch, 1e3), color=color, label=f"{letter}: {at:.0f} Hz")
     finish(right, "N1 [N]", "max |tip| [mm]", legend="")
 
 for N1, branch in responses.items():

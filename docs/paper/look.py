@@ -62,6 +62,14 @@ def harmonic(branch: solver.Branch, k: int) -> np.ndarray:
     return np.hypot(branch.observed[:, 2 * k - 1], branch.observed[:, 2 * k])
 
 
+def curve(branch: solver.Branch, unit: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Parameter and amplitude of a branch without folds, its polished peaks among the points."""
+    at = np.append(branch.values, [peak.at for peak in branch.peaks])
+    height = np.append(branch.amplitude, [peak.value for peak in branch.peaks])
+    order = np.argsort(at)
+    return at[order], unit * height[order]
+
+
 def highest(branch: solver.Branch) -> solver.Peak:
     """The highest peak of a branch that reached its end."""
     if not branch.completed or branch.peak is None:
