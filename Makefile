@@ -7,9 +7,6 @@ STAMP := .venv/.up-to-date
 PYTEST ?=
 # Which benchmarks: all when empty; `python -m benchmarks --help` lists them.
 BENCH ?=
-# What the reference describes: the names that users import.
-REFERENCE := solver optim service.client service.answers
-
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-long lint bench docs serve clean
 
@@ -57,7 +54,7 @@ bench: setup
 	$(BIN)/python -m benchmarks $(BENCH)
 
 docs: setup
-	$(BIN)/python -m pdoc --docformat numpy --no-show-source --output-directory site $(REFERENCE)
+	$(BIN)/python docs/reference.py site
 
 serve: setup
 	$(BIN)/stickslip serve

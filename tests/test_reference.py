@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
-import shutil
-import subprocess
+import runpy
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -13,6 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+SCRIPT = ROOT / "docs" / "reference.py"
 MODULES = ("solver", "optim", "service.client", "service.answers")
 
 
@@ -55,23 +55,37 @@ def own_docstring(found: object) -> str:
     return "" if generated else (text or "").strip()
 
 
-def test_the_reference_builds_without_a_warning(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By the command of `make docs`; pytest makes warnings errors."""
-    if shutil.which("make") is None:
-        pytest.skip("make is not installed")
-    main = pytest.importorskip("pdoc.__main__", reason="pdoc is not installed")
-    recipe = subprocess.run(
-        ["make", "--dry-run", "docs"], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    (line,) = [line for line in recipe.stdout.splitlines() if " -m pdoc " in line]
-    words = line.partition(" -m pdoc ")[2].split()
-    assert tuple(words[-len(MODULES) :]) == MODULES
-    words[words.index("site")] = str(tmp_path / "site")
-    monkeypatch.setattr(sys, "argv", ["pdoc", *words])
-    main.cli()
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What `make docs` writes; pytest makes warnings errors."""
+    pytest.importorskip("pdoc", reason="pdoc is not installed")
+    folder = tmp_path_factory.mktemp("site")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", [str(SCRIPT), str(folder)])
+        runpy.run_path(str(SCRIPT), run_name="__main__")
+    return folder
+
+
+def test_the_reference_builds_without_a_warning(site: Path) -> None:
     for module, name in NAMES:
-        page = (tmp_path / "site" / f"{module.replace('.', '/')}.html").read_text(encoding="utf-8")
+        page = (site / f"{module.replace('.', '/')}.html").read_text(encoding="utf-8")
         assert f'id="{name}"' in page, f"{module}.{name} is not in the reference"
+
+
+def test_parameters_read_as_they_are_written(site: Path) -> None:
+    """With a type and without, and where a description goes on in the next line."""
+    page = (site / "solver.html").read_text(encoding="utf-8")
+    text = " ".join(re.sub("<[^>]+>", "", page).split())
+    for part in (
+        "scene: what vibrates, with the values that stay fixed. ",
+        "that the harmonics are chosen for; see solver.adaptive.harmonics_for for where",
+        "frequency_hz (float): Excitation frequency [Hz].",
+    ):
+        assert part in text
+
+
+def test_make_builds_it() -> None:
+    assert "$(BIN)/python docs/reference.py site" in (ROOT / "Makefile").read_text(encoding="utf-8")
 
 
 def test_what_names_refer_to_exists_in_docstrings() -> None:
