@@ -11,7 +11,9 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext
 
 
-@pytest.fixture(scope="session")
+# Playwright keeps an event loop running in its thread, which other tests' own loops do not bear beside them:
+# it ends with each file.
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """A real Chromium."""
     api = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
