@@ -115,7 +115,8 @@ def run_sweep(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldS
     result["states"] = {}
     if len(branch.values):
         at = int(branch.amplitude.argmax())
-        names = [contact.name for contact in scene.contacts]
+        # Those of all sectors where one does not stand for them.
+        names = [contact.name for contact in branch.balance.scene.contacts]
         result["states"] = _states(names, branch.states[at].tolist())
     return JobOutput(result=result, shortfall=None if branch.completed else branch.status.value)
 

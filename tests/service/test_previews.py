@@ -64,6 +64,16 @@ def test_a_point_has_loops_and_what_the_contact_does_when(shipped: httpx.Client)
     assert sum(contact["shares"].values()) == pytest.approx(1.0)
 
 
+def test_of_a_disk_written_out_every_sector_has_its_states(shipped: httpx.Client) -> None:
+    scene = solver.load_scene("bladed-disk").to_dict()
+    scene["structure"]["sectors"] = 3
+    scene["structure"]["mistuning"] = {"of": ["tip"], "spread": 0.01}
+    found = post(shipped, kind="sweep", scene=scene, harmonics=3).json()
+    assert set(found["states"]) == {f"{name}@{j}" for name in ("shroud", "root") for j in range(3)}
+    point = post(shipped, kind="point", scene=scene, harmonics=3, frequency_hz=750.0).json()
+    assert [contact["name"] for contact in point["period"]["contacts"]] == list(found["states"])
+
+
 @pytest.mark.parametrize(
     ("body", "pointer"),
     [

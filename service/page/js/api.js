@@ -8,9 +8,10 @@ let offline = false;
 let back = null;
 
 export class Problem extends Error {
-  constructor(status, document) {
+  constructor(status, document, retryAfter = null) {
     super(document.detail || document.title || `HTTP status ${status}`);
     this.status = status;
+    this.retryAfter = retryAfter;
     this.errors = document.errors ?? [];
   }
 }
@@ -49,7 +50,8 @@ export async function fetched(path, { method = "GET", body, headers = {}, signal
     throw new Offline();
   }
   if (answer.ok) return answer;
-  const problem = new Problem(answer.status, await answer.json().catch(() => ({})));
+  const later = Number(answer.headers.get("Retry-After")) || null;
+  const problem = new Problem(answer.status, await answer.json().catch(() => ({})), later);
   if (answer.status === 401) tell("key-wanted", problem);
   throw problem;
 }

@@ -46,11 +46,14 @@ export function partsOf(scene) {
     contacts: scene.contacts ?? [],
     sectors: structure.kind === "cyclic" ? structure.sectors : 1,
     cyclic: structure.kind === "cyclic",
+    matrices: structure.kind === "matrices",
   };
 }
 
 export function chain(parts, width, height) {
-  const layers = layersOf(parts.dofs, parts.springs, parts.contacts);
+  const inOrder = new Map(parts.dofs.map((dof, i) => [dof, i + 1]));
+  const layers = parts.matrices ? inOrder : layersOf(parts.dofs, parts.springs, parts.contacts);
+  const above = parts.contacts.some((c) => !c.between.includes(GROUND)) ? 22 : 0;
   const columns = new Map();
   for (const dof of parts.dofs) {
     const layer = layers.get(dof);
@@ -61,7 +64,7 @@ export function chain(parts, width, height) {
   for (const [layer, names] of columns) {
     names.forEach((name, i) => {
       const x = 54 + (layer / (last + 0.35)) * (width - 90);
-      places.set(name, { x, y: (height * (i + 1)) / (names.length + 1) - 18 });
+      places.set(name, { x, y: (height * (i + 1)) / (names.length + 1) - 18 + above });
     });
   }
   const size = Math.min(24, (0.36 * (width - 90)) / (last + 1), (0.3 * height) / Math.max(...[...columns.values()].map((n) => n.length)));

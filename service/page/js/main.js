@@ -66,7 +66,7 @@ let drawn = "";
 // The drawing changes with the scene and the states alone; under a slider that is seldom.
 function drawScene() {
   const scene = shownScene();
-  const now = JSON.stringify([state.scene, states.states]);
+  const now = JSON.stringify([scene.name, states.states]);
   if (now !== drawn) drawStructure(byId("structure-figure"), scene, states.states);
   drawn = now;
   show(byId("structure-states"), contactTable(scene, states.states, states.at));
@@ -90,12 +90,14 @@ function study() {
   const body = asked();
   const { scene, set } = body;
   const path = variable();
+  // Peaks are followed where every contact is plain friction; a map without them is for all laws.
+  const tracked = current.body.contacts.every((contact) => (contact.law ?? "coulomb") === "coulomb");
   const ranged = { parameter: path, from: low, to: high };
   say("study-status", "The jobs are under way: response, design, map, front, accuracy, Campbell diagram.");
   const all = [
     run("sweep", body, sweepView, 6).then(() => referee(5)),
     run("design", { ...body, variables: { [path]: [low, high] } }, designView, 5),
-    run("map", { ...body, ...ranged, steps: 60, frequencies: 400 }, mapView, 4),
+    run("map", { ...body, ...ranged, steps: 60, frequencies: 400, ridge: tracked }, mapView, 4),
     run("accuracy", { scene, set }, accuracyView, 3),
     run("campbell", { ...body, ...campbellBody() }, campbellView, 3),
     run("pareto", { ...body, variables: { [path]: [low, high] } }, frontView, 2),

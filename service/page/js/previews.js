@@ -1,6 +1,8 @@
 // Previews: one at a time under way for each purpose, the newest wish next; what is overtaken is never sent.
 
-import { patiently, post } from "./api.js";
+import { patiently, pause, post } from "./api.js";
+
+const LONGEST_PAUSE = 5;
 
 const session = Math.random().toString(36).slice(2, 10);
 
@@ -21,6 +23,11 @@ export function previewer(purpose, onAnswer, onError) {
         onAnswer(answer, { milliseconds: performance.now() - begun, token });
       } catch (error) {
         onError(error, token);
+        // Too many just now: the same is asked again, unless something newer is wanted.
+        if (error.retryAfter) {
+          await pause(Math.min(error.retryAfter, LONGEST_PAUSE));
+          wanted ??= { body, token };
+        }
       }
     }
     busy = false;

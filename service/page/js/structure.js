@@ -21,7 +21,7 @@ const wordsOf = (state) => STATES[state]?.[1] ?? "not computed yet";
 // Draws `scene`; `states` are those of its contacts by name.
 export function drawStructure(host, scene, states) {
   const parts = partsOf(scene);
-  const names = parts.contacts.map((c) => `${c.name} ${wordsOf(states?.[c.name])}`).join(", ");
+  const names = parts.contacts.map((c) => `${c.name} ${statesOf(states, c.name)}`).join(", ");
   const label = `${scene.name}: ${parts.cyclic ? `${parts.sectors} sectors of ` : ""}${parts.dofs.length} masses, ${parts.springs.length} springs; ${names || "no contacts"}`;
   const drawing = svg("svg", { role: "img", "aria-label": label }, pattern());
   if (parts.cyclic) disk(drawing, scene, parts, states);
@@ -60,7 +60,7 @@ export function contactTable(scene, states, at) {
   const rows = parts.contacts.map((c) => [
     c.name,
     c.between.join(" – "),
-    wordsOf(states?.[c.name]),
+    statesOf(states, c.name),
     { text: c.N0 === undefined ? (c.law ?? "") : `${number(c.N0)} N`, number: true },
     { text: c.kt === undefined ? "" : `${number(c.kt)} N/m`, number: true },
     { text: c.mu === undefined ? "" : number(c.mu), number: true },
@@ -71,6 +71,19 @@ export function contactTable(scene, states, at) {
     rows,
     where,
   );
+}
+
+// The state of a contact in sector j; of a disk written out every sector has its own.
+const stateIn = (states, name, j) => states?.[`${name}@${j}`] ?? states?.[name];
+
+// What a contact does, in words; where sectors differ, in how many of them.
+function statesOf(states, name) {
+  const counts = new Map();
+  for (const [contact, found] of Object.entries(states ?? {})) {
+    if (ownName(contact) === name) counts.set(wordsOf(found), (counts.get(wordsOf(found)) ?? 0) + 1);
+  }
+  if (counts.size < 2) return [...counts.keys()][0] ?? wordsOf(undefined);
+  return [...counts].map(([words, count]) => `${words} in ${count}`).join(", ");
 }
 
 // Two plates that rub, across the way from a to b.
@@ -121,7 +134,7 @@ function arrow(place, size) {
   return [
     svg("path", { class: "force", d: `M${x} ${top - 26}V${top - 6}` }),
     svg("path", { class: "force", d: `M${x - 4} ${top - 8}H${x + 4}L${x} ${top}Z` }),
-    svg("text", { class: "halo", x: x + 8, y: top - 15 }, "force"),
+    svg("text", { class: "halo", x: x - 8, y: top - 15, "text-anchor": "end" }, "force"),
   ];
 }
 
@@ -131,6 +144,17 @@ const hatched = (x, y, wide) => {
   return svg("path", { class: "earth", d });
 };
 
+// A structure given by matrices: its DOFs in one box.
+function box(places, size) {
+  const [xs, ys] = [[...places.values()].map((p) => p.x), [...places.values()].map((p) => p.y)];
+  const [left, top] = [Math.min(...xs) - size - 16, Math.min(...ys) - size - 10];
+  const [right, bottom] = [Math.max(...xs) + size + 16, Math.max(...ys) + size + 10];
+  return [
+    svg("rect", { class: "earth", x: left, y: top, width: right - left, height: bottom - top, rx: 10, "stroke-dasharray": "5 4" }),
+    svg("text", { class: "soft", x: left + 6, y: bottom + 16 }, "given by its matrices"),
+  ];
+}
+
 const forcesOf = (scene) => (Array.isArray(scene.excitation) ? scene.excitation : [scene.excitation]);
 
 function lumped(drawing, scene, parts, states) {
@@ -139,28 +163,19 @@ function lumped(drawing, scene, parts, states) {
   drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
   const end = (name, other, count) =>
     name === GROUND ? { x: ground.x, y: (places.get(ownName(other)) ?? { y: 0 }).y + 10 * count } : places.get(ownName(name));
+  if (parts.matrices) drawing.append(...box(places, size));
   const wall = [...places.values()].map((p) => p.y);
   const [low, high] = [Math.min(...wall) - 26, Math.max(...wall) + 26];
-  drawing.append(svg("g", { transform: `rotate(90 ${ground.x} ${(low + high) / 2})` }, hatched(ground.x, (low + high) / 2, (high - low) / 2)));
+  if (!parts.matrices) drawing.append(svg("g", { transform: `rotate(90 ${ground.x} ${(low + high) / 2})` }, hatched(ground.x, (low + high) / 2, (high - low) / 2)));
   parts.springs.forEach((s) => {
     const [a, b] = [end(s.between[0], s.between[1], 0), end(s.between[1], s.between[0], 0)];
     if (a && b) drawing.append(spring(a, b, 6, `${s.name ?? "spring"}: ${number(s.k)} N/m`));
   });
-  parts.contacts.forEach((c, i) => {
-    const free = c.between.find((name) => name !== GROUND);
-    const grounded = c.between.includes(GROUND);
-    const a = places.get(ownName(free));
-    const b = grounded ? { x: a.x, y: height - 42 } : places.get(ownName(c.between[1]));
-    if (!a || !b) return;
-    const lift = grounded ? 0 : 34 + 20 * i;
-    const [p, q] = grounded ? [{ x: a.x, y: a.y + size }, b] : [{ x: a.x, y: a.y + lift }, { x: b.x, y: b.y + lift }];
-    const words = `${c.name} ${wordsOf(states?.[c.name])}`;
-    if (!grounded) drawing.append(svg("path", { class: "earth", d: `M${a.x} ${a.y}V${p.y}M${b.x} ${b.y}V${q.y}` }));
-    drawing.append(plates(p, q, 20, classOf(states?.[c.name]), words));
-    if (grounded) drawing.append(hatched(b.x, b.y, 18));
-    const side = (p.x + q.x) / 2 > width / 2;
-    drawing.append(svg("text", { class: "halo", x: (p.x + q.x) / 2 + (grounded ? (side ? -18 : 18) : 0), y: (p.y + q.y) / 2 + (grounded ? 4 : 24), "text-anchor": grounded ? (side ? "end" : "start") : "middle" }, words));
-  });
+  const held = new Map();
+  for (const contact of parts.contacts) {
+    const words = `${contact.name} ${wordsOf(states?.[contact.name])}`;
+    drawing.append(...lumpedContact(contact, places, size, held, classOf(states?.[contact.name]), words));
+  }
   for (const dof of parts.dofs) {
     drawing.append(...mass(places.get(dof), size, dof, dof === ownName(scene.observe.dof), { dy: 4 }).filter(Boolean));
   }
@@ -170,13 +185,46 @@ function lumped(drawing, scene, parts, states) {
   }
 }
 
+// A contact to the ground hangs below its mass, one between masses is drawn above them; `held` counts those there.
+function lumpedContact({ between }, places, size, held, state, words) {
+  const free = ownName(between.find((name) => name !== GROUND));
+  const grounded = between.includes(GROUND);
+  const [a, b] = [places.get(free), places.get(ownName(between[grounded ? 0 : 1])) ?? places.get(free)];
+  if (!a || !b) return [];
+  const where = grounded ? free : "above";
+  const before = held.get(where) ?? 0;
+  held.set(where, before + 1);
+  if (grounded) {
+    const x = a.x + 48 * before;
+    const [top, bottom] = [a.y + size, CHAIN.height - 42];
+    const left = x > CHAIN.width / 2 && before === 0;
+    return [
+      before ? svg("path", { class: "earth", d: `M${a.x} ${a.y + size + 4}H${x}` }) : null,
+      plates({ x, y: top }, { x, y: bottom }, 20, state, words),
+      hatched(x, bottom, 18),
+      before
+        ? svg("text", { class: "halo", x: Math.min(x + 40, CHAIN.width - 4), y: bottom + 22 + 15 * (before - 1), "text-anchor": "end" }, words)
+        : svg("text", { class: "halo", x: x + (left ? -18 : 18), y: (top + bottom) / 2 + 4, "text-anchor": left ? "end" : "start" }, words),
+    ].filter(Boolean);
+  }
+  const side = a.x < b.x ? 10 : -10;
+  const y = Math.max(Math.min(a.y, b.y) - size - 20 - 34 * before, 24);
+  const [p, q] = [{ x: a.x + side, y }, { x: b.x - side, y }];
+  return [
+    svg("path", { class: "earth", d: `M${p.x} ${a.y}V${y}M${q.x} ${b.y}V${y}` }),
+    plates(p, q, 20, state, words),
+    svg("text", { class: "halo", x: (p.x + q.x) / 2, y: y - 16, "text-anchor": "middle" }, words),
+  ];
+}
+
 function disk(drawing, scene, parts, states) {
   const radius = 190;
   const { place, hub, shown, closed, size } = ring(parts, radius);
   const pad = 34;
-  const depth = closed ? 2 * (radius + pad) : radius + 2 * pad;
+  const depth = closed ? 2 * (radius + pad) : radius + 2 * pad + 26;
   drawing.setAttribute("viewBox", `${-radius - pad - 40} ${-radius - pad} ${2 * (radius + pad + 40)} ${depth}`);
   drawing.append(svg("circle", { class: "earth", r: radius * 0.12, "stroke-dasharray": "3 3" }), svg("text", { class: "soft", y: 4, "text-anchor": "middle" }, "hub"));
+  if (!closed) drawing.append(svg("text", { class: "soft", y: radius * 0.12 + 16, "text-anchor": "middle" }, `${shown} of ${parts.sectors} sectors`));
   const end = (name, j) => {
     const next = name.endsWith("@next") ? 1 : 0;
     return name === GROUND ? hub(j) : place(ownName(name), j + next);
@@ -191,11 +239,12 @@ function disk(drawing, scene, parts, states) {
   for (const j of sectors) {
     for (const c of parts.contacts) {
       if (!reach(c.between, j)) continue;
-      const words = `${c.name} ${wordsOf(states?.[c.name])}`;
+      const found = stateIn(states, c.name, j);
+      const words = `${c.name} ${wordsOf(found)}`;
       const ends = [end(c.between[0], j), end(c.between[1], j)];
       const [a, b] = beside(...ends, size);
       if (a !== ends[0]) drawing.append(svg("path", { class: "earth", d: `M${ends[0].x} ${ends[0].y}L${a.x} ${a.y}M${ends[1].x} ${ends[1].y}L${b.x} ${b.y}` }));
-      drawing.append(plates(a, b, Math.max(size * 0.95, 8), classOf(states?.[c.name]), words));
+      drawing.append(plates(a, b, Math.max(size * 0.95, 8), classOf(found), words));
     }
   }
   const observed = ownName(scene.observe.dof);
@@ -205,7 +254,8 @@ function disk(drawing, scene, parts, states) {
       const here = place(dof, j);
       drawing.append(...mass(here, size, dof, dof === observed, null).filter(Boolean));
       if (pushed.includes(dof)) drawing.append(push(here, size));
-      if (j === 0) drawing.append(svg("text", { class: "halo", x: here.x + size + (pushed.includes(dof) ? 21 : 5), y: here.y + 4 }, dof));
+      const far = size + (closed && pushed.includes(dof) ? 21 : 5);
+      if (j === 0) drawing.append(svg("text", { class: "halo", x: here.x + (closed ? far : -far), y: here.y + 4, "text-anchor": closed ? "start" : "end" }, dof));
     }
   }
 }
