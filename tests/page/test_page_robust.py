@@ -61,6 +61,36 @@ def test_a_reload_goes_on_watching_and_two_tabs_do_not_disturb_each_other(
         expect(tab.locator("#map-status")).to_contain_text("The job was stopped.")
 
 
+def test_another_scene_in_the_middle_of_a_study_begins_anew(profile: Profile, site: Site) -> None:
+    context, _ = profile
+    page = visit(context, site, "?scene=two-dof&set=damper.mu:0.31")
+    page.click("#study")
+    expect(page.locator("#jobs-list")).to_contain_text("pareto of two-dof")
+    page.select_option("#scene", "bladed-disk")
+    expect(page.locator("#live-status")).to_contain_text("0.1016 mm")
+    expect(page.locator("#jobs-list")).to_have_text("None yet.")
+    expect(page.locator("#study-status")).to_have_text("")
+    assert page.url.endswith("?scene=bladed-disk&contact=shroud&range=20:3000")
+    for job in httpx.get(f"{site.url}/v1/jobs").json()["items"]:
+        if job["status"] in ("accepted", "running"):
+            httpx.delete(f"{site.url}/v1/jobs/{job['id']}")
+
+
+def test_a_study_that_falls_short_says_so(profile: Profile, site: Site) -> None:
+    context, watch = profile
+    watch.allowed = ("status of 422",)
+    page = visit(context, site, "?scene=two-dof")
+    page.fill("#low", "2000")
+    page.click("#study")
+    expect(page.locator("#study-status")).to_contain_text("0 < from < to")
+    page.fill("#low", "99.9")
+    page.fill("#high", "1e200")
+    page.click("#study")
+    expect(page.locator("#design-status")).to_have_class("status bad")
+    expect(page.locator("#map-status")).to_contain_text("must be")
+    expect(page.locator("#study-status")).to_contain_text("did not come to their end", timeout=60_000)
+
+
 def test_the_service_stopped_and_started_under_the_page(profile: Profile, site: Site) -> None:
     context, watch = profile
     watch.allowed = AWAY

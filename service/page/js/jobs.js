@@ -11,22 +11,25 @@ const WORDS = { accepted: "waits", running: "runs", successful: "done", failed: 
 const shown = new Map();
 const watching = new Map();
 
-// Submits a job of a kind and follows it: `view` hears {progress, points, result, failed, waiting}.
+// A key that no other request has; also where a page that did not come over TLS has no `randomUUID`.
+const freshKey = () =>
+  [...crypto.getRandomValues(new Uint8Array(16))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+
+// Submits a job of a kind and follows it: `view` hears {progress, points, result, failed, waiting}. Whether it succeeded.
 export async function run(kind, body, view, priority = 0) {
   forget(kind);
   const mine = begin(kind);
   view.waiting?.();
-  const key = crypto.randomUUID();
+  const key = freshKey();
   try {
     const headers = { "Idempotency-Key": key };
     const job = await patiently(() => post("/v1/jobs", { kind, priority, ...body }, { headers, signal: mine.signal }));
     state.jobs[kind] = job.id;
     write();
-    await follow(kind, job.id, view, mine);
-    return job.id;
+    return await follow(kind, job.id, view, mine);
   } catch (error) {
     refused(kind, error, view, mine);
-    return null;
+    return false;
   }
 }
 
@@ -84,16 +87,19 @@ async function follow(kind, id, view, { signal }) {
         onPoints: (news) => view.points?.(news),
       });
   enter(kind, job);
-  if (job.status === "dismissed") return view.failed("The job was stopped.", []);
+  if (job.status === "dismissed") {
+    view.failed("The job was stopped.", []);
+    return false;
+  }
   const results = await patiently(() => request(`/v1/jobs/${id}/results`, { signal })).catch((error) => {
     if (error instanceof Problem) return null;
     throw error;
   });
-  if (signal.aborted) return undefined;
+  if (signal.aborted) return false;
   if (results) view.result(results.result, results.sweeps, job);
   if (job.status === "failed") view.failed(job.error?.detail ?? "The job failed.", job.error?.issues ?? []);
   tell("job-ended", job);
-  return undefined;
+  return job.status === "successful";
 }
 
 function enter(kind, job) {

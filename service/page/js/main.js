@@ -23,6 +23,7 @@ import { saveToml } from "./toml.js";
 const FIRST = "bladed-disk";
 const VIEWS = { sweep: sweepView, design: designView, map: mapView, pareto: frontView, accuracy: accuracyView, campbell: campbellView };
 let states = { states: null, at: null };
+let studies = 0;
 
 function sections() {
   const links = [...document.querySelectorAll("main > section")].slice(1).map((section) =>
@@ -75,6 +76,7 @@ function drawScene() {
 async function change(name) {
   for (const kind of [...Object.keys(VIEWS), "march"]) forget(kind);
   Object.assign(state, { scene: name, set: {}, contact: "", range: null, at: null, jobs: {} });
+  studies += 1;
   say("study-status", "");
   await open().catch(failed);
 }
@@ -95,14 +97,20 @@ function study() {
   const ranged = { parameter: path, from: low, to: high };
   say("study-status", "The jobs are under way: response, design, map, front, accuracy, Campbell diagram.");
   const all = [
-    run("sweep", body, sweepView, 6).then(() => referee(5)),
+    run("sweep", body, sweepView, 6).then(async (done) => done && (await referee(5))),
     run("design", { ...body, variables: { [path]: [low, high] } }, designView, 5),
     run("map", { ...body, ...ranged, steps: 60, frequencies: 400, ridge: tracked }, mapView, 4),
     run("accuracy", { scene, set }, accuracyView, 3),
     run("campbell", { ...body, ...campbellBody() }, campbellView, 3),
     run("pareto", { ...body, variables: { [path]: [low, high] } }, frontView, 2),
   ];
-  Promise.all(all).then(() => say("study-status", "Everything is there."));
+  const mine = (studies += 1);
+  Promise.all(all).then((done) => {
+    const short = done.filter((each) => !each).length;
+    if (mine !== studies) return;
+    if (short) say("study-status", `${short} of ${all.length} studies did not come to their end: each says why.`, true);
+    else say("study-status", "Everything is there.");
+  });
   return undefined;
 }
 
