@@ -4,7 +4,7 @@ import { svg } from "./dom.js";
 import { scale } from "./scales.js";
 
 const MARGIN = { left: 62, right: 14, top: 12, bottom: 44 };
-const PIXELS_A_TICK = { x: 85, y: 42 };
+const PIXELS_A_TICK = { x: 72, y: 42 };
 
 export function plane(width, height, x, y, { paper = true, above = 0 } = {}) {
   const box = {

@@ -35,7 +35,7 @@ export function linearTicks(low, high, count) {
   const rough = (high - low) / Math.max(count, 1);
   if (!(rough > 0)) return [tick(low)];
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * STEPS.find((each) => each * power >= rough * 0.999);
+  const step = power * STEPS.find((each) => each * power >= rough * 0.85);
   const found = [];
   for (let i = Math.ceil(low / step - 1e-9); i * step <= high + step * 1e-9; i += 1) found.push(tick(i * step));
   return found;

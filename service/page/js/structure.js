@@ -13,7 +13,9 @@ export const STATES = {
   "opens and closes": ["is-apart", "opens and closes"],
   "separated": ["is-apart", "open"],
 };
-const CHAIN = { width: 560, height: 250 };
+const WIDEST = 560;
+const NARROWEST = 320;
+const HEIGHT = 250;
 
 const classOf = (state) => STATES[state]?.[0] ?? "is-unknown";
 const wordsOf = (state) => STATES[state]?.[1] ?? "not computed yet";
@@ -25,7 +27,7 @@ export function drawStructure(host, scene, states) {
   const label = `${scene.name}: ${parts.cyclic ? `${parts.sectors} sectors of ` : ""}${parts.dofs.length} masses, ${parts.springs.length} springs; ${names || "no contacts"}`;
   const drawing = svg("svg", { role: "img", "aria-label": label }, pattern());
   if (parts.cyclic) disk(drawing, scene, parts, states);
-  else lumped(drawing, scene, parts, states);
+  else lumped(drawing, scene, parts, states, Math.min(Math.max(host.clientWidth, NARROWEST), WIDEST));
   show(host, drawing, legend());
 }
 
@@ -157,10 +159,9 @@ function box(places, size) {
 
 const forcesOf = (scene) => (Array.isArray(scene.excitation) ? scene.excitation : [scene.excitation]);
 
-function lumped(drawing, scene, parts, states) {
-  const { width, height } = CHAIN;
-  const { places, size, ground } = chain(parts, width, height);
-  drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
+function lumped(drawing, scene, parts, states, width) {
+  const { places, size, ground } = chain(parts, width, HEIGHT);
+  drawing.setAttribute("viewBox", `0 0 ${width} ${HEIGHT}`);
   const end = (name, other, count) =>
     name === GROUND ? { x: ground.x, y: (places.get(ownName(other)) ?? { y: 0 }).y + 10 * count } : places.get(ownName(name));
   if (parts.matrices) drawing.append(...box(places, size));
@@ -174,7 +175,7 @@ function lumped(drawing, scene, parts, states) {
   const held = new Map();
   for (const contact of parts.contacts) {
     const words = `${contact.name} ${wordsOf(states?.[contact.name])}`;
-    drawing.append(...lumpedContact(contact, places, size, held, classOf(states?.[contact.name]), words));
+    drawing.append(...lumpedContact(contact, { places, size, width, held }, classOf(states?.[contact.name]), words));
   }
   for (const dof of parts.dofs) {
     drawing.append(...mass(places.get(dof), size, dof, dof === ownName(scene.observe.dof), { dy: 4 }).filter(Boolean));
@@ -186,7 +187,7 @@ function lumped(drawing, scene, parts, states) {
 }
 
 // A contact to the ground hangs below its mass, one between masses is drawn above them; `held` counts those there.
-function lumpedContact({ between }, places, size, held, state, words) {
+function lumpedContact({ between }, { places, size, width, held }, state, words) {
   const free = ownName(between.find((name) => name !== GROUND));
   const grounded = between.includes(GROUND);
   const [a, b] = [places.get(free), places.get(ownName(between[grounded ? 0 : 1])) ?? places.get(free)];
@@ -196,14 +197,14 @@ function lumpedContact({ between }, places, size, held, state, words) {
   held.set(where, before + 1);
   if (grounded) {
     const x = a.x + 48 * before;
-    const [top, bottom] = [a.y + size, CHAIN.height - 42];
-    const left = x > CHAIN.width / 2 && before === 0;
+    const [top, bottom] = [a.y + size, HEIGHT - 42];
+    const left = x > width / 2 && before === 0;
     return [
       before ? svg("path", { class: "earth", d: `M${a.x} ${a.y + size + 4}H${x}` }) : null,
       plates({ x, y: top }, { x, y: bottom }, 20, state, words),
       hatched(x, bottom, 18),
       before
-        ? svg("text", { class: "halo", x: Math.min(x + 40, CHAIN.width - 4), y: bottom + 22 + 15 * (before - 1), "text-anchor": "end" }, words)
+        ? svg("text", { class: "halo", x: Math.min(x + 40, width - 4), y: bottom + 22 + 15 * (before - 1), "text-anchor": "end" }, words)
         : svg("text", { class: "halo", x: x + (left ? -18 : 18), y: (top + bottom) / 2 + 4, "text-anchor": left ? "end" : "start" }, words),
     ].filter(Boolean);
   }
