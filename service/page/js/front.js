@@ -6,6 +6,7 @@ import { byId, el, say, show, table } from "./dom.js";
 import { on } from "./events.js";
 import { length, lengthUnit, number, percent, quantity, seconds } from "./format.js";
 
+const FAR_APART = 8;
 let plot = null;
 let points = [];
 
@@ -31,11 +32,13 @@ export const frontView = {
   result(result) {
     points = [...result.points].sort((a, b) => a.band_hz - b.band_hz);
     if (!points.length) return say("front-status", result.status, true);
-    const unit = lengthUnit(Math.max(...points.map((p) => p.peak)));
+    const peaks = points.map((p) => p.peak);
+    const unit = lengthUnit(Math.max(...peaks));
+    const log = Math.max(...peaks) > FAR_APART * Math.min(...peaks);
     const words = (p) => Object.entries(p.values).map(([path, v]) => `${path} ${quantity(path, v)}`).join(", ");
     plot.draw({
       x: { name: "resonance band [Hz]", pad: 0.06 },
-      y: { name: `highest peak [${unit.name}]`, pad: 0.12 },
+      y: { name: `highest peak [${unit.name}]`, log, pad: 0.12 },
       series: [{ name: "front", x: points.map((p) => p.band_hz), y: points.map((p) => p.peak * unit.perMetre), colour: 1, shape: "circle", size: 4.5 }],
       describe: (x, y, i) => `${words(points[i])}: peak ${number(y)} ${unit.name}, band ${number(x)} Hz. Enter or a click loads it.`,
     });
