@@ -139,6 +139,7 @@ def test_sweeps_are_filtered_compared_and_shared(profile: Profile, site: Site) -
     expect(page.locator("#library-table tbody")).not_to_contain_text("damper 50 N")
     page.get_by_label("Compare two-dof, damper 80 N").check()
     page.get_by_label("Compare two-dof, damper 120 N").check()
+    expect(page.locator("#compare-facts thead th")).to_have_count(3)
     expect(page.locator("#compare-facts thead")).to_contain_text("two-dof, damper 80 N")
     assert paths(page, "compare-figure") == 2
     other = visit(context, site, page.url.removeprefix(f"{site.url}/"))

@@ -22,6 +22,9 @@ let plot = null;
 let items = [];
 let next = null;
 const details = new Map();
+// What was asked last; an older answer that comes later is not shown.
+let listed = 0;
+let compared = 0;
 
 export function startLibrary() {
   plot = chart(byId("compare-figure"), { label: "Sweeps side by side", file: "compare", height: 320 });
@@ -51,8 +54,10 @@ function query() {
 }
 
 async function list(address = null) {
+  const mine = (listed += 1);
   try {
     const page = await request(address ?? query());
+    if (mine !== listed) return;
     items = address ? [...items, ...page.items] : page.items;
     next = page.next;
     byId("library-more").hidden = next === null;
@@ -115,6 +120,7 @@ function choose(id, chosen) {
 }
 
 async function compare() {
+  const mine = (compared += 1);
   const found = [];
   for (const id of state.compare) {
     try {
@@ -124,6 +130,7 @@ async function compare() {
       say("library-status", error.message, true);
     }
   }
+  if (mine !== compared) return;
   byId("compare-note").hidden = found.length > 0;
   if (!found.length) {
     plot.shown = null;
