@@ -59,8 +59,8 @@ def downloaded(page: Page, selector: str) -> bytes:
     return Path(found.value.path()).read_bytes()
 
 
-def paths(page: Page, figure: str) -> int:
-    return page.locator(f"#{figure} svg.chart g[clip-path] > path.series").count()
+def has_paths(page: Page, figure: str, count: int) -> None:
+    expect(page.locator(f"#{figure} svg.chart g[clip-path] > path.series")).to_have_count(count)
 
 
 def test_a_newcomer_presses_one_button_and_takes_results_away(profile: Profile, site: Site) -> None:
@@ -81,8 +81,8 @@ def test_a_newcomer_presses_one_button_and_takes_results_away(profile: Profile, 
     expect(page.locator("#plan-facts")).to_contain_text("left out")
     expect(page.locator("#march-status")).to_contain_text("% apart")
     expect(page.locator("#map-facts")).to_contain_text("least peak2.346 m at 104.79 N")
-    assert paths(page, "response-figure") == 3
-    assert paths(page, "front-figure") == 1
+    has_paths(page, "response-figure", 3)
+    has_paths(page, "front-figure", 1)
     for motion in ("path.stick", "path.slip", "circle.f7"):
         assert page.locator(f"#loops-figure g[clip-path] > {motion}").count() >= 1
     assert page.locator("#campbell-figure path.f7").count() >= 2
@@ -141,7 +141,7 @@ def test_sweeps_are_filtered_compared_and_shared(profile: Profile, site: Site) -
     page.get_by_label("Compare two-dof, damper 120 N").check()
     expect(page.locator("#compare-facts thead th")).to_have_count(3)
     expect(page.locator("#compare-facts thead")).to_contain_text("two-dof, damper 80 N")
-    assert paths(page, "compare-figure") == 2
+    has_paths(page, "compare-figure", 2)
     other = visit(context, site, page.url.removeprefix(f"{site.url}/"))
     expect(other.locator("#compare-facts thead")).to_contain_text("two-dof, damper 120 N")
 
