@@ -131,8 +131,8 @@ class Return:
         (two_dof(N1=60.0), 0.5, 101),
         (loose_mass(), 1.2, 101),
         (mistuned(disk(sectors=4), of="root", values=VALUES[:4]), 3.4, 61),
-        (disk(2, N1=40.0), 3.3, 101),
-        (disk(1, "standing", sectors=3), 3.4, 61),
+        pytest.param(disk(2, N1=40.0), 3.3, 101, marks=pytest.mark.long),
+        pytest.param(disk(1, "standing", sectors=3), 3.4, 61, marks=pytest.mark.long),
     ],
     ids=["slipping", "separating", "out of phase", "slow", "loose", "mistuned", "cyclic", "standing"],
 )

@@ -98,7 +98,7 @@ def test_random_responses(problem: tuple[Scene, int, float]):
 
 
 @given(problem=problems())
-@settings(max_examples=80, **_ALWAYS_THE_SAME)
+@settings(max_examples=30, **_ALWAYS_THE_SAME)
 def test_random_motions_against_time_marching(problem: tuple[Scene, int, float]):
     marched(*problem)
 
