@@ -201,15 +201,16 @@ def accuracy_study(
     ways += [(h, n) for n in samples for h in harmonics if n >= _PER_WAVE * max(h, 1)]
     prepared: list[tuple[AccuracyRow, Callable[[], object]]] = []
     asked = should_stop or (lambda: False)
+    tell = on_progress or (lambda _share, _rows: None)
+    steps = len(ways) + repeats
     for done, (highest, count) in enumerate(ways):
         if asked():
             break
         way = _prepared(scene, p, highest, count, exact)
         if way is not None:
             prepared.append(way)
-        if on_progress is not None:
-            on_progress((done + 1) / len(ways), len(prepared))
-    rows = _timed(prepared, repeats, asked)
+        tell((done + 1) / steps, len(prepared))
+    rows = _timed(prepared, repeats, asked, lambda turns: tell((len(ways) + turns) / steps, len(prepared)))
     stopped = asked()
     return AccuracyStudy(
         scene=scene.name, frequency_hz=frequency_hz, reference=exact,
@@ -291,7 +292,10 @@ def _prepared(
 
 
 def _timed(
-    prepared: list[tuple[AccuracyRow, Callable[[], object]]], repeats: int, asked: Callable[[], bool]
+    prepared: list[tuple[AccuracyRow, Callable[[], object]]],
+    repeats: int,
+    asked: Callable[[], bool],
+    tell: Callable[[int], None],
 ) -> list[AccuracyRow]:
     """Return the rows with their times, all measured in turn: a busy moment slows every one of them."""
     seconds = np.zeros((repeats, len(prepared)))
@@ -303,6 +307,7 @@ def _timed(
             begun = time.thread_time()  # other programs do not count
             work()
             seconds[turn, i] = time.thread_time() - begun
+        tell(turn + 1)
     medians = 1e3 * np.median(seconds, axis=0)
     return [
         replace(row, milliseconds=float(ms)) for (row, _), ms in zip(prepared, medians, strict=True)

@@ -122,7 +122,7 @@ def test_a_mistuning_study_is_that_of_python_and_the_worst_responses_are_stored(
         {**MAP, "scene": "bladed-disk", "parameter": "shroud.N0", "harmonics": 25, "steps": 1000,
          "frequencies": 500},
         {**PEAKS, "scene": "bladed-disk", "parameter": "shroud.N0", "harmonics": 50, "checks": 150},
-        {**ACCURACY, "repeats": 1000},
+        {**ACCURACY, "repeats": 500},
         {**CAMPBELL, "scene": "bladed-disk", "speeds_rpm": [[9000, 12000]], "harmonics": 50,
          "orders": list(range(1, 101))},
         {**MISTUNING, "samples": 1000},
