@@ -8,7 +8,7 @@ ball: δ = centre + axes ξ, where δ is the value of a parameter or its deviati
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -317,8 +317,3 @@ class UncertainSet:
 def is_number(value: object) -> bool:
     """Return whether a value is a finite number."""
     return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def is_table(value: object) -> bool:
-    """Return whether a value is a table."""
-    return isinstance(value, Mapping)

@@ -289,9 +289,8 @@ class Service:
             If there is none of this id that the caller may see.
         """
         missing = f"there is no design {design_id!r}"
-        job: JobRow | None = visible(self.jobs.get(design_id), caller, missing)
-        if job is not None and job.result_of is not None:
-            job = self.jobs.get(job.result_of)
+        asked = visible(self.jobs.get(design_id), caller, missing)
+        job = asked if asked.result_of is None else self.jobs.get(asked.result_of)
         row = None if job is None else self.designs.get(job.id)
         result = None if row is None else self.jobs.result(row.job_id)
         if job is None or row is None or result is None:

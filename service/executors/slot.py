@@ -192,7 +192,10 @@ class Slot(threading.Thread):
         if child is None:
             return
         child.orders.stop(held.token)
-        timer = threading.Timer(self._executor.grace_seconds, self._kill, (child.process, held.token))
+        self._kill_after_grace(child, held.token)
+
+    def _kill_after_grace(self, child: Child, token: int) -> None:
+        timer = threading.Timer(self._executor.grace_seconds, self._kill, (child.process, token))
         timer.daemon = True
         timer.start()
 
@@ -301,10 +304,7 @@ class Slot(threading.Thread):
 
     def _expect_withdrawn(self, child: Child) -> None:
         """A task taken back too late is computed all the same: it has the grace to notice."""
-        token = min(self._withdrawn)
-        timer = threading.Timer(self._executor.grace_seconds, self._kill, (child.process, token))
-        timer.daemon = True
-        timer.start()
+        self._kill_after_grace(child, min(self._withdrawn))
 
     def _lose_all(self, reason: str) -> None:
         """The process is gone: what it computed is lost, what waited behind goes back to the queue."""

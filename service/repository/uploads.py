@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from datetime import datetime
 
-from sqlalchemy import Connection, delete, insert, select
+from sqlalchemy import delete, insert, select
 
 from service.clock import utc_now
 from service.db import Database
@@ -40,10 +40,9 @@ class UploadRepository:
         self, *, owner: str, name: str, format: str, size: int, sha256: str, data: bytes
     ) -> tuple[UploadRow, bool]:
         """Store a file, or find the same one of the same owner and format; whether it was stored."""
-
-        def find_or_add(connection: Connection) -> tuple[UploadRow, bool]:
-            same = (Upload.owner == owner, Upload.sha256 == sha256, Upload.format == format)
-            query = select(*_COLUMNS).where(*same).order_by(Upload.id).limit(1)
+        same = (Upload.owner == owner, Upload.sha256 == sha256, Upload.format == format)
+        query = select(*_COLUMNS).where(*same).order_by(Upload.id).limit(1)
+        with self._db.writing() as connection:
             known = connection.execute(query).mappings().one_or_none()
             if known is not None:
                 return UploadRow(**known), False
@@ -56,12 +55,8 @@ class UploadRepository:
                 sha256=sha256,
                 created=utc_now(),
             )
-            values = {item.name: getattr(row, item.name) for item in fields(UploadRow)}
-            connection.execute(insert(Upload).values(**values, data=data))
+            connection.execute(insert(Upload).values(**asdict(row), data=data))
             return row, True
-
-        with self._db.writing() as connection:
-            return find_or_add(connection)
 
     def get(self, upload_id: str) -> UploadRow | None:
         """The upload, or None."""
