@@ -9,6 +9,7 @@ from sqlalchemy import Table, Update, bindparam, func, insert, select, update
 from sqlalchemy.sql.elements import ColumnElement
 
 from service.models import Job, JobResult, JobState
+from service.repository.guarding import OWNED
 from service.repository.rows import Attempt, JobRow, NewJob
 
 _JOB: Table = Job.metadata.tables["job"]
@@ -66,15 +67,10 @@ TAKE = (
 
 def _guarded(*conditions: ColumnElement[bool]) -> Update:
     """A change of the row of an attempt that still owns it."""
-    return update(_JOB).where(
-        _C.id == bindparam("job"),
-        _C.attempt == bindparam("number"),
-        _C.lease_owner == bindparam("holder"),
-        _C.state == JobState.RUNNING,
-        *conditions,
-    )
+    return update(_JOB).where(OWNED, *conditions)
 
 
+RENEW = _guarded().values(lease_until=bindparam("until"))
 REPORT = _guarded().values(
     progress=bindparam("fraction"), points=bindparam("counted"), lease_until=bindparam("until")
 )

@@ -23,8 +23,9 @@ from service.repository.checkpoints import (
     with_what_was_kept,
 )
 from service.repository.designs import insert_design
+from service.repository.guarding import OWNED, change_owned, of_attempt
 from service.repository.listing import met, owner_condition, plain_conditions
-from service.repository.recovery import FREE, change, guard, recover
+from service.repository.recovery import FREE, change, recover
 from service.repository.room import Room, require_share
 from service.repository.rows import Attempt, JobRow, NewJob, Recovered
 from service.repository.sweeps import insert_sweeps
@@ -37,8 +38,7 @@ _LISTED = [getattr(Job, field.name) for field in fields(JobRow) if field.name !=
 
 def _guarded(connection: Connection, statement: Executable, attempt: Attempt, values: dict[str, Any]) -> bool:
     """Execute a guarded change of the attempt's row; whether the attempt owned it."""
-    guard = {"job": attempt.job_id, "number": attempt.attempt, "holder": attempt.lease_owner}
-    return connection.execute(statement, guard | values).rowcount > 0
+    return connection.execute(statement, of_attempt(attempt) | values).rowcount > 0
 
 
 def _attempt(row: Any, owner: str) -> Attempt:
@@ -197,9 +197,9 @@ class JobRepository:
 
         A waiting job with points is one with a checkpoint: there is at least one point then.
         """
-        values = {"progress": fraction, "points": max(points, 1), "lease_until": lease_until}
+        values = {"fraction": fraction, "counted": max(points, 1), "until": lease_until}
         with self._db.writing() as connection:
-            owned = change(connection, guard(attempt), **values)
+            owned = _guarded(connection, statements.REPORT, attempt, values)
             if owned:
                 store_pieces(connection, attempt, pieces, self.now(), anew=anew)
             return owned
@@ -207,7 +207,8 @@ class JobRepository:
     def renew(self, attempts: Iterable[Attempt], lease_until: datetime) -> list[Attempt]:
         """Renew the leases; gives back the attempts that own their job no more."""
         with self._db.writing() as connection:
-            return [a for a in attempts if not change(connection, guard(a), lease_until=lease_until)]
+            until = {"until": lease_until}
+            return [a for a in attempts if not _guarded(connection, statements.RENEW, a, until)]
 
     def succeed(self, attempt: Attempt, output: JobOutput) -> bool:
         """Commit state, result and sweeps together, unless the job was lost or its cancel asked for."""
@@ -226,9 +227,9 @@ class JobRepository:
         """Commit a failure for good, with what was computed all the same."""
         with self._db.writing() as connection:
             finished = self.now()
-            changed = change(
+            changed = change_owned(
                 connection,
-                guard(attempt),
+                attempt,
                 state=JobState.FAILED,
                 finished=finished,
                 error=failure.to_json(),
@@ -243,14 +244,14 @@ class JobRepository:
     def lose(self, attempt: Attempt, reason: str) -> Recovered:
         """The attempt's worker died: the job waits again, or fails after its last attempt."""
         with self._db.writing() as connection:
-            return recover(connection, guard(attempt), reason, self.now())
+            return recover(connection, OWNED, reason, self.now(), of_attempt(attempt))
 
     def release(self, attempt: Attempt) -> bool:
         """Give an unfinished job back to the queue, with its checkpoint, without costing it an attempt."""
         with self._db.writing() as connection:
-            return change(
+            return change_owned(
                 connection,
-                guard(attempt),
+                attempt,
                 state=JobState.ACCEPTED,
                 attempt=attempt.attempt - 1,
                 started=None,
@@ -261,8 +262,8 @@ class JobRepository:
     def dismiss(self, attempt: Attempt) -> bool:
         """The running job was stopped because its cancel was asked for."""
         with self._db.writing() as connection:
-            dismissed = change(
-                connection, guard(attempt), state=JobState.DISMISSED, finished=self.now(), **FREE
+            dismissed = change_owned(
+                connection, attempt, state=JobState.DISMISSED, finished=self.now(), **FREE
             )
             if dismissed:
                 drop_checkpoint(connection, attempt.job_id)

@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, and_, select, update
+from sqlalchemy import ColumnElement, Connection, select, update
 
 from service.jobs import FailureKind, JobFailure
 from service.models import Job, JobState
 from service.repository.checkpoints import as_far_as_kept, drop_checkpoint
-from service.repository.rows import Attempt, Recovered
+from service.repository.rows import Recovered
 
 FREE: dict[str, Any] = {"lease_owner": None, "lease_until": None}
-
-
-def guard(attempt: Attempt) -> ColumnElement[bool]:
-    """True for the job's row only while this attempt owns it."""
-    return and_(
-        Job.id == attempt.job_id,
-        Job.attempt == attempt.attempt,
-        Job.lease_owner == attempt.lease_owner,
-        Job.state == JobState.RUNNING,
-    )
 
 
 def change(connection: Connection, condition: ColumnElement[bool], **values: Any) -> bool:
@@ -35,6 +26,7 @@ def recover(
     condition: ColumnElement[bool],
     reason: str,
     now: datetime,
+    parameters: Mapping[str, Any] | None = None,
     *,
     skip_locked: bool = False,
 ) -> Recovered:
@@ -45,7 +37,7 @@ def recover(
     columns = (Job.id, Job.attempt, Job.max_attempts, Job.cancel_requested)
     query = select(*columns).where(condition).with_for_update(skip_locked=skip_locked)
     counts = dict.fromkeys(("accepted", "failed", "dismissed"), 0)
-    for row in connection.execute(query).all():
+    for row in connection.execute(query, parameters).all():
         values: dict[str, Any] = {"state": JobState.ACCEPTED, "started": None, **as_far_as_kept()}
         if row.cancel_requested:
             values = {"state": JobState.DISMISSED, "finished": now}

@@ -7,6 +7,8 @@ is and its result exists if and only if it was successful (or failed with what i
 
 from __future__ import annotations
 
+import importlib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -22,14 +24,14 @@ from hypothesis.stateful import (
     rule,
     run_state_machine_as_test,
 )
-from sqlalchemy import delete, select
+from sqlalchemy import Integer, String, bindparam, delete, select
 
 from service import revisions
 from service.db import Database
 from service.errors import IdempotencyError, QueueFullError
 from service.jobs import FailureKind, JobFailure, JobOutput
 from service.models import Job, JobResult, JobState
-from service.repository import Attempt, JobRepository, NewJob
+from service.repository import Attempt, JobRepository, NewJob, job_statements
 
 LEASE = timedelta(seconds=60)
 ROOM = 4
@@ -286,14 +288,23 @@ def test_the_queue_keeps_its_promises_for_long(module_database: Database) -> Non
     run(module_database, examples=400, steps=80)
 
 
-def test_a_queue_that_forgets_the_guard_is_caught(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def unguarded() -> Iterator[None]:
+    """The condition of all guarded statements forgets attempt and owner, while the block lasts."""
+    forgotten = (bindparam("number", type_=Integer) >= 0) & (bindparam("holder", type_=String) != "")
+    with pytest.MonkeyPatch.context() as patch:
+        weak = (Job.id == bindparam("job")) & (Job.state == JobState.RUNNING) & forgotten
+        for module in ("guarding", "jobs"):
+            patch.setattr(f"service.repository.{module}.OWNED", weak)
+        importlib.reload(job_statements)
+        yield
+    importlib.reload(job_statements)
+
+
+@pytest.mark.usefixtures("unguarded")
+def test_a_queue_that_forgets_the_guard_is_caught(tmp_path: Path) -> None:
     """The test can fail: a queue that lets a lost attempt write is found out."""
     url = f"sqlite:///{tmp_path}/jobs.db"
     revisions.upgrade(url)
-
-    def without_owner(attempt: Attempt) -> object:
-        return (Job.id == attempt.job_id) & (Job.state == JobState.RUNNING)
-
-    monkeypatch.setattr("service.repository.jobs.guard", without_owner)
     with pytest.raises(AssertionError):
         run(Database(url), examples=200, steps=50, phases=(Phase.generate,))
