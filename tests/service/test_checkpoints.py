@@ -210,18 +210,28 @@ def test_the_beginning_of_another_branch_is_not_used(caplog: pytest.LogCaptureFi
     assert "must be the beginning of the same branch" in caplog.text
 
 
-def test_a_damaged_checkpoint_is_dropped(database: Database, caplog: pytest.LogCaptureFixture) -> None:
-    jobs = JobRepository(database)
+def test_a_checkpoint_damaged_in_the_database_is_replaced(
+    database: Database, caplog: pytest.LogCaptureFixture
+) -> None:
+    """It is handed out as it is: who uses it compares the checksums, and what is kept next replaces it."""
+    jobs, later = JobRepository(database), utc_now() + timedelta(seconds=60)
     jobs.submit(new_job(), queue_limit=10)
     attempt = claimed(jobs)
-    assert jobs.keep(attempt, [piece(0), piece(1)], 0.5, 7, utc_now() + timedelta(seconds=60))
+    assert jobs.keep(attempt, [piece(0), piece(1)], 0.5, 7, later)
     assert jobs.release(attempt)
     with database.writing() as connection:
         connection.execute(update(Checkpoint).where(Checkpoint.part == 1).values(data=b"something else"))
     again = claimed(jobs)
-    assert (again.saved, again.progress, again.points) == ((), 0.0, 0)
-    assert kept(database, attempt.job_id) == []
-    assert f"job {attempt.job_id} begins anew: piece 1 of its checkpoint" in caplog.text
+    assert [one.part for one in again.saved] == [0, 1]
+
+    def keep(message: Kept) -> None:
+        assert jobs.keep(again, message.pieces, 0.1, 1, later, anew=message.anew)
+
+    checkpoints = Checkpoints(again.job_id, again.saved, keep, pace())
+    assert checkpoints.found() == {}
+    assert f"job {attempt.job_id} begins anew, its checkpoint cannot be used: piece 1 does" in caplog.text
+    checkpoints.add(0, {"values": np.zeros(2)})
+    assert [part for part, _ in kept(database, attempt.job_id)] == [0]
 
 
 def new_job() -> NewJob:
