@@ -70,6 +70,7 @@ class _State(Collector):
         gone = self._service.retention.pruned
         pruned.add_metric(("jobs",), float(gone.jobs))
         pruned.add_metric(("sweeps",), float(gone.sweeps))
+        pruned.add_metric(("uploads",), float(gone.uploads))
         yield pruned
 
 

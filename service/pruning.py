@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import timedelta
 
 from sqlalchemy.exc import DBAPIError
@@ -10,14 +11,20 @@ from service.db import Database, database_name, database_path, is_sqlite, shown,
 from service.errors import DatabaseError
 from service.repository.jobs import JobRepository
 from service.repository.retention import Pruned, RetentionRepository
-from service.retention import prune
+from service.retention import prune, prune_uploads
 from service.revisions import current_revision, head_revision
 
 
 def prune_database(
-    url: str, seconds: float, *, keep_designs: bool, dry_run: bool = False, vacuum: bool = False
+    url: str,
+    seconds: float,
+    *,
+    keep_designs: bool,
+    uploads: bool = False,
+    dry_run: bool = False,
+    vacuum: bool = False,
 ) -> Pruned:
-    """Delete the jobs that ended longer ago than `seconds`, or count them.
+    """Delete the jobs that ended longer ago than `seconds`, and uploads as old, or count them.
 
     Raises
     ------
@@ -43,9 +50,13 @@ def prune_database(
     try:
         before = JobRepository(database).now() - timedelta(seconds=seconds)
         if dry_run:
-            return RetentionRepository(database).count(before, keep_designs=keep_designs)
+            repository = RetentionRepository(database)
+            counted = repository.count(before, keep_designs=keep_designs)
+            return replace(counted, uploads=len(repository.old_uploads(before)) if uploads else 0)
         database.acquire()
-        found = prune(database, before, keep_designs=keep_designs, pause=lambda _seconds: False)
+        found = prune(database, before, keep_designs=keep_designs, pause=_at_once)
+        if uploads:
+            found += prune_uploads(database, before, pause=_at_once)
         if vacuum:
             shrink(url)
         return found
@@ -53,3 +64,8 @@ def prune_database(
         raise DatabaseError(f"{name} cannot be used: {error.orig}") from error
     finally:
         database.close()
+
+
+def _at_once(_seconds: float) -> bool:
+    """Without a pause: nobody else waits for the database."""
+    return False

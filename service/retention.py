@@ -1,4 +1,4 @@
-"""Retention: old jobs and their sweeps are deleted, a little at a time.
+"""Retention: old jobs, their sweeps and old uploads are deleted, a little at a time.
 
 Nothing may hold the database for long: SQLite has one writer. Every transaction is as large as it can be
 without taking longer than a few hundredths of a second, and between two of them there is a pause as long as
@@ -94,6 +94,15 @@ def prune(
     return total
 
 
+def prune_uploads(
+    database: Database, before: datetime, *, pause: Callable[[float], bool] | None = None
+) -> Pruned:
+    """Delete the uploads that came before a time and are not used, one by one; arguments as of `prune`."""
+    repository, paced = RetentionRepository(database), _Paced(pause or _sleep)
+    old = repository.old_uploads(before)
+    return Pruned(uploads=sum(paced.once(partial(repository.delete_upload, one, before)) for one in old))
+
+
 def _sleep(seconds: float) -> bool:
     time.sleep(seconds)
     return False
@@ -107,7 +116,8 @@ class Retention:
     database : Database
         Where the jobs are.
     settings : Settings
-        `retention_days` and `retention_keep_designs`; without days nothing is ever deleted.
+        `retention_days`, `retention_keep_designs` and `retention_upload_days`; without days nothing is ever
+        deleted.
     now : callable
         The clock of the database.
     """
@@ -122,7 +132,7 @@ class Retention:
 
     def start(self) -> None:
         """Begin, if the settings say so."""
-        if self._settings.retention_days is not None:
+        if (self._settings.retention_days, self._settings.retention_upload_days) != (None, None):
             self._thread.start()
 
     def stop(self) -> None:
@@ -136,22 +146,30 @@ class Retention:
             try:
                 found = self.once()
             except Exception:
-                log.exception("old jobs could not be deleted, it is tried again later")
+                log.exception("what is old could not be deleted, it is tried again later")
             else:
                 if found != Pruned():
-                    log.info("deleted %d old jobs and %d old sweeps", found.jobs, found.sweeps)
+                    words = "deleted %d old jobs, %d old sweeps and %d old uploads"
+                    log.info(words, found.jobs, found.sweeps, found.uploads)
             self._stop.wait(_ROUND_SECONDS)
 
     def once(self) -> Pruned:
         """Delete what is too old now."""
-        before = self._now() - timedelta(days=self._settings.retention_days or 0.0)
-        return prune(
-            self._database,
-            before,
-            keep_designs=self._settings.retention_keep_designs,
-            pause=self._stop.wait,
-            on_progress=self._count,
-        )
+        found, now = Pruned(), self._now()
+        days, upload_days = self._settings.retention_days, self._settings.retention_upload_days
+        if days is not None:
+            found += prune(
+                self._database,
+                now - timedelta(days=days),
+                keep_designs=self._settings.retention_keep_designs,
+                pause=self._stop.wait,
+                on_progress=self._count,
+            )
+        if upload_days is not None and not self._stop.is_set():
+            uploads = prune_uploads(self._database, now - timedelta(days=upload_days), pause=self._stop.wait)
+            self._count(uploads)
+            found += uploads
+        return found
 
     def _count(self, found: Pruned) -> None:
         self.pruned += found

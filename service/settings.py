@@ -181,6 +181,13 @@ class Settings(BaseSettings):
     retention_keep_designs: bool = Field(
         default=True, description="Keep designs with their results for ever, and delete their sweeps alone."
     )
+    retention_upload_days: float | None = Field(
+        default=None,
+        ge=0.01,
+        le=100_000.0,
+        description="Days after which uploads are deleted that no unfinished job and none that came since "
+        "names; unset: never.",
+    )
     preview_seconds: float = Field(
         default=3.0, ge=0.05, le=60.0, description="Longest time a preview may be computed [s]."
     )
@@ -200,6 +207,13 @@ class Settings(BaseSettings):
     )
     max_upload_bytes: int = Field(
         default=64 * 1024 * 1024, ge=1024, le=1024**3, description="Largest upload accepted [bytes]."
+    )
+    header_seconds: float = Field(
+        default=10.0,
+        ge=0.1,
+        le=3600.0,
+        description="Time the headers of a request may take to arrive, from the first byte or the connection "
+        "[s].",
     )
     body_seconds: float = Field(
         default=30.0, ge=0.1, le=3600.0, description="Time a request body may take to arrive [s]."

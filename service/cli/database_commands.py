@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -35,6 +36,9 @@ def prune(
     keep_designs: Annotated[
         bool, typer.Option("--keep-designs", help="Of designs delete the sweeps alone.")
     ] = False,
+    uploads: Annotated[
+        bool, typer.Option("--uploads", help="Delete uploads as old too, unless a job uses them.")
+    ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Count, and delete nothing.")] = False,
     vacuum: Annotated[
         bool, typer.Option("--vacuum", help="Give the space back to the file system (SQLite).")
@@ -42,19 +46,22 @@ def prune(
     database: options.Database = None,
     as_json: options.Json = False,
 ) -> None:
-    """Delete old jobs with their results and sweeps.
+    """Delete old jobs with their results and sweeps, and old uploads.
 
-    An SQLite file must not be in use by a service, which can do this itself (STICKSLIP_RETENTION_DAYS).
+    An SQLite file must not be in use by a service, which can do this itself (STICKSLIP_RETENTION_DAYS,
+    STICKSLIP_RETENTION_UPLOAD_DAYS).
     """
     from service.pruning import prune_database
 
     url = settings_of(database=database).database
-    found = prune_database(url, older_than, keep_designs=keep_designs, dry_run=dry_run, vacuum=vacuum)
+    found = prune_database(
+        url, older_than, keep_designs=keep_designs, uploads=uploads, dry_run=dry_run, vacuum=vacuum
+    )
     if as_json:
-        print_json({"jobs": found.jobs, "sweeps": found.sweeps, "deleted": not dry_run})
+        print_json({**asdict(found), "deleted": not dry_run})
     else:
         words = "would be deleted" if dry_run else "are deleted"
-        say(f"{found.jobs} jobs and {found.sweeps} sweeps {words}")
+        say(f"{found.jobs} jobs, {found.sweeps} sweeps and {found.uploads} uploads {words}")
 
 
 def check(database: options.Database = None, as_json: options.Json = False) -> None:

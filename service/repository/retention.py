@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import ColumnElement, and_, delete, func, or_, select, update
+from sqlalchemy import ColumnElement, Text, and_, cast, delete, func, or_, select, update
 from sqlalchemy.orm import aliased
 
 from service.db import Database
-from service.models import Design, Job, JobState, Sweep
+from service.kinds.scenes import UPLOAD
+from service.models import Design, Job, JobState, Sweep, Upload
 
 _ENDED = [state for state in JobState if state.finished]
 _NO_ANSWER = ""
 """The spec hash of a job that is no answer any more to who asks for the same."""
+_NAMED = re.compile(re.escape(UPLOAD) + r"([0-9a-f-]+)")
 _later = aliased(Job)
 _HAS_DESIGN = select(Design.job_id).where(Design.job_id == Job.id).correlate(Job).exists()
 _HAS_SWEEPS = select(Sweep.id).where(Sweep.job_id == Job.id).correlate(Job).exists()
@@ -23,17 +26,22 @@ _IS_AN_ANSWER = select(_later.id).where(_later.result_of == Job.id).correlate(Jo
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pruned:
-    """How much was, or would be, deleted: jobs with their results, and sweeps with their arrays."""
+    """How much was, or would be, deleted: jobs with their results, sweeps with their arrays, uploads."""
 
     jobs: int = 0
     sweeps: int = 0
+    uploads: int = 0
 
     def __add__(self, other: Pruned) -> Pruned:
-        return Pruned(jobs=self.jobs + other.jobs, sweeps=self.sweeps + other.sweeps)
+        return Pruned(
+            jobs=self.jobs + other.jobs,
+            sweeps=self.sweeps + other.sweeps,
+            uploads=self.uploads + other.uploads,
+        )
 
 
 class RetentionRepository:
-    """Old jobs of one database.
+    """Old jobs and uploads of one database.
 
     A job is deleted with all it computed; one that a younger job gives as its answer (`result_of`) is kept as
     long as that. Of designs that are kept, the sweeps are deleted. What is about to lose its sweeps is taken
@@ -83,6 +91,29 @@ class RetentionRepository:
             if ids:
                 connection.execute(delete(Job).where(Job.id.in_(ids)))
         return len(ids)
+
+    def old_uploads(self, before: datetime) -> list[str]:
+        """Ids of the uploads that came before a time and that nobody uses, oldest first.
+
+        A job holds what its uploads held from the moment it is accepted. One that a waiting or running job
+        names is kept all the same, and one that a job named which came since: its client may go on with it.
+        """
+        old = select(Upload.id).where(Upload.created < before).order_by(Upload.id)
+        request = cast(Job.request, Text)
+        used = select(request).where(
+            or_(Job.state.not_in(_ENDED), Job.created >= before), request.contains(UPLOAD)
+        )
+        with self._db.reading() as connection:
+            found = list(connection.execute(old).scalars())
+            requests = connection.execute(used).scalars() if found else ()
+            named = {one for text in requests for one in _NAMED.findall(text)}
+        return [one for one in found if one not in named]
+
+    def delete_upload(self, upload: str, before: datetime) -> int:
+        """Delete an upload unless it was sent again since a time; how many were, 0 or 1."""
+        statement = delete(Upload).where(Upload.id == upload, Upload.created < before)
+        with self._db.writing() as connection:
+            return connection.execute(statement).rowcount
 
 
 def _old(before: datetime, *, keep_designs: bool) -> ColumnElement[bool]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, fields
 from datetime import datetime
 
-from sqlalchemy import delete, insert, select
+from sqlalchemy import delete, insert, select, update
 
 from service.clock import utc_now
 from service.db import Database
@@ -31,7 +31,7 @@ _COLUMNS = [getattr(Upload, item.name) for item in fields(UploadRow)]
 
 
 class UploadRepository:
-    """Uploads of one database; a stored one never changes."""
+    """Uploads of one database; what a stored one holds never changes."""
 
     def __init__(self, database: Database) -> None:
         self._db = database
@@ -39,21 +39,20 @@ class UploadRepository:
     def add(
         self, *, owner: str, name: str, format: str, size: int, sha256: str, data: bytes
     ) -> tuple[UploadRow, bool]:
-        """Store a file, or find the same one of the same owner and format; whether it was stored."""
+        """Store a file, or find the same one of the same owner and format; whether it was stored.
+
+        One that is there already counts as new from now on: who sent it is about to use it.
+        """
         same = (Upload.owner == owner, Upload.sha256 == sha256, Upload.format == format)
         query = select(*_COLUMNS).where(*same).order_by(Upload.id).limit(1)
         with self._db.writing() as connection:
             known = connection.execute(query).mappings().one_or_none()
+            now = utc_now()
             if known is not None:
-                return UploadRow(**known), False
+                connection.execute(update(Upload).where(Upload.id == known["id"]).values(created=now))
+                return UploadRow(**{**known, "created": now}), False
             row = UploadRow(
-                id=new_id(),
-                owner=owner,
-                name=name,
-                format=format,
-                size=size,
-                sha256=sha256,
-                created=utc_now(),
+                id=new_id(), owner=owner, name=name, format=format, size=size, sha256=sha256, created=now
             )
             connection.execute(insert(Upload).values(**asdict(row), data=data))
             return row, True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -20,11 +21,11 @@ from service.embedded import EmbeddedService
 from service.errors import DatabaseError
 from service.integrity import check
 from service.jobs import DesignRecord, JobOutput, SweepRecord
-from service.models import Design, Job, JobResult, JobState, Sweep, SweepArray
+from service.models import Design, Job, JobResult, JobState, Sweep, SweepArray, Upload
 from service.pruning import prune_database
-from service.repository import JobRepository
+from service.repository import JobRepository, UploadRepository
 from service.repository.retention import Pruned, RetentionRepository
-from service.retention import prune
+from service.retention import prune, prune_uploads
 
 DAY = timedelta(days=1)
 
@@ -145,6 +146,53 @@ def test_a_service_deletes_what_is_old(make_settings: MakeSettings) -> None:
         until(lambda: service._service.retention.pruned == Pruned(jobs=1, sweeps=1))
 
 
+def uploaded(database: Database, days: float, sha256: str) -> str:
+    """An upload that came some days ago."""
+    row, _ = UploadRepository(database).add(
+        owner="", name="M.npz", format="npz", size=3, sha256=sha256, data=b"abc"
+    )
+    with database.writing() as connection:
+        connection.execute(update(Upload).where(Upload.id == row.id).values(created=utc_now() - days * DAY))
+    return row.id
+
+
+def naming(upload: str) -> dict[str, Any]:
+    return {"request": {"scene": {"structure": {"M": f"upload:{upload}"}}}, "spec_hash": upload[-32:]}
+
+
+def test_uploads_that_nobody_uses_go(database: Database) -> None:
+    """Those that a waiting, running or young job names stay, and those that were sent again."""
+    cases = ("unused", "ended", "waiting", "running", "recent", "again", "young")
+    ids = {name: uploaded(database, 1.0 if name == "young" else 40.0, name) for name in cases}
+    jobs = JobRepository(database)
+    old, recent = (ended(database, 35.0, JobOutput(result={}), **naming(ids[n])) for n in ("ended", "recent"))
+    with database.writing() as connection:
+        connection.execute(update(Job).where(Job.id == old).values(created=utc_now() - 36 * DAY))
+    for name in ("running", "waiting"):
+        jobs.submit(new_job(**naming(ids[name])), queue_limit=10)
+    assert jobs.claim("one", utc_now() + DAY) is not None
+    assert uploaded(database, 0.0, "again") == ids["again"]
+    assert RetentionRepository(database).delete_upload(ids["again"], before(30)) == 0
+    assert prune_uploads(database, before(30), pause=at_once) == Pruned(uploads=2)
+    uploads = UploadRepository(database)
+    assert {name for name, one in ids.items() if uploads.get(one) is None} == {"unused", "ended"}
+    assert prune_uploads(database, before(30), pause=at_once) == Pruned()
+    for one in (old, recent):
+        assert jobs.get(one) is not None, "jobs are another matter"
+
+
+def test_a_service_deletes_old_uploads_alone(make_settings: MakeSettings) -> None:
+    with EmbeddedService(make_settings()) as service:
+        database = service._service.database
+        job = ended(database, 40.0, JobOutput(result={}))
+        old, young = uploaded(database, 40.0, "a"), uploaded(database, 1.0, "b")
+    with EmbeddedService(make_settings(retention_upload_days=30.0)) as service:
+        until(lambda: service._service.retention.pruned == Pruned(uploads=1))
+        uploads = service._service.uploads.repository
+        assert (uploads.get(old) is None, uploads.get(young) is None) == (True, False)
+        assert service.job(job).status is JobState.SUCCESSFUL
+
+
 def test_the_command(tmp_path: Path, make_settings: MakeSettings, capsys: pytest.CaptureFixture[str]) -> None:
     url = make_settings().database
     assert main(["db", "prune", "--older-than", "30d", "--database", url]) == 2
@@ -153,12 +201,20 @@ def test_the_command(tmp_path: Path, make_settings: MakeSettings, capsys: pytest
             ended(service._service.database, 40.0, JobOutput(result={}, sweeps=(sweep(4000),)),
                   spec_hash=f"{index:064}")  # fmt: skip
         assert main(["db", "prune", "--older-than", "30d", "--dry-run", "--database", url]) == 0
-        assert "30 jobs and 30 sweeps would be deleted" in capsys.readouterr().out
+        assert "30 jobs, 30 sweeps and 0 uploads would be deleted" in capsys.readouterr().out
+        old = uploaded(service._service.database, 40.0, "a")
+        assert main(["db", "prune", "--older-than", "30d", "--uploads", "--dry-run", "--database", url]) == 0
+        assert "30 sweeps and 1 uploads would be deleted" in capsys.readouterr().out
         assert main(["db", "prune", "--older-than", "30d", "--database", url]) == 1
         assert "is in use by another stickslip service" in capsys.readouterr().err
     size = (tmp_path / "jobs.db").stat().st_size
     assert main(["db", "prune", "--older-than", "30d", "--vacuum", "--json", "--database", url]) == 0
-    assert '"jobs": 30' in capsys.readouterr().out
+    assert json.loads(capsys.readouterr().out) == {"jobs": 30, "sweeps": 30, "uploads": 0, "deleted": True}
+    assert main(["db", "prune", "--older-than", "30d", "--uploads", "--database", url]) == 0
+    assert "0 jobs, 0 sweeps and 1 uploads are deleted" in capsys.readouterr().out
+    database = Database(url)
+    assert UploadRepository(database).get(old) is None
+    database.close()
     assert (tmp_path / "jobs.db").stat().st_size < 0.6 * size
     assert check(url).sound
     for bad in ("30", "d", "-3d", "3 weeks", "nan d", "1e400d"):

@@ -8,6 +8,7 @@ import threading
 import zipfile
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +79,8 @@ def test_a_file_comes_in_once(http: httpx.Client) -> None:
     assert [one["name"] for one in made["contents"]] == ["M", "K"]
     again = upload(http, "other-" + name, data)
     assert (again.status_code, again.json()["id"]) == (200, made["id"]), "the same file once"
+    assert again.json()["created"] > made["created"], "and as new"
+    made = again.json()
     link = answer.headers["location"]
     shown = http.get(link).json()
     assert shown == {key: value for key, value in made.items() if key != "contents"}
@@ -275,7 +278,9 @@ def test_uploads_are_kept_by_owner(database: Database) -> None:
     same, again = uploads.add(owner="me", **given)
     other, other_new = uploads.add(owner="you", **given)
     assert (new, again, other_new) == (True, False, True)
-    assert same == mine != other
+    assert same == replace(mine, created=same.created) != other
+    assert same.created > mine.created
+    mine = same
     assert uploads.data(mine.id) == b"abc"
     assert [row.id for row in uploads.page(10)] == [other.id, mine.id]
     assert uploads.page(10, owner="me") == uploads.page(10, before=other.id) == [mine]
