@@ -19,6 +19,7 @@ from service.errors import ConfigurationError
 from service.jobs import Registry
 from service.kinds import SHIPPED
 from service.models import JobState
+from service.patience import patient
 from service.settings import Settings
 
 log = logging.getLogger("stickslip.service")
@@ -96,6 +97,7 @@ def work(settings: Settings, registry: Registry = SHIPPED, *, until_empty: bool 
 def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
     return uvicorn.Config(
         app,
+        http=patient(settings.header_seconds),
         log_config=None,
         access_log=False,
         lifespan="on",

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import asyncio
+import importlib
 import json
 import socket
+import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
+import uvicorn
 from private_kinds import PRIVATE
-from service_helpers import ServedClient, serving
+from service_helpers import ServedClient, serving, until
 
 import solver
+from service.patience import patient
 
 BODY_SECONDS = 1.0
+HEADER_SECONDS = 1.0
 JSON = "Content-Type: application/json\r\n"
 CHUNKED = JSON + "Transfer-Encoding: chunked\r\n"
 SCENE: dict[str, Any] = solver.load_scene("two-dof").to_dict()
@@ -24,7 +31,8 @@ SCENE: dict[str, Any] = solver.load_scene("two-dof").to_dict()
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedClient]:
     folder = tmp_path_factory.mktemp("hostile")
-    with serving(folder, PRIVATE, body_seconds=BODY_SECONDS, upload_seconds=BODY_SECONDS) as client:
+    limits = {"body_seconds": BODY_SECONDS, "upload_seconds": BODY_SECONDS, "header_seconds": HEADER_SECONDS}
+    with serving(folder, PRIVATE, **limits) as client:
         client.post("/v1/plan", json={"scene": "two-dof"})  # loads what it needs
         yield client
 
@@ -260,6 +268,84 @@ def test_bodies_that_do_not_come_are_given_up(service: ServedClient, path: str) 
         assert status == 408, found[:300]
         assert b"onnection: close" in found
         assert time.monotonic() - begin < BODY_SECONDS + 5.0
+
+
+def closed_after(raw: socket.socket, then: bytes) -> tuple[float, bytes]:
+    """Send the rest byte by byte until the other side closes: how long that took [s], and what came back."""
+    begin, found = time.monotonic(), b""
+    raw.settimeout(0.05)
+    while time.monotonic() - begin < 5.0:
+        try:
+            raw.sendall(then)
+            piece = raw.recv(65536)
+        except TimeoutError:
+            continue
+        except (BrokenPipeError, ConnectionResetError):
+            break
+        if not piece:
+            break
+        found += piece
+    return time.monotonic() - begin, found
+
+
+WHOLE = b"GET /health/live HTTP/1.1\r\nHost: localhost\r\n\r\n"
+SLOW: dict[str, tuple[bytes, bytes, bool]] = {
+    "says nothing": (b"", b"", False),
+    "a byte at a time": (b"GET /health/live HTTP/1.1\r\nX-Slow: ", b"a", True),
+    "the second request a byte at a time": (WHOLE + b"GET", b" ", True),
+    "a body without end for who did not want it": (post("/none", JSON, b"{", length=10**6), b" ", True),
+}
+
+
+def test_headers_that_do_not_come_are_given_up(service: ServedClient) -> None:
+    """All at once, each with a connection of its own."""
+
+    def meet(name: str) -> tuple[float, bytes]:
+        begin, then, _ = SLOW[name]
+        with connected(service) as raw:
+            raw.sendall(begin)
+            return closed_after(raw, then)
+
+    with ThreadPoolExecutor(len(SLOW)) as pool:
+        for name, (took, found) in zip(SLOW, pool.map(meet, SLOW), strict=True):
+            assert took < HEADER_SECONDS + 2.0, name
+            assert (b"HTTP/1.1 4" in found) == SLOW[name][2], (name, found)
+
+
+async def answer(_scope: Any, _receive: Any, send: Any) -> None:
+    """An application of a few bytes, which takes longer than headers may."""
+    await asyncio.sleep(0.3)
+    await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"2")]})
+    await send({"type": "http.response.body", "body": b"ok"})
+
+
+@pytest.mark.parametrize("loop", ["asyncio", "uvloop"])
+@pytest.mark.parametrize("protocol", ["h11:H11Protocol", "httptools:HttpToolsProtocol"])
+def test_the_limit_holds_for_every_protocol_and_loop(loop: Any, protocol: str) -> None:
+    """Also behind an answer; and it is a limit of the headers, not of the answer."""
+    module, _, name = protocol.partition(":")
+    for needed in (module, loop):
+        pytest.importorskip(needed)
+    base = getattr(importlib.import_module(f"uvicorn.protocols.http.{module}_impl"), name)
+    config = uvicorn.Config(
+        answer, http=patient(0.2, base), loop=loop, port=0, log_config=None, lifespan="off"
+    )
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    try:
+        until(lambda: server.started)
+        address = server.servers[0].sockets[0].getsockname()
+        with socket.create_connection(address, timeout=5.0) as raw:
+            raw.sendall(WHOLE)
+            assert raw.recv(1000).startswith(b"HTTP/1.1 200"), "later than that"
+            raw.sendall(WHOLE[:9])
+            took, found = closed_after(raw, b"a")
+        assert took < 2.0
+        assert b"408 Request Timeout" in found
+    finally:
+        server.should_exit = True
+        thread.join()
 
 
 def test_bodies_without_end_are_cut_off(service: ServedClient) -> None:
