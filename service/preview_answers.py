@@ -23,6 +23,7 @@ class SweepPreview(Answer):
     seconds: float
     completed: bool
     status: str
+    n_harmonics: int = Field(description="Kept; fewer than asked for where a whole disk takes too long.")
     states: dict[str, str] = Field(description="What every contact does at the highest peak.")
 
 
@@ -85,6 +86,6 @@ class PointPreview(Answer):
     flags: list[str]
     residual: float | None
     error_estimate: float | None
-    n_harmonics: int
+    n_harmonics: int = Field(description="Kept; fewer than asked for where a whole disk takes too long.")
     seconds: float
     period: Period | None = None

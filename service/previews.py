@@ -1,7 +1,7 @@
 """Previews: computed at once by a worker process of their own, never stored.
 
-The process starts with the first preview. Of the previews of one client only the newest is computed; those of
-several clients wait for each other, a few at most.
+The process starts with the first preview, or when the page is opened. Of the previews of one client only the
+newest is computed; those of several clients wait for each other, a few at most.
 """
 
 from __future__ import annotations
@@ -104,6 +104,20 @@ class Previews:
         finally:
             self._drop(asked)
 
+    def begin(self) -> None:
+        """Start the worker if it does not run: for those who will want a preview in a moment."""
+        with self._lock:
+            if self._closed or self._executor is not None:
+                return
+            self._executor = LocalExecutor(
+                self.registry.runs(),
+                self.registry.warm_up,
+                workers=1,
+                grace_seconds=_GRACE_SECONDS,
+                pace=_SILENT,
+            )
+            self._executor.start(self)
+
     def close(self) -> None:
         """End the worker; whoever waits is told."""
         with self._lock:
@@ -152,15 +166,7 @@ class Previews:
             if len(self._waiting) >= MOST_WAITING:
                 raise QueueFullError(f"{MOST_WAITING} previews wait already", _RETRY_SECONDS)
             self._waiting.append(asked)
-            if self._executor is None:
-                self._executor = LocalExecutor(
-                    self.registry.runs(),
-                    self.registry.warm_up,
-                    workers=1,
-                    grace_seconds=_GRACE_SECONDS,
-                    pace=_SILENT,
-                )
-                self._executor.start(self)
+        self.begin()
         self.room()
 
     def _supersede(self, client: str) -> None:

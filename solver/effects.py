@@ -132,7 +132,8 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
     asked = effects or Effects()
     balance = build(scene, harmonics=harmonics, effects=asked)
     n, contacts = balance.n_unknowns, balance.n_ports
-    slips = tuple(_slip(balance, i) for i in range(len(balance.scene.contacts)))
+    carried = _stuck_force(balance)
+    slips = tuple(_slip(balance, i, carried) for i in range(len(balance.scene.contacts)))
     kept = sum(effect.used for effect in slips) * balance.n_coefficients
     iteration = (
         _SECONDS_AN_ITERATION
@@ -201,7 +202,7 @@ def _one_sector(scene: Scene, asked: Effects) -> Effect:
     )
 
 
-def _slip(balance: Balance, i: int) -> Effect:
+def _slip(balance: Balance, i: int, stuck: Real) -> Effect:
     """Say whether a contact is expected to slip: from the response of the structure with all contacts stuck.
 
     Only the expectation comes from here. Whether a contact is its spring is decided at every Newton step.
@@ -213,7 +214,7 @@ def _slip(balance: Balance, i: int) -> Effect:
     if not isinstance(contact, Contact):
         return Effect(name=f"law of {contact.name}", used=True, reason=_law(contact))
     limit = contact.mu * max(contact.N0 - abs(contact.N1_value), 0.0)
-    carried = _stuck_force(balance)[balance.system.first_port[i]]
+    carried = stuck[balance.system.first_port[i]]
     words = f"stuck, {contact.name} would carry up to {carried:.4g} N in the band; its limit is {limit:.4g} N"
     if carried <= limit:
         return Effect(

@@ -21,13 +21,19 @@ from service.kinds.scenes import (
     resolve_scene,
     resolved,
 )
-from service.kinds.sizes import dofs_solved
+from service.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues, balance_unknowns, dofs_solved
 from solver.errors import Issue
 from solver.scene import FrictionContact, Scene
 
 MOST_POINTS = 2000
 MOST_HARMONICS = 41
-MOST_UNKNOWNS = 20_000
+MOST_UNKNOWNS = 50_000
+LIVE_UNKNOWNS = 130
+"""Of the balance of a response that is followed live: one of more takes longer than a second or two."""
+POINT_UNKNOWNS = 500
+"""Of the balance at one point."""
+FEW_MOTIONS = 8
+"""Of contacts: so few are quick with all harmonics."""
 SAMPLES = 400
 STUCK_LOAD = 1e9
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "set": {"damper.N0": 80}, "client": "a1b2"}
@@ -69,8 +75,8 @@ class PointPreviewRequest(PreviewRequest):
     frequency_hz: FrequencyHz = Field(description="Excitation frequency [Hz].")
 
 
-def _scene(request: PreviewRequest, source: SceneSource) -> Scene:
-    """The scene, if it is small enough."""
+def _scene(request: PreviewRequest, source: SceneSource, points: int, harmonics: int) -> Scene:
+    """The scene, if it is small enough for so many points."""
     scene = resolve_scene(request, source)
     issues: list[Issue] = []
     if request.harmonics > MOST_HARMONICS:
@@ -81,18 +87,32 @@ def _scene(request: PreviewRequest, source: SceneSource) -> Scene:
         words = "DOFs × coefficients of a preview"
         message = f"{words} must be at most {MOST_UNKNOWNS}, got {unknowns}: submit a job"
         issues.append(refusal("/scene", message))
-    require(issues)
+    require(issues or balance_issues("/harmonics", scene, harmonics, points))
     return scene
 
 
+def harmonics_in_time(scene: Scene, asked: int, unknowns: int) -> int:
+    """The harmonics asked for; with many contacts those whose balance has at most so many unknowns.
+
+    A disk that is solved whole has the contacts of all its sectors: too many to be followed live with all
+    harmonics.
+    """
+    motions = balance_unknowns(scene, 0)
+    if motions <= FEW_MOTIONS:
+        return asked
+    return max(1, min(asked, (unknowns // motions - 1) // 2))
+
+
 def resolve_sweep(request: SweepPreviewRequest, source: SceneSource) -> Resolved:
-    """Look up the scene and check its size."""
-    return resolved(_scene(request, source), harmonics=request.harmonics, limit=request.limit)
+    """Look up the scene, check its size, and choose the harmonics that can be kept in time."""
+    scene = _scene(request, source, POINTS_OF_A_SWEEP, request.harmonics)
+    kept = harmonics_in_time(scene, request.harmonics, LIVE_UNKNOWNS)
+    return resolved(scene, harmonics=kept, limit=request.limit)
 
 
 def resolve_limits(request: LimitsPreviewRequest, source: SceneSource) -> Resolved:
     """Look up the scene and the contact."""
-    scene = _scene(request, source)
+    scene = _scene(request, source, 2 * POINTS_OF_A_SWEEP, 1)
     names = [contact.name for contact in scene.contacts]
     if request.contact is not None and request.contact not in names:
         message = f"`contact` must be one of {', '.join(names)}, got {request.contact!r}"
@@ -101,8 +121,10 @@ def resolve_limits(request: LimitsPreviewRequest, source: SceneSource) -> Resolv
 
 
 def resolve_point(request: PointPreviewRequest, source: SceneSource) -> Resolved:
-    """Look up the scene and check its size."""
-    return resolved(_scene(request, source), harmonics=request.harmonics, frequency_hz=request.frequency_hz)
+    """Look up the scene, check its size, and choose the harmonics that can be kept in time."""
+    scene = _scene(request, source, 1, request.harmonics)
+    kept = harmonics_in_time(scene, request.harmonics, POINT_UNKNOWNS)
+    return resolved(scene, harmonics=kept, frequency_hz=request.frequency_hz)
 
 
 def run_sweep(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldStop) -> JobOutput:
@@ -112,7 +134,7 @@ def run_sweep(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldS
     found = branch.to_json()
     kept = ("parameter", "amplitude", "peak", "peaks", "band_hz", "band_limit", "band_intervals_hz", "points")
     result = {key: found[key] for key in (*kept, "seconds", "completed", "status")}
-    result["states"] = {}
+    result |= {"n_harmonics": spec["harmonics"], "states": {}}
     if len(branch.values):
         at = int(branch.amplitude.argmax())
         # Those of all sectors where one does not stand for them.

@@ -80,10 +80,22 @@ def annulus_issues(scene: Scene, harmonics: int) -> list[Issue]:
     return _unknown_issues(scene, harmonics, sectors)
 
 
-def _unknown_issues(scene: Scene, harmonics: int, sectors: int) -> list[Issue]:
+def balance_unknowns(scene: Scene, harmonics: int) -> int:
+    """Unknowns of the balance: motions of the contacts × coefficients."""
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from solver.sectors import sectors_needed
+
+    return _motions(scene, sectors_needed(scene).sectors) * (2 * harmonics + 1)
+
+
+def _motions(scene: Scene, sectors: int) -> int:
     from solver.contact_rows import port_counts
 
-    motions = int(port_counts(scene).sum()) * sectors
+    return int(port_counts(scene).sum()) * sectors
+
+
+def _unknown_issues(scene: Scene, harmonics: int, sectors: int) -> list[Issue]:
+    motions = _motions(scene, sectors)
     unknowns = motions * (2 * harmonics + 1)
     if unknowns <= MOST_UNKNOWNS:
         return []

@@ -7,10 +7,10 @@ from functools import cache
 from importlib import resources
 from importlib.resources.abc import Traversable
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, BackgroundTasks, Request, Response
 
 from service.errors import NotFoundError
-from service.http import tagged
+from service.http import ServiceDependency, tagged
 
 router = APIRouter(include_in_schema=False)
 
@@ -67,8 +67,9 @@ def index() -> bytes:
 
 
 @router.get("/")
-async def page(request: Request) -> Response:
-    """The page."""
+async def page(request: Request, service: ServiceDependency, tasks: BackgroundTasks) -> Response:
+    """The page, whose live response is wanted in a moment."""
+    tasks.add_task(service.previews.begin)
     headers = {**_HEADERS, "Cache-Control": "no-cache"}
     return tagged(request, index(), _TYPES[".html"], headers)
 

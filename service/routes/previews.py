@@ -11,6 +11,7 @@ from service.access.callers import Caller
 from service.core import Service
 from service.http import CallerDependency, JsonBody, ServiceDependency
 from service.jobs import Resolved
+from service.kinds.sizes import work_limited
 from service.preview_answers import LimitsPreview, PointPreview, SweepPreview
 from service.validation import validated
 
@@ -20,6 +21,9 @@ router = APIRouter(prefix="/v1/previews", tags=["previews"])
 @router.post("", response_model=SweepPreview | LimitsPreview | PointPreview)
 async def preview(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> Response:
     """Compute `sweep`, `limits` or `point` within seconds. Nothing is stored, and sizes are limited.
+
+    Of a disk that is solved whole fewer harmonics are kept than asked for: the answer says how many. The
+    limit `work` of a key holds here as for a job of the same points.
 
     Of several previews with the same `client` only the newest is computed: the others are answered 409.
     """
@@ -34,4 +38,5 @@ async def preview(body: JsonBody, service: ServiceDependency, caller: CallerDepe
 def _resolved(service: Service, caller: Caller, name: str, body: dict[str, Any]) -> Resolved:
     kind = service.previews.registry[name]
     request = validated(kind.request, {key: value for key, value in body.items() if key != "kind"})
-    return kind.resolve(request, service.scenes.of(caller))
+    with work_limited(caller.limits.work):
+        return kind.resolve(request, service.scenes.of(caller))

@@ -146,6 +146,22 @@ def test_limits_of_a_key(guarded: ServedClient) -> None:
             guarded.delete(job["links"]["self"], headers=admin)
 
 
+def test_previews_keep_to_the_work_of_a_key(guarded: ServedClient) -> None:
+    # Of two-dof with 11 harmonics a sweep counts as 20 points × 11 × 2 DOFs = 440, as a job does.
+    short = bearer(token_of(guarded, owner="work", work=439))
+    body = {"scene": "two-dof", "kind": "sweep"}
+    problem = is_problem(guarded.post("/v1/previews", json=body, headers=short), 422)
+    assert [issue["pointer"] for issue in problem["errors"]] == ["/harmonics"]
+    assert "must be at most 439, got 440" in problem["detail"]
+    few = bearer(token_of(guarded, owner="work", work=21))
+    point = {**body, "kind": "point", "frequency_hz": 1.05}
+    assert "got 22" in is_problem(guarded.post("/v1/previews", json=point, headers=few), 422)["detail"]
+    limits = {**body, "kind": "limits", "contact": "none"}
+    assert "got 80" in is_problem(guarded.post("/v1/previews", json=limits, headers=few), 422)["detail"]
+    fitting = is_problem(guarded.post("/v1/previews", json=limits, headers=short), 422)
+    assert [issue["pointer"] for issue in fitting["errors"]] == ["/contact"]
+
+
 def test_wrong_keys_are_limited_and_working_ones_are_not(
     guarded: ServedClient, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -3,7 +3,7 @@
 import { tell } from "./events.js";
 
 const KEY = "stickslip-key";
-const BACKOFF = [0.25, 0.5, 1, 1.5, 2, 3];
+const BACKOFF = [0.25, 0.5, 1, 1.5];
 let offline = false;
 let back = null;
 

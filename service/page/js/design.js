@@ -61,13 +61,26 @@ async function plan() {
 }
 
 function describe({ effects, unknowns, linear_dofs: dofs, estimated_seconds_a_point: cost }) {
-  const item = ({ name, used, reason }) =>
+  const item = ({ name, used, reason, others = [] }) =>
     el("li", { class: used ? "used" : "left" },
       el("span", { class: "sign", "aria-hidden": "true" }, used ? "✓" : "–"),
-      el("strong", {}, name), ` ${used ? "in use" : "left out"}: ${reason}`);
+      el("strong", {}, name), ` ${used ? "in use" : "left out"}: ${reason}`,
+      others.length ? el("details", {}, el("summary", {}, `and ${others.length} further sector${others.length > 1 ? "s" : ""}`), others.map((each) => el("p", {}, each))) : null);
   show(
     byId("plan-facts"),
     el("p", { class: "note" }, `${unknowns} unknowns for ${dofs} linear DOFs; about ${seconds(cost)} a point.`),
-    el("ul", { class: "effects" }, [...effects].sort((a, b) => b.used - a.used).map(item)),
+    el("ul", { class: "effects" }, grouped(effects).sort((a, b) => b.used - a.used).map(item)),
   );
+}
+
+// Of a disk written out, the same effect of all its sectors as one.
+function grouped(effects) {
+  const groups = new Map();
+  for (const effect of effects) {
+    const key = `${effect.name.replace(/@\d+$/, "@")} ${effect.used}`;
+    const first = effect.name.includes("@") ? groups.get(key) : undefined;
+    if (first) first.others.push(effect.reason);
+    else groups.set(effect.name.includes("@") ? key : effect.name, { ...effect, others: [] });
+  }
+  return [...groups.values()];
 }

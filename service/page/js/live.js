@@ -10,9 +10,11 @@ import { asked, current, frictionContacts, ownValue, value } from "./scenes.js";
 
 const STEPS = 400;
 const RATE_WINDOW = 20;
+const SLOW_MS = 600;
 const times = [];
 let plot = null;
 let ask = null;
+let slow = 0;
 
 export const rate = () => (times.length > 1 ? (1000 * (times.length - 1)) / (times[times.length - 1] - times[0]) : 0);
 
@@ -23,9 +25,7 @@ export function startLive() {
     height: 260,
     onPick: ({ x }) => tell("point", x),
   });
-  ask = previewer("sweep", drawn, (error) => {
-    byId("live-status").textContent = error.message;
-  });
+  ask = previewer("sweep", drawn, refused);
   on("scene", () => {
     buildSliders();
     refresh();
@@ -37,10 +37,37 @@ export function startLive() {
 }
 
 export function refresh() {
-  if (current.body) ask({ kind: "sweep", ...asked() }, state.scene);
+  if (!current.body) return;
+  clearTimeout(slow);
+  slow = setTimeout(() => { byId("live-status").textContent = "The response is being computed …"; }, SLOW_MS);
+  ask({ kind: "sweep", ...asked() }, state.scene);
 }
 
+// What is too large to be followed live is computed by a job, whose response takes the place of this one.
+function refused(error, token) {
+  clearTimeout(slow);
+  if (token !== state.scene) return;
+  if (error.retryAfter || error.status === 409) {
+    byId("live-status").textContent = error.message;
+    return;
+  }
+  const words = `Not followed live: ${error.message.replace(/:? submit (it as )?a job$/, "")}. `;
+  const large = error.status === 503 || /preview/.test(error.message);
+  show(byId("live-status"), words, large ? el("button", { type: "button", onclick: () => tell("sweep-wanted") }, "Compute it as a job") : null);
+}
+
+// The response of a job as the live one, where that is not followed.
+export function showResponse(result) {
+  clearTimeout(slow);
+  plot.draw(responseOf(result));
+  byId("live-status").textContent = `Of a job, with ${asked().harmonics} harmonics: ${words(result)}`;
+}
+
+const words = ({ peak, band_hz: band, status }) =>
+  (peak ? `peak ${length(peak.value)} at ${number(peak.at, 5)} Hz` : status) + (band === null ? "" : `, band ${number(band)} Hz`);
+
 function drawn(answer, { milliseconds, token }) {
+  clearTimeout(slow);
   if (token !== state.scene) return;
   const now = performance.now();
   times.push(now);
@@ -48,9 +75,8 @@ function drawn(answer, { milliseconds, token }) {
   const shown = responseOf(answer);
   plot.draw(shown);
   tell("states", { states: answer.states, at: answer.peak?.at });
-  const peak = answer.peak ? `peak ${length(answer.peak.value)} at ${number(answer.peak.at, 5)} Hz` : answer.status;
-  const band = answer.band_hz === null ? "" : `, band ${number(answer.band_hz)} Hz`;
-  byId("live-status").textContent = `${peak}${band} · ${answer.points} points in ${number(answer.seconds * 1e3, 2)} ms, answered after ${number(milliseconds, 2)} ms`;
+  const fewer = answer.n_harmonics < state.harmonics ? ` · with ${answer.n_harmonics} of ${state.harmonics} harmonics, as the whole disk is solved: the frequency response below keeps all` : "";
+  byId("live-status").textContent = `${words(answer)} · ${answer.points} points in ${number(answer.seconds * 1e3, 2)} ms, answered after ${number(milliseconds, 2)} ms${fewer}`;
   performance.mark("live-drawn");
   document.documentElement.dataset.live = String(Number(document.documentElement.dataset.live ?? 0) + 1);
 }

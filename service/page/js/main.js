@@ -9,7 +9,7 @@ import { on, tell } from "./events.js";
 import { frontView, startFront } from "./front.js";
 import { forget, resume, run, startJobs } from "./jobs.js";
 import { openLibrary, startLibrary } from "./library.js";
-import { startLive } from "./live.js";
+import { showResponse, startLive } from "./live.js";
 import { mapView, startMap } from "./map.js";
 import { startNotices } from "./notices.js";
 import { referee, startPoint } from "./point.js";
@@ -114,6 +114,12 @@ function study() {
   return undefined;
 }
 
+// The frequency response alone, where it is too large to be followed live.
+async function sweepAlone() {
+  byId("response").scrollIntoView({ block: "nearest" });
+  await run("sweep", asked(), { ...sweepView, result: (result, ...more) => { sweepView.result(result, ...more); showResponse(result); } }, 6);
+}
+
 function controls() {
   byId("scene").addEventListener("change", () => change(byId("scene").value));
   byId("study").addEventListener("click", study);
@@ -182,6 +188,7 @@ function start() {
     states = found;
     drawScene();
   });
+  on("sweep-wanted", sweepAlone);
   on("contact", () => fillDesign(frictionContacts().map((c) => c.name)));
   on("scene-stored", async (name) => {
     await scenes().catch(failed);
