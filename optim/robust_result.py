@@ -264,7 +264,7 @@ class RobustResult(Shown):
         """Draw the peaks of both optima over the uncertainty; `ax`: axes to draw into, else a new figure."""
         from optim.plots.designs import robust_figure
 
-        return robust_figure(self, ax=ax)
+        return robust_figure(self.to_json(), ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the result as one JSON object."""

@@ -86,6 +86,7 @@ class JobAnswer(Answer):
         links = {
             "self": f"/v1/jobs/{row.id}",
             "results": f"/v1/jobs/{row.id}/results",
+            "scene": f"/v1/jobs/{row.id}/scene",
             "sweeps": f"/v1/sweeps?job={source}",
         }
         if row.kind == "design":
@@ -209,6 +210,13 @@ class SweepPage(Answer):
 
     items: list[SweepAnswer]
     next: str | None = Field(description="Link to the next page; null on the last one.")
+
+
+class JobScene(Answer):
+    """The scene of a job, as it is computed."""
+
+    job: str
+    scene: dict[str, Any]
 
 
 class ResultsAnswer(Answer):

@@ -21,6 +21,7 @@ from service.answers import (
     FinishedJob,
     JobAnswer,
     JobPage,
+    JobScene,
     ResultsAnswer,
     SceneAnswer,
     SceneDetail,
@@ -170,6 +171,10 @@ class Client:
     def results(self, job_id: str) -> ResultsAnswer:
         """What a job computed."""
         return self._get(ResultsAnswer, f"/v1/jobs/{segment(job_id)}/results")
+
+    def job_scene(self, job_id: str) -> dict[str, Any]:
+        """The scene of a job as it is computed, with its values set and what its uploads held."""
+        return self._get(JobScene, f"/v1/jobs/{segment(job_id)}/scene").scene
 
     def dismiss(self, job_id: str) -> JobAnswer:
         """Cancel a job."""

@@ -256,6 +256,19 @@ class Service:
             self.waiters.ended(job_id)
         return row
 
+    def scene_of(self, job_id: str, caller: Caller = KEYLESS) -> dict[str, Any]:
+        """The scene of a job as it is computed: with its values set, and what its uploads held.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such job, or it has no scene.
+        """
+        scene: dict[str, Any] | None = self.jobs.spec(self.job(job_id, caller).id).get("scene")
+        if scene is None:
+            raise NotFoundError(f"job {job_id} has no scene")
+        return scene
+
     def results(self, job_id: str, caller: Caller = KEYLESS) -> Results:
         """What a job computed; of a failed one, what it computed all the same.
 

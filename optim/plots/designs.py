@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from solver import units
+from solver.fourier import Real
 from solver.plots import style
 from solver.plots.curves import Response
 from solver.plots.responses import Demands, response_figure
 
 if TYPE_CHECKING:
     from optim.result import DesignResult
-    from optim.robust_result import RobustResult, Side
 
 
 def design_figure(result: DesignResult, *, ax: style.Into = None) -> Figure:
@@ -41,37 +44,50 @@ def design_figure(result: DesignResult, *, ax: style.Into = None) -> Figure:
     return response_figure(Response.of_branch(branch), asked=asked, title=title, ax=ax)
 
 
-def robust_figure(result: RobustResult, *, ax: style.Into = None) -> Figure:
+def robust_figure(found: Mapping[str, Any], *, ax: style.Into = None) -> Figure:
     """The highest peak of both optima over the samples of the uncertainty, sorted, with the worst of all.
 
     Parameters
     ----------
-    result : a robust design whose nominal optimum is known.
+    found : the JSON of `optim.RobustResult`, with a nominal optimum.
     """
-    sides: list[tuple[str, Side, str]] = []
-    if result.nominal is not None:
-        sides.append(("nominal optimum", result.nominal, style.BLUE))
-    if result.robust is not None:
-        sides.append(("robust optimum", result.robust, style.VERMILION))
-    known = [peak for _, side, _ in sides for peak in side.spread.peaks if np.isfinite(peak)]
-    unit = units.length_unit(max(known, default=1.0))
+    sides: list[tuple[str, _Peaks, str]] = []
+    for name, color in (("nominal", style.BLUE), ("robust", style.VERMILION)):
+        if found[name] is not None:
+            sides.append((f"{name} optimum", _Peaks.of(found[name]), color))
+    unit = units.length_unit(max((float(peaks.known.max(initial=0.0)) for _, peaks, _ in sides), default=1.0))
     with style.styled():
         page, (axes,) = style.figure(6.0, 3.4, into=ax)
-        for name, side, color in sides:
-            peaks = np.sort([peak for peak in side.spread.peaks if np.isfinite(peak)]) * unit.per_metre
-            shares = 100.0 * (np.arange(peaks.size) + 1.0) / max(peaks.size, 1)
-            axes.plot(shares, peaks, color=color, marker="o", markersize=3.0, label=name)
-            if np.isfinite(side.worst_peak):
-                worst = side.worst_peak * unit.per_metre
+        for name, peaks, color in sides:
+            heights = peaks.known * unit.per_metre
+            shares = 100.0 * (np.arange(heights.size) + 1.0) / max(heights.size, 1)
+            axes.plot(shares, heights, color=color, marker="o", markersize=3.0, label=name)
+            if math.isfinite(peaks.worst):
+                worst = peaks.worst * unit.per_metre
                 axes.axhline(worst, color=color, linewidth=0.9, linestyle=(0, (5.0, 2.5)))
-                above = all(not other.worst_peak > side.worst_peak for _, other, _ in sides)
+                above = all(not other.worst > peaks.worst for _, other, _ in sides)
                 axes.annotate(
-                    f"worst {unit.show(side.worst_peak)}", (0.02, worst), xycoords=("axes fraction", "data"),
+                    f"worst {unit.show(peaks.worst)}", (0.02, worst), xycoords=("axes fraction", "data"),
                     xytext=(0, 3 if above else -3), textcoords="offset points",
                     va="bottom" if above else "top", color=color,
                 )  # fmt: skip
         style.label(axes, "share of the samples [%]", f"highest peak at most [{unit.name}]")
         axes.margins(y=0.14)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        axes.set_title(f"{result.problem.scene.name}, {result.aim.value}")
+        axes.set_title(f"{found['scene']}, {found['aim']}")
     return page
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Peaks:
+    """The peaks of one design: those of the samples that are known, sorted, and the worst (NaN: unknown)."""
+
+    known: Real
+    worst: float
+
+    @classmethod
+    def of(cls, side: Mapping[str, Any]) -> Self:
+        """Those of a side of the JSON."""
+        known = np.sort([peak for peak in side["samples"]["peaks"] if peak is not None])
+        worst = math.nan if side["worst"] is None else float(side["worst"]["peak"])
+        return cls(known=known.astype(np.float64), worst=worst)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from service.cli import design_reports, inputs, options, problem_inputs, robust_reports
-from service.cli.failures import FELL_SHORT, InputError
+from service.cli.failures import FELL_SHORT
 from service.cli.output import print_json
 from service.cli.outputs import Outputs
 from service.cli.problem_options import NOT_OF_A_FRONT, ProblemFlags, takes_problem
@@ -46,19 +47,14 @@ def design(
     told = problem_inputs.description(name, flags, "design")
     scene, given = problem_inputs.posed(told, DesignRequest, design_issues)
     if UNCERTAIN in given:
-        if page is not None:
-            raise InputError("`--report`: a design with uncertain parameters has no report yet")
-        _robust(scene, given, outputs, as_json=as_json)
+        _robust(scene, given, outputs, page, as_json=as_json)
         return
     with bar("design", "designs") as on_progress:
         import optim
 
         result = optim.design(scene, **given, on_progress=on_progress)
     outputs.write(result, result.plot if result.sweeps else None)
-    if page is not None:
-        from service.report.design import Designed
-
-        write(Designed(scene=scene, problem=given, result=result.to_json()), page)
+    _report(scene, given, result.to_json(), page)
     if as_json:
         print_json(result.to_json())
     else:
@@ -92,10 +88,7 @@ def pareto(
 
         found = optim.pareto_front(scene, **given, on_progress=on_progress)
     outputs.write(found, found.plot if found.points else None)
-    if page is not None:
-        from service.report.design import Designed
-
-        write(Designed(scene=scene, problem=given, result=found.to_json()), page)
+    _report(scene, given, found.to_json(), page)
     if as_json:
         print_json(found.to_json())
     else:
@@ -103,18 +96,29 @@ def pareto(
     end(found.reached, found.status.value)
 
 
-def _robust(scene: Scene, given: Mapping[str, Any], outputs: Outputs, *, as_json: bool) -> None:
+def _robust(
+    scene: Scene, given: Mapping[str, Any], outputs: Outputs, page: Path | None, *, as_json: bool
+) -> None:
     """A design with uncertain parameters: the nominal and the robust optimum side by side."""
     with bar("robust design", "responses") as on_progress:
         import optim
 
         result = optim.robust_design(scene, **given, on_progress=on_progress)
     outputs.write(result, result.plot if result.nominal is not None else None)
+    _report(scene, given, result.to_json(), page)
     if as_json:
         print_json(result.to_json())
     else:
         robust_reports.robust(result.to_json())
     end(result.reached, result.status.value)
+
+
+def _report(scene: Scene, given: Mapping[str, Any], found: Mapping[str, Any], page: Path | None) -> None:
+    """Write the report, if one was asked for."""
+    if page is not None:
+        from service.report.sections import Designed
+
+        write(Designed(scene=scene, problem=given, result=found), page)
 
 
 def end(reached: bool, status: str) -> None:

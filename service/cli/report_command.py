@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,9 +12,7 @@ from service.cli.failures import InputError
 from service.cli.output import say
 
 if TYPE_CHECKING:
-    from service.answers import JobAnswer
-    from service.report.design import Designed
-    from solver.scene import Scene
+    from service.report.sections import Designed
 
 SUFFIXES = (".html", ".pdf")
 _KINDS = ("design", "pareto")
@@ -32,16 +29,20 @@ def report(
 
     A page that needs nothing else; a PDF where Chromium or Chrome is there.
     """
+    import solver
     from service.cli.submit_commands import client_of
-    from service.report.design import Designed
+    from service.report.sections import Designed
 
     target = inputs.output_path("--out", out, SUFFIXES)
     with client_of(url) as client:
         asked = client.job(job)
         if asked.kind not in _KINDS:
-            raise InputError(f"`JOB` must be a design or a pareto job, {job!r} is of the kind {asked.kind!r}")
+            raise InputError(
+                f"`JOB` must be a design or a pareto job, {job!r} is of the kind {asked.kind!r} and has no "
+                f"optimum to report: `stickslip results {job} --plot F` draws it, without --plot prints it"
+            )
         answer = client.results(job)
-        scene = _scene(asked, lambda name: client.scene(name).scene)
+        scene = solver.Scene.from_dict(client.job_scene(job))
     problem = {k: v for k, v in (asked.request or {}).items() if k not in _NOT_OF_A_PROBLEM}
     if target is not None:
         write(Designed(scene=scene, problem=problem, result=answer.result), target)
@@ -57,34 +58,19 @@ def write(given: Designed, target: Path) -> None:
     Raises
     ------
     InputError
-        A report of what has no report, or no browser for a PDF.
+        No browser for a PDF.
     """
     from service.report.design import design_report
+    from service.report.robust import robust_report
     from solver.files import whole
 
-    if "nominal" in given.result:
-        raise InputError("a design with uncertain parameters has no report yet: use --plot and --out")
+    made = robust_report if "nominal" in given.result else design_report
     if target.suffix.lower() == ".pdf":
         from service.report.pdf import browser, write_pdf
 
         program = browser()
-        write_pdf(design_report(given), target, program)
+        write_pdf(made(given), target, program)
         return
-    page = design_report(given)
+    page = made(given)
     with whole(target) as temporary:
         temporary.write_text(page, "utf-8")
-
-
-def _scene(job: JobAnswer, stored: Any) -> Scene:
-    """The scene of a job with its values set."""
-    import solver
-
-    request = job.request or {}
-    named = request.get("scene")
-    if isinstance(named, Mapping):
-        scene = solver.Scene.from_dict(named)
-    elif named in solver.shipped_scenes():
-        scene = solver.load_scene(named)
-    else:
-        scene = solver.Scene.from_dict(stored(named))
-    return scene.with_values(request.get("set") or {})

@@ -25,7 +25,8 @@ def robust(found: Json) -> None:
     title = f"Robust damper of {found['scene']}, {aim}"
     columns = ("", *(f"{name} optimum" for name, _ in sides))
     print_table(title, columns, rows, right="".join(str(i + 1) for i in range(len(sides))))
-    print_pairs("", _pairs(found))
+    said = "; ".join(f"{name} {what}" for name, what in uncertain_rows(found["uncertain"]))
+    print_pairs("", [("uncertain", said), *effort_pairs(found)])
     held = [cut for cut in found["cuts"] if abs(cut["multiplier"]) > 1e-6]
     if held:
         say("")
@@ -35,8 +36,9 @@ def robust(found: Json) -> None:
         )  # fmt: skip
 
 
-def _pairs(found: Json) -> list[tuple[str, str]]:
-    pairs = [("uncertain", "; ".join(_uncertain(found["uncertain"])))]
+def effort_pairs(found: Json) -> list[tuple[str, str]]:
+    """What was gained, how well the search closed, and what it took."""
+    pairs: list[tuple[str, str]] = []
     if found["gain"] is not None:
         pairs.append(
             ("gain", f"the robust worst peak is {100.0 * found['gain']:.3g} % below the nominal one")
@@ -51,23 +53,28 @@ def _pairs(found: Json) -> list[tuple[str, str]]:
     return [*pairs, ("effort", f"{effort} in {units.duration(found['seconds'])}")]
 
 
-def _uncertain(found: Json) -> list[str]:
-    """What is not known, in words."""
-    said = []
+def uncertain_rows(found: Json) -> list[tuple[str, str]]:
+    """What is not known, each with how."""
+    said: list[tuple[str, str]] = []
     for one in found.get("parameters", ()):
         low, high, how = one["low"], one["high"], one["how"]
         if how == "relative deviation":
-            said.append(f"{one['path']} {100.0 * low:+.4g} to {100.0 * high:+.4g} %")
+            said.append((one["path"], f"{100.0 * low:+.4g} to {100.0 * high:+.4g} %"))
         elif how == "deviation":
-            said.append(f"{one['path']} {low:+.4g} to {high:+.4g} from the design")
+            said.append((one["path"], f"{low:+.4g} to {high:+.4g} from the design"))
         else:
             ends = [units.parameter(one["path"], end) for end in (low, high)]
-            said.append(f"{one['path']} from {ends[0]} to {ends[1]}")
+            said.append((one["path"], f"from {ends[0]} to {ends[1]}"))
     if "samples" in found:
-        said.append(f"{len(found['samples'])} samples")
+        said.append(("samples", str(len(found["samples"]))))
     if "disks" in found:
-        said.append(f"{len(found['disks'])} mistuned disks")
+        said.append(("mistuned disks", str(len(found["disks"]))))
     return said
+
+
+def side_lines() -> tuple[tuple[str, Callable[[Json], str]], ...]:
+    """What is said of each optimum: a name, and how to say it."""
+    return _LINES
 
 
 def _length(value: float | None) -> str:

@@ -41,6 +41,8 @@ def result_figure(kind: str, result: Json, sweeps: Sequence[SweepAnswer], read: 
     NothingToDrawError
         The job found nothing, or stored no sweep.
     """
+    if kind == "design" and "nominal" in result:
+        return _robust(result)
     draw = _BY_KIND.get(kind)
     if draw is not None:
         return draw(result)
@@ -53,12 +55,19 @@ def _best_sweep(result: Json, sweeps: Sequence[SweepAnswer], read: Read) -> Figu
     """The sweep with the peak of the result: a design stores many."""
     from solver.plots.responses import response_figure
 
-    # Of a robust design, the sweeps are those of the search without uncertainty.
-    peak = result.get("peak") or (result.get("nominal") or {}).get("peak")
+    peak = result.get("peak")
     if not sweeps or peak is None:
         raise NothingToDrawError("it stored no sweep to draw")
     best = min(sweeps, key=lambda s: abs(s.peak.value - peak["value"]) if s.peak else math.inf)
     return response_figure(response_of(read(best.id)))
+
+
+def _robust(result: Json) -> Figure:
+    from optim.plots.designs import robust_figure
+
+    if result["nominal"] is None:
+        raise NothingToDrawError("no design was found")
+    return robust_figure(result)
 
 
 def _pareto(result: Json) -> Figure:

@@ -141,6 +141,14 @@ class JobRepository:
         with self._db.reading() as connection:
             return connection.execute(statements.RESULT, {"job": job_id}).scalar_one_or_none()
 
+    def spec(self, job_id: str) -> dict[str, Any]:
+        """What a job computes; empty if there is none of this id."""
+        with self._db.reading() as connection:
+            found: dict[str, Any] | None = connection.execute(
+                select(Job.spec).where(Job.id == job_id)
+            ).scalar_one_or_none()
+        return found or {}
+
     def count(self) -> dict[JobState, int]:
         """How many jobs are in each state."""
         query = select(Job.state, func.count().label("number")).group_by(Job.state)

@@ -12,7 +12,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service import cursors
 from service.access.callers import Caller
-from service.answers import FinishedJob, JobAnswer, JobPage, ResultsAnswer, SweepAnswer
+from service.answers import FinishedJob, JobAnswer, JobPage, JobScene, ResultsAnswer, SweepAnswer
 from service.core import Service
 from service.errors import InvalidRequestError
 from service.http import (
@@ -110,6 +110,15 @@ async def dismiss(job_id: str, service: ServiceDependency, caller: CallerDepende
             service, job_id, service.settings.grace_seconds + _STOP_MARGIN_SECONDS, caller
         )
     return _answer(service, row)
+
+
+@router.get("/jobs/{job_id}/scene")
+def scene_of(job_id: str, service: ServiceDependency, caller: CallerDependency) -> JobScene:
+    """The scene of a job as it is computed: with its values set, and what its uploads held.
+
+    It stays what it was when the stored scene or the upload it was made of is replaced or deleted.
+    """
+    return JobScene(job=job_id, scene=service.scene_of(job_id, caller))
 
 
 @router.get("/jobs/{job_id}/results")

@@ -14,6 +14,7 @@ from solver.plots import style
 
 MOST_ROWS = 2000
 _DIGITS = 6
+_SHORT = 16  # characters that stay on one line: a number with its unit
 CSS = """
 :root { color-scheme: light; }
 body { font: 15px/1.5 system-ui, "DejaVu Sans", sans-serif; color: #222; background: #fff;
@@ -24,11 +25,12 @@ figcaption, .quiet { color: #555; font-size: .9rem; }
 table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .2rem .7rem .2rem 0; text-align: left; vertical-align: top; }
 thead th { border-bottom: 1px solid #999; } td.number { text-align: right; }
-td:nth-child(2):not(:last-child) { white-space: nowrap; }
+tbody th, td.short, td:nth-child(2):not(:last-child) { white-space: nowrap; }
 tbody tr + tr > * { border-top: 1px solid #eee; }
 pre { background: #f5f5f5; padding: .8rem; overflow-x: auto; font-size: .8rem; white-space: pre-wrap; }
 @page { size: A4; margin: 18mm; }
 @media print { body { margin: 0; max-width: none; font-size: 10.5pt; padding: 0; }
+  img { max-height: 105mm; }
   figure, tr { break-inside: avoid; } h2, h3 { break-after: avoid; } }
 """
 
@@ -94,8 +96,11 @@ _IN_PARTS = ("displacement_cos", "displacement_sin")
 
 
 def _cell(value: Any) -> str:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return f"<td{' class=number' if number else ''}>{escape(_text(value))}</td>"
+    text = _text(value)
+    kind = " class=short" if len(text) <= _SHORT else ""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        kind = " class=number"
+    return f"<td{kind}>{escape(text)}</td>"
 
 
 def _text(value: Any) -> str:
