@@ -179,10 +179,11 @@ class DaskExecutor:
             run=self._runs[attempt.kind] if index is None else None,
             run_part=None if index is None or kind.parts is None else kind.parts.run_part,
             part=None if index is None else work.parts[index].spec,
-            saved=attempt.saved if index is None else (),
+            saved=work.saved if index is None else (),
+            told=work.told,
             warm_up=self._registry.warm_up,
             version=self._version,
-            progress_seconds=self._pace.progress_seconds,
+            pace=self._pace,
         )
 
     def _landed(self, token: str) -> None:
@@ -219,12 +220,12 @@ class DaskExecutor:
             self._end(work, Failed(answer.failure))
         elif answer.retry is not None:
             self._again(work, index, answer.retry)
-        elif answer.output is None and index is not None:
-            # Its worker leaves the cluster in good order; nothing was lost.
-            with self._lock:
-                work.pending.appendleft(index)
         elif answer.output is None:
-            self._end(work, Stopped())
+            # It kept something, or its worker leaves the cluster in good order; nothing was lost.
+            for kept in answer.kept:
+                self._sink.kept(work.attempt, kept.pieces, anew=kept.anew)
+            with self._lock:
+                work.go_on(index, answer.kept)
         else:
             work.keep(index, answer.output)
             self._finish_if_whole(work)
@@ -274,8 +275,11 @@ class DaskExecutor:
 
     def _take(self, note: dict[str, Any]) -> None:
         token = str(note.get("token"))
+        found = [(float(value), float(amplitude)) for value, amplitude in note.get("found", ())]
         with self._lock:
             flight = self._flights.get(token)
+            if flight is not None:
+                flight.work.told += len(found)
             if note.get("over") and self._leaving.pop(token, None) is not None:
                 self._later(self._fill)
         if flight is None:
@@ -286,7 +290,7 @@ class DaskExecutor:
             flight.begun, flight.worker = note["begun"], str(note["worker"])
             flight.threads = int(note["threads"])
         elif "share" in note:
-            if found := [(float(value), float(amplitude)) for value, amplitude in note["found"]]:
+            if found:
                 self._sink.found(flight.work.attempt, found)
             flight.work.progress(flight.index, float(note["share"]), int(note["points"]))
 

@@ -18,7 +18,7 @@ from typing import Any
 
 from distributed import Status, Worker, get_worker
 
-from service.checkpoints import Checkpoints
+from service.checkpoints import Checkpoints, Kept
 from service.jobs import JobFailure, JobOutput, Pace, Piece, RunOn, WarmUp
 from service.parts import PartOutput, RunPart
 from service.worker import THREAD_LIMITS, Report, Task, Throttle, checked, failure_of
@@ -42,11 +42,13 @@ class Order:
     run, run_part : callable or None
         One of them: for a whole job, or for the part whose spec is `part`.
     saved : tuple of Piece
-        What earlier attempts at a whole job kept. Nothing is kept here: it would go through the scheduler.
+        What earlier orders of a whole job kept.
+    told : int
+        How many points of its branch the service knows; they are not said again.
     version : str
         Of the service; a worker with another one might compute other numbers.
-    progress_seconds : float
-        Least time between two reports [s].
+    pace : Pace
+        How often the worker tells what, and when a whole job keeps what it has.
     """
 
     token: str
@@ -57,15 +59,20 @@ class Order:
     run_part: RunPart | None
     part: Mapping[str, Any] | None
     saved: tuple[Piece, ...]
+    told: int
     warm_up: WarmUp
     version: str
-    progress_seconds: float
+    pace: Pace
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """From a worker: an output, a failure, a reason to try again, or none of them if it was told to stop."""
+    """From a worker: an output, a failure, a reason to try again, or none of them if it stopped on its way.
 
+    What it `kept` then is for the next order.
+    """
+
+    kept: tuple[Kept, ...] = ()
     output: JobOutput | PartOutput | None = None
     failure: JobFailure | None = None
     retry: str | None = None
@@ -83,6 +90,25 @@ class _Unwanted:
     def __call__(self) -> bool:
         task = self._tasks.get(self._key)
         if task is None or task.state in ("cancelled", "resumed") or self._worker.status in _GONE:
+            self.obeyed = True
+        return self.obeyed
+
+
+class _Stop:
+    """`should_stop` of one order, and the place where its run keeps what it has.
+
+    A run that has kept something stops there: its pieces are the answer, and the next order goes on behind
+    them. They so take the way of the results, are stored before a worker can take them along, and are not
+    in the scheduler's log of events, which forgets little.
+    """
+
+    def __init__(self, unwanted: _Unwanted) -> None:
+        self._unwanted = unwanted
+        self.kept: list[Kept] = []
+        self.obeyed = False
+
+    def __call__(self) -> bool:
+        if self.kept or self._unwanted():
             self.obeyed = True
         return self.obeyed
 
@@ -108,35 +134,41 @@ def _answer(order: Order) -> Answer:
     def say(**note: Any) -> None:
         worker.log_event(TOPIC, {"token": order.token, "worker": worker.address, **note})
 
+    known = order.told
+
     def send(report: Report) -> None:
-        say(share=report.fraction, points=report.points, found=[list(point) for point in report.found])
+        nonlocal known
+        found = [list(point) for point in report.found[known:]]
+        known = max(known - len(report.found), 0)
+        say(share=report.fraction, points=report.points, found=found)
 
     # The time tells a second start of an order from the first one, even in the same process.
     say(begun=time.time_ns(), threads=worker.state.nthreads)
-    stop = _Unwanted(worker, worker.get_current_task())
+    stop = _Stop(_Unwanted(worker, worker.get_current_task()))
     try:
-        return _computed(order, Throttle(send, order.progress_seconds), stop)
+        return _computed(order, Throttle(send, order.pace.progress_seconds), stop)
     finally:
         say(over=True)
 
 
-def _computed(order: Order, progress: Throttle, stop: _Unwanted) -> Answer:
+def _computed(order: Order, progress: Throttle, stop: _Stop) -> Answer:
+    kept = Checkpoints(order.job_id, order.saved, stop.kept.append, order.pace)
     try:
         _warm(order.warm_up)
         output: JobOutput | PartOutput
         if order.run_part is not None and order.part is not None:
             output = order.run_part(order.spec, order.part, progress, stop)
         elif order.run is not None:
-            pace = Pace(progress_seconds=0.0, checkpoint_seconds=0.0, checkpoint_bytes=0)
-            kept = Checkpoints(order.job_id, order.saved, lambda _kept: None, pace)
             output = checked(order.run(order.spec, progress, stop, kept))
     except MemoryError as error:
         return Answer(retry=f"the worker ran out of memory ({error})")
     except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
-        if stop.obeyed:
-            return Answer()
-        return Answer(failure=failure_of(_task(order), error))
-    return Answer() if stop.obeyed else Answer(output=output)
+        if not stop.obeyed:
+            return Answer(failure=failure_of(_task(order), error))
+    if not stop.obeyed:
+        return Answer(output=output)
+    kept.flush()
+    return Answer(kept=tuple(stop.kept))
 
 
 def _task(order: Order) -> Task:

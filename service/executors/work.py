@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import Counter, deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from distributed import Future
@@ -23,6 +24,8 @@ class Work:
 
     def __init__(self, attempt: Attempt) -> None:
         self.attempt = attempt
+        self.saved = attempt.saved
+        self.told = 0  # points of its branch that the queue knows
         self.parts: list[Part] = []
         self.pending: deque[int | None] = deque()
         self.flying = 0
@@ -81,6 +84,14 @@ class Work:
                 keep_part(self._checkpoints, index, output)
             else:
                 raise TypeError(f"a worker answered {type(output).__name__}")
+
+    def go_on(self, index: int | None, kept: Sequence[Kept]) -> None:
+        """Order again what stopped on its way, behind what it kept."""
+        for one in kept:
+            before = () if one.anew else self.saved
+            known = {piece.part: piece for piece in (*before, *one.pieces)}
+            self.saved = tuple(known[part] for part in sorted(known))
+        self.pending.appendleft(index)
 
     def flush(self) -> None:
         """Store the parts that wait to be kept, for an attempt that may come after."""

@@ -20,6 +20,7 @@ import yaml
 from dask_cluster import DaskCluster, lives
 from private_kinds import PRIVATE
 from service_helpers import pids, until
+from sqlalchemy import select
 
 import solver
 from service import strict_json
@@ -29,7 +30,7 @@ from service.executors import executor_of
 from service.health import check
 from service.jobs import Registry
 from service.kinds import SHIPPED
-from service.models import JobState
+from service.models import Checkpoint, JobState
 from service.settings import Settings, load_settings
 from service.validation import validated
 
@@ -226,6 +227,54 @@ def test_a_worker_killed_costs_an_attempt(
     assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 2)
     assert first not in pids(file)[1:]
     until(lambda: threads_idle(embedded), 20.0)
+
+
+def test_a_sweep_goes_on_behind_its_last_checkpoint(
+    service: tuple[EmbeddedService, DaskCluster], tmp_path: Path
+) -> None:
+    """Its worker is killed in the middle: the branch is the one that is computed without that, to the bit.
+
+    Points come as they are found, each once in every attempt, whichever worker has the next stretch.
+    """
+    annulus = solver.annulus(solver.load_scene("bladed-disk")).to_dict()
+    body = {"scene": annulus, "from": 690, "to": 720, "harmonics": 13}
+    pace = {"checkpoint_seconds": 0.25, "progress_seconds": 0.01}
+    with EmbeddedService(settings_on(tmp_path, service[1], **pace), BOTH) as embedded:
+        queue, seen = embedded._service.queue, dict[int, list[tuple[float, float]]]()
+
+        def kept() -> list[tuple[int, int]]:
+            if live := queue.live(job):
+                seen[live.attempt] = list(live.found)
+            query = select(Checkpoint.part, Checkpoint.attempt).where(Checkpoint.job_id == job)
+            with embedded._service.database.reading() as connection:
+                return [
+                    (row.part, row.attempt) for row in connection.execute(query.order_by(Checkpoint.part))
+                ]
+
+        def busy() -> list[str]:
+            return [flight.worker for flight in queue._executor._flights.values() if flight.begun]
+
+        job = embedded.submit("slow-sweep", body)
+        until(kept)
+        workers = queue._executor._cluster._client.run(os.getpid)
+        until(lambda: len(kept()) >= 2 and not busy())
+        until(busy)  # the next order has just begun
+        os.kill(workers[busy()[0]], signal.SIGKILL)
+        until(lambda: {attempt for _, attempt in kept()} == {1, 2})
+        assert [part for part, _ in kept()] == list(range(len(kept()))), "nothing was kept twice"
+        until(lambda: not kept() and embedded.job(job).status.finished)
+        done = embedded.job(job)
+        assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 2)
+        (sweep,) = embedded.results(job).sweeps
+        arrays = embedded._service.sweeps.arrays(sweep.id)
+        result, (whole,) = computed(embedded, "sweep", body)
+        assert timeless(embedded.results(job).result) == result
+        assert {name: array.sha256 for name, array in arrays.items()} == whole
+        curve = list(zip(result["parameter"], result["amplitude"], strict=True))
+        for found in seen.values():
+            assert 0 < len(found) <= len(curve)
+            assert found == curve[: len(found)]
+        until(lambda: threads_idle(embedded), 20.0)
 
 
 def test_a_part_that_is_lost_is_computed_again_alone(
