@@ -1,0 +1,43 @@
+"""The busy statements stay quick in a long table: SQLite, which plans without counts, goes by their index."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from sqlalchemy import Select, Update
+from sqlalchemy.dialects import sqlite
+
+from service import revisions
+from service.db import Database
+from service.repository import job_statements as statements
+
+BY_KEY = "sqlite_autoindex_job_1"
+
+
+@pytest.mark.parametrize(
+    ("statement", "index"),
+    [
+        (statements.COMPUTED_BEFORE, "ix_job_spec_hash_state"),
+        (statements.NEXT_PRIORITY, "ix_job_state_priority_id"),
+        (statements.NEXT_JOBS, "ix_job_state_priority_id"),
+        (statements.TAKE, BY_KEY),
+        (statements.REPORT, BY_KEY),
+        (statements.SUCCEED, BY_KEY),
+        (statements.BY_ID, BY_KEY),
+    ],
+)
+def test_it_goes_by_its_index(tmp_path: Path, statement: Select[tuple[object]] | Update, index: str) -> None:
+    url = f"sqlite:///{tmp_path}/jobs.db"
+    revisions.upgrade(url)
+    compiled = statement.compile(dialect=sqlite.dialect())
+    values = tuple(None for _ in compiled.positiontup or ())
+    database = Database(url)
+    try:
+        with database.reading() as connection:
+            rows = connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {compiled}", values).all()
+    finally:
+        database.close()
+    plan = [str(row[-1]) for row in rows]
+    assert any(index in step for step in plan), plan
+    assert not any(step.startswith("SCAN job") for step in plan), plan
