@@ -25,6 +25,7 @@ from service.routes import (
     events,
     health,
     jobs,
+    matrices,
     metrics,
     page,
     plan,
@@ -85,7 +86,7 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
     app.add_middleware(Seal, settings=service.settings)
     events.install(app)
     for module in (
-        jobs, events, designs, sweeps, scene_text, scenes, uploads, plan, previews, health, metrics,
+        jobs, events, designs, sweeps, scene_text, scenes, uploads, matrices, plan, previews, health, metrics,
         reference, page,
     ):  # fmt: skip
         app.include_router(module.router)

@@ -12,7 +12,7 @@ import multiprocessing as mp
 import os
 import signal
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from solver.errors import Issue
 MEMORY_BYTES = 2 * 1024**3
 _AT_ONCE = threading.BoundedSemaphore(2)
 _PATIENCE_SECONDS = 5.0
-_DESCRIBE, _RESOLVE = "describe", "resolve"
+_DESCRIBE, _RESOLVE, _LOOK = "describe", "resolve", "look"
 
 
 def contents(file: Path, seconds: float) -> list[dict[str, Any]]:
@@ -54,6 +54,20 @@ def resolved_structure(
         If reading takes too much.
     """
     found: dict[str, Any] = _ask(_RESOLVE, folder, dict(structure), seconds, most_bytes)
+    return found
+
+
+def look_at(asked: Mapping[str, Any], folder: Path, seconds: float, most_bytes: int) -> dict[str, Any]:
+    """What files in `folder` hold and are good for, as `service.matrix_look.look` says.
+
+    Raises
+    ------
+    InvalidRequestError
+        With pointers into the scene that is asked for.
+    UnreadableUploadError
+        If a file cannot be read, or it takes too much.
+    """
+    found: dict[str, Any] = _ask(_LOOK, folder, dict(asked), seconds, most_bytes)
     return found
 
 
@@ -139,8 +153,9 @@ def _answer(task: str, argument: Any) -> dict[str, Any]:
     from solver.errors import SceneError
     from solver.matrices.files import MatrixFileError
 
+    tasks: dict[str, Callable[[Any], Any]] = {_DESCRIBE: _describe, _RESOLVE: _resolve, _LOOK: _look}
     try:
-        return {"found": _describe(Path(argument)) if task == _DESCRIBE else _resolve(argument)}
+        return {"found": tasks[task](argument)}
     except SceneError as error:
         return {"issues": [[issue.pointer, issue.message] for issue in error.issues]}
     except MatrixFileError as error:
@@ -151,12 +166,13 @@ def _answer(task: str, argument: Any) -> dict[str, Any]:
         return {"error": f"it cannot be read: {type(error).__name__}: {str(error)[:300]}"}
 
 
-def _describe(file: Path) -> list[dict[str, Any]]:
+def _describe(name: str) -> list[dict[str, Any]]:
     from solver.matrices.files import array_names, read_matrix, read_modes
     from solver.matrices.labels import LABEL_SUFFIXES
     from solver.matrices.sets import labels_of
 
-    if file.suffix in LABEL_SUFFIXES:
+    file = Path(name)
+    if file.suffix.lower() in LABEL_SUFFIXES:
         return [{"name": "mapping", "rows": len(labels_of(file)), "columns": 1, "entries": None}]
     names = array_names(file)
     if "modes" in names:
@@ -179,3 +195,9 @@ def _resolve(structure: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(tables, dict):
         raise TypeError(f"the structure is {type(tables).__name__}")
     return {key: item.write() if isinstance(item, Matrix | Modes) else item for key, item in tables.items()}
+
+
+def _look(asked: dict[str, Any]) -> dict[str, Any]:
+    from service.matrix_look import look
+
+    return look(asked)

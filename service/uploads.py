@@ -6,14 +6,15 @@ import enum
 import tempfile
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from service.access.callers import KEYLESS, Caller, visible
 from service.errors import InvalidRequestError, NotFoundError, UnreadableUploadError
-from service.inspection import contents, resolved_structure
+from service.inspection import contents, look_at, resolved_structure
 from service.kinds.scenes import UPLOAD
 from service.repository.uploads import UploadRepository, UploadRow
 from service.settings import Settings
@@ -147,43 +148,134 @@ class Uploads:
         structure = body.get("structure")
         if not isinstance(structure, Mapping) or structure.get("kind") != "matrices":
             return body
-        named = {key: structure[key] for key in _KEYS if _is_reference(structure.get(key))}
-        if not named:
+        if not any(_is_reference(structure.get(key)) for key in _KEYS):
             return body
-        rows, issues = {}, []
-        for key, reference in named.items():
+        return {**body, "structure": self._with(structure, self._rows(structure, caller))}
+
+    def looked_at(self, asked: Mapping[str, Any], caller: Caller = KEYLESS) -> dict[str, Any]:
+        """What uploaded matrices hold, and the scene that is asked for, as `service.matrix_look.look` says.
+
+        What a scene's structure resolves to is kept in mind: the scene is about to be used.
+
+        Raises
+        ------
+        InvalidRequestError
+            With pointers into the scene, or to the upload: one that is not there, or that does not fit.
+        """
+        structure = asked["structure"]
+        if structure is None:
+            rows = {f"{at}": self._row("uploads", at, id, caller) for at, id in enumerate(asked["uploads"])}
+        else:
+            rows = self._rows(structure, caller)
+        names = file_names(rows)
+        uploaded = {names[key]: f"{UPLOAD}{row.id}" for key, row in rows.items()}
+        placed = None if structure is None else {**structure, **names}
+        with self._placed(rows, names) as folder:
             try:
-                rows[key] = self.get(reference.removeprefix(UPLOAD), caller)
-            except NotFoundError as error:
-                issues.append(_issue(key, f"`{key}`: {error.detail}"))
+                files = list(names.values())
+                found = look_at(
+                    {**asked, "structure": placed, "files": files}, folder, self._seconds, _LARGEST_STRUCTURE
+                )
+            except UnreadableUploadError as error:
+                where = "/uploads" if structure is None else pointer("structure")
+                raise InvalidRequestError([Issue(pointer=where, message=error.detail)]) from error
+        resolved = found.pop("resolved", None)
+        if resolved is not None:
+            self._remember(_digest(structure, rows), resolved)
+        for tables in (found, found.get("scene") or {}):
+            if "structure" in tables:
+                tables["structure"] = {
+                    key: uploaded.get(item, item) if key in _KEYS else item
+                    for key, item in tables["structure"].items()
+                }
+        return found
+
+    def _row(self, key: str, at: int, upload_id: str, caller: Caller) -> UploadRow:
+        try:
+            return self.get(upload_id, caller)
+        except NotFoundError as error:
+            raise InvalidRequestError([Issue(pointer=pointer(key, at), message=error.detail)]) from error
+
+    def _rows(self, structure: Mapping[str, Any], caller: Caller) -> dict[str, UploadRow]:
+        """The uploads a structure names, by its keys.
+
+        Raises
+        ------
+        InvalidRequestError
+            One that is not there; a file that is named in another way.
+        """
+        rows, issues = {}, []
         for key in _KEYS:
-            if isinstance(structure.get(key), str) and key not in named:
+            given = structure.get(key)
+            if not isinstance(given, str):
+                continue
+            if not _is_reference(given):
                 message = f"`{key}` must be inline or an upload, `{UPLOAD}ID`: files are not read here"
                 issues.append(_issue(key, message))
+                continue
+            try:
+                rows[key] = self.get(given.removeprefix(UPLOAD), caller)
+            except NotFoundError as error:
+                issues.append(_issue(key, f"`{key}`: {error.detail}"))
         if issues:
             raise InvalidRequestError(issues)
-        return {**body, "structure": self._with(structure, rows)}
+        return rows
 
     def _with(self, structure: Mapping[str, Any], rows: Mapping[str, UploadRow]) -> dict[str, Any]:
-        files = {key: f"{row.sha256}.{row.format}" for key, row in rows.items()}
-        tables = {**structure, **files}
-        known = digest(tables)
+        known = _digest(structure, rows)
         with self._lock:
             if known in self._resolved:
                 self._resolved.move_to_end(known)
                 return self._resolved[known]
-        with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
-            for key, row in rows.items():
-                (Path(folder) / files[key]).write_bytes(self.repository.data(row.id))
+        names = file_names(rows)
+        with self._placed(rows, names) as folder:
             try:
-                found = resolved_structure(tables, Path(folder), self._seconds, _LARGEST_STRUCTURE)
+                found = resolved_structure({**structure, **names}, folder, self._seconds, _LARGEST_STRUCTURE)
             except UnreadableUploadError as error:
                 raise InvalidRequestError([_issue(next(iter(rows)), error.detail)]) from error
+        self._remember(known, found)
+        return found
+
+    @contextmanager
+    def _placed(self, rows: Mapping[str, UploadRow], names: Mapping[str, str]) -> Iterator[Path]:
+        """A folder that holds the files of uploads under their names."""
+        with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
+            for key, row in rows.items():
+                (Path(folder) / names[key]).write_bytes(self.repository.data(row.id))
+            yield Path(folder)
+
+    def _remember(self, known: str, found: dict[str, Any]) -> None:
         with self._lock:
             self._resolved[known] = found
             while len(self._resolved) > _KEPT:
                 self._resolved.popitem(last=False)
-        return found
+
+
+def file_names(rows: Mapping[str, UploadRow]) -> dict[str, str]:
+    """Names of files for uploads by their keys: those they came with, each upload its own."""
+    owners: dict[str, str] = {}
+    names = {}
+    for key, row in rows.items():
+        name = file_name(row.name, UploadFormat(row.format))
+        if owners.setdefault(name, row.id) != row.id:
+            name = f"{key}-{name}"
+        names[key] = name
+    return names
+
+
+def file_name(name: str, form: UploadFormat) -> str:
+    """The name an upload came with, with a suffix of its format."""
+    try:
+        fits = format_of(None, name, "") is form
+    except InvalidRequestError:
+        fits = False
+    return name if fits else f"{name}.{form.value}"
+
+
+def _digest(structure: Mapping[str, Any], rows: Mapping[str, UploadRow]) -> str:
+    """What a structure resolves to depends on: its tables, and what the files hold under which names."""
+    names = file_names(rows)
+    return digest({**structure, **{key: [row.sha256, names[key]] for key, row in rows.items()}})
 
 
 def _is_reference(value: object) -> bool:

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from solver.fourier import Real
-
+# Not that of `solver.fourier`, which brings the compiled loops along: files of strangers are read without.
+Real = NDArray[np.float64]
 SMALL_PIVOT = 1e-12  # of the scaled K: below it K alone may be singular, and is shifted
 SHIFT = 1e-10  # shift σ relative to the largest K_ii / M_ii
 LEAST = 1e-16  # smallest μ relative to the largest: below is rounding, and only the static share counts

@@ -14,15 +14,7 @@ from service.cli.failures import InputError
 if TYPE_CHECKING:
     from solver.matrices.sets import MatrixSet
 
-ROLES = ("M", "K", "C")
 MOST_UNNAMED = 200
-_LABELS = (".mapping", ".dof")
-_BY_SUFFIX = {".mas": "M", ".sti": "K"}
-_WORDS = {
-    "M": ("M", "MASS", "MASSE"),
-    "K": ("K", "STIF", "STIFF", "STIFFNESS"),
-    "C": ("C", "DAMP", "DAMPING", "DMPV"),
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +53,8 @@ def relative(path: Path, target: Path) -> str:
 
 def sources(files: Sequence[str], mapping: str | None, units: str) -> Sources:
     """Sort the files given by what they are."""
+    from solver.matrices.files import MatrixFileError
+    from solver.matrices.roles import MAPPING, sorted_files
     from solver.matrices.sets import UNITS
 
     if units not in UNITS:
@@ -71,51 +65,13 @@ def sources(files: Sequence[str], mapping: str | None, units: str) -> Sources:
     for name in [*files, *([mapping] if mapping else [])]:
         if not Path(name).is_file():
             raise InputError(f"`FILES`: there is no file {name!r}")
-    labels = [name for name in files if Path(name).suffix.lower() in _LABELS]
-    matrices = [name for name in files if name not in labels]
-    if len(labels) + (mapping is not None) > 1:
-        raise InputError(f"`FILES`: one file names the rows, got {', '.join([*labels, mapping or ''])}")
-    if not 0 < len(matrices) <= len(ROLES):
-        raise InputError(f"`FILES` takes M, K and maybe C, got {len(matrices)} files")
-    if len(matrices) == 1:
-        roles = dict.fromkeys(_roles_of_one(Path(matrices[0])), Path(matrices[0]))
-    else:
-        roles = {role: Path(name) for role, name in _assigned(matrices).items()}
-    rows = mapping or next(iter(labels), None)
-    return Sources(roles=roles, mapping=None if rows is None else Path(rows), units=units)
-
-
-def _assigned(files: Sequence[str]) -> dict[str, str]:
-    """Files by their role: as the last word that tells, or the suffix; else in the order M, K, C."""
-    told = [_role(Path(name)) for name in files]
-    known = [role for role in told if role is not None]
-    if len(set(known)) == len(files) and {"M", "K"} <= set(known):
-        return dict(zip(known, files, strict=True))
-    return dict(zip(ROLES, files, strict=False))
-
-
-def _role(path: Path) -> str | None:
-    if path.suffix.lower() in _BY_SUFFIX:
-        return _BY_SUFFIX[path.suffix.lower()]
-    words = [word.upper() for word in reversed(re.findall("[A-Za-z]+", path.stem))]
-    roles = (role for word in words for role, known in _WORDS.items() if word in known)
-    return next(roles, None)
-
-
-def _roles_of_one(path: Path) -> tuple[str, ...]:
-    """What a single file holds: matrices under their names, or modes."""
-    from solver.matrices.files import MatrixFileError, array_names
-
+    given = [Path(name) for name in files]
     try:
-        names = array_names(path)
+        roles = sorted_files(given, None if mapping is None else Path(mapping))
     except MatrixFileError as error:
         raise InputError(f"`FILES`: {error}") from error
-    if {"M", "K"} <= set(names):
-        return tuple(role for role in ROLES if role in names)
-    if "modes" in names:
-        return ("modes",)
-    held = ", ".join(f"`{name}`" for name in names[:20]) or "nothing with a name"
-    raise InputError(f"`FILES`: {str(path)!r} alone must hold M and K, or modes; it holds {held}")
+    rows = roles.pop(MAPPING, None)
+    return Sources(roles=roles, mapping=rows, units=units)
 
 
 def read_sources(found: Sources) -> MatrixSet | None:

@@ -16,7 +16,7 @@ from service.bodies import saved
 from service.http import CallerDependency, ServiceDependency, listing
 from service.routes.described import LISTED
 from service.upload_answers import NewUpload, UploadAnswer, UploadedArray, UploadPage
-from service.uploads import MEDIA, Arrived, UploadFormat, format_of
+from service.uploads import MEDIA, Arrived, UploadFormat, file_name, format_of
 
 router = APIRouter(prefix="/v1/uploads", tags=["uploads"])
 
@@ -63,7 +63,7 @@ async def upload(
     known = format_of(form, name, media)
     settings = service.settings
     with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
-        path = Path(folder) / f"upload.{known.value}"
+        path = Path(folder) / file_name(name, known)
         with path.open("wb") as file:
             size, sha256 = await saved(request, file, settings.max_upload_bytes, settings.upload_seconds)
         arrived = Arrived(path=path, name=name, format=known, size=size, sha256=sha256)

@@ -70,8 +70,8 @@ def refuse(found: MatrixSet, *, reduced: bool) -> None:
     bare = np.flatnonzero(mass == 0.0)
     if bare.size and not reduced:
         raise ValueError(
-            f"`M` must be positive definite, but {_rows(found, bare)} without mass: --reduce condenses such "
-            "DOFs out (do not name them by --dof)"
+            f"`M` must be positive definite, but {_rows(found, bare)} without mass: reduce the model "
+            "(--reduce), which condenses such DOFs out, and do not name them"
         )
     least = _least(M)
     if least < -_INDEFINITE:
@@ -156,8 +156,8 @@ def notes(found: MatrixSet, omega2: FloatArray) -> list[str]:
     mass = total_mass(found)
     if mass is not None and 0.0 < mass[1] < _LIGHT:
         said.append(
-            f"the mass is {mass[1]:.3g} kg in {mass[0]}: if that is in tonnes (a model in mm, t, N, s), give "
-            "--units mm"
+            f"the mass is {mass[1]:.3g} kg in {mass[0]}: if that is in tonnes (a model in mm, t, N, s), its "
+            "units are mm (--units mm)"
         )
     return said
 
@@ -165,8 +165,8 @@ def notes(found: MatrixSet, omega2: FloatArray) -> list[str]:
 def _implausible(first: float) -> str:
     return (
         f"the first elastic frequency is {first:.3g} Hz: are M and K in units that go together? K in N/mm "
-        "goes with M in t (--units mm), K in N/m with M in kg; N/mm with kg is a factor 32 too low, N/m with "
-        "t a factor 32 too high. If M and K are swapped, give them in the order M K"
+        "goes with M in t, units mm (--units mm), K in N/m with M in kg; N/mm with kg is a factor 32 too "
+        "low, N/m with t a factor 32 too high. Or are M and K swapped?"
     )
 
 

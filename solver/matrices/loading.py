@@ -12,7 +12,7 @@ from scipy.sparse import coo_array
 from solver.errors import Issue, SceneError
 from solver.matrices.files import MatrixFileError, read_labelled, read_modes
 from solver.matrices.labels import label
-from solver.matrices.reduction import craig_bampton
+from solver.matrices.reduction import Reduced, craig_bampton
 from solver.matrices.sets import UNITS, MatrixSet, in_si, put_together
 from solver.matrices.structure import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix, Modes
@@ -43,14 +43,22 @@ def with_files(raw: Mapping[str, object], folder: Path) -> dict[str, object]:
             tables["modes"] = read_modes(folder / tables["modes"])
     except MatrixFileError as error:
         raise SceneError([_issue("modes", f"`modes`: {error}")]) from error
-    found = _matrices(tables, folder)
+    found = read_matrices(tables, folder)
     if isinstance(tables.get("modes"), Modes):
         tables = _rows_in_use(tables)
-    return {**raw, "structure": _reduced(tables, found.matrices)}
+    return {**raw, "structure": as_kept(tables, found.matrices)[0]}
 
 
-def _matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:
-    """The matrices that files hold, in SI units; labels among the DOFs of `tables` become rows."""
+def read_matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:
+    """The matrices that the files of a structure hold, in SI units.
+
+    `mapping` and `units` are taken out of `tables`, and labels among its DOFs become rows.
+
+    Raises
+    ------
+    SceneError
+        A file that cannot be used, or a label that is not there; the pointer is that of the key.
+    """
     paths = {key: folder / tables[key] for key in _MATRICES if isinstance(tables.get(key), str)}
     mapping, units = tables.pop(MAPPING, None), tables.pop(IN_UNITS, "SI")
     if mapping is not None and not isinstance(mapping, str):
@@ -105,15 +113,21 @@ def _rows_in_use(tables: dict[str, Any]) -> dict[str, Any]:
     return {**tables, "modes": kept, "dofs": {name: row for row, name in enumerate(dofs)}}
 
 
-def _reduced(tables: dict[str, Any], sparse: dict[str, coo_array]) -> dict[str, Any]:
-    """Matrices as the scene keeps them: as they are, or reduced onto the DOFs in use if asked for."""
+def as_kept(tables: dict[str, Any], sparse: dict[str, coo_array]) -> tuple[dict[str, Any], Reduced | None]:
+    """Tables with the matrices as the scene keeps them: as they are, or reduced if `keep_modes` asks for it.
+
+    Raises
+    ------
+    SceneError
+        A model too large as it stands, or one that cannot be reduced so.
+    """
     keep = tables.pop(KEEP_MODES, None)
     sizes = {key: matrix.shape[0] for key, matrix in sparse.items()}
     if keep is None:
         large = next((key for key in sizes if sizes[key] > MOST_DOFS), None)
         if large is not None:
             raise SceneError([_issue(large, _too_large(large, sizes[large]))])
-        return {**tables, **{key: Matrix(matrix.toarray()) for key, matrix in sparse.items()}}
+        return {**tables, **{key: Matrix(matrix.toarray()) for key, matrix in sparse.items()}}, None
     if isinstance(keep, bool) or not isinstance(keep, int) or not 0 <= keep <= MOST_DOFS:
         message = f"`{KEEP_MODES}` must be a whole number from 0 to {MOST_DOFS}, got {keep!r}"
         raise SceneError([_issue(KEEP_MODES, message)])
@@ -128,7 +142,8 @@ def _reduced(tables: dict[str, Any], sparse: dict[str, coo_array]) -> dict[str, 
         raise SceneError([_issue("dofs" if "`dofs`" in str(error) else KEEP_MODES, str(error))]) from error
     matrices = {key: Matrix(np.asarray(value)) for key, value in found.matrices.items()}
     reduction = {"dofs": sizes["M"], "modes": found.modes, "highest_hz": found.highest_hz}
-    return {**tables, **matrices, "dofs": {n: i for i, n in enumerate(dofs)}, "reduction": reduction}
+    rows = {name: row for row, name in enumerate(dofs)}
+    return {**tables, **matrices, "dofs": rows, "reduction": reduction}, found
 
 
 def _too_large(key: str, size: int) -> str:

@@ -1,0 +1,145 @@
+"""``/v1/matrices``: what uploaded matrices are, and the scene that begins with them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.concurrency import run_in_threadpool
+
+from service.answers import Answer
+from service.errors import InvalidRequestError
+from service.http import CallerDependency, JsonBody, ServiceDependency
+from service.validation import validated
+from solver.errors import Issue
+
+router = APIRouter(prefix="/v1/matrices", tags=["uploads"])
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_@-]{1,100}$")]
+UploadId = Annotated[str, Field(max_length=100)]
+_EXAMPLE: dict[str, Any] = {
+    "name": "beam",
+    "structure": {"M": "upload:1", "K": "upload:2", "dofs": {"tip": "8.UY", "middle": 3}, "keep_modes": 10},
+    "contacts": [{"name": "damper", "between": ["tip", "ground"]}],
+    "excitation": {"dof": "middle"},
+    "observe": {"dof": "tip"},
+}
+
+
+class _Strict(BaseModel):
+    """No other keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ContactPlace(_Strict):
+    """A contact to begin with: between which DOFs, or a DOF and `ground`."""
+
+    name: Name
+    between: Annotated[list[Name], Field(min_length=2, max_length=2)]
+
+
+class OfDof(_Strict):
+    """A DOF by its name."""
+
+    dof: Name
+
+
+class MatricesRequest(_Strict):
+    """Uploads to be looked at, or a structure that refers to them; with its DOFs, the scene it begins.
+
+    Attributes
+    ----------
+    uploads : list of str
+        Ids, in place of `structure`: which is M, K, C or names the rows is found out.
+    structure : dict or None
+        Tables of a structure of kind `matrices`.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra={"examples": [_EXAMPLE]})
+
+    uploads: list[UploadId] = Field(default=[], max_length=4, description="Ids, in place of `structure`.")
+    structure: dict[Annotated[str, Field(max_length=100)], Any] | None = None
+    name: Name = "my-model"
+    contacts: list[ContactPlace] = Field(default=[], max_length=100)
+    excitation: OfDof | None = Field(default=None, description="Where the force acts.")
+    observe: OfDof | None = Field(default=None, description="What is observed; where the force acts if null.")
+
+
+class MatrixAnswer(Answer):
+    """A matrix that was read."""
+
+    name: str
+    rows: int
+    entries: int
+
+
+class LabelsAnswer(Answer):
+    """What the files call their rows."""
+
+    first: list[str] = Field(description="Of the first rows, 400 at most.")
+    components: list[str]
+    nodes: tuple[int, int] = Field(description="The lowest and the highest.")
+
+
+class MassAnswer(Answer):
+    """The mass that moves in one direction."""
+
+    direction: str
+    kg: float
+
+
+class KeptAnswer(Answer):
+    """What a reduction kept, and what it is good for."""
+
+    modes: int
+    highest_hz: float
+    good_to_hz: float = Field(description="Frequencies up to here are estimated exact to 0.1 %.")
+    held_hz: list[float]
+    static_residual: float
+    mass_carried: dict[str, float]
+
+
+class MatricesAnswer(Answer):
+    """What was read, what should be known of it, and the scene."""
+
+    structure: dict[str, Any] = Field(description="Which upload is what.")
+    rows: int
+    modes: int | None = None
+    matrices: list[MatrixAnswer]
+    held: int = Field(default=0, description="Rows left out because a boundary condition holds them.")
+    labels: LabelsAnswer | None = None
+    mass: MassAnswer | None = None
+    frequencies_hz: list[float] | None = Field(
+        description="The lowest, null before a large model is reduced."
+    )
+    notes: list[str] = Field(description="What looks wrong, and what to do.")
+    reduction: KeptAnswer | None = None
+    scene: dict[str, Any] | None = Field(default=None, description="Null until DOFs are named.")
+
+
+@router.post("")
+async def look(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> MatricesAnswer:
+    """Look at uploaded matrices: sizes, labels, mass, frequencies, what is wrong and what to do.
+
+    With `dofs` in the structure the answer has a scene that refers to the uploads, with a band around the
+    first mode and contacts whose values are of the right size to begin with. Nothing is stored.
+    """
+    request = validated(MatricesRequest, body)
+    if bool(request.uploads) == (request.structure is not None):
+        raise InvalidRequestError(
+            [Issue(pointer="/uploads", message="one of `uploads` and `structure` is needed")]
+        )
+    asked = request.model_dump()
+    if (request.structure or {}).get("dofs"):
+        if request.excitation is None:
+            raise InvalidRequestError(
+                [Issue(pointer="/excitation/dof", message="a DOF for the force is needed")]
+            )
+        asked["observe"] = asked["observe"] or asked["excitation"]
+    return MatricesAnswer.model_validate(await run_in_threadpool(service.uploads.looked_at, asked, caller))
+
+
+def _refused(where: str, message: str) -> InvalidRequestError:
+    return InvalidRequestError([Issue(pointer=where, message=message)])
