@@ -17,6 +17,10 @@ Position = tuple[float | None, str]
 
 _FEW = 2000
 _FEW_OF_AN_OWNER = 5000
+_PLANNING = (
+    "SELECT set_config('plan_cache_mode', 'force_custom_plan', true), "
+    "set_config('max_parallel_workers_per_gather', '0', true)"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,11 +31,14 @@ class Condition:
     ----------
     few : int
         Up to so many rows it leads a query (see `met`).
+    apart : bool
+        It is about rows of another table.
     """
 
     ids: Select[str]
     holds: ColumnElement[bool]
     few: int = _FEW
+    apart: bool = False
 
 
 def plain_conditions(
@@ -75,7 +82,7 @@ def met(
     conditions: Sequence[Condition],
     column: InstrumentedAttribute[Any] | None = None,
 ) -> Select[Any]:
-    """The query with every condition, on SQLite led by one that few rows meet if there is one.
+    """The query with every condition, led by one that few rows meet if there is one.
 
     Without such a one the rows are read in the order of `column` (None: of the ids), which finds a page of
     those that many rows meet after a few of them; see `_in_order`.
@@ -84,17 +91,27 @@ def met(
     the ids for four rows with a low peak. So each condition with an index is counted first, up to
     `few` rows, which its index answers in well under a millisecond. PostgreSQL keeps statistics and knows,
     if it plans with the values: a plan kept for any owner is wrong for who has few rows, or most of them.
+    Only what another table leaves of the rows it guesses badly, and reads ten thousand in order for a page
+    of two thousand. Starting its parallel workers takes longer than a page should.
     """
-    lead = None
-    if connection.dialect.name == "sqlite":
-        lead = next((condition for condition in conditions if _is_few(connection, condition)), None)
-    else:
-        connection.exec_driver_sql("SET LOCAL plan_cache_mode = force_custom_plan")
-    in_order = connection.dialect.name == "sqlite" and lead is None
+    sqlite = connection.dialect.name == "sqlite"
+    if not sqlite:
+        connection.exec_driver_sql(_PLANNING)
+    asked = (condition for condition in conditions if sqlite or condition.apart)
+    lead = next((condition for condition in asked if _is_few(connection, condition)), None)
     for condition in conditions:
-        holds = _in_order(condition.holds, column) if in_order else condition.holds
-        query = query.where(identity.in_(condition.ids) if condition is lead else holds)
+        if condition is lead:
+            query = query.where(identity.in_(_first(condition.ids)))
+        else:
+            in_order = sqlite and lead is None
+            query = query.where(_in_order(condition.holds, column) if in_order else condition.holds)
     return query
+
+
+def _first(ids: Select[str]) -> Select[str]:
+    """The same ids, of which PostgreSQL too begins."""
+    leading = ids.cte("leading").prefix_with("MATERIALIZED", dialect="postgresql")
+    return select(leading.c[0])
 
 
 def _in_order(holds: ColumnElement[bool], column: InstrumentedAttribute[Any] | None) -> ColumnElement[bool]:

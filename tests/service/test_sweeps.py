@@ -118,6 +118,7 @@ def meets(record: SweepRecord, query: dict[str, Any]) -> bool:
         {"N0_min": 100.0, "N0_max": 700.0, "contact": "root", "sort": "points"},
         {"N0_min": 100.0, "N0_max": 200.0, "contact": "nothing"},
         {"contact": "damper", "sort": "created"},
+        {"N0_min": 100.0, "sort": "peak"},
         {"N0_max": 500.0, "band_hz_max": 0.2, "sort": "band_hz", "parameter": "damper.N0"},
         {"harmonics": 7, "completed": False, "sort": "-seconds"},
         {"points_min": 499, "points_max": 499},
@@ -194,6 +195,7 @@ QUERIES: tuple[dict[str, Any], ...] = (
     {"points_min": 100},
     {"N0_min": 100.0, "N0_max": 101.0},
     {"N0_min": 100.0, "N0_max": 700.0, "contact": "root", "sort": "peak"},
+    {"N0_min": 500.0, "N0_max": 540.0, "contact": "shroud", "sort": "peak"},
     {"band_hz_max": 0.001, "sort": "band_hz"},
     {"harmonics": 7, "sort": "-peak"},
 )
