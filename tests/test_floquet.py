@@ -137,7 +137,7 @@ class Return:
     ids=["slipping", "separating", "out of phase", "slow", "loose", "mistuned", "cyclic", "standing"],
 )
 def test_matrix_against_the_marched_return_map(scene: Scene, frequency_hz: float, harmonics: int):
-    returns = Return(scene, frequency_hz)
+    returns = Return(scene, frequency_hz, steps=512)
     found = matrix_of(solve(scene, frequency_hz=frequency_hz, harmonics=harmonics))
     assert found.sliders == tuple(returns.sliders)
     np.testing.assert_allclose(found.matrix, returns.jacobian(), atol=1e-5 * np.abs(found.matrix).max())
@@ -197,7 +197,7 @@ def branch_points(damping: float, start: float, stop: float, harmonics: int) -> 
     return points
 
 
-@pytest.mark.parametrize("damping", [-0.02, -0.05])
+@pytest.mark.parametrize("damping", [-0.05, pytest.param(-0.02, marks=pytest.mark.long)])
 def test_a_multiplier_goes_through_one_at_each_fold(damping: float):
     """The determinant of the balance changes its sign where that of 1 - multipliers does."""
     points = branch_points(damping, 0.05, 0.4, 21)
@@ -242,7 +242,7 @@ def trajectory(point: Point, damping: float, move: np.ndarray, periods: int) -> 
     return np.array(states)
 
 
-@pytest.mark.parametrize("damping", [-0.02, -0.05])
+@pytest.mark.parametrize("damping", [-0.05, pytest.param(-0.02, marks=pytest.mark.long)])
 def test_perturbations_grow_and_decay_in_time_as_the_matrix_says(damping: float):
     """The motion between the folds is left, the small one is come back to."""
     points = branch_points(damping, 0.16, 0.18, 41)
