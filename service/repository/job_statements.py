@@ -71,7 +71,6 @@ def _guarded(*conditions: ColumnElement[bool]) -> Update:
     return update(_JOB).where(OWNED, *conditions)
 
 
-RENEW = _guarded().values(lease_until=bindparam("until"))
 REPORT = _guarded().values(
     progress=bindparam("fraction"), points=bindparam("counted"), lease_until=bindparam("until")
 )

@@ -24,6 +24,7 @@ from service.repository.checkpoints import (
 )
 from service.repository.designs import insert_design
 from service.repository.guarding import OWNED, change_owned, of_attempt
+from service.repository.leases import renew
 from service.repository.listing import met, owner_condition, plain_conditions
 from service.repository.recovery import FREE, change, recover
 from service.repository.room import Room, require_share
@@ -187,9 +188,14 @@ class JobRepository:
         return [_attempt(row, owner) for row in found]
 
     def report(self, attempt: Attempt, fraction: float, points: int, lease_until: datetime) -> bool:
-        """Write progress and renew the lease; False if the attempt owns the job no more."""
+        """Write progress and renew the lease; False if the attempt owns the job no more.
+
+        In a transaction of its own: of two that each told of one job and concluded the other's, PostgreSQL
+        would have to end one.
+        """
         values = {"fraction": fraction, "counted": points, "until": lease_until}
-        return self._db.grouped(lambda connection: _guarded(connection, statements.REPORT, attempt, values))
+        with self._db.writing() as connection:
+            return _guarded(connection, statements.REPORT, attempt, values)
 
     def keep(
         self,
@@ -215,8 +221,7 @@ class JobRepository:
     def renew(self, attempts: Iterable[Attempt], lease_until: datetime) -> list[Attempt]:
         """Renew the leases; gives back the attempts that own their job no more."""
         with self._db.writing() as connection:
-            until = {"until": lease_until}
-            return [a for a in attempts if not _guarded(connection, statements.RENEW, a, until)]
+            return renew(connection, list(attempts), lease_until)
 
     def succeed(self, attempt: Attempt, output: JobOutput) -> bool:
         """Commit state, result and sweeps together, unless the job was lost or its cancel asked for."""

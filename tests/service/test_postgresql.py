@@ -10,13 +10,14 @@ import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
 from postgresql_cluster import Cluster
 from private_kinds import PRIVATE
 from service_helpers import pids, settings_of, until
-from sqlalchemy import select, text
+from sqlalchemy import select, text, update
 
 from service import postgresql, revisions
 from service.cli import main
@@ -67,6 +68,27 @@ def test_two_dispatchers_take_each_job_once(url: str) -> None:
     assert counts[JobState.SUCCESSFUL] == 120
     for database in databases:
         database.close()
+
+
+def test_renewing_leases_waits_for_nobody_who_changes_a_row(url: str) -> None:
+    """It would be a deadlock with a transaction that waits for a lease renewed before."""
+    database = Database(url)
+    jobs = JobRepository(database)
+    for _ in range(3):
+        jobs.submit(NEW, queue_limit=10)
+    attempts = jobs.claim_several("me", utc_now(), 3)
+    later = utc_now() + timedelta(hours=1)
+    until = select(Job.lease_until).order_by(Job.id)
+    with database.writing() as changing:
+        changing.execute(select(Job.id).where(Job.id == attempts[1].job_id).with_for_update())
+        with ThreadPoolExecutor(1) as thread:
+            assert thread.submit(jobs.renew, attempts, later).result(timeout=10.0) == []
+        changing.execute(text("SET LOCAL lock_timeout = '1s'"))
+        assert [found == later for found in changing.execute(until).scalars()] == [True, False, True]
+        changing.execute(update(Job).where(Job.id == attempts[0].job_id).values(points=1))
+    assert jobs.succeed(attempts[2], JobOutput(result={}))
+    assert jobs.renew(attempts, later) == [attempts[2]]
+    database.close()
 
 
 def test_a_dispatcher_passes_by_what_another_one_is_taking(url: str) -> None:
