@@ -5,9 +5,9 @@ from __future__ import annotations
 import heapq
 import importlib.util
 import itertools
-import math
 import multiprocessing as mp
 import os
+import random
 import statistics
 import sys
 import tempfile
@@ -39,22 +39,26 @@ from service.worker import Throttle, checked
 
 TIMES = 100
 CORES = os.cpu_count() or 1
-_JOBS = 2000
+_JOBS = 6000
 _THREADS = 16
 _BODY = {"kind": "sweep", "scene": "two-dof", "fresh": True}
 
 
 class ReplayExecutor:
-    """So many workers that answer every attempt with the same output after a time [s] of waiting."""
+    """So many workers that answer every attempt with the same output after waiting.
+
+    They wait from half to one and a half of `seconds`: workers that all ended at once would come in bursts.
+    """
 
     def __init__(self, output: JobOutput, workers: int, seconds: float) -> None:
         self._output, self._workers, self._seconds = output, workers, seconds
+        self._chance = random.Random(0)
         self._running: dict[int, Attempt] = {}
         self._ends: list[tuple[float, int]] = []
         self._numbers = itertools.count()
         self._changed = threading.Condition()
         self._closing = False
-        self._pool = ThreadPoolExecutor(_THREADS)
+        self._pool = ThreadPoolExecutor(workers)  # a thread a worker, as the local executor has
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._sink: Sink
 
@@ -73,7 +77,8 @@ class ReplayExecutor:
         number = next(self._numbers)
         with self._changed:
             self._running[number] = attempt
-            heapq.heappush(self._ends, (time.monotonic() + self._seconds, number))
+            wait = self._seconds * self._chance.uniform(0.5, 1.5)
+            heapq.heappush(self._ends, (time.monotonic() + wait, number))
             self._changed.notify()
 
     def stop_attempt(self, attempt: Attempt) -> None:
@@ -189,15 +194,16 @@ def simulate(url: str, *, processes: int, workers: int, seconds: float, jobs: in
     number = work.jobs * processes
     database = Database(url)
     with database.reading() as connection:
-        done = connection.execute(select(func.count(), func.min(Job.started), func.max(Job.finished)).where(
-            Job.state == JobState.SUCCESSFUL, Job.attempt == 1)).one()  # fmt: skip
+        first_attempts = select(Job.finished).where(Job.state == JobState.SUCCESSFUL, Job.attempt == 1)
+        ended = connection.execute(first_attempts.order_by(Job.finished)).scalars().all()
         results = connection.execute(select(func.count()).select_from(JobResult)).scalar_one()
         size = _size(database, connection)
     database.close()
-    expect(f"{done[0]} jobs and {results} results of {number}", done[0] == results == number)
+    expect(f"{len(ended)} jobs and {results} results of {number}", len(ended) == results == number)
+    first, last = number // 10, number - number // 10
     return Simulated(
         accepted=number / max(seconds for seconds, _, _ in told),
-        done=number / (done[2] - done[1]).total_seconds(),
+        done=(last - first) / (ended[last - 1] - ended[first]).total_seconds(),
         accept_cpu=statistics.mean(cpu for _, cpu, _ in told) / work.jobs,
         done_cpu=sum(cpu for _, _, cpu in told) / number,
         size=size / number,
@@ -244,7 +250,8 @@ def scale() -> None:
          "predicted/s", "measured/s"),
         rows,
     )  # fmt: skip
-    print("Job time is that which asks for 70 % of what can be done; service CPU: handing in + working off.")
+    print("Job time: the mean that asks for 70 % of what can be done; service CPU: handing in + working off.")
+    print("Rates leave out the first and the last tenth of the jobs, in which workers begin or have no more.")
 
 
 def _row(backend: str, processes: int, url: Callable[[], str]) -> tuple[str, ...]:
@@ -252,11 +259,8 @@ def _row(backend: str, processes: int, url: Callable[[], str]) -> tuple[str, ...
     most = simulate(url(), processes=processes, workers=workers, seconds=0.0)
     seconds = workers / (0.7 * most.done)
     found = simulate(url(), processes=processes, workers=workers, seconds=seconds)
-    jobs = _JOBS // processes * processes
-    # The last jobs of a finite run leave workers idle: it ends with the last of the rounds.
-    predicted = jobs / (math.ceil(jobs / workers) * seconds)
     return (
         backend, str(processes), f"{most.accepted:.0f}", f"{most.done:.0f}",
         f"{most.accept_cpu * 1e3:.2f} + {most.done_cpu * 1e3:.2f} ms", f"{most.size / 1000:.0f} kB",
-        f"{seconds * 1e3:.0f} ms", f"{predicted:.0f}", f"{found.done:.0f}",
+        f"{seconds * 1e3:.0f} ms", f"{workers / seconds:.0f}", f"{found.done:.0f}",
     )  # fmt: skip
