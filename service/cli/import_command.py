@@ -258,5 +258,8 @@ def _report(
     if written is not None:
         pairs += written.pairs()
     pairs += [("note", note) for note in notes]
-    pairs.append(("next", "add [[contacts]] in the file, then `stickslip plan`"))
+    pairs += [
+        ("compare", "frequencies and mass with those of your program; else see --units"),
+        ("next", "add [[contacts]] and a damping in the file, then `stickslip plan`"),
+    ]
     print_pairs(f"Scene {scene.name} in {target}", pairs)

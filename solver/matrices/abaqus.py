@@ -21,6 +21,7 @@ from solver.matrices.triplets import MOST_ROWS, Labelled, mirrored
 _HELD = 1e30  # diagonal entries from here on are the penalty of a boundary condition
 _LINE = "node, DOF, node, DOF and value (or row, column and value)"
 _COMMENT = "**"
+_HARWELL_BOEING = ("RSA", "RUA", "RRA", "PSA", "PUA")
 
 
 def is_matrix_market(start: bytes) -> bool:
@@ -45,6 +46,7 @@ def read_abaqus(path: Path) -> Labelled:
                 f"line {number}: {line.strip()[:60]!r} belongs to matrices of elements or substructures: "
                 "write the assembled ones by *MATRIX GENERATE and *MATRIX OUTPUT, FORMAT=MATRIX INPUT"
             )
+    _other_format(lines)
     data = table(lines, (5, 3), _LINE, _COMMENT)
     if data.shape[1] == 3:
         return _coordinate(data, lines)
@@ -55,11 +57,29 @@ def read_abaqus(path: Path) -> Labelled:
     return Labelled(matrix=matrix, labels=labels, held=frozenset(labels[row] for row in rows[stiff]))
 
 
+def _other_format(lines: list[str]) -> None:
+    """Refuse what another program wrote, by its name."""
+    if lines and lines[0].lstrip().startswith("%"):
+        raise FormatError(
+            "line 1 is a comment of MatrixMarket, whose first line must be `%%MatrixMarket matrix coordinate "
+            "real symmetric` (or `general`): put it back"
+        )
+    if len(lines) > 2 and lines[2][:3].upper() in _HARWELL_BOEING:
+        raise FormatError(
+            "line 3 is that of a Harwell-Boeing matrix (HBMAT of Ansys): let its name end in .matrix or .rsa"
+        )
+
+
 def _coordinate(data: NDArray[np.float64], lines: list[str]) -> Labelled:
     rows, columns = (
         whole_numbers(data[:, i], 1, what, lines, _COMMENT) - 1 for i, what in ((0, "row"), (1, "column"))
     )
     size = int(max(rows.max(), columns.max())) + 1
+    if rows[0] == columns[0] == size - 1 and data.shape[0] > 1 and data[0, 2] == data.shape[0] - 1:
+        raise FormatError(
+            "line 1 counts rows, columns and entries, as in MatrixMarket: its first line, `%%MatrixMarket "
+            "matrix coordinate real symmetric` (or `general`), is missing"
+        )
     if size > MOST_ROWS:
         raise FormatError(f"a matrix may have {MOST_ROWS} rows, got {size}")
     return Labelled(matrix=coo_array(mirrored(rows, columns, data[:, 2], size)))

@@ -11,13 +11,14 @@ from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
 from solver.matrices.sets import MatrixSet
-from solver.matrices.structure import ASYMMETRY
+from solver.matrices.structure import ASYMMETRY, one_triangle
 
 FloatArray = NDArray[np.float64]
 _RIGID = 1e-3  # a frequency below this share of the next one counts as zero
 _BODY = 6
 _SLOW, _FAST = 0.1, 3e5  # Hz; a first elastic frequency outside is hardly that of a machine part
 _LIGHT = 1e-3  # kg; less than a gram is more likely tonnes
+_HEAVY = 1e7  # kg; more is more likely a stiffness, or another unit
 _PENALTY = 1e30  # a stiffness that stands for a boundary condition
 _INDEFINITE = 1e-6  # smallest eigenvalue of M scaled to a unit diagonal, negative beyond rounding
 
@@ -42,6 +43,10 @@ def refuse(found: MatrixSet, *, reduced: bool) -> None:
     for key, matrix in found.matrices.items():
         _symmetric(key, csr_array(matrix), found)
     M, K = (csr_array(found.matrices[key]) for key in "MK")
+    if M.nnz and abs(M - K).max() == 0.0:
+        raise ValueError(
+            "`M` and `K` are the same matrix: give the mass and the stiffness, in the order M K C"
+        )
     mass, stiffness = M.diagonal(), K.diagonal()
     empty = np.flatnonzero((abs(M).sum(axis=1) == 0.0) & (abs(K).sum(axis=1) == 0.0))
     if empty.size:
@@ -88,6 +93,9 @@ def _symmetric(key: str, matrix: Any, found: MatrixSet) -> None:
         at = int(difference.data.argmax())
         i, j = sorted((int(difference.row[at]), int(difference.col[at])))
         dense = csr_array(matrix)
+        triangle = one_triangle(matrix)
+        if triangle is not None:
+            raise ValueError(f"`{key}` must be symmetric: {triangle}")
         raise ValueError(
             f"`{key}` must be symmetric to {ASYMMETRY:g} of its largest entry {largest:g}, got "
             f"{dense[i, j]:.10g} in {found.name(i)}, column {j} and {dense[j, i]:.10g} on the other side: "
@@ -158,6 +166,11 @@ def notes(found: MatrixSet, omega2: FloatArray) -> list[str]:
         said.append(
             f"the mass is {mass[1]:.3g} kg in {mass[0]}: if that is in tonnes (a model in mm, t, N, s), its "
             "units are mm (--units mm)"
+        )
+    if mass is not None and mass[1] > _HEAVY:
+        said.append(
+            f"the mass is {mass[1]:.3g} kg in {mass[0]}: is M in kg, and not the stiffness? Files are "
+            "taken in the order M K C unless their names say otherwise"
         )
     return said
 

@@ -18,7 +18,7 @@ from scipy.sparse import coo_array, csc_array
 
 from solver.matrices.interior import held_modes, interior
 from solver.matrices.reduction_quality import Quality, measured
-from solver.matrices.structure import ASYMMETRY, DofTable
+from solver.matrices.structure import ASYMMETRY, DofTable, one_triangle
 from solver.matrices.values import MOST_DOFS
 
 FloatArray = NDArray[np.float64]
@@ -103,6 +103,9 @@ def _check(given: dict[str, coo_array], dofs: DofTable, n: int, keep_modes: int)
         difference = abs(csc_array(matrix) - csc_array(matrix).T)
         worst, largest = float(difference.max()), float(abs(matrix).max())
         if worst > ASYMMETRY * largest:
+            triangle = one_triangle(coo_array(matrix))
+            if triangle is not None:
+                raise ValueError(f"`{key}` must be symmetric: {triangle}")
             raise ValueError(
                 f"`{key}` must be symmetric to {ASYMMETRY:g} of its largest entry {largest:g}, got a "
                 f"difference of {worst:g} from its transpose"

@@ -69,4 +69,7 @@ def _held_by(path: Path) -> tuple[str, ...]:
     if MODES in names:
         return (MODES,)
     held = ", ".join(f"`{name}`" for name in names[:20]) or "nothing with a name"
-    raise MatrixFileError(f"{str(path)!r} alone must hold M and K, or modes; it holds {held}")
+    raise MatrixFileError(
+        f"{str(path)!r} alone must hold M and K, or modes; it holds {held}: give the "
+        "file of the other one too, in the order M K C"
+    )

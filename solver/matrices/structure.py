@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from pydantic import GetCoreSchemaHandler
@@ -82,6 +83,20 @@ class DofTable(tuple[str, ...]):
         )
 
 
+def one_triangle(array: Any) -> str | None:
+    """What to do about a matrix, dense or sparse, of which one triangle alone is there; None if both are."""
+    rows, columns = array.nonzero()
+    apart = np.sign(rows - columns)
+    sides = set(apart[apart != 0].tolist())
+    if len(sides) != 1:
+        return None
+    side = "lower" if sides == {1} else "upper"
+    return (
+        f"its {side} triangle alone is there; fill the other one (A + A.T - diagonal), or write a format that "
+        "says it (MatrixMarket with `symmetric` in its first line, Harwell-Boeing RSA)"
+    )
+
+
 def symmetric(key: str, matrix: Matrix) -> Matrix:
     """The matrix without the rounding by which it differs from its transpose.
 
@@ -97,6 +112,9 @@ def symmetric(key: str, matrix: Matrix) -> Matrix:
         return matrix
     if worst > ASYMMETRY * float(np.abs(array).max()):
         i, j = sorted(int(at) for at in np.unravel_index(np.argmax(difference), array.shape))
+        triangle = one_triangle(array)
+        if triangle is not None:
+            raise ValueError(f"`{key}` must be symmetric: {triangle}")
         raise ValueError(
             f"`{key}` must be symmetric to {ASYMMETRY:g} of its largest entry, "
             f"got {array[i, j]:.10g} in row {i}, column {j} and {array[j, i]:.10g} in row {j}, column {i}"
