@@ -53,7 +53,7 @@ WRONG = {
     "sizes": ((M[1:, 1:], K), "M has 5 rows, K has 6 rows: export all of them from one analysis"),
     "the same twice": ((K, K), "are the same matrix: give the mass and the stiffness"),
     "no mass": ((np.diag([0.0, *np.diag(M)[1:]]), K), "reduce the model (--reduce)"),
-    "not finite": ((M, np.where(K == K[0, 0], np.nan, K)), "must hold finite numbers, got nan in row 0"),
+    "not finite": ((M, np.where(K[0, 0] == K, np.nan, K)), "must hold finite numbers, got nan in row 0"),
 }
 
 

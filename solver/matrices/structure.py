@@ -92,8 +92,8 @@ def one_triangle(array: Any) -> str | None:
         return None
     side = "lower" if sides == {1} else "upper"
     return (
-        f"its {side} triangle alone is there; fill the other one (A + A.T - diagonal), or write a format that "
-        "says it (MatrixMarket with `symmetric` in its first line, Harwell-Boeing RSA)"
+        f"its {side} triangle alone is there; fill the other one (A + A.T - diagonal), or write a format "
+        "that says it (MatrixMarket with `symmetric` in its first line, Harwell-Boeing RSA)"
     )
 
 
