@@ -29,7 +29,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
-	@echo "Compiling the kernels: a minute or two, once."
+	@echo "Compiling the kernels on all cores: about half a minute on two, once."
 	$(BIN)/python -m service.warm_up
 	@touch $@
 

@@ -17,7 +17,8 @@ import math
 import numpy as np
 
 from solver.fourier import Integer, Real, coefficient_count, cosine_position
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.events import FAILED
 from solver.kernels.force import contact_force
 from solver.kernels.jacobian import factorise, step_back
@@ -34,7 +35,7 @@ BY_OMEGA, BY_LEVEL, BY_PHASE, BESIDES = 0, 1, 2, 3
 AMPLITUDE, SIGN, TAU, EXTREME_COLUMNS = 0, 1, 2, 3
 
 
-@compiled
+@apart
 def amplitude_slopes(
     system: System, linear: Receptance, u: Real, omega: float, point: Evaluation, wanted: Integer, x: Real,
     tops: Real, weights: Real, pulls: Real, by: Real,
@@ -53,7 +54,6 @@ def amplitude_slopes(
     -------
     How many extremes are max|x|: 2 where max x = −min x but for rounding; 0 where the balance is singular.
     """
-    out_of_line()
     receptance(system, omega, linear)
     if not math.isfinite(evaluate(system, linear, u, omega, 0.0, point)):
         return 0
@@ -79,10 +79,9 @@ def amplitude_slopes(
     return count
 
 
-@compiled
+@apart
 def _transpose(system: System, linear: Receptance, point: Evaluation) -> None:
     """Transpose A and ∂F/∂U in place."""
-    out_of_line()
     for i in range(system.ks.size):
         A = linear.A[0, i]
         for c in range(A.shape[0]):
@@ -132,12 +131,11 @@ def _fill_pull(system: System, point: Evaluation, weights: Real, pull: Real) -> 
                 pull[(first + a) * n + i] = total
 
 
-@compiled
+@apart
 def _by_linear_part(
     system: System, linear: Receptance, u: Real, point: Evaluation, top: Real, pull: Real, by: Real
 ) -> None:
     """Fill the slopes by ω, and by level and phase of the excitation."""
-    out_of_line()
     nc, n = system.owner.size, coefficient_count(system.ks)
     sign, tau = top[SIGN], top[TAU]
     by_omega, level, phase = 0.0, 0.0, 0.0
@@ -167,13 +165,12 @@ def _by_linear_part(
     by[first + BY_OMEGA], by[first + BY_LEVEL], by[first + BY_PHASE] = by_omega, level, phase
 
 
-@compiled
+@apart
 def _by_contacts(
     system: System, u: Real, omega: float, point: Evaluation, wanted: Integer, count: int, weights: Real,
     by: Real,
 ) -> None:  # fmt: skip
     """Fill w·∂F/∂kt, w·∂F/∂mu and w·∂F/∂N of the elastic Coulomb contacts asked for."""
-    out_of_line()
     n = coefficient_count(system.ks)
     table, load, _, _ = contact_values(system, omega, 0.0)
     for e in range(system.laws.size):

@@ -13,7 +13,8 @@ import math
 import numpy as np
 
 from solver.fourier import Real
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.linear import copy_to, set_to
 from solver.kernels.second import inner
 from solver.kernels.stationary import (
@@ -52,10 +53,9 @@ _LARGEST_MOVE = 0.05  # of the frequency in one Newton step
 MOST = 9  # Newton iterations on a peak
 
 
-@compiled
+@apart
 def all_at(system: System, u: Real, omega: float, p: float, tau: float, at: Summit) -> bool:
     """Evaluate balance, amplitude, slopes and curvatures at (u, ω, p); the extremum is near `tau`."""
-    out_of_line()
     at.numbers[NORM] = balance_at(system, u, omega, p, at)
     if not math.isfinite(at.numbers[NORM]) or not solve_responses(system, at):
         return False
@@ -72,7 +72,7 @@ def all_at(system: System, u: Real, omega: float, p: float, tau: float, at: Summ
     return math.isfinite(numbers[CURVE])
 
 
-@compiled
+@apart
 def find_summit(
     system: System, u: Real, omega: float, p: float, tau: float, fixed: bool, sharp: float, at: Summit
 ) -> tuple[bool, int, float]:
@@ -87,7 +87,6 @@ def find_summit(
     -------
     (found, iterations, ω). `at` belongs to the result.
     """
-    out_of_line()
     n = u.size
     numbers = at.numbers
     for iteration in range(MOST):
@@ -112,10 +111,9 @@ def find_summit(
     return False, MOST, omega
 
 
-@compiled
+@apart
 def settle(system: System, u: Real, omega: float, p: float, tau: float, at: Summit) -> bool:
     """Solve at a fixed frequency, u in place, and evaluate everything there."""
-    out_of_line()
     before = np.inf
     for _ in range(16):
         norm = balance_at(system, u, omega, p, at)
@@ -131,13 +129,12 @@ def settle(system: System, u: Real, omega: float, p: float, tau: float, at: Summ
     return False
 
 
-@compiled
+@apart
 def climb(
     system: System, u: Real, omega: float, p: float, tau: float, first: float, low: float, high: float,
     at: Summit,
 ) -> tuple[bool, float]:  # fmt: skip
     """Find the peak uphill from (u, ω) between `low` and `high` [rad/s], u in place; return (found, ω)."""
-    out_of_line()
     n = u.size
     if not settle(system, u, omega, p, tau, at):
         return False, omega
@@ -175,7 +172,7 @@ def _keep(side: int, omega: float, u: Real, at: Summit, ends: Real, us: Real, sl
         slopes[side, i] = -at.rhs[1, i]
 
 
-@compiled
+@apart
 def _squeeze(
     system: System, u: Real, p: float, ends: Real, us: Real, slopes: Real, at: Summit
 ) -> tuple[bool, float]:  # fmt: skip
@@ -183,7 +180,6 @@ def _squeeze(
 
     Either g is 0 there, or it jumps: a corner, where the tangents of both sides meet.
     """
-    out_of_line()
     before = np.inf
     for iteration in range(60):
         left, right = (ends[0], ends[1]) if ends[0, _AT] < ends[1, _AT] else (ends[1], ends[0])

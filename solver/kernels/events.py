@@ -22,7 +22,8 @@ import math
 import numpy as np
 
 from solver.fourier import Real
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.trigpoly import FALLING, RISING, at_point, bracketed_root, cubic_root, cubic_turn
 
 # What a contact does over the period.
@@ -45,13 +46,12 @@ def segment_capacity(degree: int) -> int:
     return 16 * degree + 64
 
 
-@compiled
+@apart
 def largest(c: Real, s: Real, degree: int, value: Real, slope: Real) -> tuple[float, float]:
     """Return the maximum of a polynomial over the period and its place, from its values on the grid.
 
     Every interval whose cubic through values and slopes comes near the best is refined.
     """
-    out_of_line()
     n = value.size
     delta = 2.0 * math.pi / n
     top, bottom = value[0], value[0]
@@ -123,7 +123,7 @@ def _crosses(
     return bracketed_root(c, s, degree, 0, shift, begin, end, guess, RISING)
 
 
-@compiled
+@apart
 def leave_stick(
     c: Real,
     s: Real,
@@ -136,7 +136,6 @@ def leave_stick(
     tol: float,
 ) -> tuple[float, int]:
     """Return when a stuck contact reaches a limit, and which (0: ξ = +1, 1: ξ = −1), or (end, −1)."""
-    out_of_line()
     n = value.shape[1]
     delta = 2.0 * math.pi / n
     j = math.floor(start / delta) + 1
@@ -193,7 +192,7 @@ def _dip(c: Real, s: Real, degree: int, lo: float, hi: float, tol: float) -> flo
     return dip if at_point(c, s, degree, dip)[1] < -tol * degree * degree else -1.0
 
 
-@compiled
+@apart
 def leave_slip(
     c: Real, s: Real, degree: int, value: Real, slope: Real, start: float, end: float, tol: float
 ) -> float:
@@ -201,7 +200,6 @@ def leave_slip(
 
     Between grid points a dip of w' below 0 is looked for where the grid has a local minimum.
     """
-    out_of_line()
     n = slope.size
     delta = 2.0 * math.pi / n
     j = math.floor(start / delta) + 1
@@ -244,7 +242,7 @@ def leave_slip(
     return end
 
 
-@compiled
+@apart
 def march(
     c: Real, s: Real, degree: int, value: Real, slope: Real, begin: float, end: float,
     motion: float, direction: float, offset: float, began: float, tol: float, segments: Real, count: int,
@@ -258,7 +256,6 @@ def march(
     motion, direction, offset, began : the state at `begin`: STICK or SLIP, ξ, offset of the stick force, and
         what the stick began after.
     """
-    out_of_line()
     tau = begin
     while tau < end:
         if count >= segments.shape[0]:

@@ -20,7 +20,8 @@ import math
 import numpy as np
 
 from solver.fourier import Integer, Real, coefficient_count
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.events import (
     AFTER_SLIP,
     BEGAN,
@@ -40,14 +41,13 @@ from solver.kernels.linear import fill, fill_block
 from solver.kernels.segments import find_segments, is_symmetric
 
 
-@compiled
+@apart
 def add_moments(begin: float, end: float, weight: float, cosines: Real, sines: Real) -> None:
     """Add weight·∫cos qτ and weight·∫sin qτ over [begin, end] for q = 0 … len − 1.
 
     Written with half-length and middle, ∫cos qτ = (2/q) sin(q·half) cos(q·middle), which keeps full relative
     precision on the very short segments of stiff contacts.
     """
-    out_of_line()
     half, middle = 0.5 * (end - begin), 0.5 * (end + begin)
     cm1, sm1 = math.cos(middle), math.sin(middle)
     ch1, sh1 = math.cos(half), math.sin(half)
@@ -92,12 +92,11 @@ def moment_rows(cosines: Real, sines: Real, ks: Integer, out: Real) -> None:
             here += 2
 
 
-@compiled
+@apart
 def products(
     cosines: Real, sines: Real, row_ks: Integer, column_ks: Integer, scale: float, out: Real
 ) -> None:
     """Fill `out` with scale·∫e_row e_column/π (2π for the mean row): Toeplitz plus Hankel of the moments."""
-    out_of_line()
     half = 0.5 * scale / math.pi
     row = 0
     for a in range(row_ks.size):
@@ -124,7 +123,7 @@ def products(
         row += 2 if i > 0 else 1
 
 
-@compiled
+@apart
 def contact_force(
     U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, cos_table: Real, sin_table: Real,
     segments: Real, dF_dU: Real, dF_dkt: Real, dF_dmu: Real, dF_dN: Real, F: Real,
@@ -141,7 +140,6 @@ def contact_force(
     -------
     (state, number of segments), see `find_segments`; on FAILED the outputs are NaN.
     """
-    out_of_line()
     state, count = find_segments(U, ks, N, load_ks, kt, mu, cos_table, sin_table, segments)
     n = coefficient_count(ks)
     if state in (SEPARATED, FAILED):
@@ -204,13 +202,12 @@ def dot(a: Real, b: Real) -> float:
     return total
 
 
-@compiled
+@apart
 def _add_onsets(
     segments: Real, count: int, weight: float, U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float,
     mu: float, dF_dU: Real, dF_dkt: Real, dF_dmu: Real, dF_dN: Real,
 ) -> None:  # fmt: skip
     """Add the rank-one terms of every stick segment: its offset, fixed at its onset."""
-    out_of_line()
     n, m = U.size, N.size
     waves, rows = np.empty((2, ks[-1] + 1)), np.empty(2 * n + m)
     cosines, sines, moment, e_u, e_n = waves[0], waves[1], rows[:n], rows[n : 2 * n], rows[2 * n :]

@@ -12,7 +12,8 @@ import math
 import numpy as np
 
 from solver.fourier import Real
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.jacobian import step_back
 from solver.kernels.linear import set_to
 from solver.kernels.newton import ACCEPTED, TARGET
@@ -24,7 +25,7 @@ _MOST_SOLVES = 14
 _SLOWEST = 0.5  # the residual has to fall by this factor a step from the third step on
 
 
-@compiled
+@apart
 def frozen_arc(
     system: System, linear: Receptance, u: Real, p: float, tangent: Real, weight_u: float, weight_p: float,
     point: Evaluation,
@@ -38,7 +39,6 @@ def frozen_arc(
     -------
     (converged, solves, p, relative residual).
     """
-    out_of_line()
     n = u.size
     steps, sizes = np.empty((_MOST_SOLVES + 1, n + 1)), np.empty(_MOST_SOLVES + 1)
     before, norm = np.inf, np.inf

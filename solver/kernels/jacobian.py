@@ -18,7 +18,8 @@ import math
 import numpy as np
 
 from solver.fourier import Complex, Integer, Real, coefficient_count, cosine_position
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.linear import (
     back_substitute,
     back_substitute_transposed,
@@ -71,10 +72,9 @@ def _take_slopes(system: System, point: Evaluation) -> None:
                         point.G[block, i, i] -= stiffness
 
 
-@compiled
+@apart
 def fill_jacobian(system: System, linear: Receptance, point: Evaluation) -> None:
     """Fill `point.jacobian` with dr/du where `point` was evaluated last."""
-    out_of_line()
     n, nc, J = coefficient_count(system.ks), system.owner.size, point.jacobian
     fill_block(J, 0.0)
     _take_slopes(system, point)
@@ -114,10 +114,9 @@ def _part(system: System, point: Evaluation) -> None:
     point.counts[FREE], point.counts[HELD] = free, held
 
 
-@compiled
+@apart
 def _eliminate(system: System, linear: Receptance, point: Evaluation, i: int) -> bool:
     """Fill D⁻¹, W, V and A' of harmonic number i; False if D is singular."""
-    out_of_line()
     free, held = point.counts[FREE], point.counts[HELD]
     A = linear.A[0, i]
     reduced = point.reduced[i]
@@ -158,10 +157,9 @@ def _eliminate(system: System, linear: Receptance, point: Evaluation, i: int) ->
     return True
 
 
-@compiled
+@apart
 def _assemble(system: System, point: Evaluation, J: Real) -> None:
     """Fill the leading block of `J` with I + A' G."""
-    out_of_line()
     n, free = coefficient_count(system.ks), point.counts[FREE]
     for i in range(free * n):
         for j in range(free * n):
@@ -187,13 +185,12 @@ def _assemble(system: System, point: Evaluation, J: Real) -> None:
                 J[row + 1, row + 1] += 1.0
 
 
-@compiled
+@apart
 def _times(
     system: System, matrices: Complex, transposed: bool, rows: int, columns: int, x: Real, sign: float,
     y: Real,
 ) -> None:  # fmt: skip
     """Add sign·(matrix of each harmonic) @ x to y, or with its conjugate transpose; x, y (ports·n,)."""
-    out_of_line()
     n = coefficient_count(system.ks)
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
@@ -245,7 +242,7 @@ def _slopes_times(system: System, point: Evaluation, transposed: bool, x: Real, 
         b += m
 
 
-@compiled
+@apart
 def factorise(
     system: System, linear: Receptance, point: Evaluation, tangent: Real, weight_u: float, weight_p: float
 ) -> float:
@@ -259,7 +256,6 @@ def factorise(
     -------
     The sign of the determinant, which condensing does not change; 0.0 if singular.
     """
-    out_of_line()
     n, lu = coefficient_count(system.ks), point.lu
     _part(system, point)
     _take_slopes(system, point)
@@ -276,10 +272,9 @@ def factorise(
     return 1.0 if size == 0 else factorise_block(lu, size, point.pivots)
 
 
-@compiled
+@apart
 def _border(system: System, point: Evaluation, tangent: Real, weight_u: float, weight_p: float) -> None:
     """Put condensed dr/dλ and tangent around the leading block of the factors."""
-    out_of_line()
     n, lu = coefficient_count(system.ks), point.lu
     free, held = point.counts[FREE], point.counts[HELD]
     end = free * n
@@ -310,7 +305,7 @@ def _border(system: System, point: Evaluation, tangent: Real, weight_u: float, w
     lu[end, end] = corner
 
 
-@compiled
+@apart
 def step_back(system: System, point: Evaluation, x: Real) -> None:
     """Solve with the factors of `factorise`, in place.
 
@@ -318,7 +313,6 @@ def step_back(system: System, point: Evaluation, x: Real) -> None:
     ----------
     x : (nt,) or, with a border, (nt + 1,) the right-hand side, last the border's.
     """
-    out_of_line()
     n = coefficient_count(system.ks)
     free, held = point.counts[FREE], point.counts[HELD]
     end, size = free * n, point.counts[SIZE]
@@ -359,7 +353,7 @@ def step_back(system: System, point: Evaluation, x: Real) -> None:
         copy_to(x[point.held[h] * n : (point.held[h] + 1) * n], moved[h * n : (h + 1) * n])
 
 
-@compiled
+@apart
 def step_back_transposed(system: System, point: Evaluation, x: Real) -> None:
     """Solve with the transpose of what `factorise` factorised without a border, in place.
 
@@ -369,7 +363,6 @@ def step_back_transposed(system: System, point: Evaluation, x: Real) -> None:
     ----------
     x : (nt,) the right-hand side.
     """
-    out_of_line()
     n = coefficient_count(system.ks)
     free, held = point.counts[FREE], point.counts[HELD]
     size = point.counts[SIZE]

@@ -9,14 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numba.experimental import structref
 
 from solver.fourier import Complex
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.linear import invert
 from solver.kernels.receptance import excitation
+from solver.kernels.reference import Reference
 from solver.kernels.system import DENSE, FORCE_PHASE, MODES, STRUCTURE, System
 
 # First index of every array.
@@ -34,7 +35,7 @@ class Jets(NamedTuple):
 
 
 @structref.register
-class _JetsType(numba.types.StructRef):
+class _JetsType(Reference):
     """Numba's type of `Jets` by reference."""
 
 
@@ -57,10 +58,9 @@ def new_jets(system: System) -> Jets:
     )  # fmt: skip
 
 
-@compiled
+@apart
 def fill_jets(system: System, omega: float, p: float, out: Jets) -> None:
     """Fill `out` at the frequency `omega` [rad/s] and the parameter λ = p (which is not the frequency)."""
-    out_of_line()
     _clear(out)
     if system.form == DENSE:
         _dense(system, omega, p, out)
@@ -185,10 +185,9 @@ def _dense(system: System, omega: float, p: float, out: Jets) -> None:
                 _project(system, s, i, G[order], order, out)
 
 
-@compiled
+@apart
 def _sandwich(left: Complex, middle: Complex, right: Complex, half: Complex, out: Complex) -> None:
     """Fill `out` with left @ middle @ right."""
-    out_of_line()
     _product(left, middle, half)
     _product(half, right, out)
 
@@ -222,10 +221,9 @@ def _more(target: Complex, factor: float, source: Complex) -> None:
             target[a, b] += factor * source[a, b]
 
 
-@compiled
+@apart
 def _project(system: System, s: int, i: int, green: Complex, order: int, out: Jets) -> None:
     """Add Z⁻¹ (or a derivative) of harmonic number i, seen from contacts, excitation and observed DOF."""
-    out_of_line()
     nc, n = out.u_linear.shape[2], green.shape[0]
     for a in range(n):
         for b in range(n):

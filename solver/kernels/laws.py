@@ -16,7 +16,8 @@ from __future__ import annotations
 import numpy as np
 
 from solver.fourier import Integer, Real
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.events import FAILED, LIFTING, SEPARATED, SLIPPING, STUCK, piece_of
 from solver.kernels.force import contact_force
 from solver.kernels.laws_columns import (
@@ -40,13 +41,12 @@ from solver.kernels.linear import fill_block
 from solver.kernels.system import N0
 
 
-@compiled
+@apart
 def law_force(
     law: int, U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
     cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Evaluate any law; see the module for the arguments. An unknown number is FAILED."""
-    out_of_line()
     if law in (COULOMB, COULOMB_BOX):
         return _coulomb_ports(
             U, ks, load, load_ks, row, slope, dload, cos_table, sin_table, segments, F, dF_dU, dF_dp
@@ -84,13 +84,12 @@ def held_stiffness(law: int, row: Real, port: int) -> float:
     return float(row[KT])
 
 
-@compiled
+@apart
 def _coulomb_ports(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
     cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Elastic Coulomb with a given load, each direction on its own: one port, or two with a square limit."""
-    out_of_line()
     m, n = U.shape
     dF_dkt, dF_dmu, dF_dN = np.empty(n), np.empty(n), np.empty((n, load.size))
     stuck, lifting, separated, piece = True, False, True, 0

@@ -14,7 +14,8 @@ from __future__ import annotations
 import numpy as np
 
 from solver.fourier import Integer, Real, coefficient_count, cosine_position
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.events import BEGIN, END, FAILED, LIFTING, SEPARATED, piece_of
 from solver.kernels.force import add_moments, contact_force, products
 from solver.kernels.laws_columns import KN, KT, MU, PRESTRESSED
@@ -52,7 +53,7 @@ def positions(ks: Integer, inside: Integer) -> Integer:
     return out
 
 
-@compiled
+@apart
 def elastic_normal(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
     cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
@@ -62,7 +63,6 @@ def elastic_normal(
     The arguments are those of `solver.kernels.laws`. With `row[PRESTRESSED]` the normal force is counted from
     the state in which N0 (if positive) is in equilibrium already: P − max(N0, 0).
     """
-    out_of_line()
     n, kn = U.shape[1], row[KN]
     all_ks = merged(ks, load_ks)
     of_motion, of_load = positions(ks, all_ks), positions(load_ks, all_ks)
@@ -101,12 +101,11 @@ def elastic_normal(
     return state, piece_of(segments, count)
 
 
-@compiled
+@apart
 def _normal_by_load(
     state: int, segments: Real, count: int, ks: Integer, all_ks: Integer, of_motion: Integer, dP_dN: Real
 ) -> None:
     """Fill ∂P/∂N: nothing if separated, the identity if always closed, else from the intervals of contact."""
-    out_of_line()
     if state == LIFTING:
         top = ks[-1] + all_ks[-1]
         cosines, sines = np.zeros(top + 1), np.zeros(top + 1)

@@ -19,7 +19,8 @@ import math
 import numpy as np
 
 from solver.fourier import Integer, Real, coefficient_count, cosine_position
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.events import LIFTING, SEPARATED, SLIPPING, STUCK
 from solver.kernels.laws_columns import KT, MU, SAMPLES
 from solver.kernels.linear import fill_block
@@ -165,7 +166,7 @@ def _turn(
         dT[1, j] = dhigh * ty + high * (dalong * wy + along * dwy + dkept * ny + kept * dny)
 
 
-@compiled
+@apart
 def periods_to_repeat(u: Real, limit: Real, kt: float) -> int:
     """Return how many periods pass until the force at τ = 0 repeats, at most MOST_PERIODS.
 
@@ -173,7 +174,6 @@ def periods_to_repeat(u: Real, limit: Real, kt: float) -> int:
     ----------
     u : (2, samples) motion; limit : (samples,) μ N.
     """
-    out_of_line()
     n, T = limit.size, np.zeros(2)
     no_seeds, nothing = np.empty((7, 0)), np.empty((2, 0))
     plane_step(kt, u[0, 0], u[1, 0], limit[0], limit[0], T, no_seeds, nothing)
@@ -189,13 +189,12 @@ def periods_to_repeat(u: Real, limit: Real, kt: float) -> int:
     return MOST_PERIODS
 
 
-@compiled
+@apart
 def coulomb_plane(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real, F: Real,
     dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Fill both components of the force, their Jacobian and their derivative by λ (as in the contract)."""
-    out_of_line()
     samples = int(row[SAMPLES])
     cosine, sine = np.empty(samples), np.empty(samples)
     for j in range(samples):
@@ -223,7 +222,7 @@ def coulomb_plane(
     return (SLIPPING, piece) if piece > 0 else (STUCK, piece)
 
 
-@compiled
+@apart
 def _march(
     u: Real, limit: Real, dlimit: Real, kt: float, dkt: float, ks: Integer, cosine: Real, sine: Real,
     periods: int, F: Real, dF_dU: Real, dF_dp: Real,
@@ -236,7 +235,6 @@ def _march(
     -------
     A number for the samples at which it slips in the last period, 0 if at none.
     """
-    out_of_line()
     samples, n, piece = limit.size, coefficient_count(ks), 0
     T, D, seeds, J = np.zeros(2), np.zeros((2, 2 * n + 1)), np.eye(7), np.empty((2, 7))
     step, project = np.zeros(n), np.empty(n)

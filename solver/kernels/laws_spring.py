@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from solver.fourier import Integer, Real, coefficient_count
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
 from solver.kernels.events import SEPARATED, largest
 from solver.kernels.force import add_moments, moment_rows, products
 from solver.kernels.laws_columns import A_1, CLOSED, DEFORMING, GAP, K_GAP, MOST_DEGREE, TOUCHING
@@ -22,7 +22,7 @@ from solver.kernels.segments import contact_intervals, one_wave
 from solver.kernels.trigpoly import on_grid, unpack
 
 
-@compiled
+@apart
 def positive_intervals(c: Real, s: Real, degree: int, cos_table: Real, sin_table: Real, out: Real) -> int:
     """Fill `out` (degree + 1, 2) with [begin, end] of every interval where a polynomial is positive.
 
@@ -30,7 +30,6 @@ def positive_intervals(c: Real, s: Real, degree: int, cos_table: Real, sin_table
     -------
     Their number; −1 if it never becomes negative (then `out` is not filled).
     """
-    out_of_line()
     if degree <= 1:
         return one_wave(c[0], c[1], s[1], out)
     n_grid = 2 * (cos_table.shape[1] - 1)
@@ -44,13 +43,12 @@ def positive_intervals(c: Real, s: Real, degree: int, cos_table: Real, sin_table
     return contact_intervals(c, s, degree, value, slope, out)
 
 
-@compiled
+@apart
 def gap_spring(
     U: Real, ks: Integer, row: Real, slope: Real, cos_table: Real, sin_table: Real, F: Real, dF_dU: Real,
     dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Fill the force of a gap spring, its Jacobian and its derivative by λ (arguments as in the contract)."""
-    out_of_line()
     n, top = coefficient_count(ks), max(ks[-1], 1)
     c, s = np.empty(top + 1), np.empty(top + 1)
     unpack(U[0], ks, c, s)
@@ -78,12 +76,11 @@ def gap_spring(
     return (CLOSED, 1) if count < 0 else (TOUCHING, 1 + count)
 
 
-@compiled
+@apart
 def polynomial_spring(
     U: Real, ks: Integer, row: Real, slope: Real, F: Real, dF_dU: Real, dF_dp: Real
 ) -> tuple[int, int]:
     """Fill the force of a polynomial spring, its Jacobian and its derivative by λ (as in the contract)."""
-    out_of_line()
     top, degree = max(ks[-1], 1), 1
     for j in range(MOST_DEGREE):
         if row[A_1 + j] != 0.0 or slope[A_1 + j] != 0.0:
@@ -122,4 +119,5 @@ def polynomial_spring(
     products(cosines, sines, ks, ks, 1.0, dF_dU[0])
     moment_rows(force_c, force_s, ks, F[0])
     moment_rows(dforce_c, dforce_s, ks, dF_dp[0])
-    return DEFORMING, 1
+    # Of literals alone the type of the result would be those literals.
+    return int(np.int64(DEFORMING)), int(np.int64(1))

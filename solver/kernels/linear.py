@@ -15,7 +15,8 @@ import numba
 import numpy as np
 
 from solver.fourier import Complex, Index, Real
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 
 OWN_UP_TO = 36  # measured crossing of our loop and LAPACK
 
@@ -73,13 +74,12 @@ def largest_entry(vector: Real) -> float:
     return size
 
 
-@compiled
+@apart
 def invert(matrix: Complex, inverse: Complex) -> bool:
     """Invert a complex matrix by Gauss–Jordan elimination with partial pivoting; `matrix` is destroyed.
 
     Returns False, with `inverse` meaningless, if the matrix is singular or not finite.
     """
-    out_of_line()
     n = matrix.shape[0]
     for i in range(n):
         for j in range(n):
@@ -110,10 +110,9 @@ def invert(matrix: Complex, inverse: Complex) -> bool:
     return True
 
 
-@compiled
+@apart
 def _own_factors(a: Real, n: int, pivots: Index) -> None:
     """Factorise the leading block, columns exchanged for the largest pivot of a row; numbers as LAPACK's."""
-    out_of_line()
     for k in range(n):
         pivot, size = k, abs(a[k, k])
         for j in range(k + 1, n):
@@ -136,7 +135,7 @@ def _own_factors(a: Real, n: int, pivots: Index) -> None:
                     a[i, j] -= factor * a[k, j]
 
 
-@compiled
+@apart
 def factorise(a: Real, n: int, pivots: Index) -> float:
     """Factorise the leading n × n block of a row-major matrix in place, as `back_substitute` needs it.
 
@@ -146,7 +145,6 @@ def factorise(a: Real, n: int, pivots: Index) -> float:
     -------
     The sign of the determinant, 0.0 if the matrix is singular or not finite.
     """
-    out_of_line()
     for i in range(n):
         for j in range(n):
             if not math.isfinite(a[i, j]):
@@ -166,13 +164,12 @@ def factorise(a: Real, n: int, pivots: Index) -> float:
     return sign
 
 
-@compiled
+@apart
 def back_substitute(a: Real, n: int, pivots: Index, x: Real) -> None:
     """Solve matrix @ x = rhs with the factors of `factorise`; `x` (≥ n,) is the right-hand side, overwritten.
 
     With Mᵀ = Pᵀ L U the solution is x = Pᵀ L⁻ᵀ U⁻ᵀ rhs: dot products along rows of `a`.
     """
-    out_of_line()
     for i in range(n):
         total = x[i]
         for k in range(i):
@@ -189,10 +186,9 @@ def back_substitute(a: Real, n: int, pivots: Index, x: Real) -> None:
             x[k], x[other] = x[other], x[k]
 
 
-@compiled
+@apart
 def back_substitute_transposed(a: Real, n: int, pivots: Index, x: Real) -> None:
     """Solve matrixᵀ @ x = rhs with the factors of `factorise`, in place: x = U⁻¹ L⁻¹ P rhs."""
-    out_of_line()
     for k in range(n):
         other = pivots[k] - 1
         if other != k:

@@ -13,7 +13,8 @@ import math
 import numpy as np
 
 from solver.fourier import Real, coefficient_count, cosine_position
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.jacobian import factorise, step_back
 from solver.kernels.laws import held_stiffness, is_friction
 from solver.kernels.laws_columns import ELASTIC_NORMAL, KN
@@ -29,7 +30,7 @@ _UPHILL_STEPS = 8
 _MOST = 25
 
 
-@compiled
+@apart
 def newton(
     system: System, linear: Receptance, u: Real, p: float, added: float, point: Evaluation
 ) -> tuple[bool, int, float]:
@@ -39,7 +40,6 @@ def newton(
     -------
     (converged, Newton iterations, relative residual); `point` belongs to the final u.
     """
-    out_of_line()
     n = u.size
     trial, kept, step = np.empty(n), np.empty(n), np.empty(n)
     copy_to(trial, u)
@@ -87,7 +87,7 @@ def newton(
     return norm <= ACCEPTED, iteration, norm
 
 
-@compiled
+@apart
 def arc_newton(
     system: System, linear: Receptance, u: Real, p: float, guess_u: Real, guess_p: float, tangent: Real,
     weight_u: float, weight_p: float, point: Evaluation, most: int,
@@ -102,7 +102,6 @@ def arc_newton(
     -------
     (converged, iterations, p, relative residual).
     """
-    out_of_line()
     n = u.size
     rhs = np.empty(n + 1)
     before, norm = np.inf, np.inf
@@ -129,13 +128,12 @@ def arc_newton(
     return False, most, p, norm
 
 
-@compiled
+@apart
 def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
     """Fill `u` with the response of fully stuck contacts; return the load that must be added to keep it so.
 
     (I + A kt) u = ū harmonic by harmonic; a contact stays stuck while max|kt u| ≤ μ (N0 − |N1| + added).
     """
-    out_of_line()
     nc, n = system.owner.size, coefficient_count(system.ks)
     table, _, _, _ = contact_values(system, p, 0.0)
     matrix, inverse = np.empty((nc, nc), np.complex128), np.empty((nc, nc), np.complex128)
@@ -198,7 +196,7 @@ def from_stuck(
     return newton(system, linear, u, p, 0.0, point)
 
 
-@compiled
+@apart
 def ladder(
     system: System, linear: Receptance, u: Real, p: float, point: Evaluation
 ) -> tuple[bool, int, float]:
@@ -211,7 +209,6 @@ def ladder(
     -------
     (converged, Newton iterations in all, relative residual).
     """
-    out_of_line()
     n = u.size
     stuck, last_u, trial, best = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     receptance(system, p, linear)

@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from solver.fourier import Real, coefficient_count, cosine_position
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.events import largest
 from solver.kernels.system import Evaluation, Receptance, System
 from solver.kernels.trigpoly import on_grid, unpack
@@ -19,10 +20,9 @@ MEASURES = 10
 SAME_HEIGHT = 1e-12  # relative distance within which max x and −min x are the same but for rounding
 
 
-@compiled
+@apart
 def observed_motion(system: System, linear: Receptance, u: Real, point: Evaluation, x: Real) -> None:
     """Fill `x` (n,) with the coefficients of the observed DOF [m]: x̂ = x̂_linear − B (F̂ − shift û)."""
-    out_of_line()
     nc, n = system.owner.size, coefficient_count(system.ks)
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
@@ -37,12 +37,11 @@ def observed_motion(system: System, linear: Receptance, u: Real, point: Evaluati
             x[here + 1] = -value.imag
 
 
-@compiled
+@apart
 def observed_slope(
     system: System, linear: Receptance, u: Real, point: Evaluation, du: Real, dp: float, dx: Real
 ) -> None:
     """Fill `dx` with the change of the observed coefficients for a change (du, dλ) of the solution."""
-    out_of_line()
     nc, n = system.owner.size, coefficient_count(system.ks)
     dF = np.empty((nc, n))
     for c in range(nc):
@@ -71,10 +70,9 @@ def observed_slope(
             dx[here + 1] = -value.imag
 
 
-@compiled
+@apart
 def extremes(system: System, x: Real) -> tuple[float, float, float, float]:
     """Return max x and its place, min x and its place, over the period."""
-    out_of_line()
     degree = system.ks[-1]
     n_grid = 2 * (system.cos_table.shape[1] - 1)
     c, s = np.empty(degree + 1), np.empty(degree + 1)
@@ -103,7 +101,7 @@ def _along(system: System, x: Real, tau: float) -> float:
     return total
 
 
-@compiled
+@apart
 def measure(
     system: System, linear: Receptance, u: Real, point: Evaluation, du: Real, dp: float, x: Real, out: Real
 ) -> None:
@@ -111,7 +109,6 @@ def measure(
 
     The place of an extremum is stationary, so a slope is the change of the motion at that place.
     """
-    out_of_line()
     observed_motion(system, linear, u, point, x)
     high, at_high, low, at_low = extremes(system, x)
     dx = np.empty(x.size)

@@ -14,7 +14,8 @@ import math
 import numpy as np
 
 from solver.fourier import Integer, Real
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.frozen import frozen_arc
 from solver.kernels.jacobian import AT_BRANCH_POINT, factorise, step_back
 from solver.kernels.linear import copy_to, set_to
@@ -57,12 +58,11 @@ STRAIGHT_ON = 0.98  # cosine of the turn at a branch point; more than that is a 
 FROZEN_FROM = 64  # unknowns from which old factors beat new ones (measured)
 
 
-@compiled
+@apart
 def begin_walk(
     system: System, linear: Receptance, point: Evaluation, control: Control, u: Real
 ) -> tuple[int, Walk]:
     """Begin a branch at a solution `u` for the start of the range: its first point and tangent."""
-    out_of_line()
     nt, p = u.size, control.start
     walk = new_walk(np.zeros(nt), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(nt + 1), np.zeros(12))
     copy_to(walk.u, u)
@@ -87,10 +87,9 @@ def _piece(point: Evaluation) -> float:
     return float(mixed)
 
 
-@compiled
+@apart
 def _turn(system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk) -> bool:
     """Replace the tangent by the one at the new point (`point` is evaluated there), oriented onward."""
-    out_of_line()
     n = walk.u.size
     weight_u, weight_p = weights(system, walk, control)
     rhs = np.zeros(n + 1)
@@ -121,7 +120,7 @@ def _turn(system: System, linear: Receptance, point: Evaluation, control: Contro
     return True
 
 
-@compiled
+@apart
 def _correct(
     system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk, guess: Real,
     p_guess: float, trial: Real, weight_u: float, weight_p: float,
@@ -132,7 +131,6 @@ def _correct(
     -------
     (converged, iterations as far as the step control is concerned, λ, relative residual).
     """
-    out_of_line()
     if trial.size >= FROZEN_FROM and point.counts[AT_BRANCH_POINT] == 1:
         copy_to(trial, guess)
         good, solves, p, norm = frozen_arc(
@@ -150,10 +148,9 @@ def _correct(
     return good, iterations, p, norm
 
 
-@compiled
+@apart
 def _step(system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk) -> int:
     """Make one step; return RUNNING, FINISHED, STALLED or LEFT_RANGE."""
-    out_of_line()
     n = walk.u.size
     guess, trial = np.empty(n), np.empty(n)
     forward = 1.0 if control.stop >= control.start else -1.0
@@ -214,10 +211,9 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
     return STALLED
 
 
-@compiled
+@apart
 def _step_over(system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk) -> int:
     """Get past a kink: look for a solution a little further in λ, where the tangent points."""
-    out_of_line()
     n = walk.u.size
     span = control.stop - control.start
     forward = math.copysign(1.0, span)
@@ -254,10 +250,9 @@ def _step_over(system: System, linear: Receptance, point: Evaluation, control: C
     return STALLED
 
 
-@compiled
+@apart
 def _turn_over(system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk) -> int:
     """Get past a kink that is a fold: look for the other piece a little back in λ, where u goes on."""
-    out_of_line()
     n = walk.u.size
     span, t = abs(control.stop - control.start), walk.tangent[n]
     if t == 0.0:
@@ -327,13 +322,12 @@ def walk_on(
     return status, count
 
 
-@compiled
+@apart
 def _record(
     system: System, linear: Receptance, point: Evaluation, walk: Walk, row: int,
     points: Real, tangents: Real, states: Integer, observed: Real, measures: Real,
 ) -> None:  # fmt: skip
     """Write the walk's present point, with what is observed there, into one row of the result."""
-    out_of_line()
     n = walk.u.size
     copy_to(points[row, :n], walk.u)
     points[row, n] = walk.numbers[P]

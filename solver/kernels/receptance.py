@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from solver.fourier import Complex, Real
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.linear import invert
 from solver.kernels.system import DENSE, FORCE_PHASE, FREQUENCY, LEVEL, MODES, STRUCTURE, Receptance, System
 
@@ -26,10 +27,9 @@ def excitation(system: System, p: float) -> tuple[complex, complex]:
     return complex(1.0), complex(0.0)
 
 
-@compiled
+@apart
 def receptance(system: System, p: float, out: Receptance) -> None:
     """Fill `out` with the condensed linear part at λ = p and its derivative by λ."""
-    out_of_line()
     if system.form == DENSE:
         _dense_receptance(system, p, out)
     else:
@@ -61,14 +61,13 @@ def _clear(out: Receptance) -> None:
                     out.A[order, i, c, d] = 0.0
 
 
-@compiled
+@apart
 def _modal_receptance(system: System, p: float, out: Receptance) -> None:
     """Sum the modes: Z⁻¹ = Σ x_m y_mᴴ / d_m with d_m = ω_m² − (kω)² + ikω c_m, or ikω − s_m for poles.
 
     Block by block: the products of modes at pairs of contacts once for all harmonics of a structure, then one
     real sum over the block for each of them, which the compiler vectorises.
     """
-    out_of_line()
     omega = p if system.kind == FREQUENCY else system.omega
     by_omega = 1.0 if system.kind == FREQUENCY else 0.0
     nc, most = out.B.shape[2], min(BLOCK, system.eigenvalues.shape[1])
@@ -220,10 +219,9 @@ def _add_driven(size: int, i: int, driven: Real, terms: Real, out: Receptance) -
             out.u_linear[1, i, c] += dvalue + 1j * dturned
 
 
-@compiled
+@apart
 def _dense_receptance(system: System, p: float, out: Receptance) -> None:
     """Invert Z_k itself; λ may be the frequency or a structural parameter: dZ⁻¹ = −Z⁻¹ dZ Z⁻¹."""
-    out_of_line()
     omega = p if system.kind == FREQUENCY else system.omega
     moved = p - system.parameter_reference if system.kind == STRUCTURE else 0.0
     n = system.observe.size

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from solver.fourier import Real
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
 from solver.kernels.jacobian import factorise, step_back
 from solver.kernels.linear import copy_to, largest_entry, set_to
 from solver.kernels.newton import arc_newton
@@ -18,12 +18,11 @@ _AT_A_FOLD = 1e-9  # weight of λ there
 HIGH_PEAK, LOW_PEAK, EDGE = 0, 1, 2
 
 
-@compiled
+@apart
 def slope_by_parameter(
     system: System, linear: Receptance, u: Real, point: Evaluation, x: Real, out: Real
 ) -> bool:
     """Measure a solution with its slopes by λ, du/dλ = −(dr/du)⁻¹ dr/dλ; False where dr/du is singular."""
-    out_of_line()
     n = u.size
     slope = np.empty(n)
     if factorise(system, linear, point, slope, 0.0, 0.0) == 0.0:
@@ -35,7 +34,7 @@ def slope_by_parameter(
     return True
 
 
-@compiled
+@apart
 def between(
     system: System, linear: Receptance, point: Evaluation, left: Real, left_slope: Real, right: Real,
     right_slope: Real, share: float, most: int, found: Real, tangent: Real, x: Real, out: Real,
@@ -53,7 +52,6 @@ def between(
     -------
     (converged, Newton iterations). The guess is the cubic through both points and tangents.
     """
-    out_of_line()
     n = left.size - 1
     chord, plane, guess, u = np.empty(n + 1), np.empty(n), np.empty(n), np.empty(n)
     set_to(chord, right, -1.0, left)
@@ -93,7 +91,7 @@ def between(
     return True, iterations
 
 
-@compiled
+@apart
 def refine(
     system: System, linear: Receptance, point: Evaluation, left: Real, left_slope: Real, right: Real,
     right_slope: Real, what: int, level: float, g_left: float, g_right: float, most: int,
@@ -111,7 +109,6 @@ def refine(
     -------
     (found, Newton iterations). A bracketed secant (Illinois) on the arc, every trial a converged solution.
     """
-    out_of_line()
     lo, hi, g_lo, g_hi = 0.0, 1.0, g_left, g_right
     scale = max(abs(g_left), abs(g_right))
     total, side = 0, 0

@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from solver.fourier import Real, coefficient_count, cosine_position
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED, piece_of
 from solver.kernels.force import contact_force
 from solver.kernels.laws import law_force
@@ -37,13 +38,12 @@ from solver.kernels.system import (
 _CANCELLED, _LOST = 1e-3, 1e-5  # shares of |A| |F| and |A| |dF/dU| |u| a residual is relative to at least
 
 
-@compiled
+@apart
 def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, Real, Real]:
     """Return the elements at λ = p: table, load coefficients (ne, 3), and the derivatives of both by λ.
 
     `added` [N] is put on every mean load (the start-up ladder presses the contacts into full stick).
     """
-    out_of_line()
     nc = system.laws.size
     table, slope = np.empty((nc, COLUMNS)), np.zeros((nc, COLUMNS))
     copy_block(table, system.contacts)
@@ -80,7 +80,7 @@ def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, 
     return table, load, slope, dload
 
 
-@compiled
+@apart
 def evaluate(system: System, linear: Receptance, u: Real, p: float, added: float, out: Evaluation) -> float:
     """Evaluate the balance at (u, λ = p) for a receptance already filled at p.
 
@@ -88,7 +88,6 @@ def evaluate(system: System, linear: Receptance, u: Real, p: float, added: float
     -------
     The relative residual, see `_residual` (NaN if a contact failed, or Z is singular).
     """
-    out_of_line()
     for i in range(system.ks.size):
         if not math.isfinite(linear.x_linear[0, i].real):
             return np.nan
@@ -103,12 +102,11 @@ def evaluate(system: System, linear: Receptance, u: Real, p: float, added: float
     return _residual(system, linear, u, least_size(system, p), out)
 
 
-@compiled
+@apart
 def _coulomb(
     system: System, e: int, u: Real, table: Real, load: Real, slope: Real, dload: Real, out: Evaluation
 ) -> bool:
     """Evaluate an elastic Coulomb contact with a given load; False if its march failed."""
-    out_of_line()
     n = coefficient_count(system.ks)
     c, block = system.first_port[e], system.first_block[e]
     if system.samples > 0:
@@ -137,12 +135,11 @@ def _coulomb(
     return True
 
 
-@compiled
+@apart
 def _any_law(
     system: System, e: int, u: Real, table: Real, load: Real, slope: Real, dload: Real, out: Evaluation
 ) -> bool:
     """Evaluate an element of any law; False if it failed."""
-    out_of_line()
     n, c, block = coefficient_count(system.ks), system.first_port[e], system.first_block[e]
     end, last = system.first_port[e + 1], system.first_block[e + 1]
     U = u[c * n : end * n].reshape((end - c, n))
@@ -185,7 +182,7 @@ def _sizes(system: System, u: Real, out: Evaluation) -> tuple[float, float]:
     return motion, max(_CANCELLED * force, _LOST * steepest * max(motion, mean))
 
 
-@compiled
+@apart
 def _residual(system: System, linear: Receptance, u: Real, least: float, out: Evaluation) -> float:
     """Put r and dr/dλ together from the contact forces and the receptance.
 
@@ -193,7 +190,6 @@ def _residual(system: System, linear: Receptance, u: Real, least: float, out: Ev
     undamped resonance ū and A F of one harmonic are huge and cancel, and must not hide what is left of the
     others. Where A F is the difference of large forces only their rounding is left, see `_sizes`.
     """
-    out_of_line()
     nc, n = system.owner.size, coefficient_count(system.ks)
     r, dr = out.residual, out.dr_dp
     motion, force_scale = _sizes(system, u, out)

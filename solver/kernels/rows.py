@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from solver.fourier import Integer, Real, coefficient_count
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.linear import copy_to
 from solver.kernels.newton import newton
 from solver.kernels.observe import extremes, observed_motion
@@ -19,7 +20,7 @@ ROW_VALUES = 3
 UNSOLVED, GIVEN, SOLVED = 0, 1, 2
 
 
-@compiled
+@apart
 def solve_row(
     system: System, linear: Receptance, point: Evaluation, omegas: Real, begin: int, above: Real,
     known_above: Integer, solutions: Real, known: Integer, values: Real,
@@ -37,7 +38,6 @@ def solve_row(
     -------
     (the first point that was not solved, or F; Newton iterations).
     """
-    out_of_line()
     spent = 0
     u, x = np.empty(solutions.shape[1]), np.empty(coefficient_count(system.ks))
     for i in range(begin, omegas.size):

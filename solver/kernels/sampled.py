@@ -17,7 +17,8 @@ import math
 import numpy as np
 
 from solver.fourier import Integer, Real, coefficient_count
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.events import (
     AFTER_SEPARATION,
     AFTER_SLIP,
@@ -44,10 +45,9 @@ _OPEN, _STICKS, _SLIPS_UP, _SLIPS_DOWN = 0, 1, 2, 3
 _MOST_PERIODS = 10
 
 
-@compiled
+@apart
 def _sample(q: Real, ks: Integer, wave: Real, out: Real) -> None:
     """Fill `out` with the values of a polynomial at its equally spaced instants; `wave` is cos τ at them."""
-    out_of_line()
     n = out.size
     fill(out, 0.0)
     here = 0
@@ -72,7 +72,7 @@ def _sample(q: Real, ks: Integer, wave: Real, out: Real) -> None:
                 behind -= n
 
 
-@compiled
+@apart
 def _march(u: Real, load: Real, kt: float, mu: float, kind: Integer, onset: Integer) -> int:
     """Fill what happens at every sample of a period that repeats, and the onset of what sticks there.
 
@@ -82,7 +82,6 @@ def _march(u: Real, load: Real, kt: float, mu: float, kind: Integer, onset: Inte
     -------
     1 if the state repeated, else 0.
     """
-    out_of_line()
     n = u.size
     offset, since = 0.0, -1
     for _ in range(_MOST_PERIODS):
@@ -104,10 +103,9 @@ def _march(u: Real, load: Real, kt: float, mu: float, kind: Integer, onset: Inte
     return 0
 
 
-@compiled
+@apart
 def _segments(kind: Integer, onset: Integer, segments: Real) -> int:
     """Fill the table of stick and slip segments; return their number, −1 if there are too many."""
-    out_of_line()
     n = kind.size
     delta = 2.0 * math.pi / n
     first = 0
@@ -159,13 +157,12 @@ def _state(kind: Integer) -> int:
     return STUCK if n_stick == kind.size else SLIPPING
 
 
-@compiled
+@apart
 def _add_sums(begin: int, end: int, delta: float, weight: float, cosines: Real, sines: Real) -> None:
     """Add weight·Σ cos qτ_j and weight·Σ sin qτ_j over the samples [begin, end) for q = 0 … len − 1.
 
     A geometric series: Σ cos qτ_j = cos(q·middle) sin(q·half)/sin(q·delta/2), whatever the number of samples.
     """
-    out_of_line()
     half, middle = 0.5 * delta * (end - begin), 0.5 * delta * (begin + end - 1)
     cosines[0] += weight * (end - begin)
     for q in range(1, cosines.size):
@@ -187,13 +184,12 @@ def _fill_wave(wave: Real) -> None:
             wave[n - j] = cosine
 
 
-@compiled
+@apart
 def _accumulate(
     segments: Real, count: int, delta: float, U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float,
     mu: float, dF_dU: Real, dF_dkt: Real, dF_dmu: Real, dF_dN: Real,
 ) -> None:  # fmt: skip
     """Fill the derivatives from the sums over the samples of every segment."""
-    out_of_line()
     n, m = U.size, N.size
     top = ks[-1] + max(ks[-1], load_ks[-1])
     stick_cos, stick_sin = np.zeros(top + 1), np.zeros(top + 1)
@@ -241,7 +237,7 @@ def _accumulate(
             dF_dN[i, j] = mu * (dF_dN[i, j] + onsets_dN[i, j])
 
 
-@compiled
+@apart
 def sampled_force(
     U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, samples: int, segments: Real,
     dF_dU: Real, dF_dkt: Real, dF_dmu: Real, dF_dN: Real, F: Real,
@@ -257,7 +253,6 @@ def sampled_force(
     -------
     (state, number of segments); on FAILED the outputs are NaN.
     """
-    out_of_line()
     n = coefficient_count(ks)
     wave, u, load = np.empty(samples), np.empty(samples), np.empty(samples)
     _fill_wave(wave)

@@ -19,7 +19,8 @@ import math
 import numpy as np
 
 from solver.fourier import Integer, Real
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.events import (
     AFTER_SLIP,
     BEGAN,
@@ -99,7 +100,7 @@ def _weight_of(begin: float, end: float, weights: Real, ks: Integer) -> float:
     return total
 
 
-@compiled
+@apart
 def second_along(
     U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, state: int, segments: Real,
     count: int, dF_dU: Real, dF_dN: Real, w: Real, dU: Real, dN: Real, out_U: Real, out_N: Real,
@@ -118,7 +119,6 @@ def second_along(
     -------
     The same of ∂F/∂kt and ∂F/∂μ (NaN where kt or μ is 0 and it takes part).
     """
-    out_of_line()
     fill(out_U, 0.0)
     fill(out_N, 0.0)
     if state == SEPARATED:

@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from solver.fourier import Integer, Real
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.events import (
     AFTER_SEPARATION,
     AFTER_SLIP,
@@ -140,7 +141,7 @@ def _turning(c: Real, s: Real, degree: int, lo: float, hi: float, way: float) ->
     return tau, at_point(c, s, degree, tau)[0]
 
 
-@compiled
+@apart
 def find_segments(
     U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, cos_table: Real, sin_table: Real,
     segments: Real,
@@ -157,7 +158,6 @@ def find_segments(
     -------
     (state, number of segments); the state is SEPARATED, STUCK, SLIPPING, LIFTING or FAILED.
     """
-    out_of_line()
     at_once = _plain(U, ks, N, load_ks, kt, mu, segments)
     if at_once >= 0:
         return at_once, 1 if at_once == STUCK else 0

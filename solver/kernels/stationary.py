@@ -18,7 +18,8 @@ import math
 import numpy as np
 
 from solver.fourier import Real, coefficient_count, cosine_position
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 from solver.kernels.events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED, piece_of
 from solver.kernels.force import contact_force
 from solver.kernels.jacobian import factorise, step_back, step_back_transposed
@@ -44,10 +45,9 @@ from solver.kernels.system import KT, LOAD_COEFFICIENTS, MU, System
 _TURNS = 12
 
 
-@compiled
+@apart
 def balance_at(system: System, u: Real, omega: float, p: float, at: Summit) -> float:
     """Evaluate the residual and its slopes at (u, ω, p); return its relative size (NaN if that failed)."""
-    out_of_line()
     nc, n = system.shift.size, coefficient_count(system.ks)
     at.numbers[SPENT] += 1.0
     fill_jets(system, omega, p, at.jets)
@@ -82,10 +82,9 @@ def balance_at(system: System, u: Real, omega: float, p: float, at: Summit) -> f
     return _assemble(system, u, least_size(system, p), at)
 
 
-@compiled
+@apart
 def _assemble(system: System, u: Real, least: float, at: Summit) -> float:
     """Put r, dr/dω and dr/dp (rows of `rhs`) together."""
-    out_of_line()
     nc, n = system.shift.size, coefficient_count(system.ks)
     jets, rhs = at.jets, at.rhs
     scale, largest = least, 0.0
@@ -202,10 +201,9 @@ def choose_extremum(system: System, at: Summit) -> None:
     at.numbers[SIGN], at.numbers[TAU] = (1.0, at_high) if high >= -low else (-1.0, at_low)
 
 
-@compiled
+@apart
 def slopes_at(system: System, at: Summit) -> bool:
     """Compute λ, g = da/dω and da/dp after `solve_responses`, `observe_at` and `find_extremum`."""
-    out_of_line()
     nc, n = system.shift.size, coefficient_count(system.ks)
     jets, numbers, tau = at.jets, at.numbers, at.numbers[TAU]
     z = at.z[VALUE]
@@ -235,10 +233,9 @@ def slopes_at(system: System, at: Summit) -> bool:
     return math.isfinite(numbers[G])
 
 
-@compiled
+@apart
 def _linear_part(system: System, at: Summit, order: int) -> float:
     """Fill z of one order, Aᵀλ − ξ Bᵀe(τ*), and return ξ e·x_linear − λ·ū of that order."""
-    out_of_line()
     nc, n = system.shift.size, coefficient_count(system.ks)
     jets, lam, total = at.jets, at.adjoint, 0.0
     sign, tau = at.numbers[SIGN], at.numbers[TAU]
@@ -308,10 +305,9 @@ def _turned(system: System, at: Summit, order: int, weights: Real) -> float:
     return total
 
 
-@compiled
+@apart
 def curvatures_at(system: System, u: Real, at: Summit) -> None:
     """Compute h (change of g by u), k and m after `slopes_at`: d²a/dω² = h·u' + k and dg/dp = h·u_p + m."""
-    out_of_line()
     nc, n = system.shift.size, coefficient_count(system.ks)
     numbers = at.numbers
     _along_response(system, at)

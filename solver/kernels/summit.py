@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numba.experimental import structref
 
@@ -14,6 +13,7 @@ from solver.kernels.compiled import compiled
 from solver.kernels.events import SEGMENT_COLUMNS, segment_capacity
 from solver.kernels.jets import Jets, new_jets
 from solver.kernels.laws_columns import COLUMNS
+from solver.kernels.reference import Reference
 from solver.kernels.system import (
     LOAD_COEFFICIENTS,
     Evaluation,
@@ -60,7 +60,7 @@ class Summit(NamedTuple):
 
 
 @structref.register
-class _SummitType(numba.types.StructRef):
+class _SummitType(Reference):
     """Numba's type of a `Summit` by reference."""
 
 

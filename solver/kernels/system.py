@@ -18,13 +18,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numba.experimental import structref
 
 from solver.fourier import Complex, Index, Integer, Real, coefficient_count
 from solver.kernels.compiled import compiled
 from solver.kernels.events import SEGMENT_COLUMNS, segment_capacity
+from solver.kernels.reference import Reference
 
 # What λ is.
 FREQUENCY, LEVEL, FORCE_PHASE, STRUCTURE = 0, 1, 2, 3
@@ -129,17 +129,17 @@ class Evaluation(NamedTuple):
 
 
 @structref.register
-class _SystemType(numba.types.StructRef):
+class _SystemType(Reference):
     """Numba's type of a `System` by reference."""
 
 
 @structref.register
-class _ReceptanceType(numba.types.StructRef):
+class _ReceptanceType(Reference):
     """Numba's type of a `Receptance` by reference."""
 
 
 @structref.register
-class _EvaluationType(numba.types.StructRef):
+class _EvaluationType(Reference):
     """Numba's type of an `Evaluation` by reference."""
 
 

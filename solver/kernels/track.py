@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.fourier import Real
+from solver.kernels.apart import apart
 from solver.kernels.climb import MOST, SHARP, climb, find_summit, settle
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.compiled import compiled
 from solver.kernels.linear import copy_to
 from solver.kernels.summit import AMPLITUDE, CORNER, CURVE, DRIFT, RATE, SIGN, TAU, G, Summit
 from solver.kernels.system import System
@@ -54,12 +55,11 @@ def value_of(z: float, logarithmic: bool) -> tuple[float, float]:
     return z, 1.0
 
 
-@compiled
+@apart
 def record(
     ridge: Ridge, u: Real, omega: float, z: float, at: Summit, row: Real, solution: Real, tangent: Real
 ) -> None:
     """Write a peak with its derivatives by z into one row of the result."""
-    out_of_line()
     p, by_z = value_of(z, ridge.logarithmic)
     numbers = at.numbers
     drift = 0.0 if ridge.fixed else numbers[DRIFT]
@@ -117,12 +117,11 @@ def _correct(
     return good, iterations, found
 
 
-@compiled
+@apart
 def _predict(
     rows: Real, solutions: Real, tangents: Real, count: int, smooth: bool, z: float, guess: Real
 ) -> float:
     """Fill `guess` with the prediction at `z` from the last rows; return the predicted ω."""
-    out_of_line()
     here = rows[count - 1]
     length = z - here[Z]
     if smooth and abs(length) < 3.0 * abs(here[Z] - rows[count - 2, Z]):
@@ -135,7 +134,7 @@ def _predict(
     return here[OMEGA] + length * here[DOMEGA]
 
 
-@compiled
+@apart
 def track(
     system: System, ridge: Ridge, u: Real, omega: float, tau: float, sign: float, at: Summit,
     rows: Real, solutions: Real, tangents: Real,
@@ -151,7 +150,6 @@ def track(
     -------
     (how it ended, number of rows).
     """
-    out_of_line()
     n, most = u.size, rows.shape[0]
     at.numbers[SIGN] = sign
     trial, guess = u.copy(), np.empty(n)
@@ -223,7 +221,7 @@ def step_error(ridge: Ridge, left: Real, right: Real) -> float:
     return max(height, omega) / looser
 
 
-@compiled
+@apart
 def polish(
     system: System, ridge: Ridge, left: int, z: float, sign: float, at: Summit, rows: Real, solutions: Real,
     tangents: Real, row: Real, solution: Real, tangent: Real,
@@ -235,7 +233,6 @@ def polish(
     rows, solutions, tangents : of `track`.
     row (COLUMNS,), solution (nt,), tangent (nt,) : the peak there, filled.
     """
-    out_of_line()
     at.numbers[SIGN] = sign
     u = np.empty(solution.size)
     here, ahead = rows[left], rows[left + 1]

@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from solver.fourier import Integer, Real
-from solver.kernels.compiled import compiled, out_of_line
+from solver.kernels.apart import apart
+from solver.kernels.compiled import compiled
 
 RISING, FALLING = 1.0, -1.0
 POINTS_PER_WAVE = 12  # grid points for the shortest wave kept; the grid only brackets the events
@@ -30,7 +31,7 @@ def grid_tables(n_grid: int, highest_harmonic: int) -> tuple[Real, Real]:
     return np.cos(angle), np.sin(angle)
 
 
-@compiled
+@apart
 def on_grid(
     c: Real, s: Real, degree: int, cos_table: Real, sin_table: Real, value: Real, slope: Real
 ) -> None:
@@ -38,7 +39,6 @@ def on_grid(
 
     Even and odd part are summed on half the grid only: q(−τ) = even − odd.
     """
-    out_of_line()
     n = value.size
     half = n // 2
     parts = np.zeros((4, half + 1))
@@ -91,7 +91,7 @@ def order_at(c: Real, s: Real, degree: int, tau: float, order: int, shift: float
     return q2, q3
 
 
-@compiled
+@apart
 def bracketed_root(
     c: Real, s: Real, degree: int, order: int, shift: float, lo: float, hi: float, guess: float, way: float
 ) -> float:
@@ -100,7 +100,6 @@ def bracketed_root(
     Newton's method kept inside a bracket: `way` is RISING if the function goes from negative at `lo` to
     positive at `hi`, else FALLING; the end values are never evaluated, so an end may itself be a zero.
     """
-    out_of_line()
     x = guess
     if not (lo < x < hi):
         x = 0.5 * (lo + hi)

@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numba
 from numba.experimental import structref
 
 from solver.fourier import Real
 from solver.kernels.compiled import compiled
 from solver.kernels.linear import copy_to, largest_entry
+from solver.kernels.reference import Reference
 from solver.kernels.residual import least_size
 from solver.kernels.system import System
 
@@ -49,7 +49,7 @@ class Walk(NamedTuple):
 
 
 @structref.register
-class _WalkType(numba.types.StructRef):
+class _WalkType(Reference):
     """Numba's type of a `Walk` by reference."""
 
 
