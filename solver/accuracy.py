@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from solver.kernels.receptance import receptance
 from solver.kernels.residual import evaluate
 from solver.kernels.system import by_reference, evaluation_by_value, new_receptance, receptance_by_value
 from solver.parametric import linear_model
+from solver.shown import Piece
 from solver.widening import linear_part, more_harmonics, pad
 from solver.workspace import Workspace
 
@@ -30,9 +32,11 @@ SAFETY = 1.7
 _ANYWHERE = 0.1
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ErrorEstimate:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class ErrorEstimate(Piece):
     """Estimated errors of an answer [m]; NaN where the balance with more harmonics is singular."""
+
+    UNITS: ClassVar[Mapping[str, str]] = {"max_abs": "m", "half_peak_to_peak": "m"}
 
     max_abs: float
     half_peak_to_peak: float

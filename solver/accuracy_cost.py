@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from solver.errors import SettingError
 from solver.fourier import Real
 from solver.kernels.observe import MAX_ABS
 from solver.scene import Scene
-from solver.shown import Shown, Summary
+from solver.shown import Piece, Shown, Summary
 from solver.widening import more_harmonics, pad
 from solver.workspace import Workspace
 
@@ -48,8 +48,8 @@ class AccuracyStatus(Enum):
     STOPPED = "The study was stopped by the caller: it has no rows, none was timed to the end."
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AccuracyRow:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class AccuracyRow(Piece):
     """One way to compute one point.
 
     Attributes
@@ -73,6 +73,8 @@ class AccuracyRow:
     pareto : bool
         No other row is both at least as accurate and at least as fast.
     """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"max_abs": "m", "error": "m", "milliseconds": "ms"}
 
     harmonics: int
     evaluator: str

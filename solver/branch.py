@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from solver.balance import Balance
 from solver.fourier import Integer, Real
 from solver.kernels.observe import HALF_RANGE, MAX_ABS, MEAN, RESIDUAL, SLOPE
 from solver.kernels.walk import FINISHED, LEFT_RANGE, NO_START, STALLED
-from solver.shown import Shown, Summary
+from solver.shown import Piece, Shown, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,8 +48,8 @@ ENDINGS = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Peak:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Peak(Piece):
     """A local maximum of the amplitude along a branch, polished to the stationary point.
 
     Attributes
@@ -62,6 +63,8 @@ class Peak:
     interior : bool
         A true maximum, not an end of the branch.
     """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"value": "m"}
 
     value: float
     at: float
@@ -88,8 +91,8 @@ class Edge:
     opens: bool
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Band:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Band(Piece):
     """Where the amplitude exceeds a limit.
 
     Attributes
@@ -103,6 +106,8 @@ class Band:
     edges : tuple of Edge
         The interval ends inside the branch (an end of the range itself is not one).
     """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"limit": "m"}
 
     limit: float
     width: float

@@ -13,14 +13,17 @@ at two distances, and extrapolated to it.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import ClassVar
 
 import numpy as np
 
 from solver.branch import Peak
 from solver.fourier import Real
 from solver.sensitivity import Gradient, Sensitivities
+from solver.shown import Piece
 from solver.workspace import Workspace
 
 SMOOTH = 1e-6  # slope da/dω · ω/a below which a peak is a smooth maximum
@@ -40,8 +43,8 @@ class PeakKind(Enum):
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PeakGradient:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class PeakGradient(Piece):
     """The derivatives of a peak.
 
     Attributes
@@ -53,6 +56,8 @@ class PeakGradient:
     kind : PeakKind
         What the derivative is.
     """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"value": "m"}
 
     value: float
     gradient: Real

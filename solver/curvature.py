@@ -13,20 +13,23 @@ amplitude is stationary in ω the peak A(p) has the Hessian H_pp − H_pω H_ωp
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from solver.contact_seconds import ContactForces, second_forces, second_loads
 from solver.fourier import Complex, Integer, Real
 from solver.kernels.system import KT, MU
+from solver.shown import Piece
 from solver.whole_motion import WholeMotion, times, times_transposed
 
 STATIONARY = 1e-10  # largest share of a peak's height that a solution may lie below it
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PeakHessian:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class PeakHessian(Piece):
     """A peak that moves with its parameters, to second order.
 
     Drift and Hessian are NaN where the peak is not a smooth maximum over the frequency: at a kink (a contact
@@ -44,14 +47,16 @@ class PeakHessian:
         d² peak / dp² [m per both units].
     """
 
+    UNITS: ClassVar[Mapping[str, str]] = {"value": "m"}
+
     value: float
     gradient: Real
     drift: Real
     hessian: Real
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EdgeHessian:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class EdgeHessian(Piece):
     """A band edge, where the amplitude equals a limit, to second order.
 
     Attributes
@@ -66,8 +71,8 @@ class EdgeHessian:
     hessian: Real
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AmplitudeHessian:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class AmplitudeHessian(Piece):
     """The amplitude at a solution to second order in frequency and parameters; NaN where it has no such.
 
     Attributes
@@ -85,6 +90,8 @@ class AmplitudeHessian:
     hessian : (n, n) array
         At a fixed frequency, that of a peak at an end of the band [m per both units].
     """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"value": "m", "by_frequency": "m/Hz", "by_frequency_twice": "m/Hz²"}
 
     value: float
     by_frequency: float

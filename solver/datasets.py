@@ -16,10 +16,12 @@ if TYPE_CHECKING:
     from solver.accuracy_cost import AccuracyStudy
     from solver.branch import Branch
     from solver.effects import Plan
+    from solver.floquet import Stability
     from solver.maps import ResponseMap
     from solver.march_result import MarchResult
     from solver.mistuned_disks import MistuningStudy
-    from solver.peak_tracks import PeakTrack
+    from solver.mistuning import BladeAmplitudes, BladePeaks
+    from solver.peak_tracks import LeastPeak, PeakTrack
     from solver.response import Solution
     from solver.scene import Scene
 
@@ -234,3 +236,49 @@ def plan_dataset(found: Plan) -> Dataset:
         "reason": column("effect", np.array([effect.reason for effect in found.effects], dtype=np.str_)),
     }
     return Dataset(kind="plan", rows=("effect",), variables=variables, attributes=attributes("planned"))
+
+
+def least_dataset(best: LeastPeak) -> Dataset:
+    """A local minimum of the highest peak a row, best first."""
+    basins = best.basins
+    variables = {
+        "parameter": column("minimum", np.array([one.at for one in basins], dtype=np.float64)),
+        "peak": column("minimum", np.array([one.peak for one in basins], dtype=np.float64), "m"),
+        "solved": column("minimum", np.array([one.solved for one in basins], dtype=bool)),
+        "proven": column("minimum", np.array([one.proven for one in basins], dtype=bool)),
+    }
+    scene = None if best.branch is None else best.branch.balance.scene
+    notes = attributes(best.status.value, scene, least_at=best.at, least_peak=best.peak)
+    return Dataset(kind="least", rows=("minimum",), variables=variables, attributes=notes)
+
+
+def blade_peaks_dataset(peaks: BladePeaks) -> Dataset:
+    """A sector a row: the highest peak of its blade."""
+    variables = {
+        "sector": column("sector", np.arange(peaks.value.size)),
+        "peak": column("sector", peaks.value, "m", f"highest peak, max|x| of {peaks.dof}"),
+        "frequency": column("sector", peaks.at_hz, "Hz", "of that peak"),
+        "status": column("sector", np.array([one.value for one in peaks.status], dtype=np.str_)),
+    }
+    return Dataset(kind="blade-peaks", rows=("sector",), variables=variables, attributes=attributes("solved"))
+
+
+def amplitudes_dataset(blades: BladeAmplitudes) -> Dataset:
+    """A sector a row: the motion of its blade."""
+    variables = {
+        "sector": column("sector", np.arange(blades.max_abs.size)),
+        "max_abs": column("sector", blades.max_abs, "m", f"max|x| of {blades.dof}"),
+        "half_peak_to_peak": column("sector", blades.half_peak_to_peak, "m", "(max x - min x) / 2"),
+    }
+    return Dataset(kind="blades", rows=("sector",), variables=variables, attributes=attributes("solved"))
+
+
+def stability_dataset(found: Stability) -> Dataset:
+    """A Floquet multiplier a row, largest first."""
+    variables = {
+        "real": column("multiplier", found.multipliers.real),
+        "imaginary": column("multiplier", found.multipliers.imag),
+        "modulus": column("multiplier", np.abs(found.multipliers)),
+    }
+    notes = attributes(found.growth.value, frequency_hz=found.frequency_hz, neutral=found.neutral)
+    return Dataset(kind="stability", rows=("multiplier",), variables=variables, attributes=notes)

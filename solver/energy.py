@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,11 +13,12 @@ from solver import fourier
 from solver.histories import coordinates, matrices
 from solver.parametric import linear_model
 from solver.response import Solution
+from solver.shown import Piece
 from solver.structure import force_amplitudes
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PowerBalance:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class PowerBalance(Piece):
     """Mean power over a period, of one sector if the structure is cyclic.
 
     A solution of the balance loses none: input = viscous + friction to rounding, whatever the number of
@@ -32,6 +35,13 @@ class PowerBalance:
     contacts_w : dict of str to float
         Taken out by each contact [W].
     """
+
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "input_w": "W",
+        "viscous_w": "W",
+        "friction_w": "W",
+        "contacts_w": "W",
+    }
 
     input_w: float
     viscous_w: float

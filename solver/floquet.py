@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,13 @@ from solver.parametric import linear_model
 from solver.response import Solution
 from solver.scene import Contact, CyclicStructure, Scene
 from solver.sectors import annulus
+from solver.shown import Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.dataset import Dataset
+    from solver.plots.style import Into
 
 GROWS = 1e-9  # a multiplier's modulus beyond 1 that is more than rounding
 REAL = 1e-7  # imaginary part, relative to the modulus, that counts as none
@@ -36,8 +44,8 @@ class Growth(Enum):
     TORUS = "a pair of complex multipliers is beyond 1: a second frequency grows (Neimark-Sacker)"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Stability:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Stability(Shown):
     """Whether small perturbations of a periodic response die out.
 
     Attributes
@@ -71,6 +79,24 @@ class Stability:
     def stable(self) -> bool:
         """Whether no perturbation grows."""
         return self.growth is Growth.NONE
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.summaries import of_stability
+
+        return of_stability(self)
+
+    def to_dataset(self) -> Dataset:
+        """A multiplier a row."""
+        from solver.datasets import stability_dataset
+
+        return stability_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the multipliers and the unit circle; `ax`: axes to draw into, else a new figure."""
+        from solver.plots.multipliers import multipliers_figure
+
+        return multipliers_figure(self, ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the answer as one JSON object; multipliers as [real, imaginary]."""

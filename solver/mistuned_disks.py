@@ -21,7 +21,7 @@ from solver.fourier import Real
 from solver.mistuning import BladePeaks, blade_peaks, mistuned, with_mistuning
 from solver.scene import CyclicStructure, Scene
 from solver.scene_parts import Mistuning
-from solver.shown import Shown, Summary
+from solver.shown import Piece, Shown, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,8 +49,8 @@ class MistuningStatus(Enum):
     STOPPED = "The study was stopped by the caller: the figures are those of the disks so far."
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MistunedDisk:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class MistunedDisk(Piece):
     """One disk of a study.
 
     Attributes

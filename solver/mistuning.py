@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,12 +22,19 @@ from solver.response import Solution
 from solver.scene import CyclicStructure, Observe, Scene
 from solver.scene_checks import listing, nearest
 from solver.sectors import annulus, sectors_needed
+from solver.shown import Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.dataset import Dataset
+    from solver.plots.style import Into
 
 _OF_THE_SWEEP = 0.4  # share of the time; the rest looks for the peaks of the other blades
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BladeAmplitudes:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class BladeAmplitudes(Shown):
     """The motion of one DOF in every sector.
 
     Attributes
@@ -51,13 +59,31 @@ class BladeAmplitudes:
         """The sector that has it."""
         return int(self.max_abs.argmax())
 
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.summaries import of_amplitudes
+
+        return of_amplitudes(self)
+
+    def to_dataset(self) -> Dataset:
+        """A sector a row."""
+        from solver.datasets import amplitudes_dataset
+
+        return amplitudes_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the amplitude of every blade; `ax`: axes to draw into, else a new figure."""
+        from solver.plots.disks import blades_figure
+
+        return blades_figure(self.max_abs, f"max |{self.dof}|", ax=ax)
+
     def magnification(self, tuned: Solution | BladeAmplitudes) -> float:
         """Largest amplitude relative to that of another disk, usually the tuned one."""
         return self.largest / (tuned.largest if isinstance(tuned, BladeAmplitudes) else tuned.max_abs)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BladePeaks:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class BladePeaks(Shown):
     """The highest peak of one DOF in every sector over a range of the frequency.
 
     Attributes
@@ -89,6 +115,24 @@ class BladePeaks:
     def worst(self) -> int:
         """The sector that has it."""
         return int(self.value.argmax())
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.summaries import of_blade_peaks
+
+        return of_blade_peaks(self)
+
+    def to_dataset(self) -> Dataset:
+        """A sector a row."""
+        from solver.datasets import blade_peaks_dataset
+
+        return blade_peaks_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the highest peak of every blade; `ax`: axes to draw into, else a new figure."""
+        from solver.plots.disks import blades_figure
+
+        return blades_figure(self.value, f"highest peak, max |{self.dof}|", ax=ax)
 
     def magnification(self, tuned: BladePeaks) -> float:
         """The amplitude magnification factor: the highest peak relative to that of the tuned disk."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from solver.branch import Branch
+from solver.errors import SettingError
 from solver.fourier import Real
-from solver.shown import Shown, Summary
+from solver.shown import Piece, Shown, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,8 +65,8 @@ class ActivePeak:
     slope: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Basin:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Basin(Piece):
     """A local minimum of the highest peak over the parameter.
 
     Attributes
@@ -80,14 +82,16 @@ class Basin:
         basin is no better than that, but may be worse. What the coarse stage finds is seldom proven.
     """
 
+    UNITS: ClassVar[Mapping[str, str]] = {"peak": "m"}
+
     at: float
     peak: float
     solved: bool
     proven: bool
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LeastPeak:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class LeastPeak(Shown):
     """Where the highest peak is least.
 
     Attributes
@@ -122,6 +126,26 @@ class LeastPeak:
     sweeps: int
     work: float
     seconds: float
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.summaries import of_least
+
+        return of_least(self)
+
+    def to_dataset(self) -> Dataset:
+        """A local minimum a row."""
+        from solver.datasets import least_dataset
+
+        return least_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the response at the optimum; `ax`: axes to draw into, else a new figure."""
+        if self.branch is None:
+            raise SettingError(
+                "branch", None, "must be the response at the optimum to be drawn: there is none"
+            )
+        return self.branch.plot(ax=ax)
 
     def to_json(self) -> dict[str, object]:
         """Return the optimum as one JSON object."""

@@ -25,13 +25,14 @@ from solver.scene import (
     parse_end,
 )
 from solver.scene_checks import BETWEEN_KEYS
+from solver.shown import Piece
 
 _JoinT = TypeVar("_JoinT", Spring, Damper)
 _NamedT = TypeVar("_NamedT", Spring, Damper, Mass)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Extent:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Extent(Piece):
     """How many sectors a scene has to be solved with, and why.
 
     Attributes

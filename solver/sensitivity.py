@@ -8,8 +8,9 @@ needs the whole motion x = Z⁻¹ (f − Lᴴ F) and the adjoint motion y of eve
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -47,6 +48,7 @@ from solver.kernels.laws_columns import COULOMB
 from solver.kernels.system import KT, MU, N0, N1, PHASE, evaluation_by_value
 from solver.parameter import Kind
 from solver.path_slopes import contact_slopes, matrices_of_paths, modal_dampings, resolved
+from solver.shown import Piece
 from solver.whole_motion import WholeMotion, times, whole_motion
 from solver.workspace import Workspace
 
@@ -54,8 +56,8 @@ TWO_PI = 2.0 * math.pi
 _KINK = 1e-8  # relative difference of the slopes of max x and −min x beyond which a parameter parts them
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Gradient:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Gradient(Piece):
     """The amplitude at a solution with its derivatives, all others held fixed; NaN where it is singular.
 
     Attributes
@@ -67,6 +69,8 @@ class Gradient:
     by_parameters : (n_paths,) array
         At a fixed frequency [m per unit of each].
     """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"value": "m", "by_frequency": "m/Hz"}
 
     value: float
     by_frequency: float

@@ -5,17 +5,22 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from solver import units
+from solver.branch import BranchStatus
 from solver.shown import Summary
 
 if TYPE_CHECKING:
     from solver.accuracy_cost import AccuracyStudy
     from solver.branch import Branch
     from solver.effects import Plan
+    from solver.floquet import Stability
     from solver.maps import ResponseMap
     from solver.march_result import MarchResult
     from solver.mistuned_disks import MistuningStudy
-    from solver.peak_tracks import PeakTrack
+    from solver.mistuning import BladeAmplitudes, BladePeaks
+    from solver.peak_tracks import LeastPeak, PeakTrack
     from solver.response import Solution
 
 Pairs = list[tuple[str, str]]
@@ -129,3 +134,53 @@ def of_plan(found: Plan) -> Summary:
     pairs.append(("unknowns", str(found.unknowns)))
     pairs.append(("a point takes about", units.duration(found.seconds_a_point)))
     return Summary(title=f"{found.scene}, {found.harmonics} harmonics", pairs=tuple(pairs))
+
+
+def of_least(best: LeastPeak) -> Summary:
+    """The least highest peak, what holds it, and what else was met."""
+    pairs: Pairs = []
+    if math.isfinite(best.at):
+        pairs.append(("least peak", f"{units.length(best.peak)} at {best.at:.6g}"))
+        pairs.append(("peaks there", ", ".join(f"{one.frequency:.6g} Hz" for one in best.active)))
+    others = [f"{units.length(basin.peak)} at {basin.at:.6g}" for basin in best.basins[1:]]
+    if others:
+        pairs.append(("other minima", "; ".join(others)))
+    pairs += [("responses", f"{best.sweeps}, the work of {best.work:.3g}")]
+    pairs.append(("time", units.duration(best.seconds)))
+    scene = "" if best.branch is None else f"of {best.branch.balance.scene.name}"
+    return made(f"highest peak {scene}".rstrip(), pairs, best.status.value)
+
+
+def of_blade_peaks(peaks: BladePeaks) -> Summary:
+    """The highest blade, the least, and those whose branch did not reach the end."""
+    known = peaks.value[np.isfinite(peaks.value)]
+    pairs: Pairs = []
+    if known.size:
+        at = int(np.nanargmax(peaks.value))
+        pairs.append(("highest", f"{units.length(known.max())} at {peaks.at_hz[at]:.6g} Hz, blade {at}"))
+        pairs.append(("lowest", units.length(known.min())))
+    pairs.append(("blades", str(peaks.value.size)))
+    reached = BranchStatus.COMPLETED
+    ended = next((one for one in peaks.status if one is not reached), reached)
+    return made(peaks.dof, pairs, ended.value)
+
+
+def of_amplitudes(blades: BladeAmplitudes) -> Summary:
+    """The blade that moves most, and the one that moves least."""
+    pairs = (
+        ("largest", f"{units.length(blades.largest)}, blade {blades.worst}"),
+        ("smallest", units.length(float(blades.max_abs.min()))),
+        ("blades", str(blades.max_abs.size)),
+    )
+    return Summary(title=f"max|x| of {blades.dof}", pairs=pairs)
+
+
+def of_stability(found: Stability) -> Summary:
+    """Whether it is stable, and the largest multiplier."""
+    pairs: Pairs = [
+        ("stable", "yes" if found.stable else "no"),
+        ("largest multiplier", f"{found.radius:.6g} in modulus"),
+        ("multipliers", f"{found.multipliers.size}, and {found.neutral} that are 1 by construction"),
+        ("time", units.duration(found.seconds)),
+    ]
+    return made(f"at {found.frequency_hz:.6g} Hz", pairs, found.growth.value)

@@ -27,12 +27,13 @@ from solver.response import Solution
 from solver.savings import Effects, even_harmonics_reason
 from solver.scene_checks import listing
 from solver.segments_of import Shares, sampled_shares, segments_of, shares_of
+from solver.shown import Piece
 from solver.wear_measures import Change, Cycle, friction_work, least_load, slip_travel
 from solver.workspace import Workspace
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Measured:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Measured(Piece):
     """A number of a response with its derivatives through the whole solve; NaN where that is singular.
 
     Attributes
@@ -50,8 +51,8 @@ class Measured:
     gradient: Real
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ContactWear:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class ContactWear(Piece):
     """What one contact goes through in a period.
 
     Attributes

@@ -28,6 +28,7 @@ from solver.kernels.residual import contact_values, evaluate
 from solver.kernels.system import evaluation_by_value
 from solver.parameter import Kind
 from solver.peaks import MOST_HALVINGS, NEAR_THE_TOP, PREDICTED, share_scales
+from solver.shown import Piece
 from solver.wear import contact_index
 from solver.wear_measures import Change, Cycle, friction_work, least_load, slip_travel
 from solver.workspace import Workspace
@@ -56,8 +57,8 @@ _MEASURES: dict[Measure, Callable[[Cycle, int, Sequence[Change]], tuple[float, R
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WorstWear:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class WorstWear(Piece):
     """A local worst value of a measure over a branch.
 
     Attributes

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
@@ -14,10 +16,15 @@ import optim
 import solver
 from solver.dataset import Dataset
 from solver.saving import SUFFIXES
+from solver.shown import Piece, Shown, Told
 
 
 def two_dof() -> solver.Scene:
     return solver.load_scene("two-dof")
+
+
+def mistuned_disk() -> solver.Scene:
+    return solver.mistuned(solver.load_scene("bladed-disk"), of="tip", spread=0.02, seed=1)
 
 
 MAKERS: dict[str, Callable[[], Any]] = {
@@ -32,6 +39,10 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "mistuning": lambda: solver.mistuning_study(
         solver.load_scene("bladed-disk"), of=["tip"], samples=2, harmonics=1, start=740.0, stop=780.0
     ),
+    "least": lambda: solver.least_peak(two_dof(), "damper.N0", 50.0, 200.0, harmonics=3),
+    "blade peaks": lambda: solver.blade_peaks(mistuned_disk(), 740.0, 780.0, harmonics=1),
+    "blades": lambda: solver.blade_amplitudes(solver.solve(mistuned_disk(), frequency_hz=755.0, harmonics=1)),
+    "stability": lambda: solver.stability(solver.solve(two_dof(), frequency_hz=1.2, harmonics=5)),
     "plan": lambda: solver.plan(two_dof(), harmonics=3),
     "design": lambda: optim.design(two_dof(), variables={"damper.N0": (20.0, 500.0)}, harmonics=3),
     "pareto": lambda: optim.pareto_front(
@@ -46,7 +57,7 @@ MAKERS: dict[str, Callable[[], Any]] = {
 _made: dict[str, Any] = {}
 
 
-_SLOW = ("mistuning", "robust", "accuracy", "sensitivities")
+_SLOW = ("blade peaks", "mistuning", "robust", "accuracy", "sensitivities")
 
 
 @pytest.fixture(params=[pytest.param(k, marks=pytest.mark.long if k in _SLOW else ()) for k in MAKERS])
@@ -84,6 +95,41 @@ def test_a_result_says_what_it_is(result: Any) -> None:
     assert page.startswith("<table>")
     assert page.endswith("</table>")
     assert all(pair for pairs in result.summary().pairs for pair in pairs)
+
+
+# What a user gives, the arrays themselves, and what a stopped sweep is gone on with.
+NOT_LOOKED_AT = {"ContinuationSettings", "Effects", "Issue", "Summary", "Dataset", "Variable", "Stretch"}
+
+
+def public_dataclasses() -> list[type]:
+    named = [getattr(package, name) for package in (solver, optim) for name in package.__all__]
+    return [one for one in named if isinstance(one, type) and dataclasses.is_dataclass(one)]
+
+
+@pytest.mark.parametrize("kind", public_dataclasses(), ids=lambda kind: kind.__name__)
+def test_every_public_result_says_what_it_is(kind: type) -> None:
+    assert issubclass(kind, Told) != (kind.__name__ in NOT_LOOKED_AT)
+    if issubclass(kind, Told):
+        assert kind.__repr__ is Told.__repr__
+        assert issubclass(kind, Shown | Piece)
+
+
+def test_pieces_say_their_numbers_with_units() -> None:
+    scene = two_dof()
+    branch = solver.sweep(scene, "frequency", 0.8, 1.4, harmonics=3, limit=2.0)
+    assert branch.peak is not None
+    assert re.fullmatch(
+        r"<Peak: value 2\.\d+ m, at 1\.0\d+, solution 7 numbers, interior yes>", repr(branch.peak)
+    )
+    assert repr(branch.band).startswith("<Band: limit 2 m, width 0.")
+    solution = solver.solve(scene, frequency_hz=1.2, harmonics=3)
+    power = solver.power_balance(solution)
+    assert repr(power).startswith("<PowerBalance: input_w ")
+    assert "contacts_w damper " in repr(power)
+    wear = solver.contact_wear(solution)["damper"]
+    assert "shares stick 0." in repr(wear)
+    assert "<Measured: value " in repr(wear)
+    assert wear._repr_html_().startswith("<table><caption style='text-align:left'>ContactWear</caption>")
 
 
 def test_a_result_draws_itself(result: Any) -> None:

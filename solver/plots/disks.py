@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from solver import units
+from solver.fourier import Real
 from solver.plots import style
 
 
@@ -46,4 +47,26 @@ def mistuning_figure(answer: Mapping[str, Any], *, ax: style.Into = None) -> Fig
         blades.xaxis.set_major_locator(MaxNLocator(integer=True))
         style.label(blades, "blade", f"highest peak, max |{answer['dof']}| [{unit.name}]")
         blades.set_title(f"worst disk, seed {worst['seed']}")
+    return page
+
+
+def blades_figure(heights: Real, what: str, *, ax: style.Into = None) -> Figure:
+    """One number of every blade of a disk, the largest in another colour.
+
+    Parameters
+    ----------
+    heights : (sectors,) array [m]; NaN where it is not known.
+    what : the heights in words.
+    ax : axes to draw into, as `solver.plots.style.figure`.
+    """
+    known = heights[np.isfinite(heights)]
+    unit = units.length_unit(float(known.max(initial=0.0)))
+    highest = int(np.nanargmax(heights)) if known.size else -1
+    with style.styled():
+        page, (axes,) = style.figure(5.0, 3.3, into=ax)
+        colors = [style.VERMILION if i == highest else style.SKY for i in range(heights.size)]
+        axes.bar(np.arange(heights.size), heights * unit.per_metre, color=colors, width=0.7)
+        axes.grid(visible=False, axis="x")
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        style.label(axes, "blade", f"{what} [{unit.name}]")
     return page
