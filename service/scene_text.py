@@ -9,6 +9,7 @@ from typing import Any
 
 from service import strict_json
 from service.errors import InvalidRequestError, MalformedBodyError
+from service.jobs import SceneSource
 from service.kinds.scenes import read_scene
 from solver.errors import Issue
 
@@ -34,10 +35,10 @@ def read_text(text: str, form: str) -> dict[str, Any]:
     return plain
 
 
-def issues_of_scene(raw: Mapping[str, Any]) -> list[Issue]:
-    """Everything wrong with a scene."""
+def issues_of_scene(raw: Mapping[str, Any], source: SceneSource) -> list[Issue]:
+    """Everything wrong with a scene, whose uploads are looked up in `source`."""
     try:
-        read_scene(raw)
+        read_scene(source.with_uploads(raw))
     except InvalidRequestError as error:
         return list(error.issues)
     return []

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
 
 from service.http import CallerDependency, JsonBody, ServiceDependency
+from service.jobs import SceneSource
 from service.kinds.scenes import SceneRequest, resolve_scene
 from service.routes.described import TEXT, media
 from service.scene_text import issues_of_scene, read_text
@@ -60,10 +61,10 @@ class SceneRead(BaseModel):
 
 
 @router.post("/read")
-async def read(body: JsonBody) -> SceneRead:
+async def read(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> SceneRead:
     """Read the text of a scene file and list everything that is wrong with it; nothing is stored."""
     request = validated(ReadRequest, body)
-    return await run_in_threadpool(_read, request)
+    return await run_in_threadpool(_read, request, service.scenes.of(caller))
 
 
 @router.post("/text", response_class=Response, responses={200: media({"application/toml": TEXT})})
@@ -74,7 +75,8 @@ async def text(body: JsonBody, service: ServiceDependency, caller: CallerDepende
     return Response(toml_text(scene.to_dict(), tuple(request.comments)), media_type="application/toml")
 
 
-def _read(request: ReadRequest) -> SceneRead:
+def _read(request: ReadRequest, source: SceneSource) -> SceneRead:
     raw = read_text(request.text, request.form)
-    issues = [SceneIssue(pointer=issue.pointer, detail=issue.message) for issue in issues_of_scene(raw)]
+    found = issues_of_scene(raw, source)
+    issues = [SceneIssue(pointer=issue.pointer, detail=issue.message) for issue in found]
     return SceneRead(scene=raw, issues=issues)

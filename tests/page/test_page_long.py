@@ -11,6 +11,7 @@ import pytest
 from page_site import Site, opened
 from PIL import Image
 from test_page import BAD_SCENE
+from test_page_matrices import ANSYS, place
 
 from benchmarks.page import OPENED, SLIDE
 
@@ -75,6 +76,22 @@ def test_every_view_of_the_bladed_disk(browser: Browser, site: Site, tmp_path: P
         page.set_input_files("#file", [file])
         expect(page.locator("#field-contacts-0-mu-message")).to_be_visible()
         keep(page.locator("#start"), where / "editor.png")
+
+
+def test_matrices_with_what_was_read(browser: Browser, site: Site, tmp_path: Path) -> None:
+    where = folder(tmp_path)
+    where.mkdir(parents=True, exist_ok=True)
+    with opened(browser, site) as (context, _):
+        page = context.new_page()
+        page.goto(site.url)
+        page.locator("html[data-ready]").wait_for(state="attached")
+        page.click("#open-matrices")
+        page.set_input_files("#matrix-input", ANSYS)
+        page.get_by_label("Modes kept of the rest").fill("6")
+        place(page, "21.UY", "11.UY")
+        expect(page.locator("#matrix-report")).to_contain_text("2 DOFs and 6 modes")
+        page.evaluate("document.activeElement.blur()")
+        keep(page.locator("#matrices"), where / "matrices.png")
 
 
 def test_the_two_masses_in_the_dark(browser: Browser, site: Site, tmp_path: Path) -> None:

@@ -34,14 +34,14 @@ export const pause = (seconds) => new Promise((resolve) => setTimeout(resolve, s
 const authorised = (headers) => (key() ? { ...headers, Authorization: `Bearer ${key()}` } : headers);
 
 // A raw answer of the service; Offline if there is none, Problem if it refuses.
-export async function fetched(path, { method = "GET", body, headers = {}, signal } = {}) {
+export async function fetched(path, { method = "GET", body, raw, headers = {}, signal } = {}) {
   const sent = body === undefined ? {} : { "Content-Type": "application/json" };
   let answer;
   try {
     answer = await fetch(path, {
       method,
       headers: authorised({ ...sent, ...headers }),
-      body: body === undefined ? undefined : JSON.stringify(body),
+      body: raw ?? (body === undefined ? undefined : JSON.stringify(body)),
       signal,
     });
   } catch (error) {

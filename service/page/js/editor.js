@@ -9,10 +9,14 @@ const escaped = (key) => String(key).replaceAll("~", "~0").replaceAll("/", "~1")
 let draft = null;
 let rest = [];
 
+// Matrices and what came of them are kept as they are: nobody edits them number by number.
+const KEPT = /^\/structure\/(M|K|C|modes|reduction)$/;
+
 // Every value that is no table, with its pointer and where it sits.
 export function leaves(item, pointer = "", into = []) {
   for (const [key, value] of Object.entries(item)) {
     const here = `${pointer}/${escaped(key)}`;
+    if (KEPT.test(here) && typeof value === "object") continue;
     if (value !== null && typeof value === "object" && Object.keys(value).length) leaves(value, here, into);
     else into.push({ pointer: here, owner: item, key, value });
   }
@@ -78,7 +82,7 @@ function draw(issues) {
     });
     input.setAttribute("value", textOf(leaf.value));
     input.addEventListener("change", () => (leaf.owner[leaf.key] = read(input.value, leaf.value)));
-    return el("div", { class: mine.length ? "field wrong" : "field" }, el("label", { for: id }, nameOf(leaf.pointer)), input,
+    return el("div", { class: mine.length ? "field wrong" : "field" }, el("label", { for: id }, nameOf(leaf.pointer), unitOf(leaf) ? ` [${unitOf(leaf)}]` : ""), input,
       mine.length ? el("span", { class: "message", id: `${id}-message` }, message) : null);
   }
 }
@@ -101,6 +105,13 @@ function read(text, before) {
   if (typeof before === "boolean" || trimmed === "true" || trimmed === "false") return trimmed === "true";
   return trimmed !== "" && Number.isFinite(Number(trimmed)) ? Number(trimmed) : trimmed;
 }
+
+// What a number of a scene is counted in, by the end of its pointer.
+const UNITS = [
+  [/\/(kt|k|kn|ktx|kty)$/, "N/m"], [/\/c$/, "N s/m"], [/\/masses\/(?!.*\/(name|dof|between))/, "kg"], [/\/(N0|N1|amplitude)$/, "N"],
+  [/\/band\/\d$/, "Hz"], [/phase$/, "rad"], [/stiffness_proportional_damping$/, "s"], [/mass_proportional_damping$/, "1/s"], [/\/gap$/, "m"],
+];
+const unitOf = ({ pointer, value }) => (typeof value === "number" && UNITS.find(([end]) => end.test(pointer))?.[1]) || "";
 
 // "/structure/springs/0/k" is "springs 1 › k" in its group, "/contacts/0/mu" is "mu".
 function nameOf(pointer) {

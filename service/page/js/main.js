@@ -11,6 +11,8 @@ import { forget, resume, run, startJobs } from "./jobs.js";
 import { openLibrary, startLibrary } from "./library.js";
 import { showResponse, startLive } from "./live.js";
 import { mapView, startMap } from "./map.js";
+import { openMatrices } from "./matrices.js";
+import { SCENES } from "./matrix_files.js";
 import { startNotices } from "./notices.js";
 import { referee, startPoint } from "./point.js";
 import { startResponse, sweepView } from "./response.js";
@@ -132,13 +134,36 @@ function controls() {
   });
   byId("open-file").addEventListener("click", () => byId("file").click());
   byId("file").addEventListener("change", async () => {
-    const [file] = byId("file").files;
-    if (file) await openText(await file.text(), file.name.toLowerCase().endsWith(".json") ? "json" : "toml");
+    await take([...byId("file").files]);
     byId("file").value = "";
   });
+  byId("open-matrices").addEventListener("click", () => openMatrices());
+  startDrops();
   byId("edit-scene").addEventListener("click", editCurrent);
   byId("save-toml").addEventListener("click", () => saveToml(`${state.scene}.toml`));
   byId("share").addEventListener("click", share);
+}
+
+// Files that were chosen or dropped: a scene is opened, anything else is taken for matrices.
+async function take(files) {
+  const scene = files.find(({ name }) => SCENES.test(name));
+  if (scene) await openText(await scene.text(), scene.name.toLowerCase().endsWith(".json") ? "json" : "toml");
+  else if (files.length) openMatrices(files);
+}
+
+function startDrops() {
+  const card = byId("start");
+  const over = (event, on) => {
+    if (!event.dataTransfer?.types.includes("Files")) return;
+    event.preventDefault();
+    card.classList.toggle("dropping", on);
+  };
+  card.addEventListener("dragover", (event) => over(event, true));
+  card.addEventListener("dragleave", (event) => over(event, false));
+  card.addEventListener("drop", (event) => {
+    over(event, false);
+    take([...event.dataTransfer.files]).catch(failed);
+  });
 }
 
 async function share() {

@@ -1,0 +1,100 @@
+// Files of matrices: sent to the service one by one, each with what it is and what is wrong beside it.
+
+import { Problem, request } from "./api.js";
+import { el, show } from "./dom.js";
+
+export const SCENES = /\.(toml|json)$/i;
+export const SUFFIXES = ".npz,.npy,.mat,.mtx,.matrix,.mapping,.dof,.sti,.mas,.op4,.pch,.dmig,.bdf,.rsa,.rua,.hb,.rb";
+const ROLES = { M: "the mass matrix M", K: "the stiffness matrix K", C: "the damping matrix C", mapping: "the names of the rows", modes: "modes", "": "not used" };
+const LONGEST_NAME = 200;
+
+// The name as the service takes it: letters, digits and what is usual between them.
+const plainName = (name) => name.replaceAll(/[^A-Za-z0-9_.\- ]/g, "_").replace(/^[^A-Za-z0-9_]+/, "").slice(-LONGEST_NAME) || "matrices";
+
+const size = (bytes) => (bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toPrecision(3)} MB`);
+
+// The files of one model. `changed` is told when what was sent, or what a file is, changed.
+export function matrixFiles(host, changed) {
+  let files = [];
+  let count = 0;
+
+  async function add(list) {
+    const fresh = [...list].map((file) => ({ key: (count += 1), file, name: plainName(file.name), id: null, roles: [], words: "is being sent …", error: "" }));
+    files = [...files.filter((old) => !fresh.some(({ name }) => name === old.name)), ...fresh];
+    draw();
+    await Promise.all(fresh.map(send));
+    draw();
+    changed(true);
+  }
+
+  async function send(entry) {
+    try {
+      const found = await request(`/v1/uploads?name=${encodeURIComponent(entry.name)}`, { method: "POST", raw: entry.file });
+      entry.id = found.id;
+      entry.words = found.contents.map(contentsOf).join("; ");
+    } catch (error) {
+      entry.words = "";
+      entry.error = error instanceof Problem && error.errors.some(({ pointer }) => pointer === "/format")
+        ? "Its suffix tells no format that can be read: give it the one of its program."
+        : error.message;
+    }
+  }
+
+  const contentsOf = ({ name, rows, columns, entries }) =>
+    (name === "mapping" ? `names ${rows} rows` : name === "modes" ? `${columns} modes of ${rows} rows` : `${name ? `${name}: ` : ""}${rows} × ${columns}, ${entries} entries`);
+
+  function draw() {
+    const focus = document.activeElement?.id;
+    show(host, files.map(row));
+    if (focus) document.getElementById(focus)?.focus();
+  }
+
+  function row(entry) {
+    const id = `matrix-file-${entry.key}`;
+    const several = entry.roles.length > 1;
+    const choices = several ? [[entry.roles.join(), `${entry.roles.join(" and ")} in one file`], ["", ROLES[""]]] : Object.entries(ROLES);
+    const choose = el("select", { id, disabled: !entry.id, "aria-describedby": `${id}-words` },
+      choices.map(([value, text]) => el("option", { value, selected: value === entry.roles.join() }, text)));
+    choose.addEventListener("change", () => {
+      const roles = choose.value ? choose.value.split(",") : [];
+      for (const other of files) if (other !== entry) other.roles = other.roles.filter((role) => !roles.includes(role));
+      entry.roles = roles;
+      draw();
+      changed(false);
+    });
+    const drop = el("button", { type: "button", "aria-label": `Leave out ${entry.name}`, onclick: () => {
+      files = files.filter((other) => other !== entry);
+      draw();
+      changed(true);
+    } }, "Leave out");
+    return el("li", { class: entry.error ? "matrix-file wrong" : "matrix-file" },
+      el("label", { for: id }, `${entry.name} (${size(entry.file.size)}) is`), choose, drop,
+      el("span", { id: `${id}-words`, class: entry.error ? "message" : "note" }, entry.error || entry.words));
+  }
+
+  return {
+    add,
+    ids: () => files.filter(({ id }) => id).map(({ id }) => id),
+    // The keys of a structure that refer to the files.
+    structure: () => Object.fromEntries(files.flatMap(({ id, roles }) => (id ? roles.map((role) => [role, `upload:${id}`]) : []))),
+    take(structure) {
+      for (const entry of files) entry.roles = Object.keys(ROLES).filter((role) => role && structure[role] === `upload:${entry.id}`);
+      draw();
+    },
+    // Says what is wrong beside the files it is about; returns what is about none of them.
+    blame(issues) {
+      for (const entry of files) if (entry.id) entry.error = "";
+      const left = issues.filter(({ pointer, detail }) => {
+        const [, top, key] = pointer.split("/");
+        const sent = files.filter(({ id }) => id);
+        const entry = top === "uploads" ? sent[Number(key)] : top === "structure" ? files.find(({ roles }) => roles.includes(key)) : null;
+        if (entry) entry.error = detail;
+        return !entry;
+      });
+      draw();
+      return left;
+    },
+    first: () => files[0]?.name ?? "",
+    broken: () => files.some(({ id }) => !id),
+  };
+}

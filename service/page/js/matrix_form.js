@@ -1,0 +1,162 @@
+// What a scene of matrices needs beside its files: DOFs by name, what acts on them, what is kept.
+
+import { el, show } from "./dom.js";
+
+const GROUND = "ground";
+const FEW_ROWS = 300;
+const USUAL_MODES = 20;
+let count = 0;
+
+// A control with its label above and what is wrong below; its pointers are those of the issues about it.
+function field(label, control, pointers, hint = "") {
+  const id = (control.id ||= `matrix-field-${(count += 1)}`);
+  const message = el("span", { class: "message", id: `${id}-message` });
+  const node = el("div", { class: "field" }, el("label", { for: id }, label), control, hint ? el("span", { class: "note", id: `${id}-hint` }, hint) : null, message);
+  if (hint) control.setAttribute("aria-describedby", `${id}-hint`);
+  node.pointers = pointers;
+  node.blame = (text) => {
+    message.textContent = text;
+    node.classList.toggle("wrong", Boolean(text));
+    if (text) control.setAttribute("aria-invalid", "true");
+    else control.removeAttribute("aria-invalid");
+    control.setAttribute("aria-describedby", [hint && `${id}-hint`, text && `${id}-message`].filter(Boolean).join(" "));
+  };
+  return node;
+}
+
+const text = (value, more = {}) => el("input", { type: "text", spellcheck: false, autocomplete: "off", value, ...more });
+const filled = (value, more) => {
+  const input = text(value, more);
+  input.setAttribute("value", value);
+  return input;
+};
+
+export function matrixForm(host, { onUnits }) {
+  const dofs = el("div", { class: "matrix-rows" });
+  const contacts = el("div", { class: "matrix-rows" });
+  const places = el("datalist", { id: "matrix-places" });
+  const name = filled("my-model");
+  const units = el("select", {}, [["SI", "kg, N, m, s"], ["mm", "t, N, mm, s"], ["in", "lbf s²/in, lbf, in, s"]].map(([value, words]) => el("option", { value }, words)));
+  const modes = el("input", { type: "number", min: 0, max: 1000, step: 1 });
+  const damping = el("input", { type: "number", min: 0, step: "any", value: 0.001 });
+  damping.setAttribute("value", "0.001");
+  const force = el("select", {});
+  const observed = el("select", {});
+  let named = [];
+  let rubbing = [];
+
+  units.addEventListener("change", onUnits);
+
+  function addDof(given) {
+    const label = filled(given, { class: "dof-name" });
+    const row = text("", { list: "matrix-places" });
+    const one = { label, row };
+    one.node = el("div", { class: "fields" },
+      field("Name", label, () => []),
+      (one.field = field("Node and direction, or row", row, () => [`/structure/dofs/${label.value.trim()}`])),
+      el("button", { type: "button", "aria-label": `Leave out the DOF ${given}`, onclick: () => { named = named.filter((each) => each !== one); one.node.remove(); choices(); } }, "Leave out"));
+    label.addEventListener("change", choices);
+    named.push(one);
+    dofs.append(one.node);
+    choices();
+    return label;
+  }
+
+  function addContact(given) {
+    const label = filled(given);
+    const ends = [el("select", {}), el("select", {})];
+    const one = { label, ends };
+    const at = () => rubbing.indexOf(one);
+    one.node = el("div", { class: "fields" },
+      field("Contact", label, () => [`/contacts/${at()}/name`, `/contacts/${at()}`]),
+      field("rubs between", ends[0], () => [`/contacts/${at()}/between/0`, `/contacts/${at()}/between`]),
+      field("and", ends[1], () => [`/contacts/${at()}/between/1`]),
+      el("button", { type: "button", "aria-label": `Leave out the contact ${given}`, onclick: () => { rubbing = rubbing.filter((each) => each !== one); one.node.remove(); } }, "Leave out"));
+    rubbing.push(one);
+    contacts.append(one.node);
+    choices();
+    return label;
+  }
+
+  // The names of the DOFs in every list that offers them; what was chosen stays.
+  function choices() {
+    const names = named.map(({ label }) => label.value.trim()).filter(Boolean);
+    const offer = (select, options, first) => {
+      const before = select.value;
+      show(select, options.map((option) => el("option", { value: option }, option)));
+      select.value = options.includes(before) ? before : (first ?? options[0] ?? "");
+    };
+    offer(force, names, names[1] ?? names[0]);
+    offer(observed, names, names[0]);
+    for (const { ends } of rubbing) {
+      offer(ends[0], names, names[0]);
+      offer(ends[1], [GROUND, ...names], GROUND);
+    }
+  }
+
+  const unitsField = field("Units of the files", units, () => ["/structure/units"]);
+  const modesField = field("Modes kept of the rest", modes, () => ["/structure/keep_modes"], "Craig-Bampton: the DOFs named below stay, the rest moves in so many of its modes. Left empty, nothing is reduced.");
+  const others = [
+    unitsField,
+    modesField,
+    field("Damping ratio of every mode", damping, () => ["/structure/damping_ratio"], "0.001 is usual for a blade; what friction adds comes from the contacts."),
+    field("Force at", force, () => ["/excitation/dof", "/excitation/0/dof", "/excitation"]),
+    field("Observed", observed, () => ["/observe/dof", "/observe"]),
+    field("Name of the scene", name, () => ["/name"]),
+  ];
+
+  const group = (title, ...content) => el("fieldset", {}, el("legend", {}, title), ...content);
+  const more = (words, add) => el("button", { type: "button", onclick: () => add().focus() }, words);
+  show(host, places,
+    group("Units and reduction", el("div", { class: "fields" }, others.slice(0, 3))),
+    group("DOFs in use", el("p", { class: "note", id: "matrix-rows-note" }), dofs, more("Add a DOF", () => addDof(`dof${named.length + 1}`))),
+    group("Friction contacts", contacts, more("Add a contact", () => addContact(`contact${rubbing.length + 1}`))),
+    group("Force and observation", el("div", { class: "fields" }, others.slice(3))));
+  addDof("tip");
+  addDof("middle");
+  addContact("damper");
+  force.value = "middle";
+
+  const all = () => [...others, ...[...dofs.children, ...contacts.children].flatMap((row) => [...row.children])].filter((node) => node.blame);
+
+  return {
+    units: () => units.value,
+    // What was read tells what may be typed.
+    learn({ labels, rows }, file) {
+      const first = labels?.first ?? [];
+      show(places, first.map((label) => el("option", { value: label })));
+      const example = labels ? `such as ${first[first.length - 1]}: nodes ${labels.nodes[0]} to ${labels.nodes[1]}, ${labels.components.join(", ")}; a row from 0 to ${rows - 1} will do too` : `rows 0 to ${rows - 1}; the files do not name them, a .mapping or .dof file would`;
+      host.querySelector("#matrix-rows-note").textContent = `The DOFs that contacts, the force and the observation need, ${example}.`;
+      if (modes.value === "" && rows > FEW_ROWS) modes.value = String(USUAL_MODES);
+      if (name.value === "my-model" && file) name.value = file.replace(/\.[^.]*$/, "").replaceAll(/[^A-Za-z0-9_-]/g, "-").replace(/[-_]?(mass|stiff\w*|M|K)$/i, "") || "my-model";
+    },
+    structure() {
+      const rows = named.map(({ label, row }) => [label.value.trim(), row.value.trim()]).map(([key, at]) => [key, /^\d+$/.test(at) ? Number(at) : at]);
+      const found = { dofs: Object.fromEntries(rows) };
+      if (units.value !== "SI") found.units = units.value;
+      if (modes.value !== "") found.keep_modes = modes.valueAsNumber;
+      if (damping.valueAsNumber > 0) found.damping_ratio = damping.valueAsNumber;
+      return found;
+    },
+    asked: () => ({
+      name: name.value.trim(),
+      contacts: rubbing.map(({ label, ends }) => ({ name: label.value.trim(), between: ends.map((end) => end.value) })),
+      excitation: { dof: force.value },
+      observe: { dof: observed.value },
+    }),
+    // Says what is wrong beside its field, the first of which takes the focus; returns what is about none.
+    blame(issues) {
+      const fields = all();
+      for (const node of fields) node.blame("");
+      const left = issues.filter(({ pointer, detail }) => {
+        const node = fields.find(({ pointers }) => pointers().includes(pointer));
+        node?.blame(detail);
+        return !node;
+      });
+      host.querySelector("[aria-invalid]")?.focus();
+      return left;
+    },
+    // DOFs without a place are said before anything is asked.
+    missing: () => named.filter(({ row }) => !row.value.trim()).map(({ label }) => ({ pointer: `/structure/dofs/${label.value.trim()}`, detail: "A node and direction, or a row, is needed." })),
+  };
+}

@@ -1,0 +1,109 @@
+"""Matrices of a finite-element program through the page: files in, a scene, its response; what is wrong."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import httpx
+import numpy as np
+import pytest
+from fe_files import ansys_mapping, coordinate, hbmat
+from matrix_cases import beam
+from page_site import Site, Watch
+from test_page import visit
+
+expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
+axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
+
+if TYPE_CHECKING:
+    from playwright.sync_api import BrowserContext, Page
+
+Profile = tuple["BrowserContext", Watch]
+# A blade of 0.3 kg, 0.2 m long, clamped at its root: 1.1 kHz.
+M, K = beam(20, length=0.2, EI=2000.0, mass=0.3)
+LABELS = [(2 + row // 2, ("UY", "ROTZ")[row % 2]) for row in range(len(M))]
+DROP = """([selector, name, text]) => {
+  const dataTransfer = new DataTransfer();
+  dataTransfer.items.add(new File([text], name));
+  for (const type of ["dragover", "drop"]) {
+    const event = new DragEvent(type, { dataTransfer, bubbles: true, cancelable: true });
+    document.querySelector(selector).dispatchEvent(event);
+  }
+}"""
+
+
+def file(name: str, text: str | bytes) -> Any:
+    buffer = text if isinstance(text, bytes) else text.encode()
+    return {"name": name, "mimeType": "application/octet-stream", "buffer": buffer}
+
+
+ANSYS = [
+    file("blade K.matrix", hbmat(K)), file("blade M.matrix", hbmat(M)),
+    file("blade K.mapping", ansys_mapping(LABELS)),
+]  # fmt: skip
+
+
+def place(page: Page, *rows: str) -> None:
+    for at, row in enumerate(rows):
+        page.get_by_label("Node and direction, or row").nth(at).fill(row)
+    page.get_by_role("button", name="Make the scene").click()
+
+
+def test_matrices_become_a_scene_and_its_response(profile: Profile, site: Site) -> None:
+    context, watch = profile
+    watch.allowed = ("status of 422",)
+    page = visit(context, site)
+    page.get_by_role("button", name="Matrices…").press("Enter")
+    expect(page.locator("#matrix-choose")).to_be_focused()
+    damaged = hbmat(K).replace("D+", "X+", 1)
+    page.set_input_files("#matrix-input", [file("blade K.matrix", damaged)])
+    expect(page.locator("#matrix-files .message")).to_contain_text("line 163, column 1")
+    page.set_input_files("#matrix-input", ANSYS)
+    report = page.locator("#matrix-report")
+    expect(report).to_contain_text("named: nodes 2 to 21, ROTZ, UY")
+    expect(report).to_contain_text("0.05811 kg in UY")
+    expect(report).to_contain_text("1142, 7158")
+    expect(page.get_by_label("blade K.matrix (")).to_have_value("K")
+    found = axe.Axe().run(page).response["violations"]
+    assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
+    place(page, "", "11.UY")
+    expect(page.get_by_label("Node and direction, or row").first).to_be_focused()
+    place(page, "99.UY")
+    wrong = page.get_by_label("Node and direction, or row").first
+    expect(wrong).to_have_attribute("aria-invalid", "true")
+    expect(page.locator(f"#{wrong.get_attribute('id')}-message")).to_contain_text("no node 99 in use")
+    page.get_by_label("Modes kept of the rest").fill("6")
+    place(page, "21.UY")
+    expect(report).to_contain_text("2 DOFs and 6 modes")
+    assert page.input_value("#field-structure-K").startswith("upload:")
+    page.get_by_role("button", name="Use this scene").click()
+    expect(page.locator("#matrices")).to_be_hidden()
+    expect(page.locator("#scene")).to_have_value("blade")
+    expect(page.locator("#live-status")).to_contain_text("µm at")
+    page.locator("#live-figure svg.chart").click(position={"x": 250, "y": 100})
+    expect(page.locator("#point-facts")).to_contain_text("max |x|")
+    stored = httpx.get(f"{site.url}/v1/scenes/blade").json()["scene"]["structure"]
+    assert stored["reduction"]["dofs"] == len(M)
+    page.click("#edit-scene")
+    expect(page.locator("#field-structure-damping-ratio")).to_have_value("0.001")
+    assert page.locator("#editor input").count() < 40, "nobody edits a matrix number by number"
+
+
+def test_files_that_do_not_fit_are_told_beside_them(profile: Profile, site: Site) -> None:
+    context, watch = profile
+    watch.allowed = ("status of 422",)
+    page = visit(context, site)
+    page.evaluate(DROP, ["#start", "job.sti", coordinate(K)])
+    expect(page.locator("#matrix-status")).to_contain_text("'job.sti' alone must hold M and K")
+    small = io.BytesIO()
+    np.save(small, beam(5)[0])
+    page.set_input_files("#matrix-input", [file("mass.npy", small.getvalue()), file("notes.txt", "hello")])
+    expect(page.locator("#matrix-files")).to_contain_text("Its suffix tells no format")
+    expect(page.locator("#matrix-status")).to_contain_text("M has 10 rows, K has 40 rows: export all of them")
+    page.get_by_role("button", name="Leave out mass.npy").click()
+    expect(page.locator("#matrix-form")).to_be_hidden()
+    page.set_input_files("#matrix-input", [file("mass.mas", coordinate(M * 1e-9))])
+    expect(page.get_by_label("What looks wrong")).to_contain_text("units that go together")
+    page.get_by_label("mass.mas (").select_option("C")
+    expect(page.locator("#matrix-status")).to_contain_text("`M`, the mass matrix, is missing")
