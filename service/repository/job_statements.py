@@ -32,12 +32,12 @@ INSERT_RESULT = insert(_RESULT)
 BY_ID = select(*(_C[name] for name in ROW)).where(_C.id == bindparam("job"))
 RESULT = select(_RESULT.c.body).where(_RESULT.c.job_id == bindparam("job"))
 
-# Ordered by `created`, not by `id`: SQLite would walk all jobs of an owner by the index (owner, id).
+# Not ordered by the bare `id`: SQLite would walk all jobs of an owner by the index (owner, id).
 COMPUTED_BEFORE = (
     select(_C.id)
     .where(_C.spec_hash == bindparam("hash"), _C.state == JobState.SUCCESSFUL, _C.result_of.is_(None))
     .where(_C.owner == bindparam("owner"))
-    .order_by(_C.created.desc())
+    .order_by(_C.id.concat("").desc())
     .limit(1)
 )
 
