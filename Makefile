@@ -2,16 +2,20 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
+# Bytecode is compiled at the first import: that of every package at once would take as long as the kernels.
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 STAMP := .venv/.up-to-date
+DEV := .venv/.for-development
 # What pytest gets in addition, for example: make test PYTEST="-k march -x"
 PYTEST ?=
 # Which benchmarks: all when empty; `python -m benchmarks --help` lists them.
 BENCH ?=
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-long lint bench docs serve clean
+.PHONY: help setup dev demo test test-long lint bench docs serve clean
 
 help:
 	@echo "make setup      set up .venv; the command is then $(BIN)/stickslip"
+	@echo "make dev        add to it what tests, checks, benchmarks and the reference need"
 	@echo "make demo       run the main job end to end; pictures go to demo-output/"
 	@echo "make test       check the code and run every test but the long ones"
 	@echo "make test-long  run the long studies"
@@ -27,33 +31,39 @@ $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 	  echo "stickslip needs Python 3.11 or newer, as in: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r constraints.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	$(PIP) --constraint constraints.txt setuptools
+	$(PIP) --constraint constraints.txt --no-build-isolation -e .
 	@echo "Compiling the kernels on all cores: about half a minute on two, once."
 	$(BIN)/python -m service.warm_up
+	@touch $@
+
+dev: $(DEV)
+
+$(DEV): $(STAMP)
+	$(PIP) -r constraints.txt
 	@touch $@
 
 demo: setup
 	$(BIN)/stickslip demo
 
 # Two processes: the kernels are compiled before, so that not both do it.
-test: setup lint
+test: lint
 	$(BIN)/python -m service.warm_up
 	$(BIN)/python -m pytest -n 2 $(PYTEST)
 
-test-long: setup
+test-long: dev
 	$(BIN)/python -m pytest -m long $(PYTEST)
 
-lint: setup
+lint: dev
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: setup
+bench: dev
 	$(BIN)/python -m benchmarks $(BENCH)
 
-docs: setup
+docs: dev
 	$(BIN)/python docs/reference.py site
 
 serve: setup

@@ -19,6 +19,7 @@ import math
 
 import numpy as np
 
+from solver.kernels.apart import apart
 from solver.kernels.compiled import compiled
 from solver.kernels.falls import NONE, first_fall, value_at
 from solver.kernels.march_state import (
@@ -39,6 +40,10 @@ from solver.kernels.march_state import (
     State,
     System,
     motion_size,
+    new_record,
+    new_series,
+    new_state,
+    new_system,
     normal_slip,
     power_series,
     product,
@@ -57,7 +62,7 @@ def _load_series(system: System, tau: float, h: float, series: Series) -> None:
         series.load[0, c] += system.N0[c]
 
 
-@compiled
+@apart
 def _contact_series(system: System, state: State, series: Series, k: int) -> None:
     """Coefficient k of the contact forces from the motion's and the given load's."""
     for c in range(system.kt.size):
@@ -105,7 +110,7 @@ def _pull(system: System, tau: float, k: int, scale: float, series: Series) -> N
                 pull[second] += series.normal[k, c]
 
 
-@compiled
+@apart
 def _expand(system: System, state: State, tau: float, h: float, series: Series) -> None:
     """Fill the Taylor series of motion and contact forces from `tau` over a step `h`."""
     n = state.x.size
@@ -154,7 +159,7 @@ def _load(series: Series, c: int, sign: int, q: Real) -> None:
         q[k] = sign * series.load[k, c]
 
 
-@compiled
+@apart
 def _next_change(
     system: System, state: State, series: Series, h: float, c: int, q: Real
 ) -> tuple[float, int]:
@@ -208,7 +213,7 @@ def _gap_change(system: System, series: Series, c: int, mode: int, q: Real) -> t
     return first_fall(q), STICK if mode == SEPARATED else SEPARATED
 
 
-@compiled
+@apart
 def _advance(system: System, state: State, series: Series, s: float) -> None:
     """Move the state to the place s of the step."""
     for i in range(state.x.size):
@@ -218,7 +223,7 @@ def _advance(system: System, state: State, series: Series, s: float) -> None:
         state.force[c] = value_at(series.force[:, c], s)
 
 
-@compiled
+@apart
 def _change(system: System, state: State, tau: float, c: int, target: int) -> None:
     """Put contact c into its next state at `tau`; one that closes sticks or slips by its rates."""
     before = state.mode[c]
@@ -237,7 +242,7 @@ def _change(system: System, state: State, tau: float, c: int, target: int) -> No
             state.mode[c] = 1 if pull > 0.0 else -1
 
 
-@compiled
+@apart
 def _sample(system: System, series: Series, place: float, index: int, dof: int, record: Record) -> None:
     record.x[index] = value_at(series.x[:, dof], place)
     record.v[index] = value_at(series.v[:, dof], place)
@@ -249,7 +254,7 @@ def _sample(system: System, series: Series, place: float, index: int, dof: int, 
         record.load[c, index] = max(value_at(series.load[:, c], place), 0.0)
 
 
-@compiled
+@apart
 def _step(
     system: System, state: State, step: int, steps: int, dof: int, record: Record, series: Series, q: Real
 ) -> bool:
@@ -327,8 +332,17 @@ def run_periods(
     int, int
         RAN, SETTLED, CHATTER or NOT_FINITE, and the periods run.
     """
+    held, here, kept = new_system(*system), new_state(*state), new_record(*record)
+    return _run_periods(held, here, steps, tolerance, dof, kept, change)
+
+
+@apart
+def _run_periods(
+    system: System, state: State, steps: int, tolerance: float, dof: int, record: Record, change: Real
+) -> tuple[int, int]:
+    """As `run_periods`, all of it by reference."""
     n, n_contacts, rows = state.x.size, system.kt.size, ORDER + 1
-    series = Series(
+    series = new_series(
         np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, n_contacts)), np.empty((rows, n_contacts)),
         np.empty(n), np.empty((rows, n_contacts)), np.empty((n_contacts, system.powers.shape[1], rows)),
     )  # fmt: skip
