@@ -25,6 +25,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         robustness,
         savings,
         service_load,
+        service_pruning,
         service_scale,
     )  # fmt: skip
 
@@ -51,6 +52,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "load": service_load.load,
         "latency": service_load.latency,
         "lists": service_load.lists,
+        "pruning": service_pruning.pruning,
         "scale": service_scale.scale,
         "page": page.page,
         "cluster": cluster.mistuning_study,

@@ -229,6 +229,12 @@ class Database:
         with self._read.begin() as connection:
             yield connection
 
+    def settle(self) -> None:
+        """Move what was committed from the log of SQLite into its file, as far as nobody has to wait for it."""
+        if self.exclusive:
+            with self._read.connect() as connection:
+                connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)").all()
+
     def own_connection(self) -> Any:
         """A connection to PostgreSQL outside of the pool (`Notices`)."""
         return postgresql.own_connection(self._write)
