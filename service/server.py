@@ -21,6 +21,7 @@ from service.kinds import SHIPPED
 from service.models import JobState
 from service.patience import patient
 from service.settings import Settings
+from service.sparing import spare_modules
 
 log = logging.getLogger("stickslip.service")
 
@@ -58,6 +59,7 @@ def serve(settings: Settings, registry: Registry = SHIPPED) -> None:
         service.open()
         log.info("listening on http://%s:%d", settings.host, listener.getsockname()[1])
         server = _Server(_config(app, settings), service)
+        spare_modules()
         with _signals(lambda: setattr(server, "should_exit", True)):
             server.run(sockets=[listener])
     finally:
