@@ -230,7 +230,7 @@ class Database:
             yield connection
 
     def settle(self) -> None:
-        """Move what was committed from the log of SQLite into its file, as far as nobody has to wait for it."""
+        """Move what was committed from the log of SQLite into its file; nobody waits for it."""
         if self.exclusive:
             with self._read.connect() as connection:
                 connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)").all()

@@ -1,7 +1,7 @@
 """Retention: old jobs, their sweeps and old uploads are deleted, a little at a time.
 
 Nothing may hold the database for long: SQLite has one writer. Every transaction is as large as it can be
-without taking longer than a few hundredths of a second, and between two of them there is a pause as long as
+without taking longer than some thousandths of a second, and between two of them there is a pause as long as
 the work was.
 """
 
@@ -20,7 +20,7 @@ from service.settings import Settings
 
 log = logging.getLogger("stickslip.retention")
 
-_WANTED_SECONDS = 0.008
+_WANTED_SECONDS = 0.004
 _MOST = 64
 _JOBS = 64
 _JOBS_AT_ONCE = 4
@@ -60,9 +60,9 @@ class _Paced:
             return 0
         begun = time.monotonic()
         done = step()
-        self._database.settle()
         self._last = time.monotonic() - begun
-        self.stopped = self._pause(self._last)
+        self._database.settle()
+        self.stopped = self._pause(time.monotonic() - begun)
         return done
 
 
