@@ -1,4 +1,4 @@
-"""Types as a user's checker sees them: packages marked as typed, and a script clean under the strictest rules."""
+"""Types as a user's checker sees them: packages marked as typed, a script clean under the strictest rules."""
 
 from __future__ import annotations
 
