@@ -60,8 +60,10 @@ def _locked(*, alone: bool) -> Iterator[None]:
     """Have the folder, alone or with others who only read, until the block ends."""
     Path(CACHE_FOLDER).mkdir(parents=True, exist_ok=True)
     with open(Path(CACHE_FOLDER) / "lock", "w") as file:
+        # Some network file systems have no locks; there it is as it would be without this.
         if fcntl is not None:
-            fcntl.flock(file, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
+            with contextlib.suppress(OSError):
+                fcntl.flock(file, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
         yield
 
 
