@@ -142,6 +142,14 @@ def test_sweeps_are_filtered_compared_and_shared(profile: Profile, site: Site) -
     expect(page.locator("#compare-facts thead th")).to_have_count(3)
     expect(page.locator("#compare-facts thead")).to_contain_text("two-dof, damper 80 N")
     has_paths(page, "compare-figure", 2)
+    page.get_by_label("Files of two-dof, damper 80 N").first.click()
+    forms = {form: downloaded(page, f"button[aria-label='{form} of two-dof, damper 80 N'] >> nth=0")
+             for form in ("CSV", "Parquet", "SVG", "PNG", "TOML")}  # fmt: skip
+    assert forms["Parquet"].startswith(b"PAR1")
+    assert forms["PNG"].startswith(b"\x89PNG")
+    again = solver.sweep(solver.Scene.from_dict(tomllib.loads(forms["TOML"].decode())))
+    rows = list(csv.DictReader(io.StringIO(forms["CSV"].decode())))
+    assert [float(row["amplitude"]) for row in rows] == pytest.approx(again.amplitude.tolist(), rel=1e-9)
     other = visit(context, site, page.url.removeprefix(f"{site.url}/"))
     expect(other.locator("#compare-facts thead")).to_contain_text("two-dof, damper 120 N")
 

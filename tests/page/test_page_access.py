@@ -27,7 +27,7 @@ CUT_OFF = """() => [...document.querySelectorAll("button, label, dd, p, h2, svg.
   .filter((node) => node.getBoundingClientRect().right > innerWidth + 1)
   .map((node) => node.outerHTML.slice(0, 120))
 """
-FOCUSABLE = "a[href], button:not([disabled]), select, input:not([tabindex='-1']), [tabindex='0']"
+FOCUSABLE = "a[href], summary, button:not([disabled]), select, input:not([tabindex='-1']), [tabindex='0']"
 
 
 def visit(context: BrowserContext, site: Site, words: str = "?scene=two-dof") -> Page:

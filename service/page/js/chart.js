@@ -22,8 +22,18 @@ export function chart(host, { label, file, height = 300, onPick, legend = true, 
 
   self.draw = (what) => {
     self.shown = what;
+    tools.hidden = false;
     paint(self, host, height, legend, label);
   };
+  // Nothing to show: a frame of the same size, so that nothing moves when there is.
+  self.clear = (words = "Nothing computed yet.") => {
+    Object.assign(self, { shown: null, at: null });
+    tools.hidden = true;
+    read.textContent = "";
+    const width = Math.max(host.clientWidth, 240);
+    drawingOf(drawing, width, height, empty(width, height, words));
+  };
+  self.clear();
   self.cursor = (index) => moveCursor(self, index, read, pickSeries);
   drawing.addEventListener("pointermove", (event) => hover(self, event, pickSeries));
   drawing.addEventListener("pointerleave", () => self.mark?.replaceChildren());
@@ -226,6 +236,11 @@ function keyed(self, event, onPick, which) {
   else return;
   event.preventDefault();
 }
+
+export const empty = (width, height, words) => [
+  svg("rect", { class: "nothing", x: 1, y: 1, width: width - 2, height: height - 2, rx: 6 }),
+  svg("text", { class: "soft", x: width / 2, y: height / 2, "text-anchor": "middle" }, words),
+];
 
 // The buttons that take a chart away.
 export function saving(self, file, label, canvas) {

@@ -19,8 +19,7 @@ export function startFront() {
   });
   on("scene", () => {
     points = [];
-    plot.shown = null;
-    show(plot.drawing);
+    plot.clear();
     say("front-status", "Designs of which none has both a lower peak and a narrower band than another.");
     show(byId("front-facts"));
   });

@@ -1,5 +1,6 @@
 // The map of amplitude over two parameters: a canvas below, axes and lines in SVG above.
 
+import { empty } from "./chart.js";
 import { chartTools } from "./heatmap_tools.js";
 import { SHADES } from "./colours.js";
 import { el, show, svg } from "./dom.js";
@@ -16,14 +17,27 @@ export function heatmap(host, { label, file, height = 340, onPick }) {
   drawing.setAttribute("aria-roledescription", "map, arrows move in it, Enter picks");
   const stage = el("div", { class: "canvas-host" }, canvas, drawing);
   const self = { drawing, canvas, shown: null, row: 0, column: 0 };
-  show(host, stage, el("div", { class: "chart-foot" }, read, chartTools(self, file, label)));
+  const tools = chartTools(self, file, label);
+  show(host, stage, el("div", { class: "chart-foot" }, read, tools));
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   self.draw = (what) => {
     const begun = performance.now();
     self.shown = what;
+    tools.hidden = false;
     paint(self, host, height);
     self.milliseconds = performance.now() - begun;
   };
+  // Nothing to show: a frame of the same size, so that nothing moves when there is.
+  self.clear = () => {
+    self.shown = null;
+    tools.hidden = true;
+    canvas.width = 0;
+    read.textContent = "";
+    const width = Math.max(host.clientWidth, 240);
+    sized(drawing, width, height);
+    show(drawing, empty(width, height, "Nothing computed yet."));
+  };
+  self.clear();
   self.redraw = () => self.shown && paint(self, host, height);
   const place = (event) => {
     if (!self.shown) return false;
@@ -58,6 +72,12 @@ function nearest(values, wanted) {
   return best;
 }
 
+function sized(drawing, width, height) {
+  drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  drawing.setAttribute("width", width);
+  drawing.setAttribute("height", height);
+}
+
 const axisOf = ({ name, values, log }) => ({ name, log, low: Math.min(...values), high: Math.max(...values) });
 
 function paint(self, host, height) {
@@ -69,9 +89,7 @@ function paint(self, host, height) {
   const { box, xs, ys } = base;
   const range = shades(self, box);
   self.mark = svg("g", {});
-  self.drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  self.drawing.setAttribute("width", width);
-  self.drawing.setAttribute("height", height);
+  sized(self.drawing, width, height);
   const inside = (m) => m.x >= xs.low && m.x <= xs.high && m.y >= ys.low && m.y <= ys.high;
   show(
     self.drawing,

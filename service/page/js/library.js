@@ -5,7 +5,7 @@ import { request } from "./api.js";
 import { chart } from "./chart.js";
 import { load } from "./design.js";
 import { byId, el, say, show, table } from "./dom.js";
-import { on } from "./events.js";
+import { on, tell } from "./events.js";
 import { saveFrom } from "./exports.js";
 import { length, lengthUnit, number, quantity, when, withUnit } from "./format.js";
 import { current } from "./scenes.js";
@@ -53,6 +53,11 @@ function query() {
   return `/v1/sweeps?${words}`;
 }
 
+const nothing = () =>
+  ([...byId("library-form").querySelectorAll("input")].some(({ value }) => value.trim())
+    ? "No stored sweep meets this."
+    : "No sweep is stored yet: Find the best damper computes the first ones.");
+
 async function list(address = null) {
   const mine = (listed += 1);
   try {
@@ -61,7 +66,7 @@ async function list(address = null) {
     items = address ? [...items, ...page.items] : page.items;
     next = page.next;
     byId("library-more").hidden = next === null;
-    say("library-status", items.length ? `${items.length} sweeps${next ? ", there are more" : ""}.` : "No stored sweep meets this.");
+    say("library-status", items.length ? `${items.length} sweeps${next ? ", there are more" : ""}.` : nothing());
     rows();
   } catch (error) {
     say("library-status", error.message, true);
@@ -96,11 +101,33 @@ function rows() {
 }
 
 function actions(sweep, name) {
-  const file = (words, type, suffix) =>
-    el("button", { type: "button", "aria-label": `${words} of ${name}`, onclick: () => saveFrom(`/v1/sweeps/${sweep.id}`, type, `sweep-${sweep.id}.${suffix}`) }, words);
+  const button = (words, act) => el("button", { type: "button", "aria-label": `${words} of ${name}`, onclick: act }, words);
+  const file = (words, type, below = "") =>
+    button(words, () => saveFrom(`/v1/sweeps/${sweep.id}${below}`, type, `sweep-${sweep.id}.${words.toLowerCase()}`));
   const same = current.body?.name === sweep.scene;
   const use = same ? el("button", { type: "button", "aria-label": `Load ${name}`, onclick: () => load(valuesOf(sweep)) }, "Load") : null;
-  return el("span", { class: "row tight" }, use, file("CSV", "text/csv", "csv"), file("npz", "application/x-npz", "npz"));
+  const forms = [file("CSV", "text/csv"), file("npz", "application/x-npz"), file("Parquet", "application/vnd.apache.parquet"),
+    file("SVG", "image/svg+xml", "/plot.svg"), file("PNG", "image/png", "/plot.png"), button("TOML", () => tomlOf(sweep))];
+  const more = el("details", {}, el("summary", { "aria-label": `Files of ${name}` }, "Files"), el("span", { class: "row tight" }, forms));
+  return el("span", { class: "row tight" }, use, more);
+}
+
+// The scene of a sweep with its values, and the command that computes the same.
+async function tomlOf(sweep) {
+  const file = `sweep-${sweep.id}.toml`;
+  try {
+    const job = await request(`/v1/jobs/${sweep.job}`);
+    if (!["sweep", "design", "pareto"].includes(job.kind) || job.request.cases) {
+      throw new Error(`this sweep is of a job of the kind ${job.kind}, which changes more of the scene than these values`);
+    }
+    const { scene } = await request(`/v1/jobs/${sweep.job}/scene`);
+    const at = sweep.frequency_hz ? ` --frequency ${sweep.frequency_hz}` : "";
+    const command = `stickslip sweep ${file} --parameter ${sweep.parameter} --from ${sweep.from} --to ${sweep.to}${at} --harmonics ${sweep.harmonics}`;
+    const set = Object.fromEntries(Object.entries(valuesOf(sweep)).filter(([path]) => path !== sweep.parameter));
+    await saveFrom("/v1/scenes/text", "application/toml", file, { method: "POST", body: { scene, set, comments: ["A stored sweep of stickslip. The same from the command:", command] } });
+  } catch (error) {
+    tell("notice", `${file}: ${error.message}`);
+  }
 }
 
 // The values of a sweep that stayed fixed, as paths.
@@ -132,9 +159,9 @@ async function compare() {
   }
   if (mine !== compared) return;
   byId("compare-note").hidden = found.length > 0;
+  byId("compare-figure").hidden = found.length === 0;
   if (!found.length) {
-    plot.shown = null;
-    show(plot.drawing);
+    plot.clear();
     show(byId("compare-facts"));
     return;
   }

@@ -29,7 +29,7 @@ let studies = 0;
 
 function sections() {
   const links = [...document.querySelectorAll("main > section")].slice(1).map((section) =>
-    el("li", {}, el("a", { href: `#${section.id}` }, section.querySelector("h2").textContent)));
+    el("li", {}, el("a", { href: `#${section.id}` }, section.querySelector("h2").dataset.short ?? section.querySelector("h2").textContent)));
   show(byId("sections"), links);
 }
 

@@ -22,9 +22,7 @@ export function startMap() {
   });
   on("scene", () => {
     [last, optimum] = [null, null];
-    plot.shown = null;
-    show(plot.drawing);
-    plot.canvas.width = 0;
+    plot.clear();
     say("map-status", "60 loads × 400 frequencies, with the peaks followed from load to load.");
     show(byId("map-facts"));
   });

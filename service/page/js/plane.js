@@ -13,7 +13,7 @@ export function plane(width, height, x, y, { paper = true, above = 0 } = {}) {
     top: MARGIN.top + above,
     bottom: height - MARGIN.bottom,
   };
-  const xs = scale(x.log, x.low, x.high, box.left, box.right);
+  const xs = { ...scale(x.log, x.low, x.high, box.left, box.right), whole: x.whole };
   const ys = scale(y.log, y.low, y.high, box.bottom, box.top);
   const frame = svg(
     "g",
@@ -34,6 +34,7 @@ export function plane(width, height, x, y, { paper = true, above = 0 } = {}) {
 function gridLines(box, xs, ys, lines) {
   const nodes = [];
   for (const { value, text } of xs.ticks((box.right - box.left) / PIXELS_A_TICK.x)) {
+    if (xs.whole && !Number.isInteger(value)) continue;
     const at = xs.at(value);
     nodes.push(svg("line", { class: lines ? "grid" : "axis", x1: at, x2: at, y1: lines ? box.top : box.bottom + 4, y2: box.bottom }));
     nodes.push(svg("text", { class: "soft", x: at, y: box.bottom + 16, "text-anchor": "middle" }, text));

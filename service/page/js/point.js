@@ -36,8 +36,7 @@ export function startPoint() {
     show(byId("point-facts"));
     show(byId("loops-more"));
     for (const plot of Object.values(plots)) {
-      plot.shown = null;
-      show(plot.drawing);
+      plot.clear();
     }
     if (state.at !== null) go(state.at, true);
   });
@@ -164,7 +163,7 @@ function drawHarmonics() {
   const least = 1e-6 * largest(found.harmonics);
   const shown = heights.map((v) => (v !== null && v > least ? v * unit.perMetre : null));
   plots.harmonics.draw({
-    x: { name: "harmonic (0 is the mean)", low: -0.5, high: found.harmonics.length - 0.5 },
+    x: { name: "harmonic (0 is the mean)", whole: true, low: -0.5, high: found.harmonics.length - 0.5 },
     y: { name: `amplitude [${unit.name}]`, log: true, pad: 0.08 },
     series: [{ name: "amplitude", x: found.harmonics.map((_, i) => i), y: shown, colour: 1, bars: true, width: 0 }],
   });

@@ -35,8 +35,7 @@ export function startResponse() {
     [limits, last, points] = [null, null, []];
     say("response-status", "Press the button above: the sweep arrives here point by point.");
     show(byId("response-facts"));
-    show(plot.drawing);
-    plot.shown = null;
+    plot.clear();
   });
 }
 

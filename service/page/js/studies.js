@@ -14,8 +14,7 @@ export function startStudies() {
   speeds = chart(byId("campbell-figure"), { label: "Campbell diagram", file: "campbell", height: 340, onPick: ({ y }) => tell("point", y) });
   on("scene", () => {
     for (const plot of [costs, speeds]) {
-      plot.shown = null;
-      show(plot.drawing);
+      plot.clear();
     }
     say("accuracy-status", "Error against time for numbers of harmonics, in closed form and by samples.");
     say("campbell-status", "Where engine orders meet the peaks of the response with friction.");
