@@ -189,9 +189,9 @@ class Client:
         return self._get(SweepDetail, f"/v1/sweeps/{segment(sweep_id)}")
 
     def sweep_arrays(self, sweep_id: str) -> dict[str, NDArray[Any]]:
-        """The arrays of a stored sweep, as they were computed."""
+        """The arrays of a stored sweep, under the names that `Branch.to_dataset` gives them."""
         with np.load(io.BytesIO(self._sweep_as(sweep_id, "application/x-npz")), allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in arrays.files if name != "about"}
+            return {name: arrays[name] for name in arrays.files if name != "stickslip"}
 
     def sweep_csv(self, sweep_id: str) -> str:
         """A stored sweep as a table, a row for each point."""

@@ -129,8 +129,8 @@ class Branch(Shown):
         Parameter values in user units.
     solutions, tangents : (P, n_unknowns + 1) array
         Slip motions [m] with λ (inside unit) last, and unit tangents of the branch.
-    observed : (P, n) array
-        Coefficients of the observed DOF [m].
+    observed : (P, 2H + 1) array
+        Full coefficients of the observed DOF [m], zero where a harmonic is not kept.
     measures : (P, MEASURES) array
         Columns named in `solver.kernels.observe`; slopes are along the tangents.
     states : (P, n_contacts) array

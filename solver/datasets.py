@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.dataset import Attribute, Dataset, Variable
-from solver.fourier import Real, basis, to_full
+from solver.fourier import Real, basis
 from solver.saving import scene_attributes
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from solver.scene import Scene
 
 _SAMPLES = 500
+ContactStates = tuple[Sequence[str], NDArray[np.integer]]
 AMPLITUDE = "max|x| of the observed DOF"
 
 
@@ -58,30 +60,55 @@ def harmonics(coefficients: Real, dims: tuple[str, ...], name: str, unit: str) -
     }
 
 
-def branch_dataset(branch: Branch) -> Dataset:
-    """A point a row, with the harmonics of the observed DOF and the state of every contact."""
+def point_variables(
+    path: str, unit: str, columns: Mapping[str, Real], observed: Real | None, states: ContactStates | None
+) -> dict[str, Variable]:
+    """What a branch knows of each of its points, computed just now or stored before.
+
+    Parameters
+    ----------
+    path, unit : of the parameter.
+    columns : ``parameter`` and any of the other names of one number a point.
+    observed : (P, 2H + 1) full coefficients of the observed DOF [m].
+    states : names of the contacts, and their states by number, (P, n_contacts).
+    """
     from solver.response import state_of
 
-    balance, top = branch.balance, branch.balance.n_harmonics
-    observed = to_full(branch.observed, balance.system.ks, top)
-    states = [[state_of(int(state)).value for state in row] for row in branch.states]
-    names = [contact.name for contact in balance.scene.contacts]
-    shape = (len(branch.values), len(names))
-    variables = {
-        "parameter": column("point", branch.values, balance.parameter.unit, branch.parameter),
-        "amplitude": column("point", branch.amplitude, "m", AMPLITUDE),
-        "half_peak_to_peak": column("point", branch.half_peak_to_peak, "m", "(max x - min x) / 2"),
-        "mean": column("point", branch.mean, "m", "mean of the observed DOF"),
-        "residual": column("point", branch.residuals, "", "relative residual"),
-        "harmonic": column("harmonic", np.arange(top + 1), "", "multiple of the excitation frequency"),
-        **harmonics(observed, ("point", "harmonic"), "displacement", "m"),
-    }
-    if names:
+    told = {
+        "parameter": (unit, path), "amplitude": ("m", AMPLITUDE),
+        "half_peak_to_peak": ("m", "(max x - min x) / 2"), "mean": ("m", "mean of the observed DOF"),
+        "residual": ("", "relative residual"),
+    }  # fmt: skip
+    variables = {name: column("point", columns[name], *told[name]) for name in told if name in columns}
+    if observed is not None:
+        top = (observed.shape[-1] - 1) // 2
+        variables["harmonic"] = column(
+            "harmonic", np.arange(top + 1), "", "multiple of the excitation frequency"
+        )
+        variables |= harmonics(observed, ("point", "harmonic"), "displacement", "m")
+    if states is not None and states[0]:
+        names, codes = states
+        words = [[state_of(int(code)).value for code in row] for row in codes]
         variables["contact"] = column("contact", np.array(names, dtype=np.str_), "", "name of the contact")
         variables["state"] = Variable(
-            dims=("point", "contact"), values=np.array(states, dtype=np.str_).reshape(shape),
+            dims=("point", "contact"), values=np.array(words, dtype=np.str_).reshape(len(codes), len(names)),
             about="what the contact does over a period",
         )  # fmt: skip
+    return variables
+
+
+def branch_dataset(branch: Branch) -> Dataset:
+    """A point a row, with the harmonics of the observed DOF and the state of every contact."""
+    balance, top = branch.balance, branch.balance.n_harmonics
+    columns = {
+        "parameter": branch.values, "amplitude": branch.amplitude,
+        "half_peak_to_peak": branch.half_peak_to_peak, "mean": branch.mean, "residual": branch.residuals,
+    }  # fmt: skip
+    names = [contact.name for contact in balance.scene.contacts]
+    variables = point_variables(
+        branch.parameter, balance.parameter.unit, columns, branch.observed,
+        (names, branch.states),
+    )  # fmt: skip
     peak, band = branch.peak, branch.band
     notes = attributes(
         branch.status.value, balance.scene, parameter=branch.parameter, harmonics=top,

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import re
+import tempfile
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -58,6 +59,24 @@ def save(result: Result, file: str | Path, *, scene: Scene | None = None) -> Non
         data = Dataset(kind=data.kind, rows=data.rows, variables=data.variables, attributes=attributes)
     with whole(path) as temporary:
         write(data, temporary)
+
+
+def written(data: Dataset, suffix: str) -> bytes:
+    """The bytes of the file that `save` writes; the same data gives the same bytes.
+
+    Parameters
+    ----------
+    suffix : one of `SUFFIXES`.
+
+    Raises
+    ------
+    MissingExtraError
+        Parquet without pyarrow.
+    """
+    with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
+        path = Path(folder) / f"result{suffix}"
+        _WRITERS[suffix](data, path)
+        return path.read_bytes()
 
 
 def load(file: str | Path) -> Dataset:

@@ -182,6 +182,16 @@ def test_the_scene_in_a_file_reproduces_the_result(tmp_path: Path) -> None:
     np.testing.assert_array_equal(repeated.amplitude, branch.amplitude)
 
 
+def test_the_parts_of_a_branch_with_odd_harmonics_alone_are_those_of_its_points() -> None:
+    scene = two_dof().with_values({"damper.N1": 0.0})
+    branch = solver.sweep(scene, "frequency", 0.8, 1.0, harmonics=5)
+    assert branch.balance.system.ks.tolist() == [1, 3, 5]
+    solution = solver.solve(scene, frequency_hz=float(branch.values[-1]), harmonics=5)
+    found, wanted = branch.to_dataset(), solution.to_dataset()
+    for name in ("displacement_cos", "displacement_sin"):
+        np.testing.assert_allclose(found[name][-1], wanted[name], atol=1e-8)
+
+
 def test_cosine_and_sine_parts_make_the_motion() -> None:
     solution = solver.solve(two_dof(), frequency_hz=1.2, harmonics=5)
     arrays = solution.to_xarray()

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from service.arrays import encode
 from service.jobs import ContactValues, DesignRecord, StoredArray, SweepRecord, VariableValues
 from service.strict_json import digest
@@ -54,7 +56,11 @@ def sweep_record(branch: Branch, frequency_hz: float | None = None) -> SweepReco
         completed=branch.completed,
         status=branch.status.value,
         contacts=contact_values(scene, parameter),
-        arrays={"parameter": encode(branch.values)}
+        arrays={
+            "parameter": encode(branch.values),
+            "residual": encode(branch.residuals),
+            "states": encode(branch.states.astype(np.int8)),
+        }
         | {name: encode(getattr(branch, name)) for name in _ARRAYS},
     )
 

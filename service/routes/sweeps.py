@@ -63,7 +63,9 @@ def get_sweep(
     headers = {"Vary": "Accept"}
     if kind in SUFFIXES:
         headers["Content-Disposition"] = f'attachment; filename="sweep-{sweep_id}.{SUFFIXES[kind]}"'
-    return tagged(request, sweep_body(service.sweep(sweep_id, caller), kind, service.sweeps), kind, headers)
+    sweep = service.sweep(sweep_id, caller)
+    scene = None if kind == "application/json" else service.jobs.spec(sweep.job_id).get("scene")
+    return tagged(request, sweep_body(sweep, kind, service.sweeps, scene), kind, headers)
 
 
 @router.get(

@@ -54,7 +54,8 @@ def test_a_sweep_is_the_solver_s_and_is_stored(shipped: httpx.Client) -> None:
     np.testing.assert_allclose(detail["arrays"]["amplitude"], branch.amplitude, rtol=1e-9)
     np.testing.assert_allclose(detail["arrays"]["coefficients"], branch.coefficients, rtol=1e-6, atol=1e-9)
     assert set(detail["arrays"]) == {
-        "parameter", "amplitude", "half_peak_to_peak", "mean", "coefficients", "observed",
+        "parameter", "amplitude", "half_peak_to_peak", "mean", "residual", "coefficients", "observed",
+        "states",
     }  # fmt: skip
 
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 import csv
 import importlib.util
 import io
-import json
+from pathlib import Path
 
 import httpx
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from service_helpers import is_problem
 
+import solver
+from service.cli import main
 from service.negotiation import preferred
+from solver.dataset import Dataset
 
 OFFERED = ("application/json", "text/csv", "application/x-npz")
 FORMS = {
@@ -64,21 +66,69 @@ def sweep(shipped: httpx.Client) -> dict:
     return shipped.get(job["sweeps"][0]["links"]["self"]).json()
 
 
-def test_every_form_holds_the_same_numbers(shipped: httpx.Client, sweep: dict) -> None:
+def loaded(content: bytes, suffix: str, folder: Path) -> Dataset:
+    file = folder / f"sweep{suffix}"
+    file.write_bytes(content)
+    return solver.load(file)
+
+
+def same_table(one: Dataset, other: Dataset) -> None:
+    mine, theirs = one.table().variables, other.table().variables
+    assert list(mine) == list(theirs)
+    for name, variable in mine.items():
+        np.testing.assert_array_equal(theirs[name].values, variable.values, err_msg=name)
+
+
+def test_every_form_holds_the_same_numbers(shipped: httpx.Client, sweep: dict, tmp_path: Path) -> None:
     path, arrays = sweep["links"]["self"], {k: np.array(v) for k, v in sweep["arrays"].items()}
     rows = list(csv.DictReader(shipped.get(path, headers={"Accept": "text/csv"}).text.splitlines()))
-    assert set(rows[0]) == {"parameter", "amplitude", "half_peak_to_peak", "mean"}
-    for name in rows[0]:
+    for name in ("parameter", "amplitude", "half_peak_to_peak", "mean", "residual"):
         assert [float(row[name]) for row in rows] == arrays[name].tolist()
+    packed = loaded(shipped.get(path, headers={"Accept": "application/x-npz"}).content, ".npz", tmp_path)
+    table = loaded(shipped.get(path, params={"format": "parquet"}).content, ".parquet", tmp_path)
+    for found in (packed, table):
+        assert found.attributes["sweep"] == sweep["id"]
+        assert found["amplitude"].tolist() == sweep["arrays"]["amplitude"]
+        assert found.variables["amplitude"].unit == "m"
+    same_table(packed, table)
 
-    packed = np.load(io.BytesIO(shipped.get(path, headers={"Accept": "application/x-npz"}).content))
-    assert set(packed.files) == {*arrays, "about"}
-    assert json.loads(str(packed["about"])) == {k: v for k, v in sweep.items() if k != "arrays"}
-    table = pq.read_table(io.BytesIO(shipped.get(path, params={"format": "parquet"}).content))
-    assert json.loads(table.schema.metadata[b"stickslip"])["id"] == sweep["id"]
-    for name, array in arrays.items():
-        np.testing.assert_array_equal(packed[name], array)
-        np.testing.assert_array_equal(np.array(table[name].to_pylist()).reshape(array.shape), array)
+
+@pytest.mark.parametrize(
+    ("words", "scene"),
+    [
+        (["--from", "0.5", "--to", "1.5"], "two-dof"),
+        (["--from", "0.5", "--to", "1.5", "--set", "damper.N1=0"], "two-dof"),
+        (["--parameter", "shroud.N0", "--from", "150", "--to", "160", "--frequency", "755"], "bladed-disk"),
+        (["--parameter", "structure.k1", "--from", "150", "--to", "160", "--frequency", "1"], "two-dof"),
+    ],
+)
+def test_python_the_command_and_the_service_write_the_same_table(
+    shipped: httpx.Client, words: list[str], scene: str, tmp_path: Path
+) -> None:
+    """Odd harmonics alone and all of them, another parameter than the frequency, several contacts."""
+    given = dict(zip(words[::2], words[1::2], strict=True))
+    parameter, harmonics = given.get("--parameter", "frequency"), 5
+    values = {k: float(v) for k, v in [one.split("=") for one in given.get("--set", "").split()]}
+    at = float(given["--frequency"]) if "--frequency" in given else None
+    ends = float(given["--from"]), float(given["--to"])
+    here = solver.load_scene(scene).with_values(values)
+    branch = solver.sweep(here, parameter, *ends, frequency_hz=at, harmonics=harmonics)
+    body = {
+        "kind": "sweep", "scene": scene, "parameter": parameter, "from": ends[0], "to": ends[1],
+        "set": values, "harmonics": harmonics, **({} if at is None else {"frequency_hz": at}),
+    }  # fmt: skip
+    job = shipped.post("/v1/jobs", json=body, headers={"Prefer": "wait=60"}).json()
+    path = job["sweeps"][0]["links"]["self"]
+    for suffix in (".csv", ".npz", ".parquet"):
+        file = tmp_path / f"mine{suffix}"
+        assert main(["sweep", scene, *words, "--harmonics", "5", "--out", str(file), "--json"]) == 0
+        stored = loaded(shipped.get(path, params={"format": suffix[1:]}).content, suffix, tmp_path)
+        same_table(solver.load(file), stored)
+    mine = branch.to_dataset()
+    theirs = loaded(shipped.get(path, params={"format": "npz"}).content, ".npz", tmp_path)
+    same_table(mine, theirs)
+    assert {n: v.unit for n, v in mine.variables.items()} == {n: v.unit for n, v in theirs.variables.items()}
+    assert theirs.attributes["scene"] == mine.attributes["scene"]
 
 
 @pytest.mark.parametrize("form", FORMS)
