@@ -151,3 +151,24 @@ if __name__ == "__main__":
 """
     out, _ = said(python(tmp_path, program))
     assert out.splitlines() == ["True False", "False True"]
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="users have temporary folders of their own there")
+@pytest.mark.parametrize("mode", [0o700, 0o777])
+def test_without_a_home_code_is_kept_where_nobody_else_can_write(tmp_path: Path, mode: int) -> None:
+    own = tmp_path / f"stickslip-kernels-{os.getuid()}"
+    own.mkdir()
+    own.chmod(mode)
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    found = subprocess.run(
+        [sys.executable, "-c", "from solver.kernels.cache import CACHE_FOLDER; print(CACHE_FOLDER)"],
+        env=environment | {"XDG_CACHE_HOME": "/dev/null/none", "TMPDIR": str(tmp_path)},
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    folder = Path(found.stdout.strip())
+    assert folder.stat().st_uid == os.getuid()
+    assert folder.is_relative_to(own) == (mode == 0o700)
+    assert folder.is_relative_to(tmp_path)

@@ -14,6 +14,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -41,15 +42,27 @@ def _cache_folder() -> str:
     """Return a writable folder for the machine code of exactly these sources."""
     asked = os.environ.get("NUMBA_CACHE_DIR")
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    for root in [asked] if asked else [home, tempfile.gettempdir()]:
-        folder = Path(root) / "stickslip-kernels" / _source_hash()
+    for root in [asked] if asked else [home, None]:
         try:
+            folder = (Path(root) / "stickslip-kernels" if root else _temporary()) / _source_hash()
             folder.mkdir(parents=True, exist_ok=True)
         except OSError:
             continue
         if os.access(folder, os.W_OK):
             return str(folder)
     return tempfile.mkdtemp(prefix="stickslip-kernels-")
+
+
+def _temporary() -> Path:
+    """Return this user's own temporary folder; OSError if somebody else could put machine code there."""
+    if not hasattr(os, "getuid"):  # on Windows each user has a folder for temporary files
+        return Path(tempfile.gettempdir()) / "stickslip-kernels"
+    folder = Path(tempfile.gettempdir()) / f"stickslip-kernels-{os.getuid()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o022:
+        raise PermissionError(f"{folder} is not this user's alone")
+    return folder
 
 
 CACHE_FOLDER = _cache_folder()
