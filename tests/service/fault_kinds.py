@@ -38,7 +38,7 @@ def child_paused(site: Site, generator: random.Random) -> None:
     for child in site.children(_one(site, generator))[:1]:
         with contextlib.suppress(ProcessLookupError):
             os.kill(child, signal.SIGSTOP)
-            time.sleep(1.3 * LEASE)
+            time.sleep(1.2 * LEASE)
             os.kill(child, signal.SIGCONT)
 
 
@@ -64,7 +64,7 @@ def program_paused(site: Site, generator: random.Random) -> None:
     """A service or dispatcher stands still past its leases and comes back."""
     program = _one(site, generator)
     program.process.send_signal(signal.SIGSTOP)
-    time.sleep(1.5 * LEASE)
+    time.sleep(1.3 * LEASE)
     program.process.send_signal(signal.SIGCONT)
 
 
@@ -104,7 +104,7 @@ def disk_full(folder: Path) -> Fault:
                 while True:
                     file.write(block)
         except OSError:
-            time.sleep(generator.uniform(0.3, 2.0))
+            time.sleep(generator.uniform(0.3, 1.2))
         finally:
             filler.unlink()
 

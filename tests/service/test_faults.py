@@ -53,7 +53,7 @@ def undergo(site: Site, faults: Mapping[str, Fault], number: int, seed: int) -> 
     generator, names = random.Random(seed), list(faults)
     began = time.monotonic()
     with site:
-        with clients(site, jobs=8 * number, seed=seed):
+        with clients(site, jobs=(5 if number < 10 else 8) * number, seed=seed):
             for index in range(number):
                 time.sleep(generator.uniform(0.05, 0.4))
                 name = names[index % len(names)] if index < len(names) else generator.choice(names)
