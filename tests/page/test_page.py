@@ -173,6 +173,22 @@ def test_the_response_follows_the_sliders_and_nothing_is_stored(profile: Profile
     expect(page.locator("#live-status")).to_contain_text("peak 2.35 m")
 
 
+def test_what_is_too_large_for_the_sliders_says_so_and_becomes_a_job(profile: Profile, site: Site) -> None:
+    context, watch = profile
+    watch.allowed = ("status of 422",)
+    whole = solver.load_scene("bladed-disk").to_dict() | {"name": "whole"}
+    whole["structure"] |= {"sectors": 6, "mistuning": {"of": ["tip"], "spread": 0.02, "seed": 1}}
+    assert httpx.post(f"{site.url}/v1/scenes", json=whole).status_code in (200, 201)
+    page = visit(context, site, "?scene=whole")
+    expect(page.locator("#live-status")).to_contain_text("with 4 of 11 harmonics, as the whole disk is")
+    expect(page.locator("#plan-facts summary").first).to_have_text("and 5 further sectors")
+    page.goto(f"{site.url}/?scene=two-dof&harmonics=50")
+    expect(page.locator("#live-status")).to_contain_text("must be at most 41, got 50")
+    page.get_by_role("button", name="Compute it as a job").press("Enter")
+    expect(page.locator("#live-status")).to_contain_text("Of a job, with 50 harmonics: peak 2.35 m")
+    expect(page.locator("#response-facts")).to_contain_text("highest peak")
+
+
 def test_what_is_wrong_with_a_scene_is_said_beside_its_field(profile: Profile, site: Site) -> None:
     context, _ = profile
     page = visit(context, site)
