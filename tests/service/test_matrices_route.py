@@ -144,6 +144,7 @@ def test_what_does_not_fit_is_said_beside_its_key(shipped: httpx.Client) -> None
     assert "alone must hold M and K" in refused(shipped, uploads=[mass])["/uploads"]
 
 
+@pytest.mark.long
 def test_a_large_model_is_reduced(shipped: httpx.Client) -> None:
     n = 2400
     main, side = np.full(n, 2e6), np.full(n - 1, -1e6)
@@ -162,11 +163,13 @@ def test_a_large_model_is_reduced(shipped: httpx.Client) -> None:
     assert made["reduction"]["good_to_hz"] > 3.0 * first
 
 
-def test_modes_begin_a_scene_too(shipped: httpx.Client) -> None:
+def test_modes_begin_a_scene_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     omega2, modes = np.array([100.0, 4000.0]), np.array([[1.0, 0.5], [0.6, -1.0], [0.1, 0.2]])
-    (whole,) = sent(shipped, {"modes.npz": npz(modes=modes, omega2=omega2)})
-    found = look(shipped, uploads=[whole])
-    assert (found["rows"], found["modes"], found["structure"]) == (3, 2, {"modes": f"upload:{whole}"})
-    made = look(shipped, structure={**found["structure"], "dofs": {"tip": 0, "mid": 1}}, **ASKED)
+    files: dict[str, str | bytes] = {"modes.npz": npz(modes=modes, omega2=omega2)}
+    found = looked_at(tmp_path, files)["found"]
+    assert (found["rows"], found["modes"], found["structure"]) == (3, 2, {"modes": "modes.npz"})
+    structure = {**found["structure"], "dofs": {"tip": 0, "mid": 1}}
+    made = looked_at(tmp_path, files, structure=structure, **ASKED)["found"]
     assert made["frequencies_hz"] == pytest.approx(np.sqrt(omega2) / (2.0 * np.pi))
     assert made["scene"]["observe"]["dof"] == "mid"
