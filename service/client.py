@@ -32,6 +32,7 @@ from service.answers import (
 )
 from service.errors import ServiceProblem
 from service.event_answers import END, EventData, JobPoints, JobProgress, told
+from service.matrix_answers import MatricesAnswer
 from service.transport import Transport, pauses, segment, words
 from service.upload_answers import NewUpload, UploadAnswer, UploadPage
 
@@ -272,6 +273,11 @@ class Client:
     def delete_upload(self, upload_id: str) -> None:
         """Forget an upload."""
         self._transport.send("DELETE", f"/v1/uploads/{segment(upload_id)}")
+
+    def matrices(self, body: Mapping[str, Any]) -> MatricesAnswer:
+        """What uploaded matrices are; with DOFs named, the scene that begins with them."""
+        answer = self._transport.json("POST", "/v1/matrices", json=dict(body))
+        return MatricesAnswer.model_validate(answer)
 
     def health(self) -> Health | Readiness:
         """Whether the service can work, also if it cannot; the details if the key may see them."""

@@ -74,7 +74,7 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     # Of another's upload it is said that there is none.
     "POST /v1/matrices": (
         (401, 401, 422, 401, 401, 403, 200, 200),
-        {"structure": {"M": "upload:UPLOAD", "K": "upload:UPLOAD"}},
+        {"structure": {"M": "upload:MASS", "K": "upload:UPLOAD"}},
     ),
     # Whoever may delete it does so, and it is gone.
     "DELETE /v1/uploads/{upload_id}": ((401, 401, 404, 401, 401, 403, 204, 404), None),
@@ -109,10 +109,11 @@ class House:
         )
 
     def filled(self, body: Any) -> Any:
-        """A body with the id of the owner's upload."""
+        """A body with the ids of the owner's uploads."""
         if not isinstance(body, dict):
             return body
-        return json.loads(json.dumps(body).replace("UPLOAD", self.ids["upload_id"]))
+        words = json.dumps(body).replace("UPLOAD", self.ids["upload_id"])
+        return json.loads(words.replace("MASS", self.ids["mass_id"]))
 
 
 @pytest.fixture(scope="module")
@@ -127,6 +128,8 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[House]:
         assert job["status"] == "successful"
         assert made.ask("submit", "POST", "/v1/scenes", json=MINE).status_code == 201
         upload = made.ask("submit", "POST", "/v1/uploads", **arguments_of(FILE, -1)).json()
+        mass = made.ask("submit", "POST", "/v1/uploads", **arguments_of(2.0 * FILE, -1)).json()
+        made.ids.update(mass_id=mass["id"])
         made.ids.update(job_id=job["id"], sweep_id=job["sweeps"][0]["id"], upload_id=upload["id"])
         made.ids.update(design_id=add_design(client, "ann"), name="mine")
         made.ids.update(hashed=page.version(), path="icon.svg")
