@@ -34,7 +34,7 @@ $(STAMP): pyproject.toml constraints.txt
 	  echo "stickslip needs Python 3.11 or newer, as in: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv .venv
 	$(PIP) --constraint constraints.txt setuptools
-	$(PIP) --constraint constraints.txt --no-build-isolation -e .
+	$(PIP) --constraint constraints.txt --no-build-isolation -e '.[fast]'
 	$(BYTECODE)
 	@echo "Compiling the kernels on all cores: about half a minute on two, once."
 	$(BIN)/python -m service.warm_up
