@@ -10,7 +10,6 @@ headers, and measured under load the other one was not faster.
 from __future__ import annotations
 
 import asyncio
-from typing import Protocol, cast
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
@@ -18,20 +17,6 @@ _TOO_SLOW = (
     b"HTTP/1.1 408 Request Timeout\r\ncontent-type: text/plain; charset=utf-8\r\n"
     b"content-length: 34\r\nconnection: close\r\n\r\nThe headers did not come in time.\n"
 )
-
-
-class _Cycle(Protocol):
-    """A request that is dealt with."""
-
-    response_complete: bool
-
-
-class _Connection(Protocol):
-    """What uvicorn's protocols have in common and is needed here."""
-
-    loop: asyncio.AbstractEventLoop
-    transport: asyncio.Transport
-    cycle: _Cycle | None
 
 
 def patient(seconds: float) -> type[asyncio.Protocol]:
@@ -57,8 +42,7 @@ def patient(seconds: float) -> type[asyncio.Protocol]:
 
         def data_received(self, data: bytes) -> None:
             super().data_received(data)
-            cycle = cast(_Connection, self).cycle
-            if cycle is not None and not cycle.response_complete:
+            if self.cycle is not None and not self.cycle.response_complete:
                 self._begun()
             else:
                 self._heard = True
@@ -66,7 +50,7 @@ def patient(seconds: float) -> type[asyncio.Protocol]:
 
         def _wait(self) -> None:
             if self._deadline is None:
-                self._deadline = cast(_Connection, self).loop.call_later(seconds, self._too_slow)
+                self._deadline = self.loop.call_later(seconds, self._too_slow)
 
         def _begun(self) -> None:
             if self._deadline is not None:
@@ -74,11 +58,10 @@ def patient(seconds: float) -> type[asyncio.Protocol]:
                 self._deadline = None
 
         def _too_slow(self) -> None:
-            transport = cast(_Connection, self).transport
-            if transport.is_closing():
+            if self.transport.is_closing():
                 return
             if self._heard:
-                transport.write(_TOO_SLOW)
-            transport.close()
+                self.transport.write(_TOO_SLOW)
+            self.transport.close()
 
     return Patient
