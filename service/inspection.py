@@ -189,12 +189,12 @@ def _describe(name: str) -> list[dict[str, Any]]:
 
 def _resolve(structure: dict[str, Any]) -> dict[str, Any]:
     from solver.matrices.loading import with_files
-    from solver.matrices.values import Matrix, Modes
+    from solver.matrices.values import as_json
 
     tables = with_files({"structure": structure}, Path())["structure"]
     if not isinstance(tables, dict):
         raise TypeError(f"the structure is {type(tables).__name__}")
-    return {key: item.write() if isinstance(item, Matrix | Modes) else item for key, item in tables.items()}
+    return as_json(tables)
 
 
 def _look(asked: dict[str, Any]) -> dict[str, Any]:

@@ -159,7 +159,7 @@ def _scene(
     from service.scene_start import started
     from solver.matrices.checks import refuse
     from solver.matrices.loading import as_kept, with_files
-    from solver.matrices.values import MOST_DOFS, Matrix, Modes
+    from solver.matrices.values import MOST_DOFS, as_json
 
     reduced = None
     if given.matrices:
@@ -177,9 +177,7 @@ def _scene(
     body = scene.to_dict()
     return {
         "scene": {**body, "structure": {"kind": "matrices", **structure}},
-        "resolved": {
-            key: item.write() if isinstance(item, Matrix | Modes) else item for key, item in kept.items()
-        },
+        "resolved": as_json(kept),
         "reduction": None if reduced is None else _kept(reduced, scene),
         **_frequencies(given, omega2, notes),
     }

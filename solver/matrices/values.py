@@ -7,7 +7,7 @@ what they hold (`solver.matrices.loading`), so that a scene from somewhere else 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -231,6 +231,11 @@ class Modes:
     @classmethod
     def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
         return _schema(cls.read, cls.write, None)
+
+
+def as_json(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables of a structure with its matrices and modes as lists of numbers."""
+    return {key: item.write() if isinstance(item, Matrix | Modes) else item for key, item in tables.items()}
 
 
 def _numbers(data: object, what: str) -> FloatArray:
