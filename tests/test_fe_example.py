@@ -49,17 +49,17 @@ def run(line: str, capsys: pytest.CaptureFixture[str]) -> str:
     return capsys.readouterr().out
 
 
-def skip_without_scikit_fem() -> None:
+@pytest.fixture
+def beside_docs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work in a new folder beside the documentation, as the page does."""
     if importlib.util.find_spec("skfem") is None:
         pytest.skip("scikit-fem, which makes the matrices of the page, is not installed")
-
-
-def test_the_page_runs_line_by_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    skip_without_scikit_fem()
     monkeypatch.chdir(tmp_path)
     (tmp_path / "docs").symlink_to(ROOT / "docs")
+
+
+@pytest.mark.usefixtures("beside_docs")
+def test_the_page_runs_line_by_line(capsys: pytest.CaptureFixture[str]) -> None:
     said = {}
     for line in COMMANDS:
         said[line] = " ".join(run(line, capsys).split())
@@ -101,13 +101,9 @@ def the_reduction_is_good_to_what_it_says() -> None:
 
 
 @pytest.mark.long
-def test_all_rows_of_the_model_say_what_the_reduced_ones_say(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.mark.usefixtures("beside_docs")
+def test_all_rows_of_the_model_say_what_the_reduced_ones_say(capsys: pytest.CaptureFixture[str]) -> None:
     """And the kept scene is the one just made."""
-    skip_without_scikit_fem()
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "docs").symlink_to(ROOT / "docs")
     for line in COMMANDS[:2]:
         run(line, capsys)
     made = Path("blade.toml")
