@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from solver.accuracy import ErrorEstimate, branch_errors
     from solver.accuracy_cost import AccuracyRow, AccuracyStudy, accuracy_study
     from solver.branch import Band, Branch, BranchStatus, Peak
-    from solver.continuation import ContinuationSettings, Predictor, sweep
+    from solver.continuation import sweep
+    from solver.continuation_settings import ContinuationSettings, Predictor
     from solver.corners import PeakGradient, PeakKind, peak_gradient
     from solver.curvature import AmplitudeHessian, EdgeHessian, PeakHessian
     from solver.dataset import Dataset, Variable
@@ -45,7 +46,8 @@ _HOME = {
     "AccuracyRow": "accuracy_cost", "AccuracyStudy": "accuracy_cost", "accuracy_study": "accuracy_cost",
     "ErrorEstimate": "accuracy", "branch_errors": "accuracy",
     "Band": "branch", "Branch": "branch", "BranchStatus": "branch", "Peak": "branch",
-    "ContinuationSettings": "continuation", "Predictor": "continuation", "sweep": "continuation",
+    "ContinuationSettings": "continuation_settings", "Predictor": "continuation_settings",
+    "sweep": "continuation",
     "Dataset": "dataset", "Variable": "dataset", "Shown": "shown", "Summary": "shown",
     "progress_bar": "shown", "load": "saving", "save": "saving",
     "MissingExtraError": "errors", "ResultFileError": "errors",

@@ -9,14 +9,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.branch import Branch, Peak
+from solver.branch import Branch
 from solver.fourier import Real
+from solver.harmonics import MULTIPLES, is_fast
 from solver.kernels.jacobian import factorise, step_back
 from solver.kernels.observe import extremes, observed_motion
 from solver.kernels.receptance import receptance
 from solver.kernels.residual import evaluate
 from solver.kernels.system import by_reference, evaluation_by_value, new_receptance, receptance_by_value
-from solver.parametric import linear_model
 from solver.shown import Piece
 from solver.widening import linear_part, more_harmonics, pad
 from solver.workspace import Workspace
@@ -42,7 +42,7 @@ class ErrorEstimate(Piece):
     half_peak_to_peak: float
 
 
-_UNKNOWN = ErrorEstimate(max_abs=math.nan, half_peak_to_peak=math.nan)
+UNKNOWN = ErrorEstimate(max_abs=math.nan, half_peak_to_peak=math.nan)
 
 
 class ErrorEstimator:
@@ -60,14 +60,21 @@ class ErrorEstimator:
     def __init__(self, workspace: Workspace) -> None:
         balance = workspace.balance
         highest = balance.n_harmonics
-        forced = max((force.harmonic for force in linear_model(balance.scene).forces), default=0)
         self._workspace = workspace
-        self._top = max(highest + max(highest, _LEAST_BEYOND), forced)
-        self._larger = Workspace.of(more_harmonics(balance, self._top))
+        self._top = highest + max(highest, _LEAST_BEYOND)
+        self._larger = Workspace.of(more_harmonics(balance, self._top, multiples=2 * MULTIPLES))
         beyond = linear_part(self._larger.balance, _TAIL * self._top)
-        self._beyond_ks = beyond.ks
+        self._is_beyond = ~np.isin(beyond.ks, self._larger.balance.system.ks)
+        self._beyond_ks = beyond.ks[self._is_beyond]
+        self._is_fast = is_fast(balance.scene, self._larger.balance.system.ks)
+        self._later_is_fast = is_fast(balance.scene, self._beyond_ks)
         self._beyond = by_reference(beyond)
         self._beyond_linear = new_receptance(self._beyond)
+
+    @property
+    def larger(self) -> Workspace:
+        """The balance with more harmonics, in which the residual is looked at."""
+        return self._larger
 
     def at(self, u: Real, p: float, *, across: bool = False) -> ErrorEstimate:
         """Estimate the errors at a solution.
@@ -83,28 +90,28 @@ class ErrorEstimator:
         before = self._motion(self._workspace, u, p)
         tangent = self._tangent() if across else np.zeros(self._larger.balance.n_unknowns + 1)
         if before is None or tangent is None:
-            return _UNKNOWN
+            return UNKNOWN
         x = pad(before, kept, larger.balance)
         U = pad(u, kept, larger.balance)
         if self._motion(larger, U, p) is None:
-            return _UNKNOWN
+            return UNKNOWN
         point = evaluation_by_value(larger.point)
         tail = self._tail(point.F, p)
         # Across the branch, u and λ each count relative to their size.
         size = max(float(np.abs(u).max(initial=0.0)), 1e-150)
         weights = (1.0 / size**2, 1.0 / (p * p if p != 0.0 else 1.0)) if across else (0.0, 0.0)
         if factorise(larger.system, larger.linear, larger.point, tangent, *weights) == 0.0:
-            return _UNKNOWN
+            return UNKNOWN
         changes = []
         for _ in range(2):
             step = np.append(point.residual, 0.0) if across else point.residual.copy()
             step_back(larger.system, larger.point, step)
             if not np.all(np.isfinite(step)):
-                return _UNKNOWN
+                return UNKNOWN
             U, p = U - step[: U.size], p - (float(step[-1]) if across else 0.0)
             after = self._motion(larger, U, p)
             if after is None:
-                return _UNKNOWN
+                return UNKNOWN
             changes.append(self._change(x, after))
         largest = np.max(changes, axis=0)
         max_abs, half_range = SAFETY * largest + tail + self._rounding()
@@ -153,26 +160,25 @@ class ErrorEstimator:
 
     def _tail(self, F: Real, p: float) -> float:
         """Return the motion of the observed DOF by harmonics beyond those of the larger balance [m]."""
-        ks, beyond = self._larger.balance.system.ks, self._beyond
-        receptance(beyond, p, self._beyond_linear)
-        B = np.abs(receptance_by_value(self._beyond_linear).B[0, ks.size :])
-        late = ks.size // 2
-        pairs = F[:, F.shape[1] - 2 * (ks.size - late) :].reshape(F.shape[0], ks.size - late, 2)
-        falling = np.max(np.hypot(pairs[..., 0], pairs[..., 1]) * ks[late:] ** 2, axis=1, initial=0.0)
-        return float(np.sum(B @ falling / self._beyond_ks[ks.size :] ** 2))
+        ks = self._larger.balance.system.ks
+        receptance(self._beyond, p, self._beyond_linear)
+        B = np.abs(receptance_by_value(self._beyond_linear).B[0, self._is_beyond])
+        weighted = np.zeros((F.shape[0], ks.size))
+        moving = ks > 0
+        pairs = F[:, int(ks[0] == 0) :].reshape(F.shape[0], int(moving.sum()), 2)
+        weighted[:, moving] = np.hypot(pairs[..., 0], pairs[..., 1]) * ks[moving] ** 2
+        tail = 0.0
+        for fast in (False, True):  # waves of their own, each with its own rate
+            own, later = self._is_fast == fast, self._later_is_fast == fast
+            late = weighted[:, own][:, np.count_nonzero(own) // 2 :]
+            falling = np.max(late, axis=1, initial=0.0)
+            tail += float(np.sum(B[later] @ falling / self._beyond_ks[later] ** 2))
+        return tail
 
 
 def truncation_error(workspace: Workspace, u: Real, p: float) -> ErrorEstimate:
     """Estimate the errors of one solution (u, λ = p), see `ErrorEstimator`."""
     return ErrorEstimator(workspace).at(u, p)
-
-
-def peak_error(workspace: Workspace, peaks: tuple[Peak, ...]) -> float:
-    """Estimate the error of the value of the first of `peaks` [m]; NaN if there is none."""
-    if not peaks:
-        return math.nan
-    p = float(workspace.balance.parameter.inside(peaks[0].at))
-    return ErrorEstimator(workspace).at(peaks[0].solution, p, across=True).max_abs
 
 
 def branch_errors(branch: Branch, indices: Sequence[int] | None = None) -> Real:

@@ -17,6 +17,7 @@ from solver.branch import Branch
 from solver.continuation import sweep
 from solver.errors import SettingError
 from solver.fourier import Real
+from solver.harmonics import kept_harmonics
 from solver.kernels.observe import MAX_ABS
 from solver.scene import Scene
 from solver.shown import Piece, Shown, Summary
@@ -200,7 +201,8 @@ def accuracy_study(
         raise SettingError("frequency_hz", frequency_hz, "has no solution to compare with")
     workspace, u, exact = reference
     ways = [(h, 0) for h in harmonics]
-    ways += [(h, n) for n in samples for h in harmonics if n >= _PER_WAVE * max(h, 1)]
+    shortest = {h: int(kept_harmonics(scene, (), h, odd=False)[-1]) for h in harmonics}
+    ways += [(h, n) for n in samples for h in harmonics if n >= _PER_WAVE * max(shortest[h], 1)]
     prepared: list[tuple[AccuracyRow, Callable[[], object]]] = []
     asked = should_stop or (lambda: False)
     tell = on_progress or (lambda _share, _rows: None)
@@ -254,7 +256,7 @@ def sampled(balance: Balance, samples: int) -> Balance:
     SettingError
         Not a multiple of 4, or not above twice the highest harmonic.
     """
-    if check_samples(samples) <= 2 * balance.n_harmonics:
+    if check_samples(samples) <= 2 * balance.highest_harmonic:
         raise SettingError("samples", samples, f"must be > {2 * balance.n_harmonics} for these harmonics")
     return replace(balance, system=balance.system._replace(samples=samples))
 

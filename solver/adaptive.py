@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.accuracy import ErrorEstimator
-from solver.balance import Balance, fewer_harmonics
+from solver.balance import Balance
 from solver.branch import Branch, BranchStatus
 from solver.errors import SettingError
 from solver.fourier import Real
 from solver.kernels.observe import HALF_RANGE, MAX_ABS
-from solver.widening import more_harmonics, pad
+from solver.widening import less_harmonics, more_harmonics, pad
 from solver.workspace import PointSolution, Workspace
 
 FIRST_HARMONICS = 5
@@ -148,9 +148,8 @@ def _with(
         balance = more_harmonics(known, harmonics)
         guess = pad(like.found.u, known, balance)
     else:
-        fewer = fewer_harmonics(known, int(np.count_nonzero(known.system.ks <= harmonics)))
-        balance = replace(fewer, n_harmonics=harmonics)
-        guess = like.found.u.reshape(-1, known.n_coefficients)[:, : balance.n_coefficients].reshape(-1)
+        balance = less_harmonics(known, harmonics)
+        guess = pad(like.found.u, known, balance)
     workspace = Workspace.of(balance)
     found = workspace.solve(p, guess)
     if not found.converged:
@@ -210,9 +209,14 @@ def harmonics_for(branch: Branch, accuracy: float) -> int | None:
         error = estimator.at(u, p, across=True).max_abs
         allowed = accuracy * max(amplitude, floor)
         excesses.append(error / allowed if math.isfinite(error) else math.inf)
-    if max(excesses) <= 1.0:
+    # What the whole branch may be wrong by includes peaks that its harmonics do not show.
+    hidden = branch.error_estimate / (accuracy * branch.peaks[0].value) if branch.peaks else 0.0
+    hidden = hidden if math.isfinite(hidden) else 0.0
+    if max(*excesses, hidden) <= 1.0:
         return None
     needed = balance.n_harmonics + 1
+    if hidden > max(1.0, *excesses):
+        needed = max(needed, next_harmonics(balance.n_harmonics, hidden))
     for index in np.argsort(excesses)[::-1][:_WORST]:
         u, p, amplitude = points[index]
         if excesses[index] <= 1.0:

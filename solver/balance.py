@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.contact_rows import contact_table, law_numbers, port_counts, port_stiffnesses
+from solver.contact_rows import contact_table, enough_samples, law_numbers, port_counts, port_stiffnesses
 from solver.errors import SettingError
-from solver.fourier import Integer, all_harmonics
+from solver.fourier import Integer
+from solver.harmonics import MOST_HARMONICS, forced_harmonics, kept_harmonics
 from solver.kernels.system import System
 from solver.kernels.trigpoly import grid_size, grid_tables
 from solver.parameter import Kind, Parameter, resolve
@@ -18,8 +19,6 @@ from solver.savings import Effects, even_harmonics_reason
 from solver.scene import Scene
 from solver.sectors import check_in_annulus, written_out
 from solver.structure import reduce_model
-
-MOST_HARMONICS = 1000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +34,8 @@ class Balance:
     system : System
         The arrays the compiled loops work on.
     n_harmonics : int
-        Highest harmonic asked for; of those up to it the system keeps `system.ks`.
+        Highest harmonic asked for. The system keeps `system.ks`: these, or the odd ones of them, and those
+        that forces and loads call for whatever was asked, see `solver.harmonics.kept_harmonics`.
     effects : Effects
         What is paid for though the scene does not call for it.
     """
@@ -45,6 +45,11 @@ class Balance:
     system: System
     n_harmonics: int
     effects: Effects
+
+    @property
+    def highest_harmonic(self) -> int:
+        """Highest harmonic of full coefficients: the one asked for, or that of a force above it."""
+        return max(self.n_harmonics, int(self.system.ks[-1]))
 
     @property
     def n_ports(self) -> int:
@@ -101,7 +106,8 @@ def build(
     ----------
     scene : the scene, with the values that stay fixed.
     path : the parameter that λ is.
-    harmonics : highest harmonic kept; all from 0 on are, or the odd ones where the others are zero.
+    harmonics : highest harmonic asked for; all from 0 on are kept, or the odd ones where the others are zero,
+        and those that forces and loads call for, see `solver.harmonics.kept_harmonics`.
     frequency_hz : the excitation frequency [Hz], needed unless λ is the frequency.
     effects : what is paid for though the scene does not call for it.
 
@@ -130,10 +136,8 @@ def build(
 
 def _harmonics(scene: Scene, path: str, highest: int, effects: Effects) -> Integer:
     """Return the harmonics kept: all of them, or the odd ones where a symmetry makes the others zero."""
-    ks = all_harmonics(highest)
-    if highest == 0 or effects.even_harmonics or even_harmonics_reason(scene, (path,)) is not None:
-        return ks
-    return np.ascontiguousarray(ks[1::2])
+    odd = not effects.even_harmonics and even_harmonics_reason(scene, (path,)) is None
+    return kept_harmonics(scene, (path,), highest, odd=odd)
 
 
 def for_parameter(balance: Balance, path: str, frequency_hz: float) -> Balance:
@@ -160,16 +164,26 @@ def for_parameter(balance: Balance, path: str, frequency_hz: float) -> Balance:
 
 
 def fewer_harmonics(balance: Balance, count: int) -> Balance:
-    """Return the same balance with its lowest `count` harmonics (the mean counts as one)."""
+    """Return the same balance with `count` of its harmonics (the mean counts as one).
+
+    The lowest are kept, and before all others the mean and those of the forces and loads.
+    """
+    ks = balance.system.ks
+    needed = np.isin(ks, [0, *forced_harmonics(balance.scene, (balance.parameter.path,))])
+    rank = np.argsort(~needed, kind="stable")
+    return with_harmonics(balance, ks[np.sort(rank[: max(count, int(needed.sum()))])])
+
+
+def with_harmonics(balance: Balance, ks: Integer) -> Balance:
+    """Return the same balance with the harmonics `ks`, some of its own."""
     system = balance.system
-    ks = system.ks[:count]
+    at = np.searchsorted(system.ks, ks)
     highest = max(int(ks[-1]), 1)
     cos_table, sin_table = grid_tables(grid_size(highest), highest)
-    smaller = system._replace(
-        ks=ks, which=system.which[:count], cos_table=cos_table, sin_table=sin_table,
-        modal_forces=system.modal_forces[:count], forces=system.forces[:count],
-    )  # fmt: skip
-    return replace(balance, system=smaller, n_harmonics=int(ks[-1]))
+    rows = {name: getattr(system, name) for name in ("modal_forces", "forces")}
+    rows = {name: np.ascontiguousarray(row[at]) if row.shape[0] else row for name, row in rows.items()}
+    smaller = system._replace(ks=ks, which=system.which[at], cos_table=cos_table, sin_table=sin_table, **rows)
+    return replace(balance, system=smaller, n_harmonics=min(balance.n_harmonics, int(ks[-1])))
 
 
 def _level(scene: Scene) -> float:
@@ -183,7 +197,7 @@ def _system(
     """Put the arrays of the compiled loops together."""
     model = linear_model(scene)
     derivative = structure_derivative(scene, parameter.name) if parameter.kind is Kind.STRUCTURE else None
-    contacts = contact_table(scene)
+    contacts = enough_samples(contact_table(scene), law_numbers(scene), int(ks[-1]))
     reduced = reduce_model(
         model, ks, port_stiffnesses(scene, model), derivative, whole_matrices=effects.whole_matrices
     )  # fmt: skip
@@ -196,7 +210,8 @@ def _system(
         first_block=np.append(0, np.cumsum(ports**2)), owner=np.repeat(np.arange(ports.size), ports),
         contacts=contacts, samples=0, condense=0 if effects.every_contact else 1,
         least_size=reduced.least_size,
-        active=parameter.active, shift=reduced.shift, kind=int(parameter.kind), omega=omega,
+        active=parameter.active, shift=reduced.shift, loose=reduced.loose, hold=0,
+        kind=int(parameter.kind), omega=omega,
         level_reference=_level(scene), phase_reference=scene.value("excitation.phase"),
         parameter_reference=scene.value(parameter.path) if derivative is not None else 0.0,
         form=reduced.form, eigenvalues=reduced.eigenvalues, dampings=reduced.dampings,

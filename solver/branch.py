@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from solver.balance import Balance
+from solver.certificate import PeakCertificate
 from solver.fourier import Integer, Real
 from solver.kernels.observe import HALF_RANGE, MAX_ABS, MEAN, RESIDUAL, SLOPE
 from solver.kernels.walk import FINISHED, LEFT_RANGE, NO_START, STALLED
@@ -38,6 +39,16 @@ class BranchStatus(Enum):
     )
     STOPPED = "The continuation was stopped by the caller."
     TOO_MANY_POINTS = "The largest number of points was used up: allow more points or a larger step."
+    TOO_STIFF = (
+        "A contact is so much stiffer than the structure that what it deforms is lost in the rounding of its "
+        "motion: lower kt. Above a million times the structure's stiffness the response no longer depends on "
+        "it."
+    )
+    RATCHETS = (
+        "Beyond the last point there is no periodic motion: a part that contacts alone hold ratchets, it "
+        "drifts a little further every period. Press it harder, take away what pulls it to one side, or hold "
+        "it by a spring."
+    )
 
 
 ENDINGS = {
@@ -74,7 +85,7 @@ class Peak(Piece):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edge:
-    """An end of an interval in which the amplitude exceeds a limit, where it equals the limit.
+    """An end of an interval in which the amplitude exceeds a limit: where it equals the limit, or a fold.
 
     Attributes
     ----------
@@ -84,11 +95,17 @@ class Edge:
         Slip motions of the contacts there [m].
     opens : bool
         The interval begins here; otherwise it ends here.
+    fold : bool
+        The branch turns back here, above the limit.
+    corner : bool
+        It does so where a contact changes its state: the end has no derivative.
     """
 
     at: float
     solution: Real
     opens: bool
+    fold: bool = False
+    corner: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -105,6 +122,9 @@ class Band(Piece):
         Its intervals, ascending.
     edges : tuple of Edge
         The interval ends inside the branch (an end of the range itself is not one).
+    known : bool
+        Wherever the amplitude may cross the limit between two points, that was settled by solutions; see
+        also `Branch.peak_certificate`.
     """
 
     UNITS: ClassVar[Mapping[str, str]] = {"limit": "m"}
@@ -113,11 +133,14 @@ class Band(Piece):
     width: float
     intervals: tuple[tuple[float, float], ...]
     edges: tuple[Edge, ...]
+    known: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Branch(Shown):
-    """A branch of periodic responses over one parameter, P points in the order they were found.
+    """A branch of periodic responses over one parameter, P points in their order along it.
+
+    They are the steps of the continuation and what was solved for between them: narrow resonances and peaks.
 
     Attributes
     ----------
@@ -128,20 +151,26 @@ class Branch(Shown):
     values : (P,) array
         Parameter values in user units.
     solutions, tangents : (P, n_unknowns + 1) array
-        Slip motions [m] with λ (inside unit) last, and unit tangents of the branch.
+        Slip motions [m] with λ (inside unit) last, and tangents that point onward along the branch.
     observed : (P, 2H + 1) array
         Full coefficients of the observed DOF [m], zero where a harmonic is not kept.
     measures : (P, MEASURES) array
         Columns named in `solver.kernels.observe`; slopes are along the tangents.
     states : (P, n_contacts) array
-        State of every contact, as in `solver.response.ContactState`.
+        State of every contact, as in `solver.contact_response.ContactState`.
     peaks : tuple of Peak
         All local maxima, highest first; the ends of the branch are in it too.
     band : Band or None
         Where the amplitude exceeds the limit asked for (peak/√2 if none was); None without a peak.
     error_estimate : float
-        Estimated error of the highest peak's value, by the harmonics left out and the residual [m]; NaN
-        without a peak. `solver.branch_errors` gives that of every point.
+        Estimated error of the highest peak's value, by the harmonics left out and the residual [m], with
+        peaks that stand elsewhere if more are kept (`solver.branch_error`); NaN without a peak.
+        `solver.branch_errors` gives that of every point.
+    peak_certificate : PeakCertificate
+        Why no higher peak hides between two points, or why that is not known.
+    flags : tuple of str
+        ``symmetric_unstable`` if a half-wave symmetric point of it is not the motion that is seen,
+        ``travelling_wave_assumed`` where one sector stands for all though the laws allow other motions.
     """
 
     balance: Balance
@@ -161,6 +190,8 @@ class Branch(Shown):
     rejected_steps: int
     stepped_over: int
     seconds: float
+    peak_certificate: PeakCertificate
+    flags: tuple[str, ...] = ()
 
     @property
     def parameter(self) -> str:
@@ -209,6 +240,16 @@ class Branch(Shown):
         return self.peaks[0] if self.peaks else None
 
     @property
+    def mean_undetermined(self) -> bool | None:
+        """Whether the mean, and with it the height, of the highest peak depends on the history; None without.
+
+        It is found when it is asked for, as `solve` does.
+        """
+        from solver.history import peak_flags
+
+        return None if self.peak is None else "mean_undetermined" in peak_flags(self)
+
+    @property
     def folds(self) -> int:
         """How often the branch turned back in its parameter."""
         return int(np.count_nonzero(np.diff(np.sign(np.diff(self.values)))))
@@ -254,14 +295,18 @@ class Branch(Shown):
             "band_hz": None if band is None else band.width,
             "band_limit": None if band is None else band.limit,
             "band_intervals_hz": None if band is None else [list(interval) for interval in band.intervals],
+            "band_known": None if band is None else band.known and self.peak_certificate.known,
+            "peak_certificate": self.peak_certificate.to_json(),
             "points": len(self.values),
             "n_harmonics": self.balance.n_harmonics,
             "error_estimate": float(self.error_estimate) if math.isfinite(self.error_estimate) else None,
             "newton_iterations": self.newton_iterations,
             "rejected_steps": self.rejected_steps,
             "folds": self.folds,
+            "mean_undetermined": self.mean_undetermined,
             "largest_residual": float(self.residuals.max()) if len(self.values) else None,
             "seconds": self.seconds,
+            "flags": list(self.flags),
             "completed": self.completed,
             "status": self.status.value,
         }

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from solver import fourier
+from solver.contact_response import ContactResponse
 from solver.contact_rows import DEFAULT_SAMPLES
 from solver.fourier import Integer, Real
 from solver.kernels.events import (
@@ -25,7 +26,6 @@ from solver.kernels.events import (
 from solver.kernels.laws_plane import periods_to_repeat, plane_step
 from solver.kernels.segments import find_segments
 from solver.kernels.trigpoly import grid_size, grid_tables
-from solver.response import ContactResponse
 from solver.scene import AnyContact, FrictionContact, GapSpring, PlanarContact, PolynomialSpring
 
 

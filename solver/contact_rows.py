@@ -73,3 +73,16 @@ def _fill(row: Real, contact: AnyContact) -> None:
         row[columns.K_GAP], row[columns.GAP] = contact.k, contact.gap
     elif isinstance(contact, PolynomialSpring):
         row[columns.A_1 : columns.A_1 + columns.MOST_DEGREE] = contact.coefficients
+
+
+def enough_samples(table: Real, laws: Integer, highest: int) -> Real:
+    """Return the contact table with as many samples of circular limits as `highest` harmonics need.
+
+    Four for the shortest wave: with fewer it would be taken for a longer one.
+    """
+    few = (laws == columns.COULOMB_PLANE) & (table[:, columns.SAMPLES] < 4 * highest)
+    if not np.any(few):
+        return table
+    table = table.copy()
+    table[few, columns.SAMPLES] = 4 * highest
+    return table

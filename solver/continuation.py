@@ -8,72 +8,37 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 
-from solver.accuracy import peak_error
 from solver.adaptive import sweep_to
 from solver.balance import Balance, build
-from solver.branch import ENDINGS, Branch, BranchStatus
+from solver.branch import ENDINGS, Branch, BranchStatus, Peak
+from solver.branch_error import branch_error
+from solver.by_points import is_unique, rows_before_a_turn, walk_by_points
+from solver.continuation_settings import ContinuationSettings
 from solver.errors import SettingError
 from solver.fourier import Integer, Real, to_full
 from solver.kernels import walk as walk_states
 from solver.kernels.observe import MAX_ABS
 from solver.kernels.path import begin_walk, walk_on
 from solver.kernels.walk import Control, walk_by_value
-from solver.peaks import Points, Survey, band_limit
+from solver.loose_parts import balanced_part
+from solver.nodes import Points
+from solver.peaks import Survey, band_limit
 from solver.savings import Effects
 from solver.scene import Scene
 from solver.stretches import Stretch, go_on_from, joined, rows_of, state_of
+from solver.symmetry import branch_flags
+from solver.walk_ends import MANY, ratchets_ahead, stands_still, taken_up, too_stiff
 from solver.workspace import Workspace
 
 _STRETCH = 64  # points between two looks at the caller, at most
 _SHORT_STRETCH = 4  # the first of them where a point may take long
 _LARGE = 400  # unknowns from which it may
 _STRETCH_SECONDS = 0.5
-
-
-class Predictor(IntEnum):
-    """How the next point is guessed."""
-
-    TANGENT = walk_states.TANGENT
-    SECANT = walk_states.SECANT
-    CUBIC = walk_states.CUBIC
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ContinuationSettings:
-    """Settings of a continuation; arc length is relative to the size of u and to a share of the range of λ.
-
-    Attributes
-    ----------
-    predictor : Predictor
-        How the next point is guessed.
-    first_step, largest_step, smallest_step : float
-        Arc length steps.
-    range_length : float
-        Arc length of the whole range of λ if u did not change: more gives a finer branch.
-    wanted_iterations : int
-        Newton iterations of a step that is neither lengthened nor shortened.
-    most_iterations : int
-        Newton iterations after which a step is halved.
-    largest_turn : float
-        Distance from predicted to corrected point, relative to the step, beyond which a step is halved.
-    most_points : int
-        Points after which the branch ends with a status.
-    """
-
-    predictor: Predictor = Predictor.CUBIC
-    first_step: float = 0.02
-    largest_step: float = 0.2
-    smallest_step: float = 1e-8
-    range_length: float = 14.0
-    wanted_iterations: int = 3
-    most_iterations: int = 8
-    largest_turn: float = 0.3
-    most_points: int = 20_000
+_MOST_FOLLOWED = 500  # points of a look at a resonance beside the branch
+_LOST = (BranchStatus.STALLED, BranchStatus.TURNED_BACK, BranchStatus.TOO_MANY_POINTS)
 
 
 def sweep(
@@ -155,7 +120,7 @@ def sweep(
     workspace = Workspace.of(balance)
     stretches: list[Stretch] = []
     status, count = BranchStatus.TOO_MANY_POINTS, 0
-    for stretch in walk(workspace, first, last, settings, guess, resume):
+    for stretch in _covering(workspace, first, last, settings, guess, resume):
         stretches.append(stretch)
         count += len(stretch.solutions)
         if on_stretch is not None and stretch is not resume:
@@ -173,10 +138,50 @@ def sweep(
             break
         if count >= settings.most_points:
             break
-    if on_progress is not None and status is BranchStatus.COMPLETED:
-        on_progress(1.0, count)
+    if status in _LOST and too_stiff(workspace, stretches):
+        status = BranchStatus.TOO_STIFF
     earlier = 0.0 if resume is None else resume.seconds
-    return _finish(workspace, stretches, status, first, last, limit, begun - earlier)
+    branch = _finish(workspace, stretches, status, first, last, limit, begun - earlier)
+    if on_progress is not None and branch.completed:
+        on_progress(1.0, len(branch.values))
+    return branch
+
+
+def _covering(
+    workspace: Workspace, start: float, stop: float, settings: ContinuationSettings, guess: Real | None,
+    resume: Stretch | None,
+) -> Iterator[Stretch]:  # fmt: skip
+    """Yield the branch as `walk` does; what cannot be followed is solved by points where it is unique."""
+    begun = time.perf_counter() - (0.0 if resume is None else resume.seconds)
+    balance = workspace.balance
+    first, last = balance.parameter.inside(start), balance.parameter.inside(stop)
+    unique = is_unique(balance)
+    before, earlier = None, None
+    if resume is not None and len(resume.solutions) and not resume.walk.size:
+        before = resume
+        yield resume
+    else:
+        for found in walk(workspace, start, stop, settings, guess, resume):
+            stretch = found if found is resume else balanced_part(workspace, found)
+            turned = rows_before_a_turn(stretch, first, last) if unique else None
+            lost = unique and stretch.status in (BranchStatus.STALLED, BranchStatus.TURNED_BACK)
+            if turned is None and not lost:
+                yield stretch
+                if stretch is not found:
+                    return
+                earlier = stretch
+                continue
+            before = stretch.first(len(stretch.solutions) if turned is None else turned)
+            if len(before.solutions):
+                yield before
+            elif earlier is not None:
+                before = earlier.first(len(earlier.solutions))
+            else:
+                yield stretch
+                return
+            break
+    if before is not None and before.status is None:
+        yield from walk_by_points(workspace, before, last, abs(last - first), begun)
 
 
 def _curve(balance: Balance, stretch: Stretch) -> tuple[Real, Real]:
@@ -230,30 +235,43 @@ def walk(
         found = workspace.solve(control.start, guess)
         spent = found.iterations
         if not found.converged:
-            yield _no_start(balance, spent, begun)
+            yield _no_start(balance, spent, begun, ratchets=found.ratchets)
             return
         code, state = begin_walk(system, linear, point, control, found.u)
     else:
         state, spent = go_on_from(workspace, control, resume)
         code = walk_states.RUNNING if resume.status is None else walk_states.FINISHED
         yield resume
+    last = np.zeros((0, balance.n_unknowns + 1))
     size = _STRETCH if balance.n_unknowns <= _LARGE else _SHORT_STRETCH
     while code == walk_states.RUNNING:
         rows, before = rows_of(balance, size), time.perf_counter()
         code, count = walk_on(system, linear, point, control, state, size, *rows)
-        yield _stretch(rows, count, ENDINGS.get(code), state, spent, begun)
+        last = np.concatenate([last, rows[0][:count]])[-MANY:]
+        if code == walk_states.RUNNING and stands_still(last, control):
+            code = walk_states.STALLED
+        status, again = ENDINGS.get(code), None
+        if status is BranchStatus.STALLED:
+            again = taken_up(workspace, control, state, last)
+        if again is not None:
+            status, code = None, walk_states.RUNNING
+        elif status is BranchStatus.STALLED and ratchets_ahead(workspace, state, control):
+            status = BranchStatus.RATCHETS
+        yield _stretch(rows, count, status, state, spent, begun)
+        state = state if again is None else again
         elapsed = time.perf_counter() - before
         size = min(_STRETCH, max(1, int(size * min(2.0, _STRETCH_SECONDS / max(elapsed, 1e-9)))))
     if code == walk_states.NO_START:
         yield _no_start(balance, spent, begun)
 
 
-def _no_start(balance: Balance, iterations: int, begun: float) -> Stretch:
+def _no_start(balance: Balance, iterations: int, begun: float, *, ratchets: bool = False) -> Stretch:
     """Return the stretch of a branch that could not begin."""
     rows = rows_of(balance, 0)
     return Stretch(
         solutions=rows[0], tangents=rows[1], states=rows[2], observed=rows[3], measures=rows[4],
-        status=BranchStatus.NO_START, newton_iterations=iterations, rejected_steps=0, stepped_over=0,
+        status=BranchStatus.RATCHETS if ratchets else BranchStatus.NO_START, newton_iterations=iterations,
+        rejected_steps=0, stepped_over=0,
         seconds=time.perf_counter() - begun, walk=np.zeros(0),
     )  # fmt: skip
 
@@ -280,19 +298,43 @@ def _finish(
     """Put the stretches together, polish the peaks and measure the band."""
     balance = workspace.balance
     whole = joined(stretches)
-    solutions, tangents, measures = whole.solutions, whole.tangents, whole.measures
-    points = Points(solutions=solutions, tangents=tangents, measures=measures)
-    survey = Survey(workspace, points)
+    survey = _survey(workspace, whole)
     at = band_limit(limit, survey.peaks, balance.parameter.kind)
     band = None if at is None else survey.band(at)
+    points = survey.points
+    follow = None if status is BranchStatus.STOPPED else highest_between
     return Branch(
         balance=balance, status=status, start=start, stop=stop,
-        values=balance.parameter.all_outside(solutions[:, -1].copy()), solutions=solutions,
-        tangents=tangents, observed=to_full(whole.observed, balance.system.ks, balance.n_harmonics),
-        measures=measures, states=whole.states,
-        peaks=survey.peaks,
-        band=band, error_estimate=peak_error(workspace, survey.peaks),
+        values=balance.parameter.all_outside(points.solutions[:, -1].copy()), solutions=points.solutions,
+        tangents=points.tangents,
+        observed=to_full(points.observed, balance.system.ks, balance.highest_harmonic),
+        measures=points.measures, states=points.states, peaks=survey.peaks,
+        band=band, error_estimate=branch_error(workspace, points, survey.peaks, follow),
         newton_iterations=whole.newton_iterations + survey.spent,
         rejected_steps=whole.rejected_steps, stepped_over=whole.stepped_over,
         seconds=time.perf_counter() - begun,
+        flags=branch_flags(workspace, points.solutions),
+        peak_certificate=survey.certificate(completed=status is BranchStatus.COMPLETED),
     )  # fmt: skip
+
+
+def _survey(workspace: Workspace, whole: Stretch) -> Survey:
+    """Return the survey of peaks between the points of a branch."""
+    points = Points(
+        solutions=whole.solutions, tangents=whole.tangents, measures=whole.measures, observed=whole.observed,
+        states=whole.states,
+    )  # fmt: skip
+    return Survey(workspace, points)
+
+
+def highest_between(balance: Balance, low: float, high: float, guess: Real) -> Peak | None:
+    """Return the highest peak of a balance between two λ (inside unit), from `guess`; None without one."""
+    workspace, outside = Workspace.of(balance), balance.parameter.outside
+    stretches: list[Stretch] = []
+    ends = float(outside(low)), float(outside(high))
+    for stretch in walk(workspace, *ends, ContinuationSettings(), guess):
+        stretches.append(stretch)
+        if sum(len(each.solutions) for each in stretches) >= _MOST_FOLLOWED:
+            break
+    survey = _survey(workspace, joined(stretches))
+    return survey.peaks[0] if survey.peaks else None

@@ -72,7 +72,7 @@ def point_variables(
     observed : (P, 2H + 1) full coefficients of the observed DOF [m].
     states : names of the contacts, and their states by number, (P, n_contacts).
     """
-    from solver.response import state_of
+    from solver.contact_response import state_of
 
     told = {
         "parameter": (unit, path), "amplitude": ("m", AMPLITUDE),
@@ -123,11 +123,13 @@ def solution_dataset(solution: Solution) -> Dataset:
     """Harmonics of the observed DOF and of every contact, and one period in time."""
     top, names = solution.n_harmonics, [contact.name for contact in solution.contacts]
     share = np.linspace(0.0, 1.0, _SAMPLES, endpoint=False)
-    functions = basis(2.0 * np.pi * share, top)
+    functions = basis(2.0 * np.pi * share, solution.highest_harmonic)
     variables = {
         "time": column("time", share / solution.frequency_hz, "s", "from the start of a period"),
         "displacement": column("time", functions @ solution.observed, "m", "of the observed DOF"),
-        "harmonic": column("harmonic", np.arange(top + 1), "", "multiple of the excitation frequency"),
+        "harmonic": column(
+            "harmonic", np.arange(solution.highest_harmonic + 1), "", "multiple of the excitation frequency"
+        ),
         **harmonics(solution.observed, ("harmonic",), "displacement", "m"),
     }
     if names:

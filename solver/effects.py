@@ -244,9 +244,15 @@ def _stuck_force(balance: Balance) -> Real:
 def _even_harmonics(balance: Balance) -> Effect:
     count = f"{balance.n_coefficients} coefficients a contact"
     reason = even_harmonics_reason(balance.scene)
+    beyond = balance.system.ks[balance.system.ks > balance.n_harmonics]
+    if beyond.size:
+        count += f"; beyond {balance.n_harmonics} those that forces call for: " + ", ".join(map(str, beyond))
     if reason is None and balance.system.ks[0] != 0:
         odd = ", ".join(str(k) for k in balance.system.ks[:3])
-        reason = f"loads are constant and forces odd, so the response is half-wave symmetric: {odd} … only"
+        reason = (
+            "loads are constant, forces odd and no stiffness changes with the motion, so the response is "
+            f"half-wave symmetric: {odd} … only"
+        )
         return Effect(name="even harmonics and mean", used=False, reason=f"{reason}, {count}")
     reason = reason or "they were asked for"
     return Effect(

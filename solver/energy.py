@@ -67,7 +67,7 @@ def power_balance(solution: Solution) -> PowerBalance:
     """
     model = linear_model(solution.scene)
     put_in = taken = 0.0
-    for k in range(solution.n_harmonics + 1):
+    for k in range(solution.highest_harmonic + 1):
         speed = 2.0 * math.pi * solution.frequency_hz * k
         velocity = 1j * speed * coordinates(solution, k)
         force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]

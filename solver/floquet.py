@@ -146,7 +146,7 @@ def branch_stability(branch: Branch, points: Iterable[int] | None = None) -> tup
         if not -len(branch.values) <= i < len(branch.values):
             raise SettingError("points", i, f"must be indices of a branch of {len(branch.values)} points")
         value = float(branch.values[i])
-        slips = fourier.to_full(branch.coefficients[i], balance.system.ks, balance.n_harmonics)
+        slips = fourier.to_full(branch.coefficients[i], balance.system.ks, balance.highest_harmonic)
         if branch.parameter == "frequency":
             found.append(_stability(balance.scene, value, slips))
         else:

@@ -8,11 +8,11 @@ and followed. That costs half a response a place, and proves nothing: what is no
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 
+from solver.allowance import HaltedError
 from solver.fourier import Real
 from solver.kernels.track import HEIGHT
 from solver.lowest import Lowest, flat, minima
@@ -26,16 +26,13 @@ SAME = 1e-6  # share of the range within which two minima are one
 ROUNDING = 1e-7  # relative distance within which heights are equal
 
 
-def with_further(
-    tracker: Tracker, found: list[Lowest], count: int, should_stop: Callable[[], bool] | None
-) -> tuple[list[Lowest], bool]:
+def with_further(tracker: Tracker, found: list[Lowest], count: int) -> tuple[list[Lowest], bool]:
     """Look for further basins beside a proven optimum.
 
     Parameters
     ----------
     found : minima, the proven optimum first.
     count : how many minima are solved for.
-    should_stop : asked before every glance.
 
     Returns
     -------
@@ -45,19 +42,31 @@ def with_further(
     best, before = found[0], len(tracker.lines)
     if flat(tracker):
         return found, True
-    tracker.follow_up_to(NEAR)
-    while _look_further(tracker, best.height * NEAR, should_stop):
-        continue
-    kept = _listed(tracker, best, count)
-    while _look_at(tracker, kept[1:], count, should_stop):
-        kept = _listed(tracker, best, count)
-    new = [line for line in tracker.lines[before:] if line.low <= best.z <= line.high]
-    here = [row for row in (tracker.exact(line, best.z, fitting=False) for line in new) if row is not None]
-    higher = any(row[HEIGHT] > best.height * (1.0 + ROUNDING) for row in here)
+    try:
+        kept = _met(tracker, best, count)
+        new = [line for line in tracker.lines[before:] if line.low <= best.z <= line.high]
+        here = [tracker.exact(line, best.z, fitting=False) for line in new]
+    except HaltedError as halt:
+        tracker.allowance.end(halt.status)
+        # Nothing is solved for any more: the cubics have to do.
+        heights = [line.heights(np.array([best.z]))[0] for line in tracker.lines[before:]]
+        return found, all(height <= best.height * (1.0 + ROUNDING) for height in heights)
+    higher = any(row is not None and row[HEIGHT] > best.height * (1.0 + ROUNDING) for row in here)
     return kept, not higher and all(one.height >= best.height * (1.0 - ROUNDING) for one in kept)
 
 
-def _look_further(tracker: Tracker, height: float, should_stop: Callable[[], bool] | None) -> bool:
+def _met(tracker: Tracker, best: Lowest, count: int) -> list[Lowest]:
+    """Look wherever there is reason to, and return the optimum and the other minima."""
+    tracker.follow_up_to(NEAR)
+    while _look_further(tracker, best.height * NEAR):
+        continue
+    kept = _listed(tracker, best, count)
+    while _look_at(tracker, kept[1:], count):
+        kept = _listed(tracker, best, count)
+    return kept
+
+
+def _look_further(tracker: Tracker, height: float) -> bool:
     """Glance at the middle of every stretch that is lower than `height` and was not looked at.
 
     Returns
@@ -66,24 +75,22 @@ def _look_further(tracker: Tracker, height: float, should_stop: Callable[[], boo
     """
     before = len(tracker.lines)
     for low, high in _stretches(tracker, height):
-        stopped = should_stop is not None and should_stop()
-        if stopped or len(tracker.glances) >= MOST_GLANCES:
+        if len(tracker.glances) >= MOST_GLANCES:
             break
+        tracker.ask()
         _follow_new(tracker, 0.5 * (low + high), height)
     return len(tracker.lines) > before
 
 
-def _look_at(
-    tracker: Tracker, found: list[Lowest], count: int, should_stop: Callable[[], bool] | None
-) -> bool:
+def _look_at(tracker: Tracker, found: list[Lowest], count: int) -> bool:
     """Glance at minima that no look is near; return whether there is a new line."""
     before = len(tracker.lines)
     for one in found:
         if not one.solved or np.abs(_taken(tracker) - one.z).min() <= 0.5 * APART * tracker.scale.span:
             continue
-        stopped = should_stop is not None and should_stop()
-        if stopped or len(tracker.glances) >= MOST_GLANCES + count - 1:
+        if len(tracker.glances) >= MOST_GLANCES + count - 1:
             break
+        tracker.ask()
         _follow_new(tracker, one.z, one.height * NEAR)
     return len(tracker.lines) > before
 

@@ -31,7 +31,7 @@ def motion(solution: Solution) -> Real:
     SettingError
         The solution did not converge.
     """
-    amplitudes = [response(solution, k) for k in range(solution.n_harmonics + 1)]
+    amplitudes = [response(solution, k) for k in range(solution.highest_harmonic + 1)]
     return fourier.to_real(np.array(amplitudes).T)
 
 
@@ -47,7 +47,7 @@ def time_history(solution: Solution, dof: str, *, samples: int = 512) -> tuple[R
     if dof not in dofs:
         raise SettingError("dof", dof, f"must be one of {listing(dofs)}")
     tau = _angles(samples)
-    x = fourier.basis(tau, solution.n_harmonics) @ motion(solution)[dofs.index(dof)]
+    x = fourier.basis(tau, solution.highest_harmonic) @ motion(solution)[dofs.index(dof)]
     return tau / (2.0 * math.pi * solution.frequency_hz), x
 
 
@@ -69,7 +69,7 @@ def hysteresis_loop(solution: Solution, contact: str, *, samples: int = 512) -> 
         raise SettingError("contact", contact, f"must be one of {listing(names)}")
     at = names.index(contact)
     given, found = solution.scene.contacts[at], solution.contacts[at]
-    basis = fourier.basis(tau, solution.n_harmonics)
+    basis = fourier.basis(tau, solution.highest_harmonic)
     return basis @ found.slip, force_at(given, found, tau)
 
 
@@ -98,6 +98,26 @@ def coordinates(solution: Solution, k: int) -> Complex:
     speed = 2.0 * math.pi * solution.frequency_hz * k
     dynamic = K - speed**2 * model.M + 1j * speed * C
     return np.asarray(np.linalg.solve(dynamic, force - L.conj().T @ friction), dtype=np.complex128)
+
+
+def all_coordinates(solution: Solution) -> Complex:
+    """Return the complex amplitudes of all coordinates for every harmonic at once, (H + 1, n)."""
+    _check_converged(solution)
+    model = linear_model(solution.scene)
+    ks = np.arange(solution.highest_harmonic + 1)
+    turns = np.exp(1j * ks * model.interblade_phase)[:, None, None]
+    K = model.K0 + model.Kp * turns + model.Kp.T / turns
+    C = model.C0 + model.Cp * turns + model.Cp.T / turns
+    L = model.contact_here + model.contact_next * turns
+    forces = [fourier.to_complex(force) for c in solution.contacts for force in c.forces]
+    friction = np.array(forces, dtype=np.complex128).reshape(-1, ks.size).T
+    if solution.contacts:
+        kt = port_stiffnesses(solution.scene, model)
+        friction[0] -= kt * np.array([motion[0] for c in solution.contacts for motion in c.motions])
+        K[0] += L[0].conj().T @ (kt[:, None] * L[0])
+    speed = (2.0 * math.pi * solution.frequency_hz * ks)[:, None, None]
+    pushes = force_amplitudes(model, ks) - np.einsum("kpn,kp->kn", L.conj(), friction)
+    return np.asarray(np.linalg.solve(K - speed**2 * model.M + 1j * speed * C, pushes[:, :, None])[:, :, 0])
 
 
 def matrices(model: LinearModel, k: int) -> tuple[Complex, Complex, Complex]:

@@ -8,20 +8,20 @@ optimum from above: where a line is higher than that it only has to show that it
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
+from solver.allowance import RESPONSES, Allowance, HaltedError
 from solver.errors import SettingError
-from solver.fourier import Real
 from solver.further import NEAR, with_further
-from solver.kernels.track import DHEIGHT, HEIGHT, OMEGA, Z
-from solver.lines import Look, Pace
-from solver.lowest import DOUBT, Lowest, flat, minima
-from solver.peak_tracks import ActivePeak, Basin, LeastPeak, TrackStatus
+from solver.lines import Pace
+from solver.lowest import DOUBT, Lowest, flat, minima, rows_at
+from solver.peak_tracks import ChosenBy, LeastPeak, TrackStatus
+from solver.plateau import Plateau, all_level, choose, dips, interval, look_at
+from solver.proof import judge, result_of, seen
 from solver.ridges import Tracker
 from solver.savings import Effects
 from solver.scene import Scene
@@ -30,14 +30,13 @@ from solver.tighten import tighten
 COMPETES = 0.6  # share of the highest peak of a sweep from which a peak is followed
 CLOSE = 0.97  # the same once the least highest peak is being closed in on
 RIVAL = 0.9  # the same for a peak of max x or −min x that the other of the two hides
-HIGHER = 1e-7  # relative height by which a sweep must exceed the lines to count as higher
-EQUAL = 1e-7  # relative distance within which peaks count as equally high
 MOST_LOOKS = 40
 GAP = 2e-3  # share of the range below which a gap between lines is no gap
-SAME_PLACE = 1e-9  # likewise of two places
-LEVEL = 1e-6  # relative change of the peak over the range below which it does not fall at an end
 WIDE = 1.3  # times the best peak: how high other basins may be that are looked for thoroughly
 COARSE = 0.08  # share of the range: sweeps closer than that do not look for other basins between them
+REOPENED = 5  # times a proven optimum is given up because of what lies beside it
+SHORT = 5e-3  # share of the range: a line in a gap that is shorter is followed again with shorter steps
+THOROUGHLY = 3.0  # times the work allowed, where other basins are looked for thoroughly
 _STARTS = (0.5, 0.25, 0.75, 0.0, 1.0)  # shares of the range where the first sweep is tried
 _PACE = Pace(
     first_step=0.02, largest_step=0.25, smallest_step=1e-3, height_error=6e-3, omega_error=2e-3, above=1.005,
@@ -77,7 +76,7 @@ def least_peak(
         times as high as the optimum, and check as many of them as are asked for by a sweep each.
     effects : what is paid for though the scene does not call for it.
     on_progress : called after every sweep with (share done, as far as that is known; sweeps so far).
-    should_stop : asked before every sweep; once the optimum is proven it only ends the coarse stage.
+    should_stop : asked several times a second; once the optimum is proven it only ends the coarse stage.
 
     Raises
     ------
@@ -88,7 +87,8 @@ def least_peak(
     if isinstance(basins, bool) or not isinstance(basins, int) or basins < 1:
         raise SettingError("basins", basins, "must be a whole number >= 1")
     pace = replace(_PACE, above=WIDE) if thorough and basins > 1 else _PACE
-    tracker = Tracker(scene, parameter, low, high, harmonics, effects, pace)
+    allowance = Allowance(should_stop, RESPONSES * (THOROUGHLY if thorough else 1.0))
+    tracker = Tracker(scene, parameter, low, high, harmonics, effects, pace, allowance)
     scale = tracker.scale
     places = [scale.low + share * scale.span for share in _STARTS]
     if first is not None:
@@ -96,21 +96,28 @@ def least_peak(
         if not scale.low <= z <= scale.high:
             raise SettingError("first", first, f"must be from {min(low, high)} to {max(low, high)}")
         places.insert(0, z)
+    try:
+        _begin(tracker, places, on_progress)
+    except HaltedError as halt:
+        best = halted(tracker, halt.status, begun)
+    else:
+        best = prove(tracker, CLOSE, begun, basins=basins, thorough=thorough, on_progress=on_progress)
+    if on_progress is not None:
+        on_progress(1.0, best.sweeps)
+    return best
+
+
+def _begin(tracker: Tracker, places: list[float], on_progress: Callable[[float, int], None] | None) -> None:
+    """Sweep at the first of some places that shows a peak, and follow what competes there."""
     for z in places:
-        if tracker.lines or (should_stop is not None and should_stop()):
+        if tracker.lines:
             break
+        tracker.ask()
         look = tracker.look(z)
         tracker.follow(look, COMPETES)
         tracker.follow_rivals(look, RIVAL)
         if on_progress is not None:
             on_progress(_share_done(tracker), len(tracker.looks))
-    best = prove(
-        tracker, CLOSE, begun, basins=basins, thorough=thorough, on_progress=on_progress,
-        should_stop=should_stop,
-    )  # fmt: skip
-    if on_progress is not None:
-        on_progress(1.0, best.sweeps)
-    return best
 
 
 def prove(
@@ -121,7 +128,7 @@ def prove(
     basins: int = 1,
     thorough: bool = False,
     on_progress: Callable[[float, int], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    nested: bool = False,
 ) -> LeastPeak:
     """Sweep at the least point of the lines until nothing higher is found there, and where no line is.
 
@@ -130,33 +137,101 @@ def prove(
     tracker : with what is followed already.
     share : of the highest peak of a sweep from which another peak of it is followed.
     begun : when the work began, for the time it took.
-    basins, thorough, on_progress, should_stop : as for `least_peak`.
+    basins, thorough, on_progress : as for `least_peak`.
+    nested : whether a search of the highest peak has led to this one of other peaks.
+
+    Raises
+    ------
+    HaltedError
+        A nested search, if the end came before the proof.
     """
+    try:
+        status, found, plateau = _search(tracker, share, basins, thorough, nested, on_progress)
+    except HaltedError as halt:
+        if nested:
+            raise
+        return halted(tracker, halt.status, begun)
+    return result_of(tracker, found, status, begun, plateau)
+
+
+def _search(
+    tracker: Tracker, share: float, basins: int, thorough: bool, nested: bool,
+    on_progress: Callable[[float, int], None] | None,
+) -> tuple[TrackStatus, list[Lowest], Plateau | None]:  # fmt: skip
+    """Return how the search of `prove` ended, the minima of the lines, and the interval of the first."""
     doubt = WIDE - 1.0 if thorough and basins > 1 else DOUBT
     checked = basins if thorough else 1
     status: TrackStatus | None = None
     found: list[Lowest] | None = None
     settled: list[float] = []
+    plateau: Plateau | None = None
+    reopened = 0
     while status is None:
         found = None
-        if should_stop is not None and should_stop():
-            status = TrackStatus.STOPPED
-        elif not tracker.lines:
+        tracker.ask()
+        if not tracker.lines:
             status = TrackStatus.NO_RESPONSE
         elif len(tracker.looks) >= MOST_LOOKS:
             status = TrackStatus.UNPROVEN
         else:
-            before = _sweeps(tracker)
+            before = tracker.sweeps
             status, found = _next_step(tracker, share, checked, doubt, settled)
             if status is TrackStatus.TRACKED and found and basins > checked:
-                found, standing = with_further(tracker, found, basins, should_stop)
+                found, standing = with_further(tracker, found, basins)
                 if not standing:
                     status, doubt = None, NEAR - 1.0
-            if on_progress is not None and _sweeps(tracker) > before:
-                on_progress(_share_done(tracker), _sweeps(tracker))
-    if found is None:
-        found = minima(tracker, doubt)
-    return _least(tracker, found, status, begun)
+            if status is TrackStatus.TRACKED and found and reopened < REOPENED:
+                plateau, standing = _settle(tracker, found[0], share, nested)
+                status, reopened = (status, reopened) if standing else (None, reopened + 1)
+            if on_progress is not None and tracker.sweeps > before:
+                on_progress(_share_done(tracker), tracker.sweeps)
+    found = minima(tracker, doubt) if found is None else found
+    return status, found if plateau is None else [plateau.chosen, *found[1:]], plateau
+
+
+def _settle(tracker: Tracker, best: Lowest, share: float, nested: bool) -> tuple[Plateau | None, bool]:
+    """Choose a place where the highest peak is the same over an interval.
+
+    Returns
+    -------
+    The interval with the place (None: the optimum is sharp), and whether the proof stands: the sweeps that
+    are made to choose may find something higher.
+    """
+    low, high = tracker.scale.low, tracker.scale.high
+    if tracker.allowance.ended:
+        return None, True
+    if flat(tracker):
+        look = seen(tracker, best.z)
+        if look is None or all_level(tracker, look):
+            return Plateau(low=low, high=high, chosen=best, by=ChosenBy.NOTHING), True
+    ends = interval(tracker, best)
+    if ends is None:
+        return None, True
+    if dips(tracker, ends, best.height):
+        return None, False
+    looks = look_at(tracker, *ends)
+    for look in looks:
+        verdict = judge(look, best)
+        if verdict is not TrackStatus.TRACKED:
+            return None, not (verdict is TrackStatus.UNPROVEN and tracker.follow(look, share))
+    z, by = choose(tracker, looks, None if nested else _prove_nested)
+    look, rows = seen(tracker, z) or tracker.look(z), rows_at(tracker, z)
+    verdict = judge(look, best)
+    if verdict is not TrackStatus.TRACKED or not rows:
+        return None, not (verdict is TrackStatus.UNPROVEN and tracker.follow(look, share))
+    chosen = replace(best, z=z, rows=rows)
+    return Plateau(low=ends[0], high=ends[1], chosen=chosen, by=by), True
+
+
+def _prove_nested(tracker: Tracker, begun: float) -> LeastPeak:
+    """Return the least of the peaks that count in a part of the range."""
+    return prove(tracker, CLOSE, begun, nested=True)
+
+
+def halted(tracker: Tracker, status: TrackStatus, begun: float) -> LeastPeak:
+    """Return what is known where the end came before the proof."""
+    tracker.allowance.end(status)
+    return result_of(tracker, minima(tracker) if tracker.lines else [], status, begun)
 
 
 def _next_step(
@@ -174,23 +249,20 @@ def _next_step(
     """
     gap = _gap(tracker)
     if gap is not None:
-        look = tracker.look(gap)
-        new = tracker.follow(look, 1.0 if look.top > tracker.enough else share)
-        new = new or tracker.follow(look, COMPETES)
-        return (None if new else TrackStatus.GAPS), None
+        return (None if _filled(tracker, gap, share) else TrackStatus.GAPS), None
     if tighten(tracker, doubt):
         return None, None
     found = minima(tracker, doubt)
     if not found[0].solved:
         at = found[0].z
-        new = _seen(tracker, at) is None and tracker.follow(tracker.look(at), share)
+        new = seen(tracker, at) is None and tracker.follow(tracker.look(at), share, careful=True)
         return (None, None) if new else (TrackStatus.GAPS, found)
     for rank, one in enumerate(found[:basins]):
         if not one.solved or one.z in settled:
             continue
-        look = _seen(tracker, one.z) or tracker.look(one.z)
-        verdict = _judge(look, one)
-        if verdict is TrackStatus.UNPROVEN and tracker.follow(look, share, one.rows):
+        look = seen(tracker, one.z) or tracker.look(one.z)
+        verdict = judge(look, one)
+        if verdict is TrackStatus.UNPROVEN and tracker.follow(look, share, one.rows, careful=True):
             return None, None
         if rank == 0 and (verdict is not TrackStatus.TRACKED or not one.bracketed):
             return TrackStatus.UNPROVEN if verdict is TrackStatus.TRACKED else verdict, found
@@ -201,6 +273,22 @@ def _next_step(
             tracker.follow(tracker.look(place), RIVAL)
             return None, None
     return TrackStatus.TRACKED, found
+
+
+def _filled(tracker: Tracker, gap: float, share: float) -> bool:
+    """Follow what a sweep in a gap between lines shows; return whether there is a new line."""
+    look, before = tracker.look(gap), len(tracker.lines)
+    share = 1.0 if look.top > tracker.enough else share
+    for careful in (False, True):
+        for enough in (share, COMPETES):
+            if tracker.follow(look, enough, careful=careful):
+                break
+        longest = max((line.high - line.low for line in tracker.lines[before:]), default=0.0)
+        if careful or longest > SHORT * tracker.scale.span:
+            break
+        # Lines ended here before: what is between may change fast, and is followed again with short steps.
+        del tracker.lines[before:]
+    return len(tracker.lines) > before
 
 
 def _unseen(tracker: Tracker, height: float) -> float | None:
@@ -214,28 +302,8 @@ def _unseen(tracker: Tracker, height: float) -> float | None:
 
 def _share_done(tracker: Tracker) -> float:
     """Return a guess of the share done: how many sweeps are to come is not known."""
-    sweeps = _sweeps(tracker)
+    sweeps = tracker.sweeps
     return sweeps / (sweeps + 1.0)
-
-
-def _sweeps(tracker: Tracker) -> int:
-    """Return how many responses were computed, those with fewer harmonics included."""
-    return len(tracker.looks) + len(tracker.glances)
-
-
-def _seen(tracker: Tracker, z: float) -> Look | None:
-    """Return the sweep made at z, if one was."""
-    near = SAME_PLACE * tracker.scale.span
-    return next((look for look in tracker.looks if abs(look.z - z) <= near), None)
-
-
-def _judge(look: Look, best: Lowest) -> TrackStatus:
-    """Compare a sweep at a least point with the lines there."""
-    if not look.branch.completed or look.top > best.height * (1.0 + HIGHER):
-        return TrackStatus.UNPROVEN
-    if look.top < best.height * (1.0 - HIGHER):
-        return TrackStatus.OTHER_BRANCH
-    return TrackStatus.TRACKED
 
 
 def _gap(tracker: Tracker) -> float | None:
@@ -248,64 +316,3 @@ def _gap(tracker: Tracker) -> float | None:
     if tracker.scale.high - reached > widest:
         middle = 0.5 * (reached + tracker.scale.high)
     return middle
-
-
-def _least(tracker: Tracker, found: list[Lowest], status: TrackStatus, begun: float) -> LeastPeak:
-    """Put the result together."""
-    if not found:
-        return LeastPeak(
-            status=status, at=math.nan, peak=math.nan, active=(), basins=(), branch=None,
-            sweeps=_sweeps(tracker), work=_work(tracker, None), seconds=time.perf_counter() - begun,
-        )  # fmt: skip
-    best, look = found[0], _seen(tracker, found[0].z)
-    active = tuple(_active(tracker, row) for row in _highest(best.rows))
-    if status is TrackStatus.TRACKED:
-        status = _refined(tracker, best)
-    return LeastPeak(
-        status=status, at=tracker.scale.outside(best.z), peak=best.height, active=active,
-        basins=tuple(_basin(tracker, one) for one in found), branch=None if look is None else look.branch,
-        sweeps=_sweeps(tracker), work=_work(tracker, look), seconds=time.perf_counter() - begun,
-    )  # fmt: skip
-
-
-def _refined(tracker: Tracker, best: Lowest) -> TrackStatus:
-    """Tell an optimum within the range from one at its end, and from a peak that does not change."""
-    if flat(tracker):
-        return TrackStatus.FLAT
-    slopes = [float(row[DHEIGHT]) for row in _highest(best.rows)]
-    level = LEVEL * best.height / tracker.scale.span
-    if (best.z == tracker.scale.low and min(slopes) > level) or (
-        best.z == tracker.scale.high and max(slopes) < -level
-    ):
-        return TrackStatus.AT_BOUND
-    return TrackStatus.TRACKED
-
-
-def _highest(rows: Mapping[int, Real]) -> list[Real]:
-    """Return the rows that are as high as the highest."""
-    top = max((float(row[HEIGHT]) for row in rows.values()), default=math.inf)
-    return [row for row in rows.values() if row[HEIGHT] >= top * (1.0 - EQUAL)]
-
-
-def _basin(tracker: Tracker, one: Lowest) -> Basin:
-    look = _seen(tracker, one.z)
-    proven = one.solved and look is not None and _judge(look, one) is TrackStatus.TRACKED
-    return Basin(at=tracker.scale.outside(one.z), peak=one.height, solved=one.solved, proven=proven)
-
-
-def _work(tracker: Tracker, look: Look | None) -> float:
-    """Return the Newton iterations of everything in units of one sweep; 0 before the first."""
-    if not tracker.looks:
-        return 0.0
-    swept = sum(one.branch.newton_iterations for one in tracker.looks)
-    unit = swept / len(tracker.looks) if look is None else look.branch.newton_iterations
-    glanced = sum(one.iterations for one in tracker.glances)
-    return (swept + glanced + tracker.spent) / max(unit, 1)
-
-
-def _active(tracker: Tracker, row: Real) -> ActivePeak:
-    p = np.array([tracker.scale.outside(float(row[Z]))])
-    return ActivePeak(
-        frequency=float(row[OMEGA]) / (2.0 * math.pi), value=float(row[HEIGHT]),
-        slope=float(row[DHEIGHT] / tracker.scale.by_z(p)[0]),
-    )  # fmt: skip

@@ -6,19 +6,24 @@ Between its rows a line is the cubic through exact values and slopes.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
+from solver.allowance import Allowance, HaltedError
 from solver.balance import build
-from solver.branch import Branch
-from solver.continuation import ContinuationSettings, walk
+from solver.branch import Branch, Peak
+from solver.continuation import sweep, walk
+from solver.continuation_settings import ContinuationSettings
 from solver.fourier import Integer, Real
 from solver.kernels.track import DHEIGHT, DOMEGA, HEIGHT, OMEGA, Z
+from solver.peak_tracks import TrackStatus
 from solver.rivals import Rival, crests
 from solver.savings import Effects
 from solver.scene import Scene
+from solver.stretches import Stretch
 from solver.workspace import Workspace
 
 
@@ -146,16 +151,22 @@ class Glance:
     iterations: int
 
 
-def glance_at(z: float, scene: Scene, harmonics: int, effects: Effects | None) -> Glance:
+def glance_at(
+    z: float, scene: Scene, harmonics: int, effects: Effects | None, check: Callable[[], None]
+) -> Glance:
     """Walk over the band of a scene; of a walk that does not reach its end the peaks met are returned.
 
     Parameters
     ----------
     z : what the scene stands for.
+    check : called between stretches of the walk; it may raise to end it.
     """
     balance = build(scene, "frequency", harmonics=harmonics, frequency_hz=None, effects=effects)
     low, high = scene.observe.band
-    stretches = list(walk(Workspace.of(balance), low, high, ContinuationSettings()))
+    stretches = []
+    for stretch in walk(Workspace.of(balance), low, high, ContinuationSettings()):
+        stretches.append(stretch)
+        check()
     return Glance(
         z=z,
         crests=tuple(
@@ -169,20 +180,52 @@ def glance_at(z: float, scene: Scene, harmonics: int, effects: Effects | None) -
     )
 
 
+def sweep_within(scene: Scene, harmonics: int, effects: Effects | None, allowance: Allowance) -> Branch:
+    """Sweep over the band of a scene; one that takes far longer than those before is left incomplete.
+
+    Raises
+    ------
+    HaltedError
+        The caller wants it to end.
+    """
+    spent, stopped = 0, False
+
+    def watch(stretch: Stretch) -> None:
+        nonlocal spent
+        spent = stretch.newton_iterations
+
+    def stop() -> bool:
+        nonlocal stopped
+        stopped = allowance.due()
+        return stopped or spent > allowance.longest
+
+    branch = sweep(scene, harmonics=harmonics, effects=effects, on_stretch=watch, should_stop=stop)
+    if stopped:
+        raise HaltedError(TrackStatus.STOPPED)
+    return branch
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """One sweep over the band at one z; surprising if it found what no line had reached."""
+    """One sweep over the band at one z; surprising if it found what no line had reached.
+
+    Attributes
+    ----------
+    peaks : tuple of Peak
+        Those of the branch that count, highest first.
+    """
 
     z: float
     branch: Branch
     surprising: bool
+    peaks: tuple[Peak, ...]
 
     @property
     def top(self) -> float:
         """The highest peak [m]; −inf if there is none."""
-        return self.branch.peaks[0].value if self.branch.peaks else -math.inf
+        return self.peaks[0].value if self.peaks else -math.inf
 
     @property
     def seen(self) -> bool:
         """Whether the whole band was seen."""
-        return self.branch.completed and bool(self.branch.peaks)
+        return self.branch.completed and bool(self.peaks)

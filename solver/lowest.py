@@ -77,7 +77,7 @@ def minima(tracker: Tracker, doubt: float = DOUBT, most: int | None = None) -> l
     if not tracker.lines:
         return []
     if flat(tracker):
-        rows = _solve(tracker, list(range(len(tracker.lines))), tracker.looks[0].z)
+        rows = rows_at(tracker, tracker.looks[0].z)
         if rows:
             top = next(iter(rows.values()))
             height = float(top[HEIGHT])
@@ -95,14 +95,16 @@ def minima(tracker: Tracker, doubt: float = DOUBT, most: int | None = None) -> l
     kept = kept[:1] + [index for index in kept[1:] if heights[index] < tracker.enough]
     if not kept:
         return []
-    limit = heights[kept[0]] * (1.0 + doubt)
-    found = [
-        _solved(tracker, z, heights, index)
-        if heights[index] <= limit and (most is None or rank < most)
-        else Lowest(z=float(z[index]), rows={}, height=float(heights[index]), bracketed=False)
-        for rank, index in enumerate(kept)
-    ]
-    return sorted(found, key=lambda one: one.height)
+    limit, found, rest = heights[kept[0]] * (1.0 + doubt), [], []
+    for rank, index in enumerate(kept):
+        if heights[index] <= limit and (most is None or rank < most):
+            found.append(_solved(tracker, z, heights, index))
+        elif not found or heights[index] < min(one.height for one in found):
+            # What was lower by the cubics is higher: this may be the lowest.
+            found.append(_solved(tracker, z, heights, index))
+        else:
+            rest.append(Lowest(z=float(z[index]), rows={}, height=float(heights[index]), bracketed=False))
+    return sorted(found + rest, key=lambda one: one.height)
 
 
 def _apart(heights: Real, one: int, other: int) -> bool:
@@ -203,6 +205,11 @@ def _solve(tracker: Tracker, near: list[int], z: float) -> dict[int, Real]:
     rows = {index: tracker.exact(tracker.lines[index], z, fitting=False) for index in near}
     found = [(index, row) for index, row in rows.items() if row is not None]
     return dict(sorted(found, key=lambda item: -float(item[1][HEIGHT])))
+
+
+def rows_at(tracker: Tracker, z: float) -> dict[int, Real]:
+    """Return the solved rows at z of all lines that reach it, the highest first."""
+    return _solve(tracker, list(range(len(tracker.lines))), z)
 
 
 def _least(left: Mapping[int, Real], right: Mapping[int, Real]) -> float:

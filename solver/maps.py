@@ -151,7 +151,7 @@ def response_map(
     ridge : track the peaks over the range too.
     effects : what is paid for though the scene does not call for it.
     on_progress : called with (share done, points so far).
-    should_stop : asked between rows, and between the sweeps that look for peaks.
+    should_stop : asked between rows, and several times a second while peaks are looked for.
 
     Returns
     -------

@@ -38,6 +38,10 @@ class MarchStatus(Enum):
         "A contact changes its state without end at one instant: change the load, the stiffness or the "
         "frequency a little."
     )
+    RATCHETS = (
+        "There is no periodic motion: everything repeats from period to period, but a part that contacts "
+        "alone hold drifts by the same distance each period."
+    )
     NOT_FINITE = "The motion grows without bound: use more steps per period."
 
 
@@ -71,6 +75,8 @@ class MarchResult(Shown):
         Periods marched, of both step sizes.
     steps_per_period : int
         Steps of the finer run.
+    drift : float
+        How far the part that RATCHETS moves on in a period [m], else 0.
     error_estimate : float
         Estimated error of `max_abs` relative to it: Richardson's from two step sizes, and what the transient
         has left to decay. It does not see the history a stuck contact remembers (its mean).
@@ -93,6 +99,7 @@ class MarchResult(Shown):
     normal_load: FloatArray
     periods: int
     steps_per_period: int
+    drift: float
     error_estimate: float
     seconds: float
 
@@ -130,7 +137,8 @@ class MarchResult(Shown):
 
     def to_json(self) -> dict[str, object]:
         """The result without its histories, for JSON; a number that does not exist is None."""
-        return {
+        drift = {"drift": self.drift} if self.status is MarchStatus.RATCHETS else {}
+        return drift | {
             "max_abs": _finite(self.max_abs),
             "half_peak_to_peak": _finite(self.half_peak_to_peak),
             "mean": _finite(self.mean),
@@ -158,6 +166,7 @@ def describe(
     frequency_hz: float,
     steps_per_period: int,
     status: MarchStatus,
+    drift: float,
     seconds: float,
 ) -> MarchResult:
     """Read the result of a march from its records.
@@ -172,7 +181,7 @@ def describe(
         What the transient has left to decay, relative.
     contacts : tuple of str
         Names of the contacts.
-    periods, frequency_hz, steps_per_period, status, seconds
+    periods, frequency_hz, steps_per_period, status, drift, seconds
         As in `MarchResult`.
     """
     omega = 2.0 * math.pi * frequency_hz
@@ -196,6 +205,7 @@ def describe(
         normal_load=record.load,
         periods=periods,
         steps_per_period=steps_per_period,
+        drift=drift,
         error_estimate=_step_error(max_abs, coarse, order) + transient,
         seconds=seconds,
     )

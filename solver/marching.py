@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Integral, Real
 
@@ -23,12 +23,14 @@ from solver.march_contacts import columns, rows
 from solver.march_result import MarchResult, MarchStatus, describe
 from solver.matrices.equations import equations
 from solver.scene import CyclicStructure, End, Excitation, LumpedStructure, MatricesStructure, Scene
+from solver.scene_checks import listing
 from solver.sectors import annulus
 
 FloatArray = NDArray[np.float64]
 LEAST_STEPS = 64
 MOST_STEPS = 1_000_000
 SAMPLES_PER_PERIOD = 2048
+REPEATS = 1e-7  # relative change of velocities, forces and of the drift at which a part is said to drift
 BALANCING = 30  # products with full matrices, of mixed units, in the bound of the fastest motion
 MOST_PERIODS, WORK = 50, 2e6  # between two looks at progress and stop: periods, and their rough work
 _STATUS = {
@@ -59,6 +61,7 @@ class _Run:
     status: MarchStatus
     steps: int
     changes: FloatArray
+    drift: float
 
     @property
     def settled(self) -> bool:
@@ -73,15 +76,17 @@ def march(
     steps_per_period: int | None = None,
     tolerance: float = 1e-10,
     max_periods: int = 20_000,
+    tractions: Mapping[str, float] | None = None,
     on_progress: Callable[[float, int], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> MarchResult:
     """March a scene in time from rest, contacts without force, until the motion repeats.
 
     A cyclic scene is marched as its whole annulus. The march is made twice, the second time with half the
-    step and from where the first one ended; the difference gives the error estimate. In full stick the
-    contact forces keep a mean that depends on the history: `mean` and `max_abs` are then those of the start
-    from rest, only `half_peak_to_peak` is a property of the scene.
+    step and from where the first one ended; the difference gives the error estimate. A contact that sticks
+    all the time keeps a force that depends on the history: `mean` and `max_abs` are then those of this start.
+    Under given loads `half_peak_to_peak` is a property of the scene all the same; a load that moves, a gap or
+    a nonlinear spring makes it depend on the history too (`solver.history`).
 
     Parameters
     ----------
@@ -96,6 +101,9 @@ def march(
         largest values.
     max_periods : int
         Limit of the periods for each step size.
+    tractions : mapping, optional
+        Friction forces at the start by the names in `MarchResult.contacts` [N], what assembly may have left;
+        a force beyond the limit there is cut to it. None of a contact that is not named.
     on_progress : callable, optional
         Called with the fraction done (0 to 1, on the scale of the logarithm of the change) and the periods.
     should_stop : callable, optional
@@ -104,7 +112,8 @@ def march(
     Raises
     ------
     SettingError
-        An argument is out of its range, or the scene has a contact with a circular limit.
+        An argument is out of its range, a traction of an unknown contact or of one without friction, or the
+        scene has a contact with a circular limit.
     """
     begin = time.perf_counter()
     _check(frequency_hz, tolerance, max_periods)
@@ -120,7 +129,9 @@ def march(
         on_progress=on_progress,
         should_stop=should_stop,
     )
-    coarse = _run(plan, _at_rest(plan.system), steps // 2, done=0)
+    names = tuple(row.name for row in rows(whole.contacts))
+    start = _with_tractions(plan.system, _at_rest(plan.system), names, tractions or {})
+    coarse = _run(plan, start, steps // 2, done=0)
     fine = _run(plan, coarse.state, steps, done=coarse.changes.size) if coarse.settled else coarse
     periods = coarse.changes.size + (fine.changes.size if coarse.settled else 0)
     if on_progress is not None and fine.settled:
@@ -131,10 +142,11 @@ def march(
         order=kernel.ORDER,
         transient=_left_to_decay(coarse.changes, fine.changes),
         periods=periods,
-        contacts=tuple(row.name for row in rows(whole.contacts)),
+        contacts=names,
         frequency_hz=frequency_hz,
         steps_per_period=fine.steps,
         status=fine.status,
+        drift=fine.drift,
         seconds=time.perf_counter() - begin,
     )
 
@@ -274,11 +286,29 @@ def _at_rest(system: kernel.System) -> kernel.State:
     return kernel.State(np.zeros(n), np.zeros(n), np.zeros(n_contacts), mode)
 
 
+def _with_tractions(
+    system: kernel.System, start: kernel.State, names: tuple[str, ...], tractions: Mapping[str, float]
+) -> kernel.State:
+    """Put friction forces into the contacts of a start, no more than their limits there."""
+    force = start.force.copy()
+    load = np.maximum(system.N0 + system.N1 * np.cos(system.N1_phase), 0.0)
+    for name, traction in tractions.items():
+        if name not in names:
+            raise SettingError("tractions", name, f"must be of contacts with friction: {listing(names)}")
+        at = names.index(name)
+        if system.law[at] not in (kernel.COULOMB, kernel.ELASTIC_NORMAL) or not math.isfinite(traction):
+            raise SettingError("tractions", traction, f"must be a friction force in newtons, of {name!r}")
+        limit = float(system.mu[at] * load[at])
+        force[at] = min(max(float(traction), -limit), limit)
+    return start._replace(force=force)
+
+
 def _run(plan: _Plan, start: kernel.State, steps: int, *, done: int) -> _Run:
     """March until the motion repeats, then one period more with a record."""
     state = kernel.State(start.x.copy(), start.v.copy(), start.force.copy(), start.mode.copy())
     nothing = _record(plan, 0)
     status, changes, fraction = MarchStatus.MAX_PERIODS, np.empty(0), 0.9 if done else 0.0
+    drift, places = 0.0, [_copied(state)]
     many = max(1, min(MOST_PERIODS, int(WORK / (steps * (state.x.size + 8 * state.force.size)))))
     while changes.size < plan.max_periods:
         chunk = np.empty(min(many, plan.max_periods - changes.size))
@@ -288,6 +318,11 @@ def _run(plan: _Plan, start: kernel.State, steps: int, *, done: int) -> _Run:
         changes = np.append(changes, chunk[:periods])
         if code != kernel.RAN:
             status = _STATUS[code]
+            break
+        places = [*places[-2:], _copied(state)]
+        drift = _drift(places) / chunk.size
+        if drift > 0.0:
+            status = MarchStatus.RATCHETS
             break
         if plan.on_progress is not None:
             fraction = max(fraction, _fraction(changes[-1], plan.tolerance))
@@ -299,7 +334,33 @@ def _run(plan: _Plan, start: kernel.State, steps: int, *, done: int) -> _Run:
     if status not in (MarchStatus.CHATTER, MarchStatus.NOT_FINITE):
         code, _ = stepping.run_periods(plan.system, state, steps, 0.0, plan.dof, record, np.empty(1))
         status = _STATUS.get(code, status) if code in (kernel.CHATTER, kernel.NOT_FINITE) else status
-    return _Run(state=state, record=record, status=status, steps=steps, changes=changes)
+    drift = drift if status is MarchStatus.RATCHETS else 0.0
+    return _Run(state=state, record=record, status=status, steps=steps, changes=changes, drift=drift)
+
+
+def _copied(state: kernel.State) -> kernel.State:
+    return kernel.State(state.x.copy(), state.v.copy(), state.force.copy(), state.mode.copy())
+
+
+def _drift(places: list[kernel.State]) -> float:
+    """How far a part has drifted between the last two of three states as far apart [m]; 0 if none has.
+
+    All but the displacements is the same in all three, and these have moved on by the same twice.
+    """
+    if len(places) < 3:
+        return 0.0
+    first, second, third = places
+    moved = third.x - second.x
+    far = float(np.abs(moved).max(initial=0.0))
+    if not far > REPEATS * float(np.abs(third.v).max(initial=0.0)):
+        return 0.0
+    same = (
+        (third.v, second.v, third.v), (third.v, first.v, third.v),
+        (third.force, second.force, third.force), (third.force, first.force, third.force),
+        (moved, second.x - first.x, moved),
+    )  # fmt: skip
+    repeats = all(np.abs(a - b).max(initial=0.0) <= REPEATS * np.abs(c).max(initial=0.0) for a, b, c in same)
+    return far if repeats else 0.0
 
 
 def _record(plan: _Plan, n: int) -> kernel.Record:

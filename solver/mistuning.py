@@ -11,7 +11,8 @@ import numpy as np
 
 from solver import fourier
 from solver.branch import Branch, BranchStatus
-from solver.continuation import ContinuationSettings, sweep
+from solver.continuation import sweep
+from solver.continuation_settings import ContinuationSettings
 from solver.errors import SettingError
 from solver.fourier import Real
 from solver.histories import motion

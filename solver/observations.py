@@ -7,14 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.accuracy import peak_error
 from solver.balance import build
 from solver.branch import Branch
+from solver.branch_error import branch_error
+from solver.continuation import highest_between
 from solver.fourier import Real, to_full
 from solver.kernels.observe import measure
 from solver.kernels.receptance import receptance
 from solver.kernels.residual import evaluate
-from solver.peaks import Points, Survey, band_limit
+from solver.nodes import Points
+from solver.peaks import Survey, band_limit
 from solver.savings import Effects
 from solver.scene import Observe
 from solver.workspace import Workspace
@@ -48,13 +50,24 @@ def observing(
     rows, measures = np.zeros((len(branch.values), balance.n_coefficients)), branch.measures.copy()
     for i, (solution, tangent) in enumerate(zip(branch.solutions, branch.tangents, strict=True)):
         _measure(workspace, solution, tangent, rows[i], measures[i])
-    points = Points(solutions=branch.solutions, tangents=branch.tangents, measures=measures)
-    survey = Survey(workspace, points)
+    survey = Survey(
+        workspace,
+        Points(
+            solutions=branch.solutions, tangents=branch.tangents, measures=measures, observed=rows,
+            states=branch.states,
+        ),
+    )  # fmt: skip
+    points = survey.points
     at = band_limit(limit, survey.peaks, balance.parameter.kind)
+    error = branch_error(workspace, points, survey.peaks, highest_between)
     return replace(
         branch, balance=balance,
-        observed=to_full(rows, balance.system.ks, balance.n_harmonics), measures=measures, peaks=survey.peaks,
-        band=None if at is None else survey.band(at), error_estimate=peak_error(workspace, survey.peaks),
+        values=balance.parameter.all_outside(points.solutions[:, -1].copy()), solutions=points.solutions,
+        tangents=points.tangents, states=points.states,
+        observed=to_full(points.observed, balance.system.ks, balance.highest_harmonic),
+        measures=points.measures,
+        peaks=survey.peaks, peak_certificate=survey.certificate(completed=branch.completed),
+        band=None if at is None else survey.band(at), error_estimate=error,
         newton_iterations=survey.spent, seconds=time.perf_counter() - begun,
     )  # fmt: skip
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 from solver.branch import Branch
 from solver.errors import SettingError
 from solver.fourier import Real
+from solver.notes import unsettled
 from solver.shown import Piece, Shown, Summary
 
 if TYPE_CHECKING:
@@ -28,6 +29,10 @@ class TrackStatus(Enum):
     AT_BOUND = (
         "The highest peak is least at an end of the range and still falls there: a wider range may do better."
     )
+    PLATEAU = (
+        "The highest peak is least, and the same, over an interval of the parameter: the value in it was "
+        "chosen by what else changes."
+    )
     FLAT = "The highest peak does not depend on the parameter: every value in the range is as good."
     GAPS = "Somewhere in the range no peak could be tracked: use a shorter range or more harmonics."
     UNPROVEN = (
@@ -39,11 +44,27 @@ class TrackStatus(Enum):
     )
     NO_RESPONSE = "No frequency response could be computed: start somewhere else, or use more harmonics."
     STOPPED = "The tracking was stopped by the caller."
+    WORK_USED_UP = (
+        "The work allowed was used up before the optimum was proven; the best value seen is given: use a "
+        "shorter range or fewer harmonics, or compare sweeps of your own."
+    )
 
     @property
     def proven(self) -> bool:
         """Whether an optimum with this status is proven over the whole range."""
-        return self in (TrackStatus.TRACKED, TrackStatus.AT_BOUND, TrackStatus.FLAT)
+        return self in (
+            TrackStatus.TRACKED, TrackStatus.AT_BOUND, TrackStatus.PLATEAU, TrackStatus.FLAT
+        )  # fmt: skip
+
+
+class ChosenBy(Enum):
+    """What decided where an optimum is; the value is what a user reads."""
+
+    HIGHEST_PEAK = "highest peak"
+    NEXT_PEAK = "next peak"
+    BAND = "resonance band"
+    LEAST_VALUE = "least value"
+    NOTHING = "nothing depends on it"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,11 +118,12 @@ class LeastPeak(Shown):
     Attributes
     ----------
     status : TrackStatus
-        Proven only if `status.proven`: TRACKED, AT_BOUND or FLAT.
+        Proven only if `status.proven`: TRACKED, AT_BOUND, PLATEAU or FLAT.
     at : float
         The value of the parameter (NaN without a response).
     peak : float
-        The highest peak there [m].
+        The highest peak there [m]; unless it is proven or OTHER_BRANCH or STOPPED, that of the best response
+        seen.
     active : tuple of ActivePeak
         The peaks that are equally high there, highest first.
     basins : tuple of Basin
@@ -115,6 +137,12 @@ class LeastPeak(Shown):
         optimum (of a mean sweep where there is none): the work in units of one frequency response.
     seconds : float
         Time in all.
+    plateau : (float, float) or None
+        The interval of the parameter around `at` over which the highest peak is the same (PLATEAU, FLAT).
+    chosen_by : str
+        What decided where in it `at` is, one of `ChosenBy`: the highest peak where there is no interval; the
+        highest of the other peaks that depends on the parameter; the width of the resonance band at half
+        power; the least value of the parameter.
     """
 
     status: TrackStatus
@@ -126,6 +154,8 @@ class LeastPeak(Shown):
     sweeps: int
     work: float
     seconds: float
+    plateau: tuple[float, float] | None = None
+    chosen_by: str = ChosenBy.HIGHEST_PEAK.value
 
     def summary(self) -> Summary:
         """What is most worth knowing, in words and with units."""
@@ -150,7 +180,10 @@ class LeastPeak(Shown):
     def to_json(self) -> dict[str, object]:
         """Return the optimum as one JSON object."""
         active = [{"frequency": a.frequency, "value": a.value, "slope": a.slope} for a in self.active]
-        return {"at": _number(self.at), "peak": _number(self.peak), "active": active}
+        return {
+            "at": _number(self.at), "peak": _number(self.peak), "active": active,
+            "plateau": None if self.plateau is None else list(self.plateau), "chosen_by": self.chosen_by,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -218,6 +251,11 @@ class PeakTrack(Shown):
     given: Scene | None = None
 
     @property
+    def peaks_open(self) -> tuple[str, ...]:
+        """Why of some sweeps it is not known that no higher peak hides between their points."""
+        return tuple(unsettled(self.branches))
+
+    @property
     def completed(self) -> bool:
         """Whether the whole range was covered and checked."""
         return self.status is TrackStatus.TRACKED
@@ -260,6 +298,7 @@ class PeakTrack(Shown):
                 }
                 for line in self.competing
             ],
+            "peaks_open": list(self.peaks_open),
             "n_harmonics": self.n_harmonics,
             "sweeps": self.sweeps,
             "seconds": self.seconds,

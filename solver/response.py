@@ -6,24 +6,25 @@ import math
 import time
 from dataclasses import dataclass, replace
 from enum import Enum
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver import fourier
-from solver.accuracy import truncation_error
+from solver.accuracy import UNKNOWN, truncation_error
 from solver.adaptive import solve_to
 from solver.balance import Balance, build, check_frequency
+from solver.contact_response import OPENS, ContactResponse, ContactState, contact_responses
 from solver.fourier import Real
-from solver.kernels.events import LIFTING, SEPARATED, SLIPPING, STUCK
-from solver.kernels.jacobian import fill_jacobian
-from solver.kernels.laws_columns import CLOSED, DEFORMING, TOUCHING
+from solver.kernels.events import STUCK
+from solver.kernels.loose import FREE
 from solver.kernels.observe import HALF_RANGE, MAX_ABS, MEAN
-from solver.kernels.system import evaluation_by_value
+from solver.kernels.system import UNHELD, evaluation_by_value
 from solver.savings import Effects
-from solver.scene import AnyContact, ElasticNormalContact, FrictionContact, PlanarContact, Scene
+from solver.scene import FrictionContact, Scene
 from solver.shown import Shown, Summary
+from solver.structure import loose_ports
+from solver.symmetry import assumed_flags, seen
 from solver.workspace import PointSolution, Workspace
 
 if TYPE_CHECKING:
@@ -33,43 +34,8 @@ if TYPE_CHECKING:
     from solver.plots.style import Into
 
 
-# A stuck contact below this share of its friction limit cannot have slipped while the vibration built up from
-# rest: a suddenly started linear vibration overshoots its steady amplitude at most twofold.
-SAFELY_STUCK = 0.5
-# Smallest singular value of dr/du, relative to the largest, that counts as a part nothing holds.
-FREE = 1e-7
 MEAN_UNDETERMINED = "mean_undetermined"
-
-
-class ContactState(Enum):
-    """What a contact does over a period; the value is what a user reads."""
-
-    SEPARATED = "separated"
-    STUCK = "stuck"
-    SLIPPING = "stick and slip"
-    LIFTING = "stick, slip and separation"
-    CLOSED = "closed"
-    TOUCHING = "opens and closes"
-    DEFORMING = "deforms"
-
-
-_STATES = {
-    SEPARATED: ContactState.SEPARATED,
-    STUCK: ContactState.STUCK,
-    SLIPPING: ContactState.SLIPPING,
-    LIFTING: ContactState.LIFTING,
-    CLOSED: ContactState.CLOSED,
-    TOUCHING: ContactState.TOUCHING,
-    DEFORMING: ContactState.DEFORMING,
-}
-
-
-def state_of(code: int) -> ContactState:
-    """The state a compiled loop says by a number, as in `Branch.states`."""
-    return _STATES[code]
-
-
-_OPENS = (ContactState.SEPARATED, ContactState.LIFTING, ContactState.TOUCHING)
+HISTORY_DEPENDENT = "history_dependent"
 
 
 class SolutionStatus(Enum):
@@ -83,49 +49,10 @@ class SolutionStatus(Enum):
     NOT_CONVERGED = (
         "No solution was found at this frequency: try more harmonics, or a sweep that passes through it."
     )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ContactResponse:
-    """The motion and force of one contact.
-
-    Attributes
-    ----------
-    name : str
-        Name of the contact.
-    state : ContactState
-        What it does over the period.
-    slip : (2H + 1,) array
-        Coefficients of the slip motion u [m].
-    force : (2H + 1,) array
-        Coefficients of the friction force [N].
-    load : (3,) or (2H + 1,) array
-        Coefficients of the normal load N [N] before it is cut at 0; 0 of a contact without friction.
-    second_motion, second_force : (2H + 1,) array or None
-        The other relative motion of the contact [m] and the force along it [N]: the normal one of a rubbing
-        contact, or the second direction it slides in.
-    utilisation : float
-        max|f| / (μ N) of a stuck contact, 1 for one that slips, NaN for one that is separated throughout.
-    """
-
-    name: str
-    state: ContactState
-    slip: Real
-    force: Real
-    load: Real
-    utilisation: float
-    second_motion: Real | None = None
-    second_force: Real | None = None
-
-    @property
-    def motions(self) -> tuple[Real, ...]:
-        """Coefficients of all its relative motions [m]."""
-        return (self.slip,) if self.second_motion is None else (self.slip, self.second_motion)
-
-    @property
-    def forces(self) -> tuple[Real, ...]:
-        """Coefficients of the forces along them [N]."""
-        return (self.force,) if self.second_force is None else (self.force, self.second_force)
+    RATCHETS = (
+        "There is no periodic motion: a part that contacts alone hold ratchets, it drifts a little further "
+        "every period. Press it harder, take away what pulls it to one side, or hold it by a spring."
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -135,23 +62,32 @@ class Solution(Shown):
     Attributes
     ----------
     status : SolutionStatus
-        Whether and why; every number below is NaN if it is NOT_CONVERGED.
+        Whether and why; every number below is NaN if it is NOT_CONVERGED or RATCHETS.
     max_abs, half_peak_to_peak, mean : float
         Of the observed DOF over the period [m]. Not unique when `flags` has ``mean_undetermined``: the first
-        and the last then depend on the history.
+        and the last then depend on the history, and with ``history_dependent`` the second does too. Without
+        these flags they are what a start from rest with contacts free of force leads to.
+    n_harmonics : int
+        The number asked for.
     harmonics : (H + 1,) array
-        |mean| and the amplitude of each harmonic of the observed DOF [m].
+        |mean| and the amplitude of each harmonic of the observed DOF [m], up to the highest one kept: that is
+        above `n_harmonics` where a force is, see `solver.harmonics.kept_harmonics`. Zero if not kept.
     observed : (2H + 1,) array
         Its coefficients [m].
     contacts : tuple of ContactResponse
         One for each contact of the scene.
     flags : tuple of str
-        ``mean_undetermined``, ``all_stuck``, ``separation`` where they apply.
+        ``mean_undetermined``, ``history_dependent``, ``all_stuck``, ``separation``, ``not_unique``,
+        ``symmetric_unstable``, ``travelling_wave_assumed`` where they apply; for the last three see
+        `solver.symmetry`.
     residual : float
         Relative residual of the balance.
     error_estimate : float
         Estimated error of `max_abs` by the harmonics left out and the residual [m]; of `half_peak_to_peak`
         where the mean is not determined. See `solver.accuracy`.
+    mean_range : (float, float)
+        Bounds of the mean over every history [m], forces left in contacts by assembly included; NaN where no
+        bound is known. See `solver.history`.
     """
 
     scene: Scene
@@ -169,11 +105,17 @@ class Solution(Shown):
     error_estimate: float
     newton_iterations: int
     seconds: float
+    mean_range: tuple[float, float] = (math.nan, math.nan)
 
     @property
     def converged(self) -> bool:
         """Whether the numbers are a solution."""
-        return self.status is not SolutionStatus.NOT_CONVERGED
+        return self.status not in (SolutionStatus.NOT_CONVERGED, SolutionStatus.RATCHETS)
+
+    @property
+    def highest_harmonic(self) -> int:
+        """The last one in `harmonics`, H of every (2H + 1,) array."""
+        return int(self.harmonics.size) - 1
 
     @property
     def reached(self) -> bool:
@@ -220,6 +162,7 @@ class Solution(Shown):
             "n_harmonics": self.n_harmonics,
             "newton_iterations": self.newton_iterations,
             "seconds": self.seconds,
+            **({"mean_range": [*map(_number, self.mean_range)]} if MEAN_UNDETERMINED in self.flags else {}),
         }
 
 
@@ -259,22 +202,27 @@ def solve(
         )
     if not found.converged:
         return _failure(workspace.balance, frequency_hz, found, time.perf_counter() - begun)
+    found, flags = seen(workspace, found, omega)
     solution = describe(workspace, found, frequency_hz, begun)
+    solution = replace(solution, flags=(*solution.flags, *assumed_flags(workspace.balance), *flags))
     return solution if good_enough else replace(solution, status=SolutionStatus.ACCURACY_NOT_REACHED)
 
 
-def describe(workspace: Workspace, found: PointSolution, frequency_hz: float, begun: float) -> Solution:
-    """Turn a converged point of a frequency balance into a `Solution`."""
+def describe(
+    workspace: Workspace, found: PointSolution, frequency_hz: float, begun: float, *, estimated: bool = True
+) -> Solution:
+    """Turn a converged point of a frequency balance into a `Solution`, with its error estimate or without."""
+    from solver.history import has_another_solution, history_of
+
     balance = workspace.balance
     omega = 2.0 * math.pi * frequency_hz
-    error = truncation_error(workspace, found.u, omega)
+    error = truncation_error(workspace, found.u, omega) if estimated else UNKNOWN
     measures = workspace.measure(found.u, omega)
     if measures is None:
         return _failure(balance, frequency_hz, found, time.perf_counter() - begun)
     contacts = contact_responses(workspace, found.u, omega)
-    observed = fourier.to_full(measures.observed, balance.system.ks, balance.n_harmonics)
-    flags = _flags(contacts, nothing_holds=_nothing_holds_a_part(workspace))
-    return Solution(
+    observed = fourier.to_full(measures.observed, balance.system.ks, balance.highest_harmonic)
+    solution = Solution(
         scene=balance.scene,
         frequency_hz=frequency_hz,
         n_harmonics=balance.n_harmonics,
@@ -285,95 +233,65 @@ def describe(workspace: Workspace, found: PointSolution, frequency_hz: float, be
         harmonics=np.abs(fourier.to_complex(observed)),
         observed=observed,
         contacts=contacts,
-        flags=flags,
+        flags=(),
         residual=found.residual,
-        error_estimate=error.half_peak_to_peak if MEAN_UNDETERMINED in flags else error.max_abs,
+        error_estimate=error.max_abs,
         newton_iterations=found.iterations,
+        seconds=0.0,
+    )
+    history, nothing_holds = history_of(solution), _nothing_holds_a_part(workspace)
+    another = has_another_solution(workspace, found.u, omega)
+    mean_open = nothing_holds or history.mean_open or another
+    return replace(
+        solution,
+        flags=_flags(contacts, mean_open=mean_open, half_range_open=history.half_range_open or another),
+        error_estimate=error.half_peak_to_peak if mean_open else error.max_abs,
+        mean_range=(math.nan, math.nan) if nothing_holds else history.mean_range,
         seconds=time.perf_counter() - begun,
     )
 
 
-def contact_responses(workspace: Workspace, u: Real, p: float) -> tuple[ContactResponse, ...]:
-    """Return motion, force and state of every contact at a solution (u, λ = p)."""
-    balance = workspace.balance
-    _, point = workspace.evaluate(u, p)
-    ks, top = balance.system.ks, balance.n_harmonics
-    slips = fourier.to_full(u.reshape(balance.n_ports, balance.n_coefficients), ks, top)
-    forces = fourier.to_full(point.F, ks, top)
-    ports = [slice(first, end) for first, end in pairwise(balance.system.first_port)]
-    return tuple(
-        _contact(contact, int(state), slips[port], forces[port])
-        for contact, state, port in zip(balance.scene.contacts, point.states, ports, strict=True)
-    )
-
-
-def _load(contact: AnyContact, motions: Real) -> Real:
-    """Return the coefficients of N0 + N1 cos(τ + phase), and of kn v where the load moves with the parts."""
-    if not isinstance(contact, FrictionContact):
-        return np.zeros(3)
-    N1, phase = contact.N1_value, contact.N1_phase
-    load = np.array([contact.N0, N1 * math.cos(phase), -N1 * math.sin(phase)])
-    if isinstance(contact, ElasticNormalContact):
-        moving = contact.kn * motions[1]
-        load = np.pad(load, (0, max(moving.size - load.size, 0)))
-        load[: moving.size] += moving
-    return load
-
-
-def _contact(contact: AnyContact, state: int, motions: Real, forces: Real) -> ContactResponse:
-    load, utilisation = _load(contact, motions), 1.0
-    if state == STUCK and isinstance(contact, FrictionContact):
-        tau = np.linspace(0.0, 2.0 * np.pi, max(360, 8 * motions.shape[1]), endpoint=False)
-        limit = contact.mu * (fourier.basis(tau, (load.size - 1) // 2) @ load)
-        parts = np.abs(forces @ fourier.basis(tau, (motions.shape[1] - 1) // 2).T)
-        carried = parts[0]
-        if isinstance(contact, PlanarContact):
-            carried = parts.max(axis=0) if contact.limit == "box" else np.hypot(*parts)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            shares = np.where(carried > 0.0, carried / limit, 0.0)
-        utilisation = float(min(shares.max(), 1.0))
-    elif state == SEPARATED:
-        utilisation = math.nan
-    return ContactResponse(
-        name=contact.name, state=_STATES[state], slip=motions[0], force=forces[0], load=load,
-        utilisation=utilisation,
-        second_motion=motions[1] if len(motions) > 1 else None,
-        second_force=forces[1] if len(forces) > 1 else None,
-    )  # fmt: skip
-
-
 def _nothing_holds_a_part(workspace: Workspace) -> bool:
     """Return whether a part that contacts alone hold is free to stand anywhere, where last evaluated."""
-    system = workspace.balance.system
-    if not np.any(system.shift > 0.0):
+    balance, point = workspace.balance, evaluation_by_value(workspace.point)
+    if balance.system.ks[0] == 0:
+        return bool(point.counts[UNHELD] > 0 or np.any(point.elastic > 0.0))
+    loose, kt = loose_ports(balance.scene)
+    if not len(loose):
         return False
-    fill_jacobian(workspace.system, workspace.linear, workspace.point)
-    values = np.linalg.svd(evaluation_by_value(workspace.point).jacobian, compute_uv=False)
-    return bool(values[-1] < FREE * values[0])
+    friction = np.array([isinstance(contact, FrictionContact) for contact in balance.scene.contacts])
+    holds = (~friction | (point.states == STUCK))[balance.system.owner]
+    held = (loose * (kt * holds)) @ loose.T
+    return bool(np.linalg.eigvalsh(held)[0] < FREE)
 
 
-def _flags(contacts: tuple[ContactResponse, ...], *, nothing_holds: bool) -> tuple[str, ...]:
+def _flags(
+    contacts: tuple[ContactResponse, ...], *, mean_open: bool, half_range_open: bool
+) -> tuple[str, ...]:
     stuck = [contact for contact in contacts if contact.state is ContactState.STUCK]
     flags = []
-    if nothing_holds or any(contact.utilisation > SAFELY_STUCK for contact in stuck):
+    if mean_open:
         flags.append(MEAN_UNDETERMINED)
+    if half_range_open:
+        flags.append(HISTORY_DEPENDENT)
     if stuck and len(stuck) == len(contacts):
         flags.append("all_stuck")
-    if any(contact.state in _OPENS for contact in contacts):
+    if any(contact.state in OPENS for contact in contacts):
         flags.append("separation")
     return tuple(flags)
 
 
 def _failure(balance: Balance, frequency_hz: float, found: PointSolution, seconds: float) -> Solution:
-    nothing = np.full(2 * balance.n_harmonics + 1, np.nan)
+    nothing = np.full(2 * balance.highest_harmonic + 1, np.nan)
     return Solution(
         scene=balance.scene, frequency_hz=frequency_hz, n_harmonics=balance.n_harmonics,
-        status=SolutionStatus.NOT_CONVERGED, max_abs=math.nan, half_peak_to_peak=math.nan, mean=math.nan,
-        harmonics=np.full(balance.n_harmonics + 1, np.nan), observed=nothing, contacts=(), flags=(),
+        status=SolutionStatus.RATCHETS if found.ratchets else SolutionStatus.NOT_CONVERGED,
+        max_abs=math.nan, half_peak_to_peak=math.nan, mean=math.nan,
+        harmonics=np.full(balance.highest_harmonic + 1, np.nan), observed=nothing, contacts=(), flags=(),
         residual=found.residual, error_estimate=math.nan, newton_iterations=found.iterations, seconds=seconds,
     )  # fmt: skip
 
 
 def _number(value: float) -> float | None:
-    """Return a float that JSON can carry (null for NaN and infinity)."""
+    """Return a float that JSON can carry."""
     return float(value) if math.isfinite(value) else None

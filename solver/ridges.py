@@ -7,50 +7,51 @@ the highest peak from below everywhere; a sweep shows what no line has reached y
 from __future__ import annotations
 
 import math
+import time
+from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from solver import fourier
-from solver.balance import build
+from solver.allowance import Allowance
 from solver.branch import Peak
 from solver.contact_rows import law_numbers
-from solver.continuation import sweep
 from solver.errors import SettingError
 from solver.fourier import Integer, Real
 from solver.kernels import track as kernel
 from solver.kernels.laws_columns import COULOMB
-from solver.kernels.summit import SIGN, SPENT, Summit, new_summit, summit_numbers
+from solver.kernels.summit import PAUSE, SIGN, SPENT, Summit, new_summit, summit_numbers
 from solver.kernels.system import System, by_reference
 from solver.kernels.track import (
     COLUMNS,
     HEIGHT,
     OMEGA,
     PLACE,
-    SLOPE,
+    PROGRESS,
     Ridge,
     Z,
     polish,
     track,
 )
-from solver.lines import EVERYWHERE, Glance, Line, LineEnd, Look, Pace, glance_at
+from solver.lines import EVERYWHERE, Glance, Line, LineEnd, Look, Pace
+from solver.looking import SAME, Looking
 from solver.rivals import Rival, rivals
 from solver.savings import Effects
-from solver.scale import scale_of
 from solver.scene import Scene
+from solver.seeds import CROSSING, Crossing, Seed, crossings, entries, fitted, leavings, nearest, passes
 
-SAME = (
-    1e-3  # relative distance, in height and a fifth of it in frequency, within which two peaks are the same
-)
 Place = tuple[Real, Real, Real]  # row (COLUMNS,), solution and tangent (n_unknowns,) of a line at one z
 _MOST_ROWS = 600
 SUBDIVIDED = 6  # places between two rows at which the envelope is looked at
 ROUNDING = 1e-12
-FEWEST = 3  # harmonics of a glance
 ABOUT = 0.01  # relative height that a row that does not fit may lack
 CAREFUL = 3e-4  # share of the range: first step where lines are close
+AGAIN = 8  # times the peaks of one sweep are followed at most
+ENDING = 0.1  # of the first step: as short as steps become before a line ends
 EXACTLY = 1e-6  # relative distance within which a peak is one that was solved at the same place
+_AT_ONCE = 0.1  # s of following between two looks at the caller
+_FIRST_AT_ONCE = 64.0  # evaluations likewise, as long as nothing is known of their time
 
 
 _ENDS = {
@@ -79,26 +80,22 @@ def check_laws(scene: Scene) -> None:
         raise SettingError("scene", scene.name, f"{wanted}: use sweeps, or a map without the ridge")
 
 
-class Tracker:
+class Tracker(Looking):
     """Sweeps and lines of one scene and parameter; the arrays of the compiled loops are its own."""
 
     def __init__(
         self, scene: Scene, parameter: str, start: float, stop: float, harmonics: int,
-        effects: Effects | None, pace: Pace = EVERYWHERE,
+        effects: Effects | None, pace: Pace = EVERYWHERE, allowance: Allowance | None = None,
     ) -> None:  # fmt: skip
-        self.scale = scale_of(scene, parameter, start, stop)
-        self.balance = build(
-            scene, parameter, harmonics=harmonics, frequency_hz=scene.observe.band[0], effects=effects
-        )
+        super().__init__(scene, parameter, start, stop, harmonics, effects, pace, allowance)
         check_laws(self.balance.scene)
-        self._effects, self._pace, self._first_step = effects, pace, pace.first_step
-        self.lines: list[Line] = []
-        self.looks: list[Look] = []
-        self.glances: list[Glance] = []
+        self._first_step = pace.first_step
         self.exact_between: set[tuple[float, float, float]] = set()  # z, z and height of rows: cubics hold
-        self._scene, self._harmonics = self.balance.scene, harmonics
         self._system: System = by_reference(self.balance.system)
         self._summit: Summit = new_summit(self._system)
+        self._crossings: list[Crossing] = []
+        self._at_once = _FIRST_AT_ONCE
+        self._asked_at: Counter[float] = Counter()
 
     @property
     def enough(self) -> float:
@@ -115,34 +112,26 @@ class Tracker:
         """Evaluations of the balance in following peaks so far."""
         return int(summit_numbers(self._summit)[SPENT])
 
-    def look(self, z: float) -> Look:
-        """Sweep at z."""
-        path = self.balance.parameter.path
-        branch = sweep(
-            self._scene.with_values({path: self.scale.outside(z)}), harmonics=self._harmonics,
-            effects=self._effects,
-        )  # fmt: skip
-        top = branch.peaks[0].value if branch.peaks else -math.inf
-        higher = bool(self.lines) and top > float(self.envelope(np.array([z]))[0]) * (1.0 + SAME)
-        look = Look(z=z, branch=branch, surprising=higher)
-        self.looks.append(look)
-        return look
-
-    def follow(self, look: Look, share: float, solved: Mapping[int, Real] | None = None) -> bool:
+    def follow(
+        self, look: Look, share: float, solved: Mapping[int, Real] | None = None, *, careful: bool = False
+    ) -> bool:
         """Follow every peak of a sweep above `share` of the highest that is on no line yet.
 
         Parameters
         ----------
         solved : rows of lines at the same place, which tell more exactly than their cubics what is on them.
+        careful : whether to begin with short steps: other lines are close, or lines end close by.
 
         Returns
         -------
         Whether there is a new line.
         """
         before, ks = len(self.lines), look.branch.balance.system.ks
-        # A peak that the lines there do not know may have one of them close beside it.
-        self._first_step = min(self._pace.first_step, math.inf if solved is None else CAREFUL)
-        for peak in look.branch.peaks:
+        self._asked_at[look.z] += 1
+        if self._asked_at[look.z] > AGAIN:
+            return False  # what is followed from there is not what was seen there
+        self._first_step = min(self._pace.first_step, CAREFUL if careful else math.inf)
+        for peak in look.peaks:
             if peak.value >= share * look.top and not self.known(look.z, peak, solved):
                 self._follow(look.z, peak, ks)
         return len(self.lines) > before
@@ -151,16 +140,7 @@ class Tracker:
         """Follow the peaks of max x and of −min x that the other of the two hides in a sweep."""
         for rival in rivals(look.branch):
             if rival.value >= share * look.top:
-                u = self._fitted(rival.solution, look.branch.balance.system.ks)
-                self._draw(look.z, rival.omega, u, (rival.sign, math.nan), fixed=False)
-
-    def glance(self, z: float) -> Glance:
-        """Look at z with fewer harmonics, in which peaks lie nearly where they are."""
-        path, fewer = self.balance.parameter.path, max(FEWEST, self._harmonics // 2)
-        scene = self._scene.with_values({path: self.scale.outside(z)})
-        glance = glance_at(z, scene, min(fewer, self._harmonics), self._effects)
-        self.glances.append(glance)
-        return glance
+                self._draw(self._seed_of(look.z, rival, look.branch.balance.system.ks))
 
     def follow_guess(self, glance: Glance, guess: Rival, within: tuple[float, float], share: float) -> bool:
         """Solve for a peak of a glance and follow it if it is high and on no line yet.
@@ -174,16 +154,23 @@ class Tracker:
         -------
         Whether there is a new line.
         """
-        before, u, z = len(self.lines), self._fitted(guess.solution, glance.ks), glance.z
+        before, z = len(self.lines), glance.z
         self._first_step = self._pace.first_step
-        start = (guess.sign, math.nan)
-        _, rows, solutions, _, sign = self._track(z, z, guess.omega, u, start, fixed=False)
+        seed = self._seed_of(z, guess, glance.ks)
+        _, rows, solutions, _, sign = self._track(seed, z)
         if len(rows) == 0 or rows[0, HEIGHT] < share * self.envelope(np.array([z]))[0]:
             return False
         if not self._met(rows[0]):
-            extremum = sign, float(rows[0, PLACE])
-            self._draw(z, float(rows[0, OMEGA]), solutions[0], extremum, fixed=False, within=within)
+            omega, place = float(rows[0, OMEGA]), float(rows[0, PLACE])
+            self._draw(
+                Seed(z=z, omega=omega, u=solutions[0], sign=sign, place=place, fixed=False, within=within)
+            )
         return len(self.lines) > before
+
+    def _seed_of(self, z: float, rival: Rival, ks: Integer) -> Seed:
+        """Return the seed of a peak that is known as near as the points of a walk are."""
+        u = fitted(rival.solution, ks, self.balance)
+        return Seed(z=z, omega=rival.omega, u=u, sign=rival.sign, place=math.nan, fixed=False)
 
     def _met(self, row: Real) -> bool:
         """Return whether a solved peak is on a line, by solving for those that are near."""
@@ -211,11 +198,6 @@ class Tracker:
                 return True
         return False
 
-    def envelope(self, z: Real) -> Real:
-        """Return the height of the highest line; −inf where there is none."""
-        heights = [line.heights(z) for line in self.lines]
-        return np.max(heights, axis=0) if heights else np.full(z.size, -np.inf)
-
     def exact(self, line: Line, z: float, *, fitting: bool = True) -> Real | None:
         """Return the row of a line at z, solved; None if it is not found there; see `solved`."""
         same = np.flatnonzero(line.rows[:, Z] == z)
@@ -234,7 +216,16 @@ class Tracker:
         ----------
         fitting : whether it has to fit the rows beside it; otherwise about as high, or higher, will do,
             because a kink may lie between: what is found is attained in any case.
+
+        Raises
+        ------
+        HaltedError
+            The caller wants it to end, or the work allowed is used up.
         """
+        if not self.allowance.ended:
+            self.check()
+        elif self.allowance.over:
+            return None
         left = int(np.searchsorted(line.rows[:, Z], z)) - 1
         row, nt = np.zeros(COLUMNS), self.balance.n_unknowns
         solution, tangent = np.zeros(nt), np.zeros(nt)
@@ -254,34 +245,50 @@ class Tracker:
         at_end = min(abs(peak.at - end) for end in band) <= 1e-9 * band[1]
         if not peak.interior and not at_end:
             return
-        u = self._fitted(peak.solution, ks)
-        self._draw(z, 2.0 * math.pi * peak.at, u, (0.0, 0.0), fixed=not peak.interior)
+        u, fixed = fitted(peak.solution, ks, self.balance), not peak.interior
+        self._draw(Seed(z=z, omega=2.0 * math.pi * peak.at, u=u, sign=0.0, place=0.0, fixed=fixed))
 
-    def _draw(
-        self, z: float, omega: float, u: Real, extremum: tuple[float, float], *, fixed: bool,
-        within: tuple[float, float] = (-math.inf, math.inf),
-    ) -> None:  # fmt: skip
-        """Add the line through a peak; `extremum` is its sign (0: the larger of the two) and place."""
-        low, high = self._wanted(z)
-        low, high = max(low, within[0]), min(high, within[1])
+    def _draw(self, seed: Seed) -> None:
+        """Add the line through a peak, and what follows from it at the ends of the band, each once."""
+        waiting, given = deque([seed]), True
+        while waiting:
+            seed = waiting.popleft()
+            if not given and self._followed(seed):
+                continue
+            given, line = False, self._line(seed)
+            if line is None:
+                continue
+            self.lines.append(line)
+            waiting += leavings(line, self._band)
+            self._crossings += crossings(line, self._band)
+            if line.fixed:
+                waiting += entries(line, self._band, self, self._pace.smallest_step * self.scale.span)
+
+    def _line(self, seed: Seed) -> Line | None:
+        """Return the line through a peak; None if there is nothing to follow."""
+        low, high = self._wanted(seed.z)
+        low, high = max(low, seed.within[0]), min(high, seed.within[1])
         if low == high:
-            return
-        up = self._track(z, high, omega, u, extremum, fixed=fixed)
-        down = self._track(z, low, omega, u, extremum, fixed=fixed)
+            return None
+        up = self._track(seed, high)
+        down = self._track(seed, low)
         if len(up[1]) == 0 or len(down[1]) == 0:
-            return
-        line = Line(
+            return None
+        return Line(
             rows=np.concatenate([down[1][:0:-1], up[1]]), solutions=np.concatenate([down[2][:0:-1], up[2]]),
-            tangents=np.concatenate([down[3][:0:-1], up[3]]), sign=up[4], fixed=fixed, ends=(down[0], up[0]),
+            tangents=np.concatenate([down[3][:0:-1], up[3]]), sign=up[4], fixed=seed.fixed,
+            ends=(down[0], up[0]),
         )  # fmt: skip
-        self.lines.append(line)
-        for end, row in zip(line.ends, (0, -1), strict=True):
-            if end is LineEnd.LEFT_BAND and not fixed:
-                edge = min(self._band, key=lambda omega: abs(omega - line.rows[row, OMEGA]))
-                extremum = line.sign, float(line.rows[row, PLACE])
-                self._draw(float(line.rows[row, Z]), edge, line.solutions[row].copy(), extremum, fixed=True)
-        if fixed:
-            self._enter(line)
+
+    def _followed(self, seed: Seed) -> bool:
+        """Return whether what follows from a line was followed already; it is then."""
+        if seed.fixed:
+            return passes(self.lines, seed, EXACTLY, SAME)
+        one = Crossing(z=seed.z, edge=nearest(self._band, seed.omega), sign=seed.sign)
+        near = CROSSING * self._pace.smallest_step * self.scale.span
+        known = any(one.same(other, near) for other in self._crossings)
+        self._crossings.append(one)
+        return known or passes(self.lines, seed, 2.0 * SAME, SAME)
 
     def places(self) -> Real:
         """Return where the envelope is looked at: the ends, all rows of all lines, and between them."""
@@ -303,20 +310,6 @@ class Tracker:
         first, last = max(int(short[0]) - 1, 0), min(int(short[-1]) + 1, at.size - 1)
         return min(float(at[first]), z), max(float(at[last]), z)
 
-    def _enter(self, line: Line) -> None:
-        """Follow the peak that comes in at an end of the band: there the amplitude begins to fall outward."""
-        outward = 1.0 if line.rows[0, OMEGA] > 0.5 * sum(self._band) else -1.0
-        inward = np.flatnonzero(line.rows[:, SLOPE] * outward < 0.0)
-        if inward.size == 0 or inward.size == len(line.rows):
-            return
-        begin = inward[0] if inward[0] > 0 else inward[np.flatnonzero(np.diff(inward, append=-1) != 1)[0]]
-        row = line.rows[begin]
-        z, omega, u = float(row[Z]), float(row[OMEGA]), line.solutions[begin].copy()
-        for other in self.lines:
-            if not other.fixed and abs(other.frequencies(np.array([z]))[0] - omega) <= 2.0 * SAME * omega:
-                return
-        self._draw(z, omega, u, (line.sign, float(row[PLACE])), fixed=False)
-
     @property
     def _band(self) -> tuple[float, float]:
         low, high = self._scene.observe.band
@@ -329,37 +322,27 @@ class Tracker:
         return Ridge(
             start=start, stop=stop, logarithmic=self.scale.logarithmic, low=low, high=high, fixed=fixed,
             first_step=self._first_step * span, largest_step=pace.largest_step * span,
-            smallest_step=pace.smallest_step * span, height_error=pace.height_error,
-            omega_error=pace.omega_error, enough=self.enough, slack=pace.slack,
-            climb_from=pace.climb_from * span,
+            smallest_step=min(pace.smallest_step, ENDING * self._first_step) * span,
+            height_error=pace.height_error, omega_error=pace.omega_error, enough=self.enough,
+            slack=pace.slack, climb_from=pace.climb_from * span,
         )  # fmt: skip
 
-    def _track(
-        self, start: float, stop: float, omega: float, u: Real, extremum: tuple[float, float],
-        *, fixed: bool,
-    ) -> tuple[LineEnd, Real, Real, Real, float]:  # fmt: skip
+    def _track(self, seed: Seed, stop: float) -> tuple[LineEnd, Real, Real, Real, float]:
         """Follow a peak one way; return why it ended, its rows, solutions, tangents and its sign."""
-        nt = self.balance.n_unknowns
-        rows = np.zeros((_MOST_ROWS, COLUMNS))
+        nt, sign = self.balance.n_unknowns, seed.sign
+        rows, progress = np.zeros((_MOST_ROWS, COLUMNS)), np.zeros(PROGRESS)
         solutions, tangents = np.zeros((_MOST_ROWS, nt)), np.zeros((_MOST_ROWS, nt))
-        ridge = self._ridge(start, stop, fixed=fixed)
-        code, count = track(
-            self._system, ridge, u, omega, extremum[1], extremum[0], self._summit, rows, solutions, tangents
-        )
-        found = float(summit_numbers(self._summit)[SIGN])
-        return (
-            _ENDS[code], rows[:count].copy(), solutions[:count].copy(), tangents[:count].copy(), found,
-        )  # fmt: skip
-
-    def _fitted(self, solution: Real, ks: Integer) -> Real:
-        """Return a solution of a sweep with the harmonics kept here."""
-        mine, n = self.balance.system.ks, self.balance.n_coefficients
-        if np.array_equal(ks, mine):
-            return solution.copy()
-        top = int(max(ks[-1], mine[-1]))
-        full = fourier.to_full(solution.reshape(-1, 2 * ks.size - int(ks[0] == 0)), ks, top)
-        columns = [0] if mine[0] == 0 else []
-        for k in mine[mine > 0]:
-            columns += [2 * int(k) - 1, 2 * int(k)]
-        fitted: Real = np.ascontiguousarray(full[:, columns]).reshape(-1)
-        return fitted if fitted.size == n * (self.balance.n_unknowns // max(n, 1)) else solution.copy()
+        ridge, numbers = self._ridge(seed.z, stop, fixed=seed.fixed), summit_numbers(self._summit)
+        code = kernel.PAUSED
+        while code == kernel.PAUSED:
+            self.check()
+            begun, before = time.perf_counter(), numbers[SPENT]
+            numbers[PAUSE] = before + self._at_once
+            code, count = track(
+                self._system, ridge, seed.u, seed.omega, seed.place, sign, self._summit, rows, solutions,
+                tangents, progress,
+            )  # fmt: skip
+            sign = float(numbers[SIGN])
+            a_second = (numbers[SPENT] - before) / max(time.perf_counter() - begun, 1e-9)
+            self._at_once = min(max(_AT_ONCE * a_second, 1.0), 4.0 * self._at_once)
+        return _ENDS[code], rows[:count].copy(), solutions[:count].copy(), tangents[:count].copy(), sign

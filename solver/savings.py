@@ -1,9 +1,11 @@
 """Which effects a run pays for: what may be left out without changing the answer, and the override.
 
-Every saving is exact. A scene whose loads are constant and whose forces have odd harmonics only responds with
-x(τ + π) = −x(τ): even harmonics and mean are zero. A contact that sticks all the time is its spring, and one
-that never touches is nothing: both are eliminated from the Newton step. A tuned disk under a travelling wave
-repeats itself from sector to sector. Modes carry the linear part at the cost of modes instead of matrices.
+Every saving but one is exact. A scene whose loads are constant and whose forces have odd harmonics only
+responds with x(τ + π) = −x(τ) if no stiffness changes with the motion: even harmonics and mean are zero. A
+contact that sticks all the time is its spring, and one that never touches is nothing: both are eliminated
+from the Newton step. A tuned disk under a travelling wave repeats itself from sector to sector; where the
+laws of its contacts allow other motions too that is an assumption, and said. Modes carry the linear part at
+the cost of modes instead of matrices.
 """
 
 from __future__ import annotations
@@ -12,7 +14,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 
 from solver.errors import SettingError
-from solver.parametric import linear_model
 from solver.scene import (
     AnyContact,
     ElasticNormalContact,
@@ -21,7 +22,8 @@ from solver.scene import (
     PolynomialSpring,
     Scene,
 )
-from solver.structure import has_loose_parts
+
+_POWERS = tuple(f"a{power}" for power in range(1, 10))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,21 +82,46 @@ def even_harmonics_reason(scene: Scene, paths: Iterable[str] = ()) -> str | None
     paths : parameters that will be changed or differentiated by; a load amplitude breaks the symmetry.
     """
     for contact in scene.contacts:
-        reason = _breaks_symmetry(contact)
+        reason = _breaks_symmetry(contact) or _not_the_only_one(contact)
         if reason is not None:
             return reason
     for force in scene.excitation:
         if force.harmonic % 2 == 0:
             kind = "static" if force.harmonic == 0 else f"of harmonic {force.harmonic}"
             return f"the force on {force.dof} is {kind}"
-    if scene.contacts and has_loose_parts(linear_model(scene)):
-        return "contacts alone hold a part in place, whose mean is part of the answer"
     for path in paths:
         if path.endswith((".N1", ".N1_ratio")):
             return f"{path} changes the variation of a normal load"
-        if path.endswith((".a2", ".a4", ".a6", ".a8")):
-            return f"{path} changes an even power of the motion"
+        if path.rpartition(".")[2] in _POWERS:
+            return f"{path} changes a power of the motion"
     return None
+
+
+def breaks_symmetry(scene: Scene, paths: Iterable[str] = ()) -> bool:
+    """Return whether a motion and its negative half a period later are not answered alike.
+
+    Without that a half-wave symmetric response is always one of the responses, if perhaps not the only one.
+    """
+    if any(_breaks_symmetry(contact) is not None for contact in scene.contacts):
+        return True
+    if any(force.harmonic % 2 == 0 for force in scene.excitation):
+        return True
+    return any(path.endswith((".N1", ".N1_ratio", ".a2", ".a4", ".a6", ".a8")) for path in paths)
+
+
+def _not_the_only_one(contact: AnyContact) -> str | None:
+    """Return why a half-wave symmetric response need not be the only one, or None.
+
+    Friction and springs of a constant stiffness never let two responses move apart. A spring that stiffens
+    or softens does, with the inertia, though its force is odd: m = k = a3 = 1, c = 0.2, F = 15 has at
+    ω = 1.6 rad/s a symmetric response that is not stable, and two with a mean that are.
+    """
+    if not isinstance(contact, PolynomialSpring):
+        return None
+    first, *others = contact.coefficients
+    if any(others):
+        return f"the stiffness of {contact.name} changes with its motion, so other responses are possible"
+    return f"the stiffness of {contact.name} is negative" if first < 0.0 else None
 
 
 def _breaks_symmetry(contact: AnyContact) -> str | None:

@@ -12,19 +12,23 @@ from typing import TypeVar
 
 from solver.errors import SettingError
 from solver.scene import (
+    AnyContact,
     ContactOfAnyLaw,
     CyclicStructure,
     Damper,
+    ElasticNormalContact,
     Excitation,
     FrictionContact,
+    GapSpring,
     LumpedStructure,
     Mass,
     Observe,
+    PolynomialSpring,
     Scene,
     Spring,
     parse_end,
 )
-from solver.scene_checks import BETWEEN_KEYS
+from solver.scene_checks import BETWEEN_KEYS, listing
 from solver.shown import Piece
 
 _JoinT = TypeVar("_JoinT", Spring, Damper)
@@ -41,10 +45,14 @@ class Extent(Piece):
         1 where one sector (or the lumped structure itself) is enough, else all.
     reason : str
         In words and numbers.
+    assumed : bool
+        One sector stands for all only if the response is the travelling wave, which the laws of the contacts
+        do not make the only one.
     """
 
     sectors: int
     reason: str
+    assumed: bool = False
 
 
 def sectors_needed(scene: Scene) -> Extent:
@@ -76,7 +84,26 @@ def sectors_needed(scene: Scene) -> Extent:
         f"the disk is tuned and the excitation a travelling wave of engine order {order}: "
         f"one sector stands for all {n}"
     )
-    return Extent(sectors=1, reason=reason)
+    loose = [c.name for c in scene.contacts if not keeps_together(c)]
+    if not loose or n == 1:
+        return Extent(sectors=1, reason=reason)
+    reason += (
+        f", assumed, not proven: with the law of {listing(loose)} the sectors may also move otherwise than "
+        "in that wave, and the wave be unstable; the effect every-sector solves all of them"
+    )
+    return Extent(sectors=1, reason=reason, assumed=True)
+
+
+def keeps_together(contact: AnyContact) -> bool:
+    """Return whether a contact never lets two motions under the same forces move apart.
+
+    Friction under a load that is given does not, nor does a spring of constant stiffness. One that closes,
+    stiffens or softens does, and so does friction whose load moves with the parts.
+    """
+    if isinstance(contact, PolynomialSpring):
+        first, *others = contact.coefficients
+        return first >= 0.0 and not any(others)
+    return not isinstance(contact, GapSpring | ElasticNormalContact)
 
 
 def written_out(scene: Scene, *, every_sector: bool = False) -> Scene:

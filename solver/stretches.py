@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,13 +11,13 @@ from solver.balance import Balance
 from solver.branch import BranchStatus
 from solver.errors import SettingError
 from solver.fourier import Integer, Real
-from solver.kernels.jacobian import AT_BRANCH_POINT, factorise
+from solver.kernels.jacobian import factorise
 from solver.kernels.newton import ACCEPTED
 from solver.kernels.observe import MEASURES
 from solver.kernels.path import begin_walk
 from solver.kernels.receptance import receptance
 from solver.kernels.residual import evaluate
-from solver.kernels.system import evaluation_by_value
+from solver.kernels.system import AT_BRANCH_POINT, evaluation_by_value
 from solver.kernels.walk import COUNT, ITERATIONS, Control, P, Walk, walk_by_value, weights
 from solver.workspace import Workspace
 
@@ -53,6 +53,14 @@ class Stretch:
     stepped_over: int
     seconds: float
     walk: Real
+
+    def first(self, count: int) -> Stretch:
+        """Return the first points alone, without the state of a continuation, which is that of the last."""
+        return replace(
+            self, solutions=self.solutions[:count], tangents=self.tangents[:count],
+            states=self.states[:count], observed=self.observed[:count], measures=self.measures[:count],
+            status=None, walk=np.zeros(0),
+        )  # fmt: skip
 
     def to_arrays(self) -> dict[str, Real | Integer]:
         """Return everything as plain arrays, to be stored."""

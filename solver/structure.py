@@ -13,10 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from solver.contact_rows import port_stiffnesses
 from solver.decomposition import Decomposition, Held, decompose, held_alone, held_by, matrices_of
 from solver.fourier import Complex, Integer, Real
 from solver.kernels.system import DENSE
-from solver.parametric import LinearModel, LinearModelDerivative
+from solver.parametric import LinearModel, LinearModelDerivative, linear_model
+from solver.rigid import loose_motions
+from solver.scene import Scene
 
 CANCELLED = 1e-3  # a relative residual of 1e-11 of this share of what cancels in a motion is its rounding
 
@@ -27,6 +30,7 @@ class Reduced:
 
     which: Integer
     shift: Real
+    loose: Real
     least_size: float
     form: int
     eigenvalues: Complex
@@ -75,39 +79,52 @@ def reduce_model(
     forces = force_amplitudes(model, ks)
     L = model.contact_here + model.contact_next * np.exp(1j * theta)[:, None, None]
     held = matrices_of(model, theta)
-    shift = np.zeros(kt.size)
-    if 0 in ks and not held_alone(held):
-        shift, held = kt.copy(), held_by(held, L, kt)
+    shift, loose = np.zeros(kt.size), np.zeros((0, kt.size))
+    if 0 in ks:
+        loose = loose_motions(held.K[which[0]], L[which[0]], kt)
+        if len(loose) or not held_alone(held):
+            shift, held = kt.copy(), held_by(held, L, kt)
     found = None if whole_matrices or derivative is not None else decompose(held)
+    if found is None and not whole_matrices and derivative is None and not held_alone(held):
+        # A free part has a double pole at 0, of which there are no two eigenvectors: held, it has not.
+        shift, held = kt.copy(), held_by(held, L, kt)
+        found = decompose(held)
     if found is None:
         modes: dict[str, Any] = _no_modes(theta.size, ks.size, kt.size)
         dense: dict[str, Any] = _dense(held, theta, L, model, forces, derivative)
     else:
         modes = _projected(found, L, model.observe, forces, which)
         dense = {name: np.zeros((0,) * axes, np.complex128) for name, axes in _DENSE_AXES.items()}
-    least = _least_size(modes["contact_modes"], modes["modal_forces"], modes["eigenvalues"], which)
-    return Reduced(which=which.astype(np.int64), shift=shift, least_size=least, **modes, **dense)
+    least = 0.0 if found is None else _least_size(found, L, forces, which)
+    return Reduced(which=which.astype(np.int64), shift=shift, loose=loose, least_size=least, **modes, **dense)
 
 
-def _least_size(contact_modes: Complex, modal_forces: Complex, eigenvalues: Complex, which: Integer) -> float:
-    """Return the size below which a motion of the contacts is rounding [m]; 0 without modes.
+def _least_size(found: Decomposition, L: Complex, forces: Complex, which: Integer) -> float:
+    """Return the size below which a motion of the contacts is rounding [m].
 
-    A share of Σ |L x_m| |f_m| / |λ_m|, the static motion of a contact if its modes did not cancel.
+    A share of Σ |L| |x_m| |y_mᴴ| |f| / |λ_m|, the static motion of a contact if neither parts nor
+    modes cancelled.
     """
-    sizes = np.maximum(np.abs(eigenvalues), 1e-12 * np.abs(eigenvalues).max(initial=0.0))
-    shares, largest = np.abs(contact_modes), 0.0
+    sizes = np.maximum(np.abs(found.eigenvalues), 1e-12 * np.abs(found.eigenvalues).max(initial=0.0))
+    largest = 0.0
     for i, s in enumerate(which):
-        if not np.any(modal_forces[i]):
+        if not np.any(forces[i]) or not np.any(sizes[s]):
             continue
-        with np.errstate(divide="ignore", invalid="ignore"):
-            sums = shares[s] @ (np.abs(modal_forces[i]) / sizes[s])
-        largest = max(largest, float(np.nan_to_num(sums, posinf=0.0).max(initial=0.0)))
+        driven = (np.abs(forces[i]) @ np.abs(found.left[s])) / np.where(sizes[s] > 0.0, sizes[s], np.inf)
+        moved = np.abs(L[s]) @ (np.abs(found.right[s]) @ driven)
+        largest = max(largest, float(moved.max(initial=0.0)))
     return CANCELLED * largest
 
 
-def has_loose_parts(model: LinearModel) -> bool:
-    """Return whether the structure without its contacts leaves a part free to move away."""
-    return not held_alone(matrices_of(model, np.zeros(1)))
+def loose_ports(scene: Scene) -> tuple[Real, Real]:
+    """Return the rigid-body motions at the ports of what contacts alone hold, and the ports' stiffnesses.
+
+    See `solver.rigid.loose_motions`; also where the balance has no means.
+    """
+    model = linear_model(scene)
+    kt = port_stiffnesses(scene, model)
+    static = matrices_of(model, np.zeros(1))
+    return loose_motions(static.K[0], model.contact_here + model.contact_next, kt), kt
 
 
 def force_amplitudes(model: LinearModel, ks: Integer) -> Complex:

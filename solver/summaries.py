@@ -9,6 +9,7 @@ import numpy as np
 
 from solver import units
 from solver.branch import BranchStatus
+from solver.notes import branch_notes, flag_words
 from solver.shown import Summary
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ def of_branch(branch: Branch) -> Summary:
     if branch.band is not None:
         width = units.parameter(path, branch.band.width)
         pairs.append(("band", f"{width} above {units.length(branch.band.limit)}"))
+    pairs += branch_notes(branch)
     pairs += [("points", str(len(branch.values))), ("time", units.duration(branch.seconds))]
     title = f"{branch.balance.scene.name} over {path}, {branch.balance.n_harmonics} harmonics"
     return made(title, pairs, branch.status.value)
@@ -56,8 +58,10 @@ def of_solution(solution: Solution) -> Summary:
             ("estimated error", units.length(solution.error_estimate)),
             *((contact.name, contact.state.value) for contact in solution.contacts),
         ]
-        if solution.flags:
-            pairs.append(("flags", ", ".join(solution.flags)))
+        pairs += [("note", words) for words in flag_words(solution.flags)]
+        if "mean_undetermined" in solution.flags and math.isfinite(solution.mean_range[0]):
+            low, high = (units.length(bound) for bound in solution.mean_range)
+            pairs.append(("mean, any history", f"{low} to {high}"))
     pairs += [("residual", f"{solution.residual:.1e}"), ("time", units.duration(solution.seconds))]
     title = f"{solution.scene.name} at {solution.frequency_hz:.6g} Hz, {solution.n_harmonics} harmonics"
     return made(title, pairs, solution.status.value)
@@ -91,6 +95,7 @@ def of_track(track: PeakTrack) -> Summary:
     """The least highest peak, and what it took."""
     pairs = [
         *_least(track),
+        *(("warning", reason) for reason in track.peaks_open),
         ("points", f"{len(track.parameter)}, {track.sweeps} sweeps"),
         ("time", units.duration(track.seconds)),
     ]
@@ -142,6 +147,9 @@ def of_least(best: LeastPeak) -> Summary:
     if math.isfinite(best.at):
         pairs.append(("least peak", f"{units.length(best.peak)} at {best.at:.6g}"))
         pairs.append(("peaks there", ", ".join(f"{one.frequency:.6g} Hz" for one in best.active)))
+    if best.plateau is not None:
+        low, high = best.plateau
+        pairs.append(("the same from", f"{low:.6g} to {high:.6g}, chosen by: {best.chosen_by}"))
     others = [f"{units.length(basin.peak)} at {basin.at:.6g}" for basin in best.basins[1:]]
     if others:
         pairs.append(("other minima", "; ".join(others)))

@@ -17,7 +17,7 @@ from solver.lines import Line
 from solver.ridges import Place, Tracker
 
 ALLOWED = 0.25  # share of what an interval is higher by that its cubic may be wrong by
-EXACT = 1e-5  # relative error of a cubic that is no error
+EXACT = 1e-7  # relative error of a cubic that is no error
 SHORTEST = 1e-5  # share of the range below which an interval is not divided
 _SAMPLES = np.linspace(0.0, 1.0, 9)
 _DEEPEST = 12

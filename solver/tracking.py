@@ -13,12 +13,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from solver.allowance import RESPONSES, Allowance, HaltedError
 from solver.errors import SettingError
 from solver.fourier import Real
 from solver.kernels.track import DHEIGHT, HEIGHT, OMEGA, Z
-from solver.least import COMPETES, EQUAL, MOST_LOOKS, prove
+from solver.least import COMPETES, MOST_LOOKS, THOROUGHLY, halted, prove
 from solver.lines import Line, LineEnd
 from solver.peak_tracks import CompetingPeak, LeastPeak, PeakTrack, TrackStatus
+from solver.proof import EQUAL
 from solver.ridges import Tracker
 from solver.savings import Effects
 from solver.scene import Scene
@@ -50,7 +52,7 @@ def track_peak(
     checks : sweeps between the ends that look for peaks nothing has followed; the optimum is checked besides.
     effects : what is paid for though the scene does not call for it.
     on_progress : called with (share done, sweeps so far).
-    should_stop : asked between sweeps.
+    should_stop : asked several times a second.
 
     Returns
     -------
@@ -64,23 +66,33 @@ def track_peak(
     begun = time.perf_counter()
     if isinstance(checks, bool) or not isinstance(checks, int) or checks < 0:
         raise SettingError("checks", checks, "must be a whole number >= 0")
-    tracker = Tracker(scene, parameter, start, stop, harmonics, effects)
-    stopped = False
+    allowance = Allowance(should_stop, RESPONSES * (THOROUGHLY + checks / 20.0))
+    tracker = Tracker(scene, parameter, start, stop, harmonics, effects, allowance=allowance)
+    try:
+        _look_around(tracker, checks, on_progress)
+        _look_closer(tracker)
+    except HaltedError as halt:
+        best = halted(tracker, halt.status, begun)
+    else:
+        best = prove(tracker, COMPETES, begun)
+    if on_progress is not None:
+        on_progress(1.0, tracker.sweeps)
+    # An optimum at an end, or everywhere, is proven like any other: the track is complete.
+    status = TrackStatus.TRACKED if best.status.proven else best.status
+    try:
+        return _result(tracker, best, status, start <= stop, begun)
+    except HaltedError as halt:
+        allowance.end(halt.status)
+        return _result(tracker, best, halt.status, start <= stop, begun)
+
+
+def _look_around(tracker: Tracker, checks: int, on_progress: Callable[[float, int], None] | None) -> None:
+    """Sweep at the ends and at places between, and follow what competes there."""
     for done, z in enumerate(np.linspace(tracker.scale.low, tracker.scale.high, checks + 2)):
-        if should_stop is not None and should_stop():
-            stopped = True
-            break
+        tracker.ask()
         tracker.follow(tracker.look(float(z)), COMPETES)
         if on_progress is not None:
             on_progress((done + 1.0) / (checks + 3.0), len(tracker.looks))
-    if not stopped:
-        _look_closer(tracker)
-    best = prove(tracker, COMPETES, begun, should_stop=should_stop)
-    if on_progress is not None:
-        on_progress(1.0, len(tracker.looks))
-    # An optimum at an end, or everywhere, is proven like any other: the track is complete.
-    status = TrackStatus.TRACKED if best.status.proven else best.status
-    return _result(tracker, best, TrackStatus.STOPPED if stopped else status, start <= stop, begun)
 
 
 def _look_closer(tracker: Tracker) -> None:
@@ -120,7 +132,7 @@ def _result(tracker: Tracker, best: LeastPeak, status: TrackStatus, forward: boo
         parameter=parameter, peak=peak, frequency=frequency, slope=slope, optimum=best,
         competing=tuple(_competing(tracker, line, forward) for line in tracker.lines), exchanges=exchanges,
         branches=tuple(look.branch for look in tracker.looks), n_harmonics=balance.n_harmonics,
-        sweeps=len(tracker.looks), status=status,
+        sweeps=tracker.sweeps, status=status,
         seconds=time.perf_counter() - begun, given=balance.scene,
     )  # fmt: skip
 
@@ -164,6 +176,8 @@ def _exchange(tracker: Tracker, one: int, other: int, low: float, high: float) -
             end = float(z[0])
     here = 0.5 * (begin + end)
     for _ in range(8):
+        if tracker.allowance.over:
+            return []
         a, b = tracker.exact(first, here), tracker.exact(second, here)
         if a is None or b is None:
             return []

@@ -101,7 +101,7 @@ class Cycle:
     @property
     def top(self) -> int:
         """Highest harmonic of the full coefficients below; a given load has the first."""
-        return max(self.balance.n_harmonics, 1)
+        return max(self.balance.highest_harmonic, 1)
 
     def ports(self, e: int) -> range:
         """Return the relative motions of contact `e`."""

@@ -26,8 +26,9 @@ from solver.kernels.receptance import receptance
 from solver.kernels.refine import between
 from solver.kernels.residual import contact_values, evaluate
 from solver.kernels.system import evaluation_by_value
+from solver.nodes import share_scales
 from solver.parameter import Kind
-from solver.peaks import MOST_HALVINGS, NEAR_THE_TOP, PREDICTED, share_scales
+from solver.peaks import MOST_HALVINGS, NEAR_THE_TOP, PREDICTED
 from solver.shown import Piece
 from solver.wear import contact_index
 from solver.wear_measures import Change, Cycle, friction_work, least_load, slip_travel
@@ -148,7 +149,7 @@ class _Search:
         for left, right in zip(self._nodes[:-1], self._nodes[1:], strict=True):
             if (left.slope > 0.0) == (right.slope > 0.0):
                 continue  # both tangents point along the branch: the measure rises, or falls, all the way
-            by_share = share_scales(left, right)
+            by_share = share_scales(left, right, self._workspace.balance.system.least_size)
             g_left, g_right = left.slope * by_share[0], right.slope * by_share[1]
             if g_left > 0.0 >= g_right:
                 found.append(self._worst(self._polished(left, right, g_left, g_right), interior=True))
@@ -169,7 +170,7 @@ class _Search:
         below = top - (1.0 - COMPETES) * self._size
         if depth == 0 or max(left.value, right.value) < below:
             return []
-        by_share = share_scales(left, right)
+        by_share = share_scales(left, right, self._workspace.balance.system.least_size)
         g_left, g_right = left.slope * by_share[0], right.slope * by_share[1]
         if g_left == 0.0 == g_right:
             return []  # a given load does not change with the frequency
@@ -222,7 +223,10 @@ class _Search:
 
     def _between(self, left: _Node, right: _Node, share: float) -> _Node | None:
         """Return the solution at a share of the chord, its slope by the share; None if there is none."""
-        workspace, by_share = self._workspace, share_scales(left, right)
+        workspace, by_share = (
+            self._workspace,
+            share_scales(left, right, self._workspace.balance.system.least_size),
+        )
         found, tangent = np.zeros(left.solution.size), np.zeros(left.solution.size)
         observed, values = np.zeros(workspace.balance.n_coefficients), np.zeros(MEASURES)
         good, _ = between(

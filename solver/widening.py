@@ -8,46 +8,56 @@ from functools import lru_cache
 
 import numpy as np
 
-from solver.balance import Balance, build
+from solver.balance import Balance, build, with_harmonics
+from solver.contact_rows import enough_samples
 from solver.fourier import Complex, Integer, Real
+from solver.harmonics import MULTIPLES, kept_harmonics, spread
 from solver.kernels.system import System
 from solver.kernels.trigpoly import grid_size, grid_tables
 from solver.parametric import linear_model
 
 
-def more_harmonics(balance: Balance, top: int) -> Balance:
-    """Return the same balance with the harmonics up to `top`; one of odd harmonics stays one.
+def more_harmonics(balance: Balance, top: int, *, multiples: int = MULTIPLES) -> Balance:
+    """Return the same balance with the harmonics kept for `top`; one of odd harmonics stays one.
 
     The modes do not depend on the harmonics kept, only the tables of the event search are made anew. A cyclic
     structure is reduced again where a further harmonic meets a nodal diameter that is not there yet.
     """
-    ks = further_harmonics(balance.system.ks, top)
+    ks = further_harmonics(balance, top, multiples)
     system = _extended(balance, ks)
     if system is None:
         return _rebuilt(balance, top)
     cos_table, sin_table = _tables(max(int(ks[-1]), 1))
-    system = system._replace(cos_table=cos_table, sin_table=sin_table)
+    contacts = enough_samples(system.contacts, system.laws, int(ks[-1]))
+    system = system._replace(cos_table=cos_table, sin_table=sin_table, contacts=contacts)
     return replace(balance, system=system, n_harmonics=top)
+
+
+def less_harmonics(balance: Balance, top: int) -> Balance:
+    """Return the same balance with those of its harmonics that are kept if only `top` are asked for."""
+    ks = kept_harmonics(balance.scene, (balance.parameter.path,), top, odd=False)
+    return replace(with_harmonics(balance, np.intersect1d(balance.system.ks, ks)), n_harmonics=top)
 
 
 def linear_part(balance: Balance, top: int) -> System:
     """Return the linear part alone with the harmonics up to `top`: a `System` for receptances, no forces."""
-    system = _extended(balance, further_harmonics(balance.system.ks, top))
+    system = _extended(balance, further_harmonics(balance, top))
     return _rebuilt(balance, top).system if system is None else system
 
 
-def further_harmonics(ks: Integer, top: int) -> Integer:
-    """Return the harmonics `ks` and those that follow in the same pattern, up to `top`."""
-    step = int(ks[1] - ks[0]) if ks.size > 1 else 1 + int(ks[0])
-    return np.concatenate([ks, np.arange(ks[-1] + step, top + 1, step, dtype=np.int64)])
+def further_harmonics(balance: Balance, top: int, multiples: int = MULTIPLES) -> Integer:
+    """Return the harmonics of a balance and those that are kept if `top` are asked for."""
+    ks = balance.system.ks
+    odd = bool(np.all(ks % 2 == 1))
+    path = balance.parameter.path
+    wider = kept_harmonics(balance.scene, (path,), top, odd=odd, multiples=multiples)
+    return np.union1d(ks, wider)
 
 
 def pad(coefficients: Real, balance: Balance, wider: Balance) -> Real:
     """Return coefficients (of one motion or of all unknowns) of `balance` filled up for `wider`."""
     kept = coefficients.reshape(-1, balance.n_coefficients)
-    full = np.zeros((kept.shape[0], wider.n_coefficients))
-    full[:, : kept.shape[1]] = kept
-    return full.reshape(-1)
+    return spread(kept, balance.system.ks, wider.system.ks).reshape(-1)
 
 
 def _rebuilt(balance: Balance, top: int) -> Balance:
@@ -68,25 +78,26 @@ def _extended(balance: Balance, ks: Integer) -> System | None:
     That is a nodal diameter not met so far, or a force with one of the further harmonics.
     """
     model, system = linear_model(balance.scene), balance.system
-    beyond = ks[system.ks.size :]
-    if any(force.harmonic in beyond for force in model.forces):
+    if any(force.harmonic in ks and force.harmonic not in system.ks for force in model.forces):
         return None
-    diameters = (ks * model.engine_order) % model.sectors
-    known = {int(d): int(s) for d, s in zip(diameters, system.which, strict=False)}
-    if any(int(d) not in known for d in diameters):
+    known, wanted = ((each * model.engine_order) % model.sectors for each in (system.ks, ks))
+    structures = {int(d): int(s) for d, s in zip(known, system.which, strict=True)}
+    if any(int(d) not in structures for d in wanted):
         return None
+    at = np.searchsorted(ks, system.ks).astype(np.int64)
     return system._replace(
-        ks=ks, which=np.array([known[int(d)] for d in diameters], dtype=np.int64),
-        modal_forces=_padded_rows(system.modal_forces, ks.size), forces=_padded_rows(system.forces, ks.size),
+        ks=ks, which=np.array([structures[int(d)] for d in wanted], dtype=np.int64),
+        modal_forces=_padded_rows(system.modal_forces, at, ks.size),
+        forces=_padded_rows(system.forces, at, ks.size),
     )  # fmt: skip
 
 
-def _padded_rows(rows: Complex, count: int) -> Complex:
-    """Return (nk, m) unit forces with zeros for further harmonics; empty ones stay empty."""
-    if rows.size == 0:
-        return np.zeros((0 if rows.shape[0] == 0 else count, rows.shape[1]), np.complex128)
+def _padded_rows(rows: Complex, at: Integer, count: int) -> Complex:
+    """Return (nk, m) unit forces put at `at` of `count` rows, the rest zero; without rows they stay so."""
+    if rows.shape[0] == 0:
+        return rows
     padded = np.zeros((count, rows.shape[1]), np.complex128)
-    padded[: rows.shape[0]] = rows
+    padded[at] = rows
     return padded
 
 

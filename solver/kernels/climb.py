@@ -37,6 +37,7 @@ from solver.kernels.summit import (
     NORM,
     RATE,
     SIGN,
+    SPENT,
     TAU,
     G,
     Summit,
@@ -51,6 +52,8 @@ TARGET, ACCEPTED = 1e-11, 1e-9  # relative residuals, as in `solver.kernels.newt
 SHARP = 1e-10  # relative error of a peak's frequency
 _LARGEST_MOVE = 0.05  # of the frequency in one Newton step
 MOST = 9  # Newton iterations on a peak
+_MOST_CLIMB, _FEWEST_CLIMB = 400.0, 60.0  # evaluations of one climb at most, with few and with many unknowns
+_MANY = 100.0  # unknowns from which it is fewer: an evaluation takes longer
 
 
 @apart
@@ -134,8 +137,12 @@ def climb(
     system: System, u: Real, omega: float, p: float, tau: float, first: float, low: float, high: float,
     at: Summit,
 ) -> tuple[bool, float]:  # fmt: skip
-    """Find the peak uphill from (u, ω) between `low` and `high` [rad/s], u in place; return (found, ω)."""
+    """Find the peak uphill from (u, ω) between `low` and `high` [rad/s], u in place; return (found, ω).
+
+    The work is bounded: one climb is what nobody can interrupt.
+    """
     n = u.size
+    most = at.numbers[SPENT] + max(_FEWEST_CLIMB, _MOST_CLIMB * min(1.0, (_MANY / max(n, 1)) ** 2))
     if not settle(system, u, omega, p, tau, at):
         return False, omega
     ends, us, slopes = np.empty((2, _END_NUMBERS)), np.empty((2, n)), np.empty((2, n))
@@ -143,6 +150,8 @@ def climb(
     _keep(here, omega, u, at, ends, us, slopes)
     way = 1.0 if at.numbers[G] > 0.0 else -1.0
     for _ in range(60):
+        if at.numbers[SPENT] > most:
+            break
         start = ends[here, _AT]
         there = min(max(start + way * step, low), high)
         set_to(u, us[here], there - start, slopes[here])
@@ -153,7 +162,7 @@ def climb(
             continue
         _keep(1 - here, there, u, at, ends, us, slopes)
         if at.numbers[G] * way <= 0.0:
-            return _squeeze(system, u, p, ends, us, slopes, at)
+            return _squeeze(system, u, p, ends, us, slopes, most, at)
         if there <= low or there >= high:
             return False, omega
         here, step = 1 - here, 1.6 * step
@@ -174,14 +183,17 @@ def _keep(side: int, omega: float, u: Real, at: Summit, ends: Real, us: Real, sl
 
 @apart
 def _squeeze(
-    system: System, u: Real, p: float, ends: Real, us: Real, slopes: Real, at: Summit
+    system: System, u: Real, p: float, ends: Real, us: Real, slopes: Real, most: float, at: Summit
 ) -> tuple[bool, float]:  # fmt: skip
     """Find the maximum between two solutions that both rise towards it; the result in `u`.
 
-    Either g is 0 there, or it jumps: a corner, where the tangents of both sides meet.
+    Either g is 0 there, or it jumps: a corner, where the tangents of both sides meet. `most`: evaluations in
+    all at which it is given up.
     """
     before = np.inf
     for iteration in range(60):
+        if at.numbers[SPENT] > most:
+            break
         left, right = (ends[0], ends[1]) if ends[0, _AT] < ends[1, _AT] else (ends[1], ends[0])
         width = right[_AT] - left[_AT]
         for side in range(2):

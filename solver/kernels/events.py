@@ -11,7 +11,7 @@ slip, with the extremum as its onset). Otherwise c equals max w_− at the place
 before, so the periodic state is found by one march over one period from there, with no transient. Where N
 becomes negative, every contact interval starts from a known force, 0.
 
-Reference for the law: Yang, Chu, Menq, J. Sound Vib. 217 (1998) 909, doi:10.1006/jsvi.1998.1829 (variable
+Reference for the law: Yang, Chu, Menq, J. Sound Vib. 210 (1998) 461, doi:10.1006/jsvi.1997.1305 (variable
 normal load); Petrov, Ewins, J. Turbomach. 125 (2003) 364, doi:10.1115/1.1539868 (multi-harmonic form).
 """
 

@@ -29,12 +29,8 @@ from solver.kernels.linear import (
     invert,
 )
 from solver.kernels.linear import factorise as factorise_block
-from solver.kernels.system import Evaluation, Receptance, System
-
-# Put on the slope of a mean where contacts alone hold a part: once they all slip nothing does, and it stays.
-LOOSE = 1e-9
-# Numbers in `Evaluation.counts`.
-FREE, HELD, SIZE, AT_BRANCH_POINT = 0, 1, 2, 3
+from solver.kernels.loose import keep_means
+from solver.kernels.system import AT_BRANCH_POINT, FREE, HELD, SIZE, UNHELD, Evaluation, Receptance, System
 
 
 @compiled
@@ -56,7 +52,7 @@ def _add_block(
 
 @compiled
 def _take_slopes(system: System, point: Evaluation) -> None:
-    """Fill G with dF/dU less the shift."""
+    """Fill G with dF/dU less the shift, with the slopes of `elastic` in it."""
     n = coefficient_count(system.ks)
     for e in range(system.laws.size):
         first, m = system.first_port[e], system.first_port[e + 1] - system.first_port[e]
@@ -70,6 +66,7 @@ def _take_slopes(system: System, point: Evaluation) -> None:
                     stiffness = system.shift[first + a]
                     for i in range(n):
                         point.G[block, i, i] -= stiffness
+                    point.G[block, 0, 0] += point.elastic[first + a]
 
 
 @apart
@@ -89,23 +86,19 @@ def fill_jacobian(system: System, linear: Receptance, point: Evaluation) -> None
                     for q in range(first, first + m):
                         block = system.first_block[e] + (d - first) * m + q - first
                         _add_block(J, point.G[block], row, q * n, here, linear.A[0, i, c, d], has_sine)
-            J[row, row] += _own_slope(system, c, has_sine)
+            J[row, row] += 1.0
             if has_sine:
                 J[row + 1, row + 1] += 1.0
-
-
-@compiled
-def _own_slope(system: System, c: int, has_sine: bool) -> float:
-    """Return the slope of u itself in the residual."""
-    return 1.0 if has_sine or not system.shift[c] > 0.0 else 1.0 + LOOSE
+    keep_means(system, point, J, n)
 
 
 @compiled
 def _part(system: System, point: Evaluation) -> None:
-    """Divide the ports into those kept and those eliminated."""
+    """Divide the ports into those kept and those eliminated; all are kept where nothing holds a part."""
     free, held = 0, 0
+    whole = system.condense == 0 or point.counts[UNHELD] > 0
     for c in range(system.owner.size):
-        if system.condense == 0 or math.isnan(point.slopes[system.owner[c]]):
+        if whole or math.isnan(point.slopes[system.owner[c]]):
             point.free[free] = c
             free += 1
         else:
@@ -134,7 +127,7 @@ def _eliminate(system: System, linear: Receptance, point: Evaluation, i: int) ->
         c = point.held[h]
         for other in range(held):
             D[h, other] = A[c, point.held[other]] * g[other]
-        D[h, h] += _own_slope(system, c, system.ks[i] > 0)
+        D[h, h] += 1.0
     if not invert(D, inverse):
         return False
     for h in range(held):
@@ -180,9 +173,10 @@ def _assemble(system: System, point: Evaluation, J: Real) -> None:
                         response = point.reduced[i, a, b + d]
                         _add_block(J, point.G[block], row, (b + q) * n, here, response, has_sine)
                 b += m
-            J[row, row] += _own_slope(system, point.free[a], has_sine)
+            J[row, row] += 1.0
             if has_sine:
                 J[row + 1, row + 1] += 1.0
+    keep_means(system, point, J, n)
 
 
 @apart

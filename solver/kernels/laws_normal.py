@@ -5,7 +5,7 @@ Two relative motions, the tangential u and the normal v. The friction force is t
 on the normal pair is max(N, 0); the friction march has found the intervals of contact, so its coefficients
 are their moments: P = Σ ∫ N e. N is 0 where they begin and end, so these places drop out of every derivative.
 
-Reference: Yang, Chu, Menq, J. Sound Vib. 217 (1998) 909, doi:10.1006/jsvi.1998.1829; multi-harmonic form
+Reference: Yang, Chu, Menq, J. Sound Vib. 210 (1998) 461, doi:10.1006/jsvi.1997.1305; multi-harmonic form
 Petrov, Ewins, J. Turbomach. 125 (2003) 364, doi:10.1115/1.1539868.
 """
 

@@ -19,6 +19,7 @@ from solver.kernels.jacobian import factorise, step_back
 from solver.kernels.laws import held_stiffness, is_friction
 from solver.kernels.laws_columns import ELASTIC_NORMAL, KN
 from solver.kernels.linear import copy_to, invert, set_to
+from solver.kernels.loose import rebase
 from solver.kernels.receptance import receptance
 from solver.kernels.residual import contact_values, evaluate
 from solver.kernels.system import KT, MU, N0, N1, Evaluation, Receptance, System
@@ -75,6 +76,7 @@ def newton(
         if factorise(system, linear, point, step, 0.0, 0.0) == 0.0:
             break
         copy_to(step, point.residual)
+        rebase(system, linear, u, point, step)
         step_back(system, point, step)
         iteration += 1
         length, halvings, must_take = 1.0, 0, False
@@ -122,6 +124,7 @@ def arc_newton(
             rhs[i] = point.residual[i]
             plane += weight_u * tangent[i] * (u[i] - guess_u[i])
         rhs[n] = plane
+        rebase(system, linear, u, point, rhs)
         step_back(system, point, rhs)
         set_to(u, u, -1.0, rhs)
         p -= rhs[n]

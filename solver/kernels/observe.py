@@ -38,12 +38,9 @@ def observed_motion(system: System, linear: Receptance, u: Real, point: Evaluati
 
 
 @apart
-def observed_slope(
-    system: System, linear: Receptance, u: Real, point: Evaluation, du: Real, dp: float, dx: Real
-) -> None:
-    """Fill `dx` with the change of the observed coefficients for a change (du, dλ) of the solution."""
+def force_slope(system: System, point: Evaluation, du: Real, dp: float, dF: Real) -> None:
+    """Fill `dF` (nc, n) with the change of the contact forces, less that of the shift, for (du, dλ)."""
     nc, n = system.owner.size, coefficient_count(system.ks)
-    dF = np.empty((nc, n))
     for c in range(nc):
         e = system.owner[c]
         first, m = system.first_port[e], system.first_port[e + 1] - system.first_port[e]
@@ -54,6 +51,16 @@ def observed_slope(
                 for j in range(n):
                     total += point.dF_dU[block, i, j] * du[(first + q) * n + j]
             dF[c, i] = total
+
+
+@apart
+def observed_slope(
+    system: System, linear: Receptance, u: Real, point: Evaluation, du: Real, dp: float, dx: Real
+) -> None:
+    """Fill `dx` with the change of the observed coefficients for a change (du, dλ) of the solution."""
+    nc, n = system.owner.size, coefficient_count(system.ks)
+    dF = np.empty((nc, n))
+    force_slope(system, point, du, dp, dF)
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
         has_sine = system.ks[i] > 0

@@ -17,14 +17,14 @@ from solver.fourier import Integer, Real
 from solver.kernels.apart import apart
 from solver.kernels.compiled import compiled
 from solver.kernels.frozen import frozen_arc
-from solver.kernels.jacobian import AT_BRANCH_POINT, factorise, step_back
+from solver.kernels.jacobian import factorise, step_back
 from solver.kernels.linear import copy_to, set_to
 from solver.kernels.newton import arc_newton, newton
 from solver.kernels.observe import RESIDUAL, measure
 from solver.kernels.predict import predict
 from solver.kernels.receptance import receptance
 from solver.kernels.residual import evaluate
-from solver.kernels.system import Evaluation, Receptance, System
+from solver.kernels.system import AT_BRANCH_POINT, Evaluation, Receptance, System
 from solver.kernels.walk import (
     CUBIC,
     FINISHED,
@@ -219,13 +219,15 @@ def _step_over(system: System, linear: Receptance, point: Evaluation, control: C
     forward = math.copysign(1.0, span)
     direction = math.copysign(1.0, walk.tangent[n])
     trial = np.empty(n)
+    # Where a part may ratchet there is a stretch of λ without a periodic motion: it is not passed over.
+    furthest = (0.05 if system.loose.shape[0] == 0 else 1e-4) * abs(span)
     for rung in range(24):
         away = direction * abs(span) * 1e-7 * 2.0**rung
         p = walk.numbers[P] + away
         last = (p - control.stop) * forward >= 0.0
         if last:
             p = control.stop
-        if (p - control.start) * forward < 0.0 or abs(away) > 0.05 * abs(span):
+        if (p - control.start) * forward < 0.0 or abs(away) > furthest:
             break
         receptance(system, p, linear)
         copy_to(trial, walk.u)
@@ -258,10 +260,11 @@ def _turn_over(system: System, linear: Receptance, point: Evaluation, control: C
     if t == 0.0:
         return STALLED
     trial = np.empty(n)
+    furthest = (0.05 if system.loose.shape[0] == 0 else 1e-4) * span
     for rung in range(14):
         share = span * 1e-8 * 4.0**rung / abs(t)
         p = walk.numbers[P] - share * t
-        if share * abs(t) > 0.05 * span or (p - control.start) * (control.stop - control.start) < 0.0:
+        if share * abs(t) > furthest or (p - control.start) * (control.stop - control.start) < 0.0:
             break
         receptance(system, p, linear)
         set_to(trial, walk.u, share, walk.tangent)

@@ -55,7 +55,7 @@ def between(
     n = left.size - 1
     chord, plane, guess, u = np.empty(n + 1), np.empty(n), np.empty(n), np.empty(n)
     set_to(chord, right, -1.0, left)
-    size, span = largest_entry(left[:n]), abs(chord[n])
+    size, span = max(largest_entry(left[:n]), system.least_size), abs(chord[n])
     weight_u = 1.0 / (size * size) if size > 0.0 else 1.0
     weight_p = 1.0 / (span * span) if span > 0.0 else 1.0
     if left_slope[n] * right_slope[n] < 0.0:
@@ -94,7 +94,7 @@ def between(
 @apart
 def refine(
     system: System, linear: Receptance, point: Evaluation, left: Real, left_slope: Real, right: Real,
-    right_slope: Real, what: int, level: float, g_left: float, g_right: float, most: int,
+    right_slope: Real, what: int, level: float, g_left: float, g_right: float, close: float, most: int,
     found: Real, tangent: Real, x: Real, out: Real,
 ) -> tuple[bool, int]:  # fmt: skip
     """Find a peak (slope 0) or an edge (amplitude = level) between two points of a branch.
@@ -104,6 +104,7 @@ def refine(
     left, left_slope, right, right_slope, most, found, tangent, x, out : as in `between`.
     what : HIGH_PEAK of max x, LOW_PEAK of −min x, or EDGE.
     g_left, g_right : the function at both ends, of opposite sign: slope by the share, or amplitude − level.
+    close : how near to 0 it has to come, relative to the larger of them.
 
     Returns
     -------
@@ -125,7 +126,7 @@ def refine(
         g = out[MAX_ABS] - level
         if what != EDGE:
             g = out[HIGH_SLOPE] if what == HIGH_PEAK else out[LOW_SLOPE]
-        if abs(g) <= 1e-10 * scale or hi - lo <= 1e-11:
+        if abs(g) <= close * scale or hi - lo <= 1e-11:
             break
         now = -1 if (g > 0.0) == (g_lo > 0.0) else 1
         if now < 0:

@@ -14,6 +14,7 @@ from solver.kernels.force import contact_force
 from solver.kernels.laws import law_force
 from solver.kernels.laws_columns import COLUMNS, COULOMB, OWN, OWN_KIND
 from solver.kernels.linear import copy_block
+from solver.kernels.loose import find_gauge, let_hold
 from solver.kernels.sampled import sampled_force
 from solver.kernels.system import (
     FRICTION,
@@ -193,6 +194,8 @@ def _residual(system: System, linear: Receptance, u: Real, least: float, out: Ev
     nc, n = system.owner.size, coefficient_count(system.ks)
     r, dr = out.residual, out.dr_dp
     motion, force_scale = _sizes(system, u, out)
+    if system.loose.shape[0] > 0:
+        find_gauge(system, out)
     worst, check = 0.0, 0.0
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
@@ -228,6 +231,11 @@ def _residual(system: System, linear: Receptance, u: Real, least: float, out: Ev
                 dr[row + 1] = dfree.imag - dresponse.imag
                 residual = max(residual, abs(r[row + 1]))
                 check += r[row + 1]
+        if system.ks[i] == 0 and system.hold == 1 and system.loose.shape[0] > 0:
+            let_hold(system, r, out)
+            residual = 0.0
+            for c in range(nc):
+                residual = max(residual, abs(r[c * n]))
         if residual > 0.0:
             worst = max(worst, residual / scale if scale > 0.0 else residual)
     # `max` passes over NaN, a sum does not.

@@ -7,7 +7,7 @@ the state repeats, and the samples are transformed back. Sticking since sample a
 scheme itself are sums over its samples of the same form as those of `solver.kernels.force`.
 
 Cameron, Griffin, J. Appl. Mech. 56 (1989) 149, doi:10.1115/1.3176036; with a variable normal load: Yang, Chu,
-Menq, J. Sound Vib. 217 (1998) 909, doi:10.1006/jsvi.1998.1829.
+Menq, J. Sound Vib. 210 (1998) 461, doi:10.1006/jsvi.1997.1305.
 """
 
 from __future__ import annotations

@@ -26,7 +26,8 @@ from solver.kernels.system import (
 # Entries of `Summit.numbers`.
 NORM, AMPLITUDE, G, DA_DP, CURVE, DG_DP, TAU, DTAU, SIGN, CORNER, DRIFT, RATE = range(12)
 SPENT = 12  # evaluations of the balance since it was set to 0
-NUMBERS = 13
+PAUSE = 13  # of those, from which a track is interrupted between two steps; 0: it never is
+NUMBERS = 14
 
 
 class Summit(NamedTuple):

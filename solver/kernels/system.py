@@ -34,6 +34,8 @@ MODES, POLES, DENSE = 0, 1, 2
 # Columns of the contact table.
 KT, MU, N0, N1, RATIO, PHASE = 0, 1, 2, 3, 4, 5
 LOAD_COEFFICIENTS = 3
+# Numbers in `Evaluation.counts`.
+FREE, HELD, SIZE, AT_BRANCH_POINT, UNHELD = 0, 1, 2, 3, 4
 
 
 class System(NamedTuple):
@@ -55,6 +57,8 @@ class System(NamedTuple):
     contacts: Real  # (ne, COLUMNS) kt, mu, N0, N1, N1_ratio (NaN: not tied), N1_phase, and a law's own
     active: Real  # (ne,) 1.0 where λ acts
     shift: Real  # (nc,) stiffness moved into the structure [N/m]
+    loose: Real  # (nr, nc) ports' part in the rigid-body motions of what contacts alone hold, see `loose`
+    hold: int  # 1: where no contact holds such a part, a constant force does
     samples: int  # in a period, for contact forces by samples in time; 0: in closed form
     condense: int  # 1: contacts that are linear where they are leave the Newton step, 0: none does
     kind: int  # what λ is
@@ -113,7 +117,8 @@ class Evaluation(NamedTuple):
     pivots: Index  # (nt + 1,)
     free: Integer  # (nc,) ports kept in it
     held: Integer  # (nc,) ports eliminated
-    counts: Integer  # (4,) numbers of both, size of the factors, and whether they belong to a branch point
+    counts: Integer  # (5,) numbers of both, size of the factors, whether they belong to a branch point, and
+    # the number of directions in which nothing holds a part
     G: Real  # (blocks, n, n) dF_dU less the shift, at the factors' point
     inverse: Complex  # (nk, nc, nc) D⁻¹, likewise below; see `solver.kernels.jacobian`
     V: Complex  # (nk, nc, nc)
@@ -122,6 +127,9 @@ class Evaluation(NamedTuple):
     border: Real  # (nt,) the weighted tangent
     held_slope: Real  # (nt,) D⁻¹ dr/dλ of the ports eliminated
     work: Real  # (4, nt + 1) scratch
+    gauge: Real  # (nr, nc) motions of the ports that nothing holds, see `solver.kernels.loose`
+    unheld: Real  # (nr, nr) forces along them, over the rigid-body motions
+    elastic: Real  # (nc,) stiffness of contacts that carry all the mean force they can [N/m], else 0
 
 
 # Inside the compiled loops each record is one pointer: forty arrays passed by value at every call cost more
@@ -177,7 +185,8 @@ def evaluation_by_value(point: Evaluation) -> Evaluation:
         point.residual, point.dr_dp, point.F, point.dF_dU, point.dF_dp, point.dF_dkt, point.dF_dmu,
         point.dF_dN, point.states, point.pieces, point.slopes, point.segments, point.jacobian, point.lu,
         point.pivots, point.free, point.held, point.counts, point.G, point.inverse, point.V, point.W,
-        point.reduced, point.border, point.held_slope, point.work,
+        point.reduced, point.border, point.held_slope, point.work, point.gauge, point.unheld,
+        point.elastic,
     )  # fmt: skip
 
 
@@ -216,8 +225,10 @@ def new_evaluation(system: System) -> Evaluation:
         np.zeros(ne, np.int64), np.zeros(ne),
         np.zeros((segment_capacity(max(system.ks[-1], 1)), SEGMENT_COLUMNS)), np.zeros((nt, nt)),
         np.zeros((nt + 1, nt + 1)), np.zeros(nt + 1, np.int32), np.zeros(nc, np.int64),
-        np.zeros(nc, np.int64), np.zeros(4, np.int64), np.zeros((blocks, n, n)),
+        np.zeros(nc, np.int64), np.zeros(5, np.int64), np.zeros((blocks, n, n)),
         np.zeros((nk, nc, nc), np.complex128), np.zeros((nk, nc, nc), np.complex128),
         np.zeros((nk, nc, nc), np.complex128), np.zeros((nk, nc, nc), np.complex128), np.zeros(nt),
         np.zeros(nt), np.zeros((4, nt + 1)),
+        np.zeros((system.loose.shape[0], nc)), np.zeros((system.loose.shape[0], system.loose.shape[0])),
+        np.zeros(nc),
     )  # fmt: skip

@@ -15,7 +15,7 @@ from solver.kernels.apart import apart
 from solver.kernels.climb import MOST, SHARP, climb, find_summit, settle
 from solver.kernels.compiled import compiled
 from solver.kernels.linear import copy_to
-from solver.kernels.summit import AMPLITUDE, CORNER, CURVE, DRIFT, RATE, SIGN, TAU, G, Summit
+from solver.kernels.summit import AMPLITUDE, CORNER, CURVE, DRIFT, PAUSE, RATE, SIGN, SPENT, TAU, G, Summit
 from solver.kernels.system import System
 
 # Columns of a tracked peak.
@@ -24,7 +24,10 @@ COLUMNS = 10
 _NEAR = 1e-4  # relative distance to a peak's frequency where only a high amplitude is wanted
 _MOST_SLACK = 0.5  # relative error of the height in a step at most
 # How a track ended.
-ARRIVED, VANISHED, LEFT_BAND, TOO_LONG, NOT_FOUND = range(5)
+ARRIVED, VANISHED, LEFT_BAND, TOO_LONG, NOT_FOUND, PAUSED = range(6)
+# What a track needs to go on after a pause.
+COUNT, STEP, SMOOTH = range(3)
+PROGRESS = 3
 
 
 class Ridge(NamedTuple):
@@ -137,14 +140,15 @@ def _predict(
 @apart
 def track(
     system: System, ridge: Ridge, u: Real, omega: float, tau: float, sign: float, at: Summit,
-    rows: Real, solutions: Real, tangents: Real,
+    rows: Real, solutions: Real, tangents: Real, progress: Real,
 ) -> tuple[int, int]:  # fmt: skip
-    """Follow one peak from `ridge.start` to `ridge.stop`.
+    """Follow one peak from `ridge.start` to `ridge.stop`, or go on where a call before was interrupted.
 
     Parameters
     ----------
     u, omega, tau, sign : near the peak at the start; sign 0 lets the larger of max x and −min x be chosen.
     rows : (most, COLUMNS); solutions, tangents : (most, nt) u and du/dz; filled.
+    progress : (PROGRESS,) zeros at the start; after PAUSED to be given back with `rows` and the sign found.
 
     Returns
     -------
@@ -153,16 +157,21 @@ def track(
     n, most = u.size, rows.shape[0]
     at.numbers[SIGN] = sign
     trial, guess = u.copy(), np.empty(n)
-    p, _ = value_of(ridge.start, ridge.logarithmic)
-    good, _, omega = _correct(system, ridge, trial, omega, p, tau, False, 2e-3 * omega, False, True, at)
-    if not good:
-        return NOT_FOUND, 0
-    record(ridge, trial, omega, ridge.start, at, rows[0], solutions[0], tangents[0])
-    if ridge.start == ridge.stop:
-        return ARRIVED, 1
+    if progress[COUNT] == 0.0:
+        p, _ = value_of(ridge.start, ridge.logarithmic)
+        good, _, omega = _correct(system, ridge, trial, omega, p, tau, False, 2e-3 * omega, False, True, at)
+        if not good:
+            return NOT_FOUND, 0
+        record(ridge, trial, omega, ridge.start, at, rows[0], solutions[0], tangents[0])
+        if ridge.start == ridge.stop:
+            return ARRIVED, 1
+        progress[COUNT], progress[STEP], progress[SMOOTH] = 1.0, ridge.first_step, 0.0
     forward = 1.0 if ridge.stop >= ridge.start else -1.0
-    count, step, smooth = 1, ridge.first_step, False
+    count, step, smooth = int(progress[COUNT]), progress[STEP], progress[SMOOTH] > 0.0
     while count < most:
+        if 0.0 < at.numbers[PAUSE] <= at.numbers[SPENT]:
+            progress[COUNT], progress[STEP], progress[SMOOTH] = count, step, 1.0 if smooth else 0.0
+            return PAUSED, count
         here = rows[count - 1]
         z = here[Z] + forward * step
         last = (z - ridge.stop) * forward >= 0.0 or abs(z - ridge.stop) < 0.1 * ridge.smallest_step

@@ -4,6 +4,11 @@ I. S. Duff, R. G. Grimes, J. G. Lewis, Users' Guide for the Harwell-Boeing Spars
 I), 1992: four or five header lines in fixed columns, then column pointers, row indices and values in the
 Fortran formats the header names. Symmetric matrices (RSA) hold one triangle. The Rutherford-Boeing format
 (1997) leaves out what concerns right-hand sides.
+
+Some programs write other columns than their header names: SciPy's `hb_write` says 3E25.16 and writes 24
+characters a number. Where the columns hold no numbers but every line shows as many as it should, written out
+with a decimal point or an exponent, these are the values. No number is ever read both ways with two results:
+characters that columns would cut off a number stay in the field before it, which then is no number.
 """
 
 from __future__ import annotations
@@ -24,6 +29,8 @@ _REALS = re.compile(
     r"\(?\s*(?:([+-]?\d+)\s*P\s*,?)?\s*(\d*)\s*\(?\s*[EDFG]\s*(\d+)\s*\.\s*(\d+)(?:E\d+)?\s*\)*"
 )
 _EXPONENT = re.compile(r"([+-]?[\d.]+)(?:[ED]\s*([+-]?\d+)|([+-]\d+))?")
+# A number that needs no columns: with a point, and an exponent with a sign or a letter if it has one.
+_WRITTEN_OUT = re.compile(r"\s*([+-]?(?:\d+\.\d*|\.\d+)(?:[ED][+-]?\d+|[+-]\d+)?)(?=[\s+-]|$)\s*")
 _SHAPES = "SURHZ"  # symmetric, unsymmetric, rectangular, Hermitian, skew symmetric
 
 
@@ -104,7 +111,7 @@ def _header(lines: list[str]) -> _Header:
         kind=kind, rows=rows, columns=columns, entries=entries,
         pointer_lines=cards[1], index_lines=cards[2], value_lines=cards[3],
         pointers=_integer_format(formats[:16]), indices=_integer_format(formats[16:32]),
-        values=_real_format(formats[32:52]), first_line=5 if rhs > 0 else 4,
+        values=_value_format(formats[32:52], kind), first_line=5 if rhs > 0 else 4,
     )  # fmt: skip
 
 
@@ -133,6 +140,13 @@ def _real_format(text: str) -> _Format:
     return _Format(
         count=int(found[2] or 1), width=int(found[3]), decimals=int(found[4]), power=int(found[1] or 0)
     )
+
+
+def _value_format(text: str, kind: str) -> _Format:
+    """The format of the values: matrices of whole numbers (I) may be written in a format of these."""
+    if kind[0] == "I" and _INTEGERS.fullmatch(text.strip().upper()):
+        return _integer_format(text)
+    return _real_format(text)
 
 
 def _whole(text: str, line: int, column: int, what: str) -> int:
@@ -210,7 +224,31 @@ def _reals(lines: list[str], first: int, n_lines: int, form: _Format, count: int
             except ValueError:
                 quick = None  # the slow way names the field
     fields = _fields(lines, first, n_lines, form, count, "value")
-    return np.array(_parsed(fields, lambda text: _real(text, form), "value"), dtype=np.float64)
+    try:
+        return np.array(_parsed(fields, lambda text: _real(text, form), "value"), dtype=np.float64)
+    except FormatError:
+        written_out = _written_out(lines[first : first + n_lines], form, count)
+        if written_out is None:
+            raise
+        return written_out
+
+
+def _written_out(lines: list[str], form: _Format, count: int) -> NDArray[np.float64] | None:
+    """The values of a section whatever its columns; None unless every line shows as many as it should."""
+    numbers: list[str] = []
+    for line in lines[: -(-count // form.count)]:
+        at, expected = 0, min(form.count, count - len(numbers))
+        for _ in range(expected):
+            found = _WRITTEN_OUT.match(line.upper(), at)
+            if found is None:
+                return None
+            at = found.end()
+            numbers.append(found[1])
+        if at < len(line):
+            return None
+    if len(numbers) != count:
+        return None
+    return np.array([_real(text, form) for text in numbers], dtype=np.float64)
 
 
 def _plain(fields: NDArray[np.bytes_]) -> bool:

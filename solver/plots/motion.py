@@ -66,7 +66,7 @@ class Motion:
         from solver.histories import hysteresis_loop
 
         share = np.linspace(0.0, 1.0, _SAMPLES + 1)
-        functions = basis(2.0 * np.pi * share, solution.n_harmonics)
+        functions = basis(2.0 * np.pi * share, solution.highest_harmonic)
         return cls(
             title=f"{solution.scene.name} at {solution.frequency_hz:g} Hz, {solution.n_harmonics} harmonics",
             dof=solution.scene.observe.dof,
