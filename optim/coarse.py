@@ -1,32 +1,25 @@
-"""The coarse stage: designs over the whole range, from the best of which the local searches begin.
-
-With several variables it is made with half the harmonics: it only has to rank designs, and none of its
-numbers is kept.
-"""
+"""The designs that a look over the whole range begins with, and those a robust search starts from."""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from scipy.stats import qmc
 
-from optim.evaluator import Search
-from optim.local import is_flat
 from optim.problem import Problem
-from optim.rows import Evaluation
-from optim.variables import scaled, unscaled
+from optim.variables import Real, unscaled
 
-COARSE_ONE = 9  # designs of the coarse stage with one variable
+COARSE_ONE = 9  # designs of the coarse stage of a robust search with one variable
 COARSE_EACH = 6  # and for each variable with more
-FEWEST = 3  # harmonics of a coarse stage with several variables, at least
-APART = 0.15  # scaled distance of the designs that several local searches begin from
-WORTH_A_LOOK = 1.15  # relative height up to which an interval of the coarse stage is halved
+LOOKS_ONE = 17  # designs of a look with one variable
+LOOKS_EACH = 12  # and for each variable with more, besides corners and middles
+MOST_CORNERS = 32
 
 
 def coarse(problem: Problem) -> list[dict[str, float]]:
-    """Return the designs of the coarse stage: even in scaled variables, the start first."""
+    """Return the designs a robust search starts from: even in scaled variables, the start first."""
     n = len(problem.variables)
     if n == 1:
         points = [[i / (COARSE_ONE - 1.0)] for i in range(COARSE_ONE)]
@@ -37,77 +30,26 @@ def coarse(problem: Problem) -> list[dict[str, float]]:
     return [start, *designs] if start is not None and start not in designs else designs
 
 
-def between(search: Search) -> list[dict[str, float]]:
-    """Return the middles of those coarse intervals in which a design may beat the best one so far."""
-    variable = search.variables[0]
-    good = sorted(search.good(), key=lambda evaluation: evaluation.values[variable.name])
-    merits = [search.merit(evaluation) for evaluation in good]
-    places = [variable.inside(evaluation.values[variable.name]) for evaluation in good]
-    return [
-        {variable.name: variable.outside(0.5 * (places[i] + places[i + 1]))}
-        for i in range(len(good) - 1)
-        if min(merits[i], merits[i + 1]) <= WORTH_A_LOOK * min(merits)
-    ]
+def places(n: int) -> Real:
+    """Return the places of a look, (k, n), of the unit box: bounds included.
 
-
-def first_designs(search: Search) -> tuple[list[Evaluation], bool]:
-    """Run the coarse stage.
-
-    Returns
-    -------
-    The designs to begin local searches from, the best first, and whether nothing depends on any variable.
+    The middle; the corners, of many variables only those next to the lowest and the highest; the middles of
+    the faces, with two variables those of the edges; a Sobol sequence between them.
     """
-    if len(search.variables) == 1:
-        for values in coarse(search.problem):
-            search(values)
-        for values in between(search):
-            search(values)
-        good = search.good()
-        return _minima(search, good), _flat(search, good)
-    found = _scouted(search)
-    if found is None:
-        for values in coarse(search.problem):
-            search(values)
-        found = _apart(search, search.good()), _flat(search, search.good())
-    return found
+    if n == 1:
+        return np.linspace(0.0, 1.0, LOOKS_ONE)[:, None]
+    middle = np.full((1, n), 0.5)
+    faces = np.repeat(middle, 2 * n, axis=0)
+    for i in range(n):
+        faces[2 * i, i], faces[2 * i + 1, i] = 0.0, 1.0
+    between = qmc.Sobol(n, scramble=False).random(2 ** math.ceil(math.log2(LOOKS_EACH * n)))
+    # The first place of the sequence is a corner, the second the middle.
+    return np.vstack([middle, corners(n), faces, between[2:]])
 
 
-def _scouted(search: Search) -> tuple[list[Evaluation], bool] | None:
-    """Run the coarse stage with half the harmonics; None if that leads to no design that can be evaluated."""
-    few = max(FEWEST, (search.problem.harmonics + 1) // 2)
-    if few >= search.problem.harmonics:
-        return None
-    scout = search.scout(few)
-    try:
-        for values in coarse(search.problem):
-            scout(values)
-    finally:
-        search.scouting_done(scout)
-    chosen = [search(evaluation.values) for evaluation in _apart(scout, scout.good())]
-    good = [evaluation for evaluation in chosen if evaluation.good]
-    return (good, _flat(scout, scout.good()) and _flat(search, good)) if good else None
-
-
-def _flat(search: Search, good: Sequence[Evaluation]) -> bool:
-    """Return whether no design depends on any variable."""
-    return bool(good) and all(is_flat(search.model(evaluation)) for evaluation in good)
-
-
-def _apart(search: Search, good: Sequence[Evaluation]) -> list[Evaluation]:
-    """Return the best designs, each some way from those before it."""
-    chosen: list[Evaluation] = []
-    for evaluation in sorted(good, key=search.merit):
-        z = scaled(search.variables, evaluation.values)
-        near = [np.abs(z - scaled(search.variables, other.values)).max() for other in chosen]
-        if len(chosen) < search.problem.basins and min(near, default=np.inf) >= APART:
-            chosen.append(evaluation)
-    return chosen
-
-
-def _minima(search: Search, good: Sequence[Evaluation]) -> list[Evaluation]:
-    """Return the local minima along one variable, the best first."""
-    name = search.variables[0].name
-    along = sorted(good, key=lambda evaluation: evaluation.values[name])
-    merits = [math.inf, *(search.merit(evaluation) for evaluation in along), math.inf]
-    minima = [e for i, e in enumerate(along) if merits[i] >= merits[i + 1] <= merits[i + 2]]
-    return sorted(minima, key=search.merit)[: search.problem.basins]
+def corners(n: int) -> Real:
+    """Return the corners of the unit box, (k, n); of many variables those that differ from an end in one."""
+    if 2**n <= MOST_CORNERS:
+        return np.array(list(itertools.product((0.0, 1.0), repeat=n)))
+    low = np.vstack([np.zeros(n), np.eye(n)])
+    return np.vstack([low, 1.0 - low])

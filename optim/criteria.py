@@ -3,8 +3,9 @@
 Peak: at a maximum over the frequency ∂a/∂ω = 0, so its derivative by a parameter is the partial one there
 (envelope theorem). At an end of the band the frequency does not move either, so the same holds; where a
 contact changes its state at the top, the two smooth pieces that meet there give it (`solver.corners`).
-Band edge: a(ω_e, p) = limit, so dω_e/dp = (dlimit/dp − ∂a/∂p)/(∂a/∂ω). The second derivatives are those of
-`solver.curvature`.
+Band edge: a(ω_e, p) = limit, so dω_e/dp = (dlimit/dp − ∂a/∂p)/(∂a/∂ω). An interval that ends in a fold moves
+with it, whatever the limit does: the ratio of both derivatives at the fold (`solver.folds`). The second
+derivatives are those of `solver.curvature`.
 """
 
 from __future__ import annotations
@@ -51,7 +52,10 @@ class Sensitivity:
             slopes = self._slopes.gradient(edge.solution, edge.at)
             if not math.isfinite(slopes.by_frequency) or slopes.by_frequency == 0.0:
                 return np.full(dlimit.shape, np.nan)
-            moves = (dlimit - slopes.by_parameters) / slopes.by_frequency
+            if edge.corner:
+                return np.full(dlimit.shape, np.nan)
+            given = np.zeros(dlimit.shape) if edge.fold else dlimit
+            moves = (given - slopes.by_parameters) / slopes.by_frequency
             total += -moves if edge.opens else moves
         return total
 
@@ -61,8 +65,13 @@ class Sensitivity:
         return found.of_peak().hessian if peak.interior else found.hessian
 
     def band_second(self, edges: Sequence[Edge], highest: Peak | None) -> Real:
-        """Return d² width / dp², (n_paths, n_paths); the limit is half power of `highest` if given."""
+        """Return d² width / dp², (n_paths, n_paths); the limit is half power of `highest` if given.
+
+        NaN where an interval ends in a fold.
+        """
         n = self._n
+        if any(edge.fold for edge in edges):
+            return np.full((n, n), np.nan)
         dlimit, ddlimit = np.zeros(n), np.zeros((n, n))
         if highest is not None:
             dlimit, ddlimit = HALF_POWER * self.peak(highest), HALF_POWER * self.peak_second(highest)

@@ -113,6 +113,11 @@ class OrderResponse:
             "highest_running": None if highest is None else _crossing_json(highest),
             "stuck_hz": list(self.stuck_hz),
             "open_hz": list(self.open_hz),
+            "peak_certificate": branch.peak_certificate.to_json(),
+            "band_known": None
+            if branch.band is None
+            else branch.band.known and branch.peak_certificate.known,
+            "flags": list(branch.flags),
             "completed": branch.completed,
             "status": branch.status.value,
         }
@@ -157,13 +162,15 @@ class CampbellDiagram(Shown):
     def clear(self) -> bool | None:
         """Whether the amplitude stays within the limit at every running speed; None if that is not known.
 
-        Without a limit: whether no peak lies at a running speed.
+        Without a limit: whether no peak lies at a running speed. It is not known either where a peak may hide
+        between two points of a response, see `Branch.peak_certificate`.
         """
         if self.limit is None:
             meets = any(crossing.inside for one in self.orders for crossing in one.crossings)
         else:
             meets = any(one.exceeded_running_rpm for one in self.orders)
-        return False if meets else True if self.completed else None
+        known = all(one.branch.peak_certificate.known for one in self.orders)
+        return False if meets else True if self.completed and known else None
 
     def summary(self) -> Summary:
         """What is most worth knowing, in words and with units."""

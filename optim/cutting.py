@@ -45,6 +45,8 @@ class Progress:
         The best design so far.
     gap : float
         Relative excess of the worst scenario found over the worst of the master problem.
+    finished : bool
+        Whether the look over the whole uncertainty behind the gap came to its end.
     """
 
     scenarios: list[Scenario] = field(default_factory=list)
@@ -52,6 +54,7 @@ class Progress:
     peaks: list[float] = field(default_factory=list)
     best: Local | None = None
     gap: float = math.nan
+    finished: bool = False
 
     def add(self, found: Outcome, exceeds: float) -> bool:
         """Add a scenario to the master problem unless it is there."""
@@ -98,17 +101,19 @@ def cutting_sets(
         return ended
     known = dict.fromkeys(range(len(basins)), len(progress.scenarios))
     for _ in range(MOST_CUTS):
-        place = min(range(len(basins)), key=lambda i: basins[i].merit)
+        place = min(range(len(basins)), key=lambda i: basins[i].standing)
         if known[place] < len(progress.scenarios):
             again = search.improve(basins[place].evaluation.values, progress.scenarios)
             basins[place], known[place] = again or basins[place], len(progress.scenarios)
-            if min(basin.merit for basin in basins) < basins[place].merit:
+            if min(basin.standing for basin in basins) < basins[place].standing:
                 continue
         progress.best = basins[place]
         worse = _worse(search, basins[place].evaluation.values, progress, drawn)
         progress.gap = max((gap for _, gap in worse), default=math.nan)
         if progress.gap <= CLOSED:
-            return _ended(basins[place])
+            ended = _ended(basins[place])
+            open_look = ended is RobustStatus.OPTIMAL and not progress.finished
+            return RobustStatus.LOCAL if open_look else ended
         added = [progress.add(found, gap) for outcomes, gap in worse for found in outcomes]
         if not any(added):
             return RobustStatus.NOT_CLOSED
@@ -121,6 +126,7 @@ def _worse(
     """Return for every aspect the scenarios worse than the master's, and by how much the worst of them is."""
     here = search.evaluation(values, progress.scenarios)
     found = []
+    progress.finished = True
     for aspect in search.aspects():
         master = aspect.worst(here.rows)
         finding = pessimise(
@@ -128,6 +134,7 @@ def _worse(
         )
         if drawn and _excess(aspect, finding.value, master) <= CLOSED and not search.uncertain.finite:
             finding = _checked(search, values, aspect, progress, drawn)
+        progress.finished = progress.finished and finding.finished
         worse = [o for o in finding.outcomes if _excess(aspect, aspect.worst(o.rows), master) > CLOSED]
         found.append((_distinct(worse), _excess(aspect, finding.value, master)))
     return found
@@ -148,13 +155,13 @@ def _checked(
     search: RobustSearch, values: Mapping[str, float], aspect: Aspect, progress: Progress,
     drawn: Sequence[Scenario],
 ) -> Finding:  # fmt: skip
-    """Return the worst scenarios again, climbing from the worst of the drawn ones too."""
+    """Return the worst scenarios again, looking at the whole set and climbing from the worst drawn ones."""
     inside = [scenario for scenario in drawn if search.uncertain.inside_of(scenario)]
     asked = [search.outcome(values, scenario, gradients=False) for scenario in inside]
     ranked = sorted((o for o in asked if o.good), key=lambda found: -aspect.worst(found.rows))
     return pessimise(
         lambda scenario: search.outcome(values, scenario), search.uncertain, aspect, progress.scenarios,
-        besides=[found.scenario for found in ranked[:CHECKED]],
+        besides=[found.scenario for found in ranked[:CHECKED]], thorough=True,
     )  # fmt: skip
 
 
@@ -179,7 +186,7 @@ def sampled(
     progress.scenarios = list(drawn)
     progress.exceeded = [math.nan] * len(drawn)
     progress.peaks = [math.nan] * len(drawn)
-    best = min(basins, key=lambda basin: basin.merit)
+    best = min(basins, key=lambda basin: basin.standing)
     starts = [best.evaluation.values] + ([dict(nominal.optimum)] if nominal.optimum else [])
     begin = min(
         (e for values in starts if (e := search.evaluation(values, drawn)).good),

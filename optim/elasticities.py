@@ -178,6 +178,7 @@ class SensitivityResult(Shown):
                 for row in self.rows
             ],
             "left_out": [{"path": path, "reason": reason} for path, reason in self.left_out],
+            "peak_certificate": self.branch.peak_certificate.to_json(),
             "seconds": self.seconds,
             "reached": self.reached,
             "status": self.status.value,

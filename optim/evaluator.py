@@ -13,7 +13,7 @@ from optim.rows import Evaluation
 from optim.variables import Variable
 from optim.watch import OnProgress, ShouldStop
 
-MOST_EVALUATIONS = 400
+MOST_EVALUATIONS = 800
 
 
 class StoppedError(Exception):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,8 @@ class Local:
         Whether the limits are kept.
     conditions : Conditions
         Multipliers and residual.
+    standing : (float, float)
+        What designs are compared by; see `standing`.
     """
 
     evaluation: Evaluation
@@ -43,6 +45,16 @@ class Local:
     settled: bool
     feasible: bool
     conditions: Conditions
+    standing: tuple[float, float]
+
+
+def standing(model: Model) -> tuple[float, float]:
+    """Return what designs are compared by: the excess over the limits that are not kept, then the objective.
+
+    No penalty is large enough for every limit: a design that keeps all of them goes before any that does not.
+    """
+    violation = model.violation
+    return (0.0 if violation <= KEPT else violation), model.objective
 
 
 def ended(here: Evaluation, model: Model, variables: Sequence[Variable]) -> Local:
@@ -51,7 +63,7 @@ def ended(here: Evaluation, model: Model, variables: Sequence[Variable]) -> Loca
     found = conditions(model, variables, feasibility=not feasible)
     return Local(
         evaluation=here, merit=model.merit, settled=found.residual <= KKT_TOLERANCE, feasible=feasible,
-        conditions=found,
+        conditions=found, standing=standing(model),
     )  # fmt: skip
 
 
@@ -59,6 +71,24 @@ def is_flat(model: Model) -> bool:
     """Return whether no row depends on any variable."""
     both = np.concatenate([model.slopes.reshape(-1), model.excess_slopes.reshape(-1)])
     return bool(np.all(np.abs(both) <= FLAT_SLOPE))
+
+
+def of_limits(model: Model) -> Model:
+    """Return the model whose objective is the largest relative excess over a limit, counted from 1."""
+    rows = tuple(
+        replace(row, weight=model.unit / unit)
+        for row, unit in zip(model.limited, model.units.tolist(), strict=True)
+    )
+    return replace(
+        without_limits(model), rows=rows, heights=1.0 + model.excess, slopes=model.excess_slopes,
+        groups=np.zeros(model.excess.size),
+    )  # fmt: skip
+
+
+def without_limits(model: Model) -> Model:
+    """Return the model of what is minimised alone."""
+    none = np.zeros(0)
+    return replace(model, limited=(), excess=none, excess_slopes=np.zeros((0, model.z.size)), units=none)
 
 
 LocalSearch = Callable[[Evaluate, tuple[Variable, ...], Evaluation, ModelOf], Local]

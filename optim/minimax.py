@@ -42,6 +42,7 @@ NOTHING = 1e-9  # multipliers below it are rounding of the conic solver
 def minimax_search(
     evaluate: Evaluate, variables: tuple[Variable, ...], begin: Evaluation, model_of: ModelOf, *,
     solve: Subproblem | None = None, norm: float = np.inf, remembered: int = REMEMBERED,
+    enough: float = -np.inf,
 ) -> Local:  # fmt: skip
     """Improve a design until no first-order decrease is left.
 
@@ -54,6 +55,7 @@ def minimax_search(
     solve : the convex subproblem; that of `optim.subproblem` if left out.
     norm : in which its trust region is round.
     remembered : designs whose rows are kept as cuts.
+    enough : merit from which on nothing better is looked for.
     """
     solve = solve or solve_subproblem
     n = len(variables)
@@ -89,6 +91,8 @@ def minimax_search(
             radius = 0.5 * size if ratio > 0.0 else 0.25 * size
         if ratio > ENOUGH and fresh.smooth:
             here, model = trial, fresh
+            if model.merit <= enough:
+                break
     return ended(here, replace(with_cuts(model, seen, SAME_DESIGN), penalty=PENALTY), variables)
 
 
@@ -100,17 +104,18 @@ def _too_weak(model: Model, step: Step) -> bool:
 
 
 def thorough_search(
-    evaluate: Evaluate, variables: tuple[Variable, ...], begin: Evaluation, model_of: ModelOf
-) -> Local:
+    evaluate: Evaluate, variables: tuple[Variable, ...], begin: Evaluation, model_of: ModelOf,
+    enough: float = -np.inf,
+) -> Local:  # fmt: skip
     """Improve a design with cuts, and go on without them where that does not settle.
 
     A row bent over a long step may pass for a new one and hold a search where nothing is.
     """
-    found = minimax_search(evaluate, variables, begin, model_of)
-    if found.settled:
+    found = minimax_search(evaluate, variables, begin, model_of, enough=enough)
+    if found.settled or found.merit <= enough:
         return found
-    again = minimax_search(evaluate, variables, found.evaluation, model_of, remembered=0)
-    return min(found, again, key=lambda local: (local.merit, not local.settled))
+    again = minimax_search(evaluate, variables, found.evaluation, model_of, remembered=0, enough=enough)
+    return min(found, again, key=lambda local: (local.standing, not local.settled))
 
 
 def _curvature(

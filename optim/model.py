@@ -15,7 +15,7 @@ from scipy.optimize import nnls
 from optim.rows import Evaluation, Quantity, Row
 from optim.variables import Real, Variable, scaled, slopes
 
-PENALTY = 100.0  # exact penalty on the largest relative excess over a bound
+PENALTY = 1e4  # the largest exact penalty on the largest relative excess over a bound
 ACTIVE = 1e-6  # relative distance from the largest row, or from its bound, within which a row is active
 AT_BOUND = 1e-12  # scaled distance within which a variable is on its bound
 

@@ -36,7 +36,7 @@ JUMP = 0.01  # share of the band's range within which two neighbours need no poi
 RESIDUAL = 1e-6  # of the first-order conditions, relative objective per scaled variable
 NOTHING_TO_TRADE = 1e-6  # relative width of the front below which the two optima are one
 MOST_EVALUATIONS = 5000
-FOUND = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK)
+FOUND = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK, DesignStatus.LOCAL)
 
 
 def pareto_front(
@@ -223,7 +223,7 @@ class _Front:
                 begin.append(evaluation)
         local_search = local_search_of(search.problem.method)
         ends = [local_search(search, search.variables, evaluation, search.model) for evaluation in begin]
-        return min(ends, key=lambda local: (local.merit, not local.settled))
+        return min(ends, key=lambda local: (local.standing, not local.settled))
 
 
 def _used(method: Method) -> Method:

@@ -4,6 +4,10 @@ A search from several starts. Over intervals and ellipsoids the gradient of ever
 the place where that peak's linear model is largest (a corner of the box, a point of the ellipsoid); from the
 best places seen, a sequential quadratic programme (SLSQP: Kraft, DFVLR-FB 88-28 (1988)) climbs on, for a
 worst case inside the set. A finite set is simply tried.
+
+A thorough search looks at the whole set as well: corners, middles of faces and a Sobol sequence, then
+wherever the slopes of what was seen leave room for something worse (`optim.surrogate`), until nothing does or
+a few rounds have found nothing; and it climbs from every place that stands out.
 """
 
 from __future__ import annotations
@@ -15,8 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
+from optim.coarse import places
 from optim.rows import Quantity, Row
 from optim.scenarios import Outcome
+from optim.surrogate import Taylor, candidates, promising
 from optim.uncertain import Disk, Scenario, Shape, UncertainSet
 from optim.variables import Real
 
@@ -24,6 +30,13 @@ MOST_CORNERS = 16  # corners that are all tried
 MOST_JUMPS = 12  # to the places that gradients point to
 CLIMBS = 2  # places climbed from
 CLIMB_STEPS = 30
+THOROUGH_CLIMBS = 4  # the same of a thorough search
+BATCH = 3  # scenarios a round and uncertain parameter
+IDLE = 2  # rounds in a row that find nothing worse
+MOST_ROUNDS = 10
+APART = 0.02  # distance of two scenarios, as a share of the width of the set
+WORSE = 1e-6  # relative, from which a scenario is worse
+NEAR_TOP = 0.85  # of the worst seen, from which a place is climbed from
 OUTWARD = 1e-9  # relative slope at a corner above which it is a local maximum
 SAME = 1e-9  # distance within which two places are one
 
@@ -90,11 +103,14 @@ class Finding:
         The number there.
     outcomes : tuple of Outcome
         Everything tried, worst first.
+    finished : bool
+        Whether every scenario was tried, or a look over the whole set came to its end.
     """
 
     worst: Outcome
     value: float
     outcomes: tuple[Outcome, ...]
+    finished: bool
 
 
 Ask = Callable[[Scenario], Outcome]
@@ -102,7 +118,7 @@ Ask = Callable[[Scenario], Outcome]
 
 def pessimise(
     ask: Ask, uncertain: UncertainSet, aspect: Aspect, known: Sequence[Scenario], *,
-    besides: Sequence[Scenario] = (),
+    besides: Sequence[Scenario] = (), thorough: bool = False,
 ) -> Finding:  # fmt: skip
     """Return the worst scenario of a design in one aspect.
 
@@ -112,22 +128,30 @@ def pessimise(
     uncertain : all scenarios.
     aspect : what is maximised.
     known : scenarios to start from.
-    besides : more scenarios to try, for global care.
+    besides : more scenarios to try.
+    thorough : look at the whole set.
 
     Raises
     ------
     UnknownScenarioError
         A response could not be computed.
     """
+    finished = uncertain.finite or thorough
     if uncertain.finite:
         tried = [_asked(ask, scenario) for scenario in uncertain.all()]
     else:
         tried = []
         for disk in uncertain.disks or (None,):
             mine = [s for s in (*known, *besides) if s.disk == disk and uncertain.inside_of(s)]
-            tried += _Ascent(ask, uncertain, aspect, disk).run(mine)
+            ascent = _Ascent(ask, uncertain, aspect, disk)
+            tried += ascent.run(mine)
+            if thorough:
+                finished = ascent.look() and finished
+                tried = [*tried, *ascent.outcomes]
     ranked = sorted(tried, key=lambda found: -aspect.worst(found.rows))
-    return Finding(worst=ranked[0], value=aspect.worst(ranked[0].rows), outcomes=tuple(ranked))
+    return Finding(
+        worst=ranked[0], value=aspect.worst(ranked[0].rows), outcomes=tuple(ranked), finished=finished
+    )
 
 
 def _asked(ask: Ask, scenario: Scenario) -> Outcome:
@@ -143,6 +167,7 @@ class _Ascent:
     def __init__(self, ask: Ask, uncertain: UncertainSet, aspect: Aspect, disk: Disk | None) -> None:
         self._ask, self._set, self._aspect, self._disk = ask, uncertain, aspect, disk
         self._tried: list[tuple[Real, Outcome]] = []
+        self._climbed: list[Real] = []
 
     def run(self, starts: Sequence[Scenario]) -> list[Outcome]:
         """Try the starts, what their gradients point to, the corners if they are few, and climb."""
@@ -158,7 +183,67 @@ class _Ascent:
         for place, found in sorted(self._tried, key=lambda pair: -self._value(pair[1]))[:CLIMBS]:
             if not self._is_top(place, found):
                 self._climb(place)
+        return self.outcomes
+
+    @property
+    def outcomes(self) -> list[Outcome]:
+        """Everything tried."""
         return [found for _, found in self._tried]
+
+    def look(self) -> bool:
+        """Look at the whole set, and climb from what stands out; return whether that came to its end."""
+        n = len(self._set.centre)
+        for z in places(n):
+            self._at(2.0 * z - 1.0)
+        idle = 0
+        for turn in range(MOST_ROUNDS):
+            worst = self._worst()
+            self._climbs()
+            idle = 0 if turn == 0 or self._worst() > worst + WORSE * abs(worst) else idle + 1
+            worst = self._worst()
+            more = self._room(turn)
+            if not more or idle >= IDLE:
+                return True
+            for z in more:
+                self._at(2.0 * z - 1.0)
+            if self._worst() > worst + WORSE * abs(worst):
+                idle = 0
+        return False
+
+    def _worst(self) -> float:
+        return max(self._value(found) for _, found in self._tried)
+
+    def _climbs(self) -> None:
+        """Climb from the places that are worse than their neighbours and not far below the worst."""
+        known = np.array([place for place, _ in self._tried])
+        values = np.array([self._value(found) for _, found in self._tried])
+        count = min(2 * known.shape[1] + 1, len(known))
+        distance = np.abs(known[:, None, :] - known).max(axis=2)
+        near = np.argpartition(distance, count - 1, axis=1)[:, :count]
+        tops = np.flatnonzero(values >= values[near].max(axis=1))
+        enough = values.max() - (1.0 - NEAR_TOP) * abs(values.max())
+        chosen = [i for i in tops[np.argsort(-values[tops])] if values[i] >= enough]
+        for i in chosen[:THOROUGH_CLIMBS]:
+            place, found = self._tried[i]
+            fresh = all(np.abs(place - other).max() > SAME for other in self._climbed)
+            if fresh and not self._is_top(place, found):
+                self._climb(place)
+
+    def _room(self, turn: int) -> list[Real]:
+        """Return places, of the unit box, whose neighbours leave room for something worse than all seen."""
+        models = []
+        for place, found in self._tried:
+            slopes = self._slopes(found)
+            if slopes:
+                values = np.array([value for value, _ in slopes])
+                by_z = 2.0 * np.array([slope for _, slope in slopes])
+                models.append(Taylor(place=0.5 * (place + 1.0), groups=((values, by_z),)))
+        if not models:
+            return []
+        n = len(self._set.centre)
+        there = 0.5 * (np.array([self._set.inside(2.0 * z - 1.0) for z in candidates(n, turn)]) + 1.0)
+        worst = self._worst()
+        return promising(models, there, worst + WORSE * abs(worst), APART, BATCH * n, above=True)
 
     def _value(self, found: Outcome) -> float:
         return self._aspect.worst(found.rows)
@@ -201,6 +286,7 @@ class _Ascent:
 
     def _climb(self, begin: Real) -> None:
         """Climb from a place; every place on the way is kept."""
+        self._climbed.append(begin)
         scale = abs(self._value(self._at(begin))) or 1.0
 
         def fall(place: Real) -> tuple[float, Real]:

@@ -4,12 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING
 
+from optim.doubts import doubts_of
 from optim.model import Conditions
 from optim.problem import Method, Problem
+from optim.result_json import (
+    bands_json,
+    basin_json,
+    checked_json,
+    conditions_json,
+    errors_of,
+    looked_json,
+    number,
+    row_json,
+)
 from optim.rows import UNITS, Evaluation, Quantity, Row
 from solver.branch import Branch
 from solver.shown import Shown, Summary
@@ -36,6 +47,11 @@ class DesignStatus(Enum):
     KINK = (
         "The search could not improve the design, but the first-order conditions do not hold there: the "
         "response has a kink at this design, or more harmonics are needed."
+    )
+    LOCAL = (
+        "No better design is near, but there may be a better one elsewhere: the look over the whole range "
+        "did not come to its end, or, as a warning then says, a response may have a higher peak than those "
+        "found. Give a start there, narrower bounds, fewer variables, or more harmonics."
     )
     FLAT = (
         "The peak does not depend on these variables (no friction, or contacts that never slip): "
@@ -92,6 +108,29 @@ class Basin:
     proven: bool
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Checked:
+    """A local optimum again with more harmonics.
+
+    Attributes
+    ----------
+    values : mapping
+        Variable name to value.
+    harmonics : int
+        Highest harmonic kept.
+    peak, objective : float
+        Highest peak [m] and what is minimised; NaN where a response could not be computed.
+    feasible : bool
+        Whether the limits are kept.
+    """
+
+    values: Mapping[str, float]
+    harmonics: int
+    peak: float
+    objective: float
+    feasible: bool
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class DesignResult(Shown):
     """The best design found.
@@ -110,8 +149,16 @@ class DesignResult(Shown):
         First-order conditions there.
     basins : tuple of Basin
         Every local optimum found, best first.
+    looked_at : tuple of Evaluation
+        The designs of the look over the whole range, in order, some of them with fewer harmonics.
     history : tuple of Evaluation
         Every design evaluated, in order; the optimum is among them (of a tracked peak the optimum alone).
+    plateau : mapping of variable name to (low, high)
+        Along each variable, how far every value is as good (to 1e-6); empty for a sharp optimum.
+    chosen_by : str or None
+        What the design was chosen by on a plateau.
+    checked : tuple of Checked
+        The local optima again with twice the harmonics, where the estimated error of a peak is large.
     evaluations : int
         Frequency responses computed.
     work : float
@@ -126,6 +173,10 @@ class DesignResult(Shown):
     evaluation: Evaluation | None
     conditions: Conditions | None
     basins: tuple[Basin, ...]
+    looked_at: tuple[Evaluation, ...] = ()
+    plateau: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    chosen_by: str | None = None
+    checked: tuple[Checked, ...] = ()
     history: tuple[Evaluation, ...]
     evaluations: int
     work: float
@@ -152,6 +203,30 @@ class DesignResult(Shown):
         if self.evaluation is None or not self.evaluation.peaks:
             return None
         return DesignPeak(value=self.evaluation.peaks[0].value, at=self.evaluation.peaks[0].at_hz)
+
+    @property
+    def held_by(self) -> Row | None:
+        """The row that holds what is minimised: the highest weighted peak, or else the widest band."""
+        if self.evaluation is None:
+            return None
+        for quantity in (Quantity.PEAK, Quantity.BAND):
+            rows = [row for row in self.evaluation.of(quantity) if row.weight > 0.0]
+            if rows:
+                return max(rows, key=lambda row: row.weight * row.value)
+        return None
+
+    @property
+    def error_estimate(self) -> float:
+        """Estimated error [m] of the highest peak of the case that holds the optimum; NaN if not known."""
+        held = self.held_by
+        if held is None or self.evaluation is None:
+            return math.nan
+        return next((e for case, _, e in errors_of(self.evaluation) if case == held.case), math.nan)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What makes the numbers doubtful, in words."""
+        return doubts_of(self)
 
     @property
     def band_hz(self) -> float | None:
@@ -245,9 +320,20 @@ class DesignResult(Shown):
             "peaks": [{"value": p.value, "at": p.at_hz, "case": p.case} for p in peaks],
             "band_hz": self.band_hz,
             "limit": self.limit,
-            "bands": [] if evaluation is None else _bands(evaluation),
+            "bands": [] if evaluation is None else bands_json(evaluation),
             "objective": None if evaluation is None or not evaluation.rows else evaluation.objective,
-            "rows": [] if evaluation is None else [_row(row) for row in evaluation.rows],
+            "rows": [] if evaluation is None else [row_json(row) for row in evaluation.rows],
+            "held_by": None if self.held_by is None else row_json(self.held_by),
+            "error_estimate": number(self.error_estimate),
+            "errors": [
+                {"case": case, "peak": peak, "error_estimate": number(error)}
+                for case, peak, error in (() if evaluation is None else errors_of(evaluation))
+            ],
+            "warnings": list(self.warnings),
+            "plateau": {name: list(ends) for name, ends in self.plateau.items()},
+            "chosen_by": self.chosen_by,
+            "checked": [checked_json(one) for one in self.checked],
+            "looked_at": [looked_json(one) for one in self.looked_at if one.good],
             "evaluations": self.evaluations,
             "newton_iterations": sum(branch.newton_iterations for branch in self.sweeps),
             "tried": [
@@ -255,14 +341,14 @@ class DesignResult(Shown):
                 for e in self.history
                 if e.good and e.peaks
             ],
-            "basins": [_basin(basin) for basin in self.basins],
+            "basins": [basin_json(basin) for basin in self.basins],
             "seconds": self.seconds,
-            "work": _number(self.work),
+            "work": number(self.work),
             "active": list(self.active),
-            "optimality": _number(self.optimality),
+            "optimality": number(self.optimality),
             "multipliers": list(self.multipliers),
-            "conditions": None if self.conditions is None else _conditions(self.conditions),
-            "broken": [{**_row(row), "by": row.value - (row.bound or 0.0)} for row in self.broken],
+            "conditions": None if self.conditions is None else conditions_json(self.conditions),
+            "broken": [{**row_json(row), "by": row.value - (row.bound or 0.0)} for row in self.broken],
             "reached": self.reached,
             "status": self.status.value,
         }
@@ -296,49 +382,3 @@ def _highest(evaluation: Evaluation) -> list[Row]:
         top = max((row.weight * row.value for row in rows), default=0.0)
         found += [row for row in rows if row.weight * row.value >= top * (1.0 - SAME_HEIGHT)]
     return found
-
-
-def _bands(evaluation: Evaluation) -> list[dict[str, object]]:
-    """Return where the resonance band of each case lies; the first response of a case is that of its band."""
-    first: dict[str, Branch] = {}
-    for response in evaluation.responses:
-        first.setdefault(response.case, response.branch)
-    return [
-        {
-            "case": case, "limit": branch.band.limit, "width_hz": branch.band.width,
-            "intervals_hz": [list(interval) for interval in branch.band.intervals],
-        }
-        for case, branch in first.items()
-        if branch.band is not None
-    ]  # fmt: skip
-
-
-def _row(row: Row) -> dict[str, object]:
-    return {
-        "quantity": row.quantity.value, "case": row.case, "what": row.what, "value": row.value,
-        "unit": UNITS[row.quantity], "at": _number(row.at_hz), "bound": row.bound, "weight": row.weight,
-    }  # fmt: skip
-
-
-def _basin(basin: Basin) -> dict[str, object]:
-    return {
-        "values": dict(basin.values), "peak": basin.peak, "objective": basin.objective,
-        "settled": basin.settled, "feasible": basin.feasible, "proven": basin.proven,
-    }  # fmt: skip
-
-
-def _conditions(found: Conditions) -> dict[str, object]:
-    return {
-        "residual": _number(found.residual),
-        "violation": found.violation,
-        "rows": [
-            {"what": row.what, "case": row.case, "quantity": row.quantity.value, "multiplier": x}
-            for row, x in found.rows
-        ],
-        "bounds": [{"variable": name, "side": side, "multiplier": x} for name, side, x in found.bounds],
-    }
-
-
-def _number(value: float) -> float | None:
-    """Return a float that JSON can carry (null for NaN)."""
-    return value if math.isfinite(value) else None

@@ -18,14 +18,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from optim.aims import Aim
-from optim.cutting import Progress, cutting_sets, sampled
+from optim.cutting import CLOSED, Progress, cutting_sets, sampled
 from optim.errors import DesignError
 from optim.evaluator import StoppedError
-from optim.pessimise import UnknownScenarioError
+from optim.pessimise import Aspect, UnknownScenarioError
 from optim.problem import Method, pose
 from optim.result import DesignResult, DesignStatus
 from optim.robust_result import RobustResult, RobustStatus, Side
 from optim.robust_search import RobustSearch
+from optim.rows import Quantity
 from optim.search import solve_problem
 from optim.sides import side_of
 from optim.uncertain import Scenario, is_number
@@ -174,6 +175,22 @@ def _search(search: RobustSearch, drawn: tuple[Scenario, ...], state: _State) ->
         unknown = state.sides["robust"].unknown
         if unknown is not None:
             raise UnknownScenarioError(unknown)
+        status = _honest(search, state, status)
+    return status
+
+
+def _honest(search: RobustSearch, state: _State, status: RobustStatus) -> RobustStatus:
+    """Return the status once the worst scenario of all looks is known: it may be worse than all cuts."""
+    best, side = state.progress.best, state.sides["robust"]
+    if search.aim is not Aim.WORST_CASE or best is None or side.worst is None:
+        return status
+    plain = Aspect(quantity=Quantity.PEAK, limited=False, plain=True)
+    known = plain.worst(best.evaluation.rows)
+    excess = side.worst_peak / known - 1.0 if known > 0.0 else 0.0
+    weighted = search.problem.weights[Quantity.PEAK] > 0.0 and len(search.problem.cases) == 1
+    if weighted and excess > CLOSED:
+        state.progress.gap = max(state.progress.gap, excess)
+        return RobustStatus.NOT_CLOSED if status is RobustStatus.OPTIMAL else status
     return status
 
 
@@ -186,6 +203,6 @@ def _result(search: RobustSearch, state: _State, status: RobustStatus) -> Robust
         robust=state.sides.get("robust"),
         objective=math.nan if best is None else search.objective(best, len(state.progress.scenarios)),
         conditions=None if best is None else best.conditions, cuts=state.progress.cuts(),
-        gap=state.progress.gap, unknown=state.unknown, designs=search.designs, responses=search.responses,
-        seconds=0.0,
+        gap=state.progress.gap, inner_look=state.progress.finished, unknown=state.unknown,
+        designs=search.designs, responses=search.responses, seconds=0.0,
     )  # fmt: skip

@@ -37,6 +37,10 @@ class RobustStatus(Enum):
         "The search could not improve the design, but the first-order conditions do not hold there: the "
         "response has a kink at this design, or more harmonics are needed."
     )
+    LOCAL = (
+        "No scenario looked at is worse, but the look over the whole uncertainty did not come to its end: a "
+        "worse one may be left. Use narrower intervals or fewer uncertain parameters."
+    )
     FLAT = (
         "The peak does not depend on these variables in any scenario (no friction, or contacts that never "
         "slip): choose others."
@@ -206,6 +210,10 @@ class RobustResult(Shown):
     gap : float
         Worst case: by how much, relative, the worst scenario found exceeds the worst of the cuts. The latter
         bounds the optimum of its basin from below, the former from above. NaN for other aims.
+    inner_look : bool
+        Worst case: whether the look over the whole uncertainty, at the robust optimum, came to its end: the
+        gap is that of the worst scenario of all, as far as corners, middles, a space-filling sequence and
+        climbs from these tell. False for other aims.
     unknown : Scenario or None
         The scenario that could not be computed.
     designs, responses : int
@@ -226,6 +234,7 @@ class RobustResult(Shown):
     conditions: Conditions | None
     cuts: tuple[Cut, ...]
     gap: float
+    inner_look: bool = False
     unknown: Scenario | None
     designs: int
     responses: int
@@ -287,6 +296,7 @@ class RobustResult(Shown):
                 for cut in self.cuts
             ],
             "gap": _number(self.gap),
+            "inner_look": self.inner_look,
             "optimality": None if found is None else _number(found.residual),
             "violation": None if found is None else found.violation,
             "unknown": None if self.unknown is None else self.unknown.to_json(),
@@ -294,6 +304,7 @@ class RobustResult(Shown):
             "responses": self.responses,
             "seconds": self.seconds,
             "nominal_status": self.design.status.value,
+            "warnings": list(self.design.warnings),
             "reached": self.reached,
             "status": self.status.value,
         }  # fmt: skip

@@ -111,7 +111,7 @@ class RobustSearch:
         # rows of scenarios that a quantile leaves out must not come back as cuts at all.
         if not found.settled and self.aim is not Aim.QUANTILE:
             again = self._searched(found.evaluation, scenarios, REMEMBERED)
-            found = min(found, again, key=lambda local: (local.merit, not local.settled))
+            found = min(found, again, key=lambda local: (local.standing, not local.settled))
         return found
 
     def _searched(self, begin: Evaluation, scenarios: Sequence[Scenario], remembered: int) -> Local:

@@ -6,19 +6,23 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 
-from optim.coarse import first_designs
+import numpy as np
+
+from optim.afterwards import looked_after, settled_status
+from optim.eased import Eased
 from optim.evaluation import natural_scales
 from optim.evaluator import Search, StoppedError
-from optim.local import Local, LocalSearch
-from optim.model import Conditions, conditions, model_of
+from optim.local import FLAT_SLOPE, Local, LocalSearch
+from optim.look import WholeRange
+from optim.model import conditions, model_of
 from optim.problem import Method, Problem, pose
 from optim.result import Basin, DesignResult, DesignStatus
 from optim.tracked import Tracked, tracked_optimum
 from optim.watch import OnProgress, ShouldStop
 from solver.scene import Scene
 
+SAME_HEIGHT = 1e-9  # relative, of two levels that are one
 SAME_PLACE = 1e-3  # scaled distance within which two optima are one
-HELD = 1e-7  # multiplier of a bound, relative objective per scaled variable, from which it holds the design
 
 
 def design(
@@ -88,6 +92,12 @@ def solve_problem(
     problem: Problem, *, on_progress: OnProgress = None, should_stop: ShouldStop = None
 ) -> DesignResult:
     """Search the best design of a problem; see `design`."""
+    found = _solved(problem, on_progress, should_stop)
+    return looked_after(found, should_stop)
+
+
+def _solved(problem: Problem, on_progress: OnProgress, should_stop: ShouldStop) -> DesignResult:
+    """Search the best design of a problem by its method."""
     begun = time.perf_counter()
     trackable = problem.method in (Method.AUTO, Method.TRACKED) and problem.why_not_tracked is None
     if trackable:
@@ -95,27 +105,30 @@ def solve_problem(
         if problem.method is Method.TRACKED or tracked.status is not DesignStatus.NOT_TRACKED:
             return _of_tracked(problem, tracked, time.perf_counter() - begun)
     search = Search(problem, on_progress, should_stop)
+    eased = Eased.of(search)
+    if eased.proven is not None:
+        return _of_tracked(problem, eased.proven, time.perf_counter() - begun)
     found: list[Local] = []
+    whole = WholeRange(search, local_search_of(problem.method), found)
     try:
-        status = _search(search, found)
+        status = _search(whole, found, eased.starts)
     except StoppedError as stop:
         status = stop.status
+        if status is DesignStatus.TOO_MANY and found:
+            status = DesignStatus.LOCAL
     if on_progress is not None and found:
         on_progress(1.0, search.count)
-    return _result(search, found, status, time.perf_counter() - begun)
+    return _result(search, whole, status, begun)
 
 
-def _search(search: Search, found: list[Local]) -> DesignStatus:
-    """Run the coarse stage, then a local search from the best designs of it that lie in different basins."""
-    begins, flat = first_designs(search)
-    if not begins:
+def _search(whole: WholeRange, found: list[Local], starts: Sequence[Mapping[str, float]]) -> DesignStatus:
+    """Look at the whole range and search locally from the best of it."""
+    flat = whole.run(starts)
+    if flat is None:
         return DesignStatus.NO_RESPONSE
     if flat:
         return DesignStatus.FLAT
-    local_search = local_search_of(search.problem.method)
-    for begin in begins:
-        found.append(local_search(search, search.variables, begin, search.model))
-    return judge(min(found, key=lambda local: local.merit))
+    return judge(min(found, key=lambda local: local.standing), finished=whole.finished)
 
 
 def local_search_of(method: Method) -> LocalSearch:
@@ -129,8 +142,15 @@ def local_search_of(method: Method) -> LocalSearch:
     return thorough_search
 
 
-def judge(best: Local) -> DesignStatus:
-    """Return how a search ended from the best end of its local searches."""
+def judge(best: Local, *, finished: bool = True) -> DesignStatus:
+    """Return how a search ended from the best end of its local searches.
+
+    Parameters
+    ----------
+    finished : whether the look over the whole range came to its end without a better design.
+    """
+    if not finished:
+        return DesignStatus.LOCAL
     if not best.feasible:
         return DesignStatus.INFEASIBLE
     if not best.settled:
@@ -138,20 +158,20 @@ def judge(best: Local) -> DesignStatus:
     return settled_status(best.conditions)
 
 
-def settled_status(found: Conditions) -> DesignStatus:
-    """Return whether a settled design is held by the bound of a variable."""
-    held = any(multiplier > HELD for _, _, multiplier in found.bounds)
-    return DesignStatus.AT_BOUND if held else DesignStatus.OPTIMAL
-
-
 def basins_of(search: Search, found: list[Local]) -> tuple[Basin, ...]:
     """Return the local optima that differ, best first."""
     basins: list[Basin] = []
     places: list[list[float]] = []
-    for local in sorted(found, key=lambda local: local.merit):
+    level: list[float] = []  # what is minimised where it does not change: one plateau is one optimum
+    for local in sorted(found, key=lambda local: local.standing):
         z = [variable.inside(local.evaluation.values[variable.name]) for variable in search.variables]
         if any(math.dist(z, other) <= SAME_PLACE for other in places):
             continue
+        height = local.evaluation.objective
+        if _is_level(search, local):
+            if any(abs(height - other) <= SAME_HEIGHT * abs(height) for other in level):
+                continue
+            level.append(height)
         places.append(z)
         basins.append(
             Basin(
@@ -163,16 +183,24 @@ def basins_of(search: Search, found: list[Local]) -> tuple[Basin, ...]:
     return tuple(basins)
 
 
-def _result(search: Search, found: list[Local], status: DesignStatus, seconds: float) -> DesignResult:
+def _is_level(search: Search, local: Local) -> bool:
+    """Return whether what is minimised does not change near an end."""
+    model = search.model(local.evaluation)
+    held = model.heights >= model.heights.max(initial=0.0) * (1.0 - SAME_HEIGHT)
+    return bool(np.all(np.abs(model.slopes[held]) <= FLAT_SLOPE))
+
+
+def _result(search: Search, whole: WholeRange, status: DesignStatus, begun: float) -> DesignResult:
     """Put the result together; after a stop the best design so far stands in it."""
-    best = min(found, key=lambda local: local.merit, default=None)
+    best = min(whole.found, key=lambda local: local.standing, default=None)
     evaluation = best.evaluation if best else min(search.good(), key=search.merit, default=None)
     method = Method.IPOPT if search.problem.method is Method.IPOPT else Method.MINIMAX
     responses = search.scouted + sum(len(e.responses) for e in search.history)
     return DesignResult(
         problem=search.problem, method=method, status=status, evaluation=evaluation,
-        conditions=None if best is None else best.conditions, basins=basins_of(search, found),
-        history=tuple(search.history), evaluations=responses, work=float(responses), seconds=seconds,
+        conditions=None if best is None else best.conditions, basins=basins_of(search, whole.found),
+        looked_at=whole.looked_at, history=tuple(search.history), evaluations=responses,
+        work=float(responses), seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
 

@@ -56,6 +56,7 @@ def _worst(
             aspect,
             known,
             besides=besides,
+            thorough=True,
         )
     except UnknownScenarioError as error:
         return None, error.scenario

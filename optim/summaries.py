@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from solver import units
+from solver.notes import unsettled
 from solver.shown import Summary
 from solver.summaries import Pairs, made
 
@@ -22,8 +23,15 @@ _MOST_ROWS = 12
 def of_design(result: DesignResult) -> Summary:
     """The optimum, its peak and band, and what holds it."""
     pairs: Pairs = [(name, units.parameter(name, value)) for name, value in result.optimum.items()]
+    for name, (low, high) in result.plateau.items():
+        pairs.append((f"{name}, as good", f"{units.parameter(name, low)} to {units.parameter(name, high)}"))
+    if result.chosen_by is not None:
+        pairs.append(("chosen by", result.chosen_by))
     if result.peak is not None:
         pairs.append(("peak", f"{units.length(result.peak.value)} at {result.peak.at:.6g} Hz"))
+    if not math.isnan(result.error_estimate):
+        pairs.append(("estimated error", units.length(result.error_estimate)))
+    pairs += [("warning", words) for words in result.warnings]
     if result.band_hz is not None and result.limit is not None:
         pairs.append(("band", f"{result.band_hz:.4g} Hz above {units.length(result.limit)}"))
     if result.active:
@@ -41,6 +49,7 @@ def of_robust(result: RobustResult) -> Summary:
             values = ", ".join(f"{path} = {units.parameter(path, v)}" for path, v in side.values.items())
             worst = "unknown" if math.isnan(side.worst_peak) else units.length(side.worst_peak)
             pairs.append((f"{name} optimum", f"{values}: peak {units.length(side.peak)}, worst {worst}"))
+    pairs += [("warning", words) for words in result.design.warnings]
     pairs.append(("time", units.duration(result.seconds)))
     return made(f"{result.problem.scene.name}, {result.aim.value}", pairs, result.status.value)
 
@@ -66,6 +75,7 @@ def of_campbell(diagram: CampbellDiagram) -> Summary:
         if highest is not None:
             text = f"at most {units.length(highest.amplitude)}, at {highest.speed_rpm:.6g} rpm"
         pairs.append((f"order {one.order}", text))
+    pairs += [("warning", reason) for reason in unsettled(one.branch for one in diagram.orders)]
     pairs.append(("time", units.duration(diagram.seconds)))
     low, high = diagram.speeds_rpm[0][0], diagram.speeds_rpm[-1][1]
     return made(f"{diagram.scene.name}, {low:g} to {high:g} rpm", pairs, diagram.status.value)
@@ -79,5 +89,6 @@ def of_sensitivities(result: SensitivityResult) -> Summary:
             band = result.band_elasticity(row)
             text = f"peak {result.peak_elasticities(row)[0]:+.4f} %"
             pairs.append((row.path, text if math.isnan(band) else f"{text}, band {band:+.4f} %"))
+    pairs += [("warning", reason) for reason in unsettled([result.branch])]
     pairs.append(("time", units.duration(result.seconds)))
     return made(f"{result.scene.name}, for 1 % more of each", pairs, result.status.value)

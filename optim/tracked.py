@@ -15,12 +15,14 @@ from solver.peak_tracks import LeastPeak, TrackStatus
 _STATUS = {
     TrackStatus.TRACKED: DesignStatus.OPTIMAL,
     TrackStatus.AT_BOUND: DesignStatus.OPTIMAL,
+    TrackStatus.PLATEAU: DesignStatus.OPTIMAL,
     TrackStatus.FLAT: DesignStatus.FLAT,
     TrackStatus.NO_RESPONSE: DesignStatus.NO_RESPONSE,
     TrackStatus.STOPPED: DesignStatus.STOPPED,
     TrackStatus.GAPS: DesignStatus.NOT_TRACKED,
     TrackStatus.UNPROVEN: DesignStatus.NOT_TRACKED,
     TrackStatus.OTHER_BRANCH: DesignStatus.NOT_TRACKED,
+    TrackStatus.WORK_USED_UP: DesignStatus.NOT_TRACKED,
 }
 
 
