@@ -31,7 +31,18 @@ _SAME = (
         "harmonics",
         "points",
     ),
-    *("limit", "band_hz", "newton_iterations", "rejected_steps", "seconds", "completed", "status", "created"),
+    *(
+        "limit",
+        "band_hz",
+        "error_estimate",
+        "peaks_known",
+        "newton_iterations",
+        "rejected_steps",
+        "seconds",
+        "completed",
+        "status",
+        "created",
+    ),
 )
 _SAME_OF_DESIGNS = (
     *(
@@ -157,6 +168,14 @@ class SweepAnswer(Answer):
     peak: Peak | None
     limit: float | None
     band_hz: float | None
+    error_estimate: float | None = Field(
+        default=None, description="Of the highest peak [m]; null if it was stored by an earlier version."
+    )
+    peaks_known: bool | None = Field(
+        default=None,
+        description="Whether it is known that no higher peak hides between two points; null if it was stored "
+        "by an earlier version.",
+    )
     newton_iterations: int
     rejected_steps: int
     seconds: float

@@ -167,6 +167,8 @@ class SweepRecord:
     seconds: float
     completed: bool
     status: str
+    error_estimate: float | None = None
+    peaks_known: bool | None = None
     contacts: tuple[ContactValues, ...] = ()
     arrays: Mapping[str, StoredArray] = field(default_factory=dict)
 

@@ -238,6 +238,8 @@ class Sweep(Base):
     peak_at: Mapped[float | None]
     limit: Mapped[float | None]
     band_hz: Mapped[float | None]
+    error_estimate: Mapped[float | None]
+    peaks_known: Mapped[bool | None]
     newton_iterations: Mapped[int]
     rejected_steps: Mapped[int]
     seconds: Mapped[float]

@@ -9,6 +9,16 @@ from service.answers import Answer, Peak
 Numbers = list[float | None]
 
 
+class PeakCertificate(Answer):
+    """Why no higher peak hides between two points of a response, or that it is not known."""
+
+    known: bool
+    reason: str
+    bound: float | None = Field(description="What the amplitude does not exceed between points [m].")
+    widest_gap: float | None = Field(description="Largest distance between neighbouring points [Hz].")
+    resonances: int = Field(description="Narrow resonances between points that were solved for.")
+
+
 class SweepPreview(Answer):
     """A frequency response over the scene's band."""
 
@@ -20,6 +30,13 @@ class SweepPreview(Answer):
     band_limit: float | None
     band_intervals_hz: list[tuple[float, float]] | None
     points: int
+    peak_certificate: PeakCertificate
+    band_known: bool | None = Field(description="Whether the band was settled everywhere by solutions.")
+    error_estimate: float | None = Field(description="Of the highest peak [m].")
+    mean_undetermined: bool | None = Field(
+        description="Whether the mean of the highest peak depends on the history."
+    )
+    flags: list[str]
     seconds: float
     completed: bool
     status: str
@@ -34,6 +51,7 @@ class LinearResponse(Answer):
     amplitude: list[float]
     peak: Peak | None
     peaks: list[Peak]
+    peak_certificate: PeakCertificate
     completed: bool
 
 

@@ -28,6 +28,9 @@ def diagram(found: Mapping[str, Any]) -> None:
         pairs.append((f"order {order['order']}", _running(order)))
         for what, name in (("stuck_hz", "all stuck"), ("open_hz", "all open")):
             pairs.append((f"  {name}", ", ".join(f"{value:.5g}" for value in order[what]) + " Hz"))
+    reasons = (o["peak_certificate"] for o in found["orders"] if "peak_certificate" in o)
+    open_ends = dict.fromkeys(one["reason"] for one in reasons if not one["known"])
+    pairs += [("warning", f"a response may have further peaks. {reason}") for reason in open_ends]
     words = {True: "no", False: "yes", None: "unknown"}[found["clear"]]
     what = "a peak" if found["limit"] is None else f"more than {units.length(found['limit'])}"
     pairs.append((f"{what} at a running speed", words))

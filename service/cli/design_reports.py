@@ -39,7 +39,7 @@ def design(found: Json) -> None:
 
 def design_tables(found: Json) -> tuple[Pairs, list[Table]]:
     """What a design came to, and its tables: limits, what is active, local optima."""
-    tables = (_limits(found), _active(found), _basins(found))
+    tables = (_limits(found), _active(found), _basins(found), _checked(found))
     return _pairs(found), [table for table in tables if table is not None]
 
 
@@ -93,7 +93,7 @@ def amount(value: float, unit: str) -> str:
 
 def _pairs(found: Json) -> Pairs:
     """What the design is and what it came to."""
-    pairs = values(found["optimum"])
+    pairs = [*values(found["optimum"]), *_plateau(found)]
     peaks: Sequence[Json] = found.get("peaks") or ([found["peak"]] if found["peak"] else [])
     several = len({peak.get("case") for peak in peaks}) > 1
     if any(row["weight"] > 0.0 and row["quantity"] != "peak" for row in found.get("rows", ())):
@@ -102,10 +102,17 @@ def _pairs(found: Json) -> Pairs:
         of = f" ({peak['case']})" if several else ""
         name = "further peak" if index else "peak"
         pairs.append((name, f"{units.length(peak['value'])} at {peak['at']:.6g} Hz{of}"))
+    pairs += _errors(found)
     if found["band_hz"] is not None:
         pairs.append(("band", f"{units.number(found['band_hz'])} Hz above {units.length(found['limit'])}"))
     if found["active"]:
-        pairs.append(("held by", "; ".join(found["active"])))
+        held = found.get("held_by")
+        case = f" (of {held['case']})" if held and several else ""
+        pairs.append(("held by", "; ".join(found["active"]) + case))
+    looked = len(found.get("looked_at", ()))
+    if looked:
+        ends = len(found.get("basins", ()))
+        pairs.append(("looked at", f"{looked} designs over the whole range; {ends} local optima"))
     residual = found.get("optimality")
     if residual is not None:
         pairs.append(("KKT residual", f"{residual:.1e}"))
@@ -115,6 +122,43 @@ def _pairs(found: Json) -> Pairs:
         effort += f", the work of {units.number(work, 3)}"
     by = f", method {found['method']}" if "method" in found else ""
     return [*pairs, ("effort", effort + by)]
+
+
+def _plateau(found: Json) -> Pairs:
+    """How far other values are as good, and what the design was chosen by among them."""
+    ends = [
+        (f"{path}, as good", f"{units.parameter(path, low)} to {units.parameter(path, high)}")
+        for path, (low, high) in found.get("plateau", {}).items()
+    ]
+    by = found.get("chosen_by")
+    return [*ends, ("chosen by", by)] if by else ends
+
+
+def _errors(found: Json) -> Pairs:
+    """The estimated error of the peak that holds the design, and what makes numbers doubtful."""
+    error = found.get("error_estimate")
+    pairs = [] if error is None else [("estimated error", units.length(error))]
+    return pairs + [("warning", words) for words in found.get("warnings", ())]
+
+
+def _checked(found: Json) -> Table | None:
+    """The local optima again with more harmonics, where the estimated error is large."""
+    checked: Sequence[Json] = found.get("checked", ())
+    if not checked:
+        return None
+    names = tuple(checked[0]["values"])
+    rows: list[tuple[str, ...]] = [
+        (
+            *(units.parameter(name, one["values"][name]) for name in names),
+            str(one["n_harmonics"]),
+            "unknown" if one["peak"] is None else units.length(one["peak"]),
+            "yes" if one["feasible"] else "no",
+        )
+        for one in checked
+    ]
+    columns = (*names, "harmonics", "peak", "keeps the limits")
+    right = "".join(str(i) for i in range(min(len(names) + 2, 10)))
+    return Table(heading="Again with more harmonics", columns=columns, rows=rows, right=right)
 
 
 def _limits(found: Json) -> Table | None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from service.cli import campbell_reports, design_reports, mistuning_command, robust_reports, track_reports
 from service.cli.output import print_pairs, print_table, say
 from solver import units
+from solver.notes import BAND_OPEN, FLAGS, between_points, flag_words
 
 if TYPE_CHECKING:
     from solver.scene import Scene
@@ -15,11 +16,6 @@ if TYPE_CHECKING:
 Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]
 
-_FLAGS = {
-    "mean_undetermined": "the mean, and with it max|x|, depends on the history: go by half peak to peak",
-    "all_stuck": "every contact sticks all the time",
-    "separation": "a contact opens during the period",
-}
 _ACCURACY_COLUMNS = ("", "harmonics", "contact forces", "max|x|", "error", "ms", "iterations")
 _EFFECT_COLUMNS = ("used", "effect", "reason")
 _SCENE_COLUMNS = ("name", "kind", "DOFs", "contacts", "observed", "band")
@@ -70,7 +66,10 @@ def solution(found: Json) -> None:
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of {of}"))
     pairs.append(("harmonics 1 to 5", ", ".join(units.length(a) for a in found["harmonics"][1:6])))
     pairs += [(f"contact {name}", state) for name, state in found["contacts"].items()]
-    pairs += [("note", _FLAGS.get(flag, flag)) for flag in found["flags"]]
+    pairs += [("note", words) for words in flag_words(found["flags"])]
+    low, high = found.get("mean_range", (None, None))
+    if low is not None and high is not None:
+        pairs.append(("mean, any history", f"{units.length(low)} to {units.length(high)}"))
     pairs += [("residual", f"{found['residual']:.1e}"), ("time", units.duration(found["seconds"]))]
     print_pairs(title, pairs)
 
@@ -81,15 +80,31 @@ def branch(found: Json) -> None:
     pairs = _peaks(found, path)
     if found["error_estimate"] is not None:
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of the highest"))
+    if found.get("mean_undetermined"):
+        pairs.append(("note", "at the highest peak " + FLAGS["mean_undetermined"]))
     if found["band_hz"] is not None:
         pairs.append(("band", _band(found)))
     effort = f"{found['newton_iterations']} Newton iterations, {found['rejected_steps']} steps rejected"
+    pairs += sure_of(found)
+    pairs += [("note", words) for words in flag_words(found.get("flags", ()))]
     pairs.append(("points", f"{found['points']} ({effort}, {found['folds']} folds)"))
     pairs.append(("time", units.duration(found["seconds"])))
     title = f"{found['scene']}, {path}"
     if values:
         title += f" from {units.parameter(path, values[0])} to {units.parameter(path, values[-1])}"
     print_pairs(f"{title}, {found['n_harmonics']} harmonics", pairs)
+
+
+def sure_of(found: Json) -> Pairs:
+    """What a branch knows between its points; nothing of one that an earlier version computed."""
+    certificate = found.get("peak_certificate")
+    if certificate is None or found["peak"] is None:
+        return []
+    said = between_points(known=certificate["known"], reason=certificate["reason"])
+    pairs = [("between points", said)]
+    if certificate["known"] and found.get("band_known") is False:
+        pairs.append(("note", BAND_OPEN))
+    return pairs
 
 
 def accuracy(found: Json) -> None:

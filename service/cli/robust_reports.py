@@ -44,9 +44,11 @@ def effort_pairs(found: Json) -> list[tuple[str, str]]:
             ("gain", f"the robust worst peak is {100.0 * found['gain']:.3g} % below the nominal one")
         )
     if found["gap"] is not None:
-        pairs.append(("gap of the cuts", f"{found['gap']:.1e}"))
+        whole = ", after a look at the whole uncertainty" if found.get("inner_look") else ""
+        pairs.append(("gap of the cuts", f"{found['gap']:.1e}{whole}"))
     if found["optimality"] is not None:
         pairs.append(("KKT residual", f"{found['optimality']:.1e}"))
+    pairs += [("warning", words) for words in found.get("warnings", ())]
     if found["unknown"] is not None:
         pairs.append(("no response", found["unknown"]["words"]))
     effort = f"{found['designs']} designs, {found['responses']} frequency responses"

@@ -66,6 +66,9 @@ def _show(found: Mapping[str, Any]) -> None:
     say("for 1 % more of the parameter; an angle, or what is 0, has no per cent")
     if any(row["peak_slope"] is None for row in found["rows"]):
         say(found["status"])
+    certificate = found["peak_certificate"]
+    if peaks and not certificate["known"]:
+        say(f"there may be higher peaks. {certificate['reason']}")
     for one in found["left_out"]:
         say(f"left out: {one['path']}: {one['reason']}")
 

@@ -10,11 +10,12 @@ from solver import units
 
 Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]
+ON_THE_GRID = "resonances narrower than the grid are not on it: the tracked peaks, or a sweep, have them"
 
 
 def track(found: Json) -> None:
     """The highest peak over a parameter: both ends, the exchanges, the least."""
-    pairs = _ridge(found)
+    pairs = [*_ridge(found), *_plateau(found), *_sure(found)]
     pairs.append(("points", f"{len(found['parameter'])}, {found['sweeps']} sweeps"))
     pairs.append(("time", units.duration(found["seconds"])))
     print_pairs(_title(found), pairs)
@@ -34,9 +35,11 @@ def response_map(found: Json) -> None:
     if known:
         value, frequency, at = max(known)
         place = f"{frequency:.6g} Hz, {path} {units.parameter(path, at)}"
-        pairs.append(("highest", f"{units.length(value)} at {place}"))
+        pairs.append(("highest of the grid", f"{units.length(value)} at {place}"))
     if found["ridge"] is not None:
-        pairs += _ridge(found["ridge"])
+        pairs += [*_ridge(found["ridge"]), *_plateau(found["ridge"]), *_sure(found["ridge"])]
+    else:
+        pairs.append(("note", ON_THE_GRID))
     pairs.append(("time", units.duration(found["seconds"])))
     print_pairs(_title(found), pairs)
 
@@ -64,3 +67,17 @@ def _ridge(found: Json) -> Pairs:
         height = units.length(best["peak"])
         pairs.append(("least peak", f"{height} at {path} = {units.parameter(path, best['at'])} ({held})"))
     return pairs
+
+
+def _plateau(found: Json) -> Pairs:
+    """How far other values of the parameter are as good."""
+    path, best = found["parameter_path"], found["optimum"]
+    if best.get("plateau") is None:
+        return []
+    low, high = (units.parameter(path, end) for end in best["plateau"])
+    return [("as good", f"{low} to {high}"), ("chosen by", best["chosen_by"])]
+
+
+def _sure(found: Json) -> Pairs:
+    """Why it is not known of a response behind the result that no higher peak hides between its points."""
+    return [("warning", f"a response may have a higher peak. {why}") for why in found.get("peaks_open", ())]

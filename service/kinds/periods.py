@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from solver.scene import AnyContact, FrictionContact, GapSpring
 
 if TYPE_CHECKING:
+    from solver.contact_response import ContactResponse
     from solver.march_result import MarchResult
-    from solver.response import ContactResponse, Solution
+    from solver.response import Solution
 
 STICK, SLIP, SEPARATION = 0, 1, 2
 FloatArray = NDArray[np.float64]
@@ -35,7 +36,7 @@ def period_of(solution: Solution, samples: int) -> dict[str, Any]:
     from solver import fourier
 
     tau = np.linspace(0.0, 2.0 * math.pi, samples + 1)
-    displacement = fourier.basis(tau, solution.n_harmonics) @ solution.observed
+    displacement = fourier.basis(tau, solution.highest_harmonic) @ solution.observed
     pairs = zip(solution.scene.contacts, solution.contacts, strict=True)
     return {
         "time": (tau / (2.0 * math.pi * solution.frequency_hz)).tolist(),

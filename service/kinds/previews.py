@@ -21,9 +21,10 @@ from service.kinds.scenes import (
     resolve_scene,
     resolved,
 )
-from service.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues, balance_unknowns, dofs_solved
+from service.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues, coefficients, contact_motions, dofs_solved
+from service.linear_limits import linear_limit
 from solver.errors import Issue
-from solver.scene import FrictionContact, Scene
+from solver.scene import Scene
 
 MOST_POINTS = 2000
 MOST_HARMONICS = 41
@@ -35,7 +36,6 @@ POINT_UNKNOWNS = 500
 FEW_MOTIONS = 8
 """Of contacts: so few are quick with all harmonics."""
 SAMPLES = 400
-STUCK_LOAD = 1e9
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "set": {"damper.N0": 80}, "client": "a1b2"}
 
 
@@ -97,10 +97,10 @@ def harmonics_in_time(scene: Scene, asked: int, unknowns: int) -> int:
     A disk that is solved whole has the contacts of all its sectors: too many to be followed live with all
     harmonics.
     """
-    motions = balance_unknowns(scene, 0)
+    motions = contact_motions(scene)
     if motions <= FEW_MOTIONS:
         return asked
-    return max(1, min(asked, (unknowns // motions - 1) // 2))
+    return next((h for h in range(asked, 1, -1) if motions * coefficients(scene, h) <= unknowns), 1)
 
 
 def resolve_sweep(request: SweepPreviewRequest, source: SceneSource) -> Resolved:
@@ -132,8 +132,12 @@ def run_sweep(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldS
     scene = Scene.from_dict(spec["scene"])
     branch = _response(scene, spec["harmonics"], spec["limit"], should_stop)
     found = branch.to_json()
-    kept = ("parameter", "amplitude", "peak", "peaks", "band_hz", "band_limit", "band_intervals_hz", "points")
-    result = {key: found[key] for key in (*kept, "seconds", "completed", "status")}
+    kept = (
+        "parameter", "amplitude", "peak", "peaks", "band_hz", "band_limit", "band_intervals_hz", "points",
+        "peak_certificate", "band_known", "error_estimate", "mean_undetermined", "flags",
+        "seconds", "completed", "status",
+    )  # fmt: skip
+    result = {key: found[key] for key in kept}
     result |= {"n_harmonics": spec["harmonics"], "states": {}}
     if len(branch.values):
         at = int(branch.amplitude.argmax())
@@ -147,21 +151,13 @@ def run_limits(spec: Mapping[str, Any], _progress: Progress, should_stop: Should
     """Follow the response with the contact removed, and with it stuck."""
     scene = Scene.from_dict(spec["scene"])
     result: dict[str, Any] = {}
-    for name, load in (("free", 0.0), ("stuck", STUCK_LOAD)):
-        branch = _response(linear(scene, spec["contact"], load), 1, None, should_stop)
-        found = branch.to_json()
-        result[name] = {key: found[key] for key in ("parameter", "amplitude", "peak", "peaks", "completed")}
+    one = spec["contact"]
+    freed = [contact.name for contact in scene.contacts] if one is None else [one]
+    kept = ("parameter", "amplitude", "peak", "peaks", "peak_certificate", "completed")
+    for name, removed in (("free", freed), ("stuck", [])):
+        found = _response(linear_limit(scene, removed), 1, None, should_stop).to_json()
+        result[name] = {key: found[key] for key in kept}
     return JobOutput(result=result)
-
-
-def linear(scene: Scene, contact: str | None, load: float) -> Scene:
-    """The scene with the load on `contact` (all if None) and every other friction contact stuck."""
-    values: dict[str, float] = {}
-    for each in scene.contacts:
-        if isinstance(each, FrictionContact):
-            here = load if contact in (None, each.name) else STUCK_LOAD
-            values |= {f"{each.name}.N1": 0.0, f"{each.name}.N0": here, f"{each.name}.mu": max(each.mu, 0.1)}
-    return scene.with_values(values)
 
 
 def run_point(spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
@@ -186,7 +182,7 @@ def _response(scene: Scene, harmonics: int, limit: float | None, should_stop: Sh
 
 
 def _states(names: list[str], codes: list[int]) -> dict[str, str]:
-    from solver.response import state_of
+    from solver.contact_response import state_of
 
     return {name: state_of(code).value for name, code in zip(names, codes, strict=True)}
 

@@ -55,6 +55,8 @@ def sweep_record(branch: Branch, frequency_hz: float | None = None) -> SweepReco
         seconds=branch.seconds,
         completed=branch.completed,
         status=branch.status.value,
+        error_estimate=_finite(branch.error_estimate),
+        peaks_known=branch.peak_certificate.known,
         contacts=contact_values(scene, parameter),
         arrays={
             "parameter": encode(branch.values),

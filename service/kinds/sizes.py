@@ -80,12 +80,19 @@ def annulus_issues(scene: Scene, harmonics: int) -> list[Issue]:
     return _unknown_issues(scene, harmonics, sectors)
 
 
-def balance_unknowns(scene: Scene, harmonics: int) -> int:
-    """Unknowns of the balance: motions of the contacts × coefficients."""
+def contact_motions(scene: Scene) -> int:
+    """Motions of the contacts, those of all sectors where one does not stand for them."""
     # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
     from solver.sectors import sectors_needed
 
-    return _motions(scene, sectors_needed(scene).sectors) * (2 * harmonics + 1)
+    return _motions(scene, sectors_needed(scene).sectors)
+
+
+def coefficients(scene: Scene, harmonics: int) -> int:
+    """Coefficients of a motion, those that forces of higher harmonics call for included."""
+    from solver.harmonics import kept_harmonics
+
+    return 2 * len(kept_harmonics(scene, (), harmonics, odd=False)) - 1
 
 
 def _motions(scene: Scene, sectors: int) -> int:
@@ -96,11 +103,14 @@ def _motions(scene: Scene, sectors: int) -> int:
 
 def _unknown_issues(scene: Scene, harmonics: int, sectors: int) -> list[Issue]:
     motions = _motions(scene, sectors)
-    unknowns = motions * (2 * harmonics + 1)
+    kept = coefficients(scene, harmonics)
+    unknowns = motions * kept
     if unknowns <= MOST_UNKNOWNS:
         return []
+    plain = kept == 2 * harmonics + 1
+    of_each = f"(2 × {harmonics} harmonics + 1)" if plain else f"{kept} coefficients"
     fitting = (MOST_UNKNOWNS // motions - 1) // 2
-    got = f"got {motions} motions of contacts × (2 × {harmonics} harmonics + 1) = {unknowns}"
+    got = f"got {motions} motions of contacts × {of_each} = {unknowns}"
     if fitting >= 1:
         words = f"`harmonics` must be at most {fitting} for this scene, {MOST_UNKNOWNS} unknowns"
         return [refusal("/harmonics", f"{words}, {got}")]

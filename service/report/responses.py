@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 import solver
 from optim.cases import Case, read_cases
 from optim.uncertain import Coordinate, Disk, How
+from service.linear_limits import linear_limit
 from solver import units
 from solver.branch import Branch
 from solver.observations import observing
@@ -19,7 +20,6 @@ from solver.plots import style
 from solver.plots.curves import Response
 from solver.scene import Contact, CyclicStructure, Scene
 
-_STUCK = 1e9  # N, a normal load under which a contact never slips
 Dashes: TypeAlias = str | tuple[float, tuple[float, ...]]
 SOLID: Dashes = "-"
 DASHED: Dashes = (0, (5.0, 2.5))
@@ -98,17 +98,14 @@ def linear_lines(scene: Scene, paths: Sequence[str]) -> list[Line]:
     if not names or not all(isinstance(contact, Contact) for contact in scene.contacts):
         return []
     sweeps = Sweeps(harmonics=1, limit=None)
-    held = {f"{name}.N0": _STUCK for name in names}
-    still = {f"{name}.N1": 0.0 for name in names}
     limits = (
-        ("contacts removed (linear)", {**held, **{f"{n}.N0": 0.0 for n in removed}, **still}, _DOTTED),
-        ("contacts stuck (linear)", {**held, **still}, DASHED),
+        ("contacts removed (linear)", linear_limit(scene, removed), _DOTTED),
+        ("contacts stuck (linear)", linear_limit(scene, ()), DASHED),
     )
     return [
-        Line(name=name, branch=sweeps.of(scene.with_values(values)), color=style.GREY, dashes=dashes,
-             width=1.0, linear=True)
-        for name, values, dashes in limits
-    ]  # fmt: skip
+        Line(name=name, branch=sweeps.of(limit), color=style.GREY, dashes=dashes, width=1.0, linear=True)
+        for name, limit, dashes in limits
+    ]
 
 
 def in_scenario(scene: Scene, scenario: Mapping[str, Any]) -> Scene:

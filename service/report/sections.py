@@ -13,6 +13,7 @@ import solver
 from service.report.responses import Line, comparison_figure
 from solver import units
 from solver.branch import Branch
+from solver.notes import flag_words
 from solver.plots.html import image, pairs, table
 from solver.scene import Scene
 from solver.toml_text import toml_text
@@ -58,16 +59,26 @@ def bounds_of(given: Designed, name: str) -> str:
 
 
 def branch_table(lines: Sequence[Line]) -> str:
-    """Peak, error, place and band of every response that is not a linear limit."""
+    """Peak, error, place and band of every response that is not a linear limit, and what is doubtful."""
     rows: list[list[Any]] = []
+    doubts: list[str] = []
     for line in lines:
         branch = line.branch
         if line.linear or branch is None or branch.peak is None:
             continue
         band = "" if branch.band is None else f"{units.number(branch.band.width)} Hz"
         error, place = units.length(branch.error_estimate), f"{branch.peak.at:.6g} Hz"
-        rows.append([line.name, units.length(branch.peak.value), error, place, band])
-    return table(["response", "highest peak", "estimated error", "at", "band"], rows)
+        certificate = branch.peak_certificate
+        rows.append(
+            [line.name, units.length(branch.peak.value), error, place, band,
+             "known" if certificate.known else "not known"]
+        )  # fmt: skip
+        if not certificate.known:
+            doubts.append(f"{line.name}: between its points there may be a higher peak. {certificate.reason}")
+        doubts += [f"{line.name}: {words}" for words in flag_words(branch.flags)]
+    heads = ["response", "highest peak", "estimated error", "at", "band", "peaks between points"]
+    said = "".join(f"<p>{escape(doubt)}</p>" for doubt in doubts)
+    return f"{table(heads, rows)}{said}"
 
 
 def motion_section(branch: Branch | None, where: str = "At the peak") -> str:
@@ -80,6 +91,7 @@ def motion_section(branch: Branch | None, where: str = "At the peak") -> str:
         return ""
     words = "One period at the highest peak: motion, hysteresis loops, harmonics"
     states = [(contact.name, contact.state.value) for contact in solution.contacts]
+    states += [("note", words) for words in flag_words(solution.flags)]
     return f"<h2>{escape(where)}</h2>{image(solution.plot(), words, words + '.')}{pairs(states)}"
 
 

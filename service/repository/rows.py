@@ -130,6 +130,8 @@ class SweepRow:
     peak_at: float | None
     limit: float | None
     band_hz: float | None
+    error_estimate: float | None
+    peaks_known: bool | None
     newton_iterations: int
     rejected_steps: int
     seconds: float

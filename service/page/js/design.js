@@ -31,8 +31,13 @@ export const designView = {
       facts([
         ...values.map(([path, v]) => [path, el("strong", {}, quantity(path, v))]),
         ["highest peak", result.peak ? `${length(result.peak.value)} at ${number(result.peak.at, 6)} Hz` : "–"],
+        ...Object.entries(result.plateau ?? {}).map(([path, [low, high]]) => [`${path}, as good`, `${quantity(path, low)} to ${quantity(path, high)}`]),
+        ...(result.chosen_by ? [["chosen by", result.chosen_by]] : []),
+        ...(typeof result.error_estimate === "number" ? [["estimated error", length(result.error_estimate)]] : []),
+        ...(result.warnings ?? []).map((words) => ["warning", el("span", { class: "bad" }, words)]),
         ["resonance band", result.band_hz === null ? "–" : `${number(result.band_hz)} Hz above ${length(result.limit)}`],
-        ["held by", (result.active ?? []).join(", ") || "nothing"],
+        ["held by", `${(result.active ?? []).join(", ") || "nothing"}${heldIn(result)}`],
+        ...(result.looked_at?.length ? [["looked at", `${result.looked_at.length} designs over the whole range`]] : []),
         ...(others.length ? [["other local optima", others.join("; ")]] : []),
       ]),
       values.length ? el("button", { type: "button", onclick: () => load(Object.fromEntries(values)) }, "Load this design") : null,
@@ -41,6 +46,10 @@ export const designView = {
   },
   failed: (text) => say("design-status", text, true),
 };
+
+// Of several load cases, the one that holds the design.
+const heldIn = ({ held_by: held, peaks }) =>
+  held && new Set((peaks ?? []).map((peak) => peak.case)).size > 1 ? ` (of ${held.case})` : "";
 
 // Sets the values of a design beside those set before.
 export function load(values) {

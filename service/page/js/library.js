@@ -186,6 +186,8 @@ function drawCompared(found) {
     table(["", ...found.map((sweep) => ({ text: titleOf(sweep), number: true }))], [
       row("highest peak", (s) => (s.peak ? length(s.peak.value) : "–")),
       row("at", (s) => (s.peak ? quantity(s.parameter, s.peak.at) : "–")),
+      row("error estimate", (s) => (typeof s.error_estimate === "number" ? length(s.error_estimate) : "–")),
+      row("peaks between points", (s) => ({ true: "known", false: "not known" })[s.peaks_known] ?? "–"),
       row("band [Hz]", (s) => (s.band_hz === null ? "–" : number(s.band_hz))),
       row("force [N]", (s) => number(s.excitation_amplitude)),
       row("harmonics", (s) => String(s.harmonics)),

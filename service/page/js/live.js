@@ -63,8 +63,10 @@ export function showResponse(result) {
   byId("live-status").textContent = `Of a job, with ${asked().harmonics} harmonics: ${words(result)}`;
 }
 
-const words = ({ peak, band_hz: band, status }) =>
-  (peak ? `peak ${length(peak.value)} at ${number(peak.at, 5)} Hz` : status) + (band === null ? "" : `, band ${number(band)} Hz`);
+const words = ({ peak, band_hz: band, status, peak_certificate: certificate }) =>
+  (peak ? `peak ${length(peak.value)} at ${number(peak.at, 5)} Hz` : status)
+  + (band === null ? "" : `, band ${number(band)} Hz`)
+  + (peak && certificate && !certificate.known ? `; ${certificate.reason}` : "");
 
 function drawn(answer, { milliseconds, token }) {
   clearTimeout(slow);

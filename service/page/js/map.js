@@ -5,6 +5,7 @@ import { on, tell } from "./events.js";
 import { length, number, percent, quantity, seconds, withUnit } from "./format.js";
 import { heatmap, shadeStrip } from "./heatmap.js";
 import { load } from "./design.js";
+import { warnings } from "./words.js";
 
 let plot = null;
 let last = null;
@@ -67,6 +68,8 @@ function draw() {
   });
   const rows = [["ridge", ridge ? "solid: the highest peak; dashed: peaks that compete" : "not tracked"]];
   if (at) rows.push(["least peak", `${length(at.peak)} at ${quantity(path, at.at)}`]);
+  if (ridge?.optimum?.plateau) rows.push(["as good", ridge.optimum.plateau.map((v) => quantity(path, v)).join(" to ")], ["chosen by", ridge.optimum.chosen_by]);
+  rows.push(...warnings((ridge?.peaks_open ?? []).map((reason) => ({ known: false, reason }))));
   show(byId("map-facts"), shadeStrip(plot.range), facts(rows),
     el("p", { class: "note" }, "A click loads the load there and shows its loops at that frequency."));
 }

@@ -8,6 +8,7 @@ import { largest, length, lengthUnit, number, percent } from "./format.js";
 import { resume, run } from "./jobs.js";
 import { previewer } from "./previews.js";
 import { asked, current } from "./scenes.js";
+import { notes } from "./words.js";
 
 const MARCH_EVERY = 16;
 const MOTIONS = [["stick", "sticks", undefined], ["slip", "slips", "dashed"], ["apart", "open", "dotted"]];
@@ -61,11 +62,10 @@ function arrived(answer) {
   found = answer;
   if (!answer.converged) return say("point-status", answer.status, true);
   say("point-status", `${number(answer.frequency_hz, 6)} Hz: ${length(answer.max_abs)}, error about ${length(answer.error_estimate)}.`);
-  const flags = answer.flags.length ? [["flags", answer.flags.join(", ").replaceAll("_", " ")]] : [];
   const states = answer.period.contacts.map((c) => [c.name, c.shares ? `${c.state}: ${shares(c.shares)}` : c.state]);
   show(
     byId("point-facts"),
-    facts([["max |x|", length(answer.max_abs)], ["half peak to peak", length(answer.half_peak_to_peak)], ["mean", length(answer.mean)], ...states, ...flags]),
+    facts([["max |x|", length(answer.max_abs)], ["half peak to peak", length(answer.half_peak_to_peak)], ["mean", length(answer.mean)], ...states, ...notes(answer.flags)]),
     el("button", { type: "button", onclick: () => referee() }, "Compare with the time march"),
   );
   tell("states", { states: Object.fromEntries(answer.period.contacts.map((c) => [c.name, c.state])), at: answer.frequency_hz });

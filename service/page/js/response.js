@@ -10,6 +10,7 @@ import { previewer } from "./previews.js";
 import { current } from "./scenes.js";
 import { state } from "./address.js";
 import { saveToml } from "./toml.js";
+import { betweenPoints, notes } from "./words.js";
 
 const FORMS = [["CSV", "text/csv", "csv"], ["npz", "application/x-npz", "npz"], ["Parquet", "application/vnd.apache.parquet", "parquet"]];
 let plot = null;
@@ -92,6 +93,8 @@ function describe() {
     ["highest peak", result.peak ? `${length(result.peak.value)} at ${number(result.peak.at, 6)} Hz` : "–"],
     ["resonance band", result.band_hz === null ? "–" : `${number(result.band_hz)} Hz above ${length(result.band_limit)}`],
     ["error estimate", result.error_estimate === null ? "–" : length(result.error_estimate)],
+    ...betweenPoints(result),
+    ...notes([...(result.mean_undetermined ? ["mean_undetermined"] : []), ...(result.flags ?? [])]),
     ["removed, linear", linearPeak("free")],
     ["stuck, linear", linearPeak("stuck")],
   ];

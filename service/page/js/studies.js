@@ -5,6 +5,7 @@ import { byId, el, facts, say, show } from "./dom.js";
 import { on, tell } from "./events.js";
 import { length, number, percent } from "./format.js";
 import { current } from "./scenes.js";
+import { warnings } from "./words.js";
 
 let costs = null;
 let speeds = null;
@@ -79,7 +80,10 @@ export const campbellView = {
       describe: (x, y, i) => `order ${crossings[i].order} meets ${length(crossings[i].amplitude)} at ${number(x, 5)} /min, ${number(y, 5)} Hz`,
     });
     say("campbell-status", `Shaded: speeds at which the amplitude is above ${result.limit === null ? "half power of the order's peak" : length(result.limit)}.`);
-    show(byId("campbell-facts"), facts(crossings.map((c) => [`order ${c.order}`, `${length(c.amplitude)} at ${number(c.speed_rpm, 5)} /min, ${number(c.frequency_hz, 5)} Hz`])));
+    show(byId("campbell-facts"), facts([
+      ...crossings.map((c) => [`order ${c.order}`, `${length(c.amplitude)} at ${number(c.speed_rpm, 5)} /min, ${number(c.frequency_hz, 5)} Hz`]),
+      ...warnings(result.orders.map((o) => o.peak_certificate)),
+    ]));
   },
   failed: (text) => say("campbell-status", text, true),
 };
