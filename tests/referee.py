@@ -66,7 +66,7 @@ def motion_error(solution: Solution) -> float:
     slips = np.array([to_complex(contact.slip) for contact in solution.contacts])
     forces = np.array([to_complex(contact.force) for contact in solution.contacts])
     worst, scale = 0.0, 0.0
-    for k in range(1, solution.n_harmonics + 1):
+    for k in range(1, solution.highest_harmonic + 1):
         omega = 2.0 * math.pi * solution.frequency_hz * k
         K, C, L = matrices(model, k)
         Z = K - omega**2 * model.M + 1j * omega * C
@@ -81,7 +81,7 @@ def lost_power(solution: Solution) -> float:
     """Power that is unaccounted for, over what forces and motion could carry at most."""
     power, contacts = power_balance(solution), solution.contacts
     omega = 2.0 * math.pi * solution.frequency_hz
-    if solution.n_harmonics == 0:
+    if solution.highest_harmonic == 0:
         return 0.0
     carried = [float(np.abs(one.force[1:]).max() * np.abs(one.slip[1:]).max()) for one in contacts]
     pushed = sum(force.amplitude for force in solution.scene.excitation if force.harmonic > 0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -90,18 +91,17 @@ def test_progress_counts_the_looks() -> None:
     assert [share for share, _ in seen] == sorted(share for share, _ in seen)
 
 
-def test_stopped_before_the_look_the_optimum_is_proven_all_the_same() -> None:
-    """The last question before the end is that before the look."""
+def test_stopped_before_the_look_the_optimum_is_proven_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The caller says stop as soon as the second sweep, which proves the optimum, is made."""
     name, path, low, high = DISK
-    asked: list[int] = []
+    swept: list[solver.Branch] = []
 
-    def never() -> bool:
-        asked.append(1)
-        return False
+    def sweep(*args: Any, **more: Any) -> solver.Branch:
+        swept.append(solver.sweep(*args, **more))
+        return swept[-1]
 
-    least_peak(scene_of(name), path, low, high, basins=2, should_stop=never)
-    answers = iter([False] * (len(asked) - 1))
-    best = least_peak(scene_of(name), path, low, high, basins=2, should_stop=lambda: next(answers, True))
+    monkeypatch.setattr("solver.lines.sweep", sweep)
+    best = least_peak(scene_of(name), path, low, high, basins=2, should_stop=lambda: len(swept) >= 2)
     assert best.status is TrackStatus.TRACKED
     assert best.sweeps == 2
     assert best.at == disk(1).at

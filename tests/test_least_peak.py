@@ -253,8 +253,11 @@ def test_stopped_before_the_first_sweep() -> None:
 
 def test_stopped_before_the_proof() -> None:
     """What was followed is told, but not as proven."""
-    asked = iter([False])
-    best = least_peak(case_a(), "damper.N0", 20.0, 3000.0, should_stop=lambda: next(asked, True))
+    seen: list[int] = []
+    best = least_peak(
+        case_a(), "damper.N0", 20.0, 3000.0, on_progress=lambda _share, count: seen.append(count),
+        should_stop=lambda: bool(seen),
+    )  # fmt: skip
     assert best.status is TrackStatus.STOPPED
     assert best.sweeps == 1
     assert best.branch is None

@@ -29,9 +29,9 @@ from solver import (
     solve,
     sweep,
 )
+from solver.contact_response import ContactState
 from solver.fourier import to_complex
 from solver.parametric import linear_model
-from solver.response import ContactState
 from solver.sectors import written_out
 
 VALUES = (1.03, 0.98, 1.01, 0.95, 1.0, 1.06)

@@ -103,8 +103,11 @@ def test_a_stiffer_contact_raises_the_resonance_and_lowers_the_peak() -> None:
     """Figure 6."""
     track = solver.track_peak(solver.load_scene("two-dof"), "damper.kt", 5.0, 60.0)
     assert track.completed
-    assert np.all(np.diff(track.frequency) > 0.0)
-    assert np.all(np.diff(track.peak) < 0.0)
+    # Where two peaks change places both stand in the track, equally high.
+    apart = np.diff(track.parameter) > 0.0
+    assert np.all(np.diff(track.frequency)[apart] > 0.0)
+    assert np.all(np.diff(track.peak)[apart] < 0.0)
+    assert np.abs(np.diff(track.peak)[~apart]).max(initial=0.0) <= 1e-12 * track.peak.max()
 
 
 def test_a_stronger_force_moves_the_resonance_from_stuck_to_free() -> None:

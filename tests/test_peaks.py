@@ -13,9 +13,10 @@ from scipy.optimize import minimize_scalar
 from solver import Scene, solve, sweep
 from solver.balance import build
 from solver.branch import Branch, Peak
+from solver.kernels.intervals import WORTH_POLISHING
 from solver.kernels.observe import MAX_ABS, SLOPE
 from solver.parameter import Kind
-from solver.peaks import HALF_POWER, WORTH_POLISHING, band_limit
+from solver.peaks import HALF_POWER, band_limit
 from solver.workspace import Workspace
 
 HARMONICS = 7

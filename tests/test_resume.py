@@ -121,7 +121,12 @@ def test_the_beginning_of_another_branch_is_refused() -> None:
 def test_the_most_points_are_those_of_both_parts() -> None:
     settings = ContinuationSettings(largest_step=0.05, most_points=150)
     stretches: list[Stretch] = []
-    sweep(two_dof(), settings=settings, on_stretch=stretches.append)
-    resumed = sweep(two_dof(), settings=settings, resume=stretches[0])
-    assert resumed.status is BranchStatus.TOO_MANY_POINTS
-    assert len(resumed.values) == sum(len(stretch.solutions) for stretch in stretches)
+    whole = sweep(two_dof(), settings=settings, on_stretch=stretches.append)
+    later: list[Stretch] = []
+    resumed = sweep(two_dof(), settings=settings, resume=stretches[0], on_stretch=later.append)
+    assert whole.status is resumed.status is BranchStatus.TOO_MANY_POINTS
+    followed = [
+        sum(len(stretch.solutions) for stretch in each) for each in (stretches, stretches[:1] + later)
+    ]
+    assert followed[0] == followed[1] >= settings.most_points
+    assert np.array_equal(resumed.values, whole.values)

@@ -224,10 +224,9 @@ def test_json_has_the_keys_of_the_command() -> None:
 
 
 def test_stopped_by_the_caller() -> None:
-    asked = iter([False, True])
     seen: list[tuple[float, int]] = []
     track = track_peak(
-        case_a(), "damper.N0", 50.0, 400.0, should_stop=lambda: next(asked, True),
+        case_a(), "damper.N0", 50.0, 400.0, should_stop=lambda: bool(seen),
         on_progress=lambda share, count: seen.append((share, count)),
     )  # fmt: skip
     assert track.status is TrackStatus.STOPPED

@@ -278,7 +278,9 @@ def test_a_sweep_goes_on_behind_its_last_checkpoint(
         curve = list(zip(result["parameter"], result["amplitude"], strict=True))
         for found in seen.values():
             assert 0 < len(found) <= len(curve)
-            assert found == curve[: len(found)]
+            # The finished branch has the points that were told, in their order, and those put between.
+            rest = iter(curve)
+            assert all(point in rest for point in found)
         until(lambda: threads_idle(embedded), 20.0)
 
 

@@ -101,7 +101,9 @@ def test_the_points_of_a_sweep_arrive_while_it_is_computed(shipped: httpx.Client
     sweep = shipped.get(f"/v1/jobs/{job}/results").json()["sweeps"][0]
     arrays = shipped.get(sweep["links"]["self"]).json()["arrays"]
     known = list(map(list, zip(arrays["parameter"], arrays["amplitude"], strict=True)))
-    assert points == known[: len(points)]
+    # The finished branch has the points that were told, in their order, and those put between.
+    rest = iter(known)
+    assert all(point in rest for point in points)
     assert len(points) >= 64
 
 

@@ -97,6 +97,9 @@ def test_a_service_of_today_works_with_what_the_first_one_stored(old: str) -> No
             for sweep in results.sweeps:
                 arrays = service.sweeps.arrays(sweep.id)
                 assert decode(arrays["amplitude"]).shape == (sweep.points,)
+                # Nobody knows of a sweep of that version what stands between its points.
+                assert sweep.peaks_known is None
+                assert sweep.error_estimate is None
         assert service.scenes.get("our-blade").body["name"] == "our-blade"
         keyed = next(job for job in jobs if job.idempotency_key == "first-sweep")
         assert keyed.owner == ""

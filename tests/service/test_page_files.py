@@ -10,6 +10,7 @@ import pytest
 from service_helpers import is_problem
 
 from service.routes import page
+from solver.notes import FLAGS
 
 FOLDER = Path(page.__file__).resolve().parent.parent / "page"
 MODULES = sorted((FOLDER / "js").glob("*.js"))
@@ -46,6 +47,13 @@ def test_a_file_of_another_version_is_not_kept(shipped: httpx.Client) -> None:
 )
 def test_nothing_else_is_served(shipped: httpx.Client, path: str) -> None:
     is_problem(shipped.get(f"/page/0123/{path}"), 404)
+
+
+def test_the_page_has_words_for_every_flag() -> None:
+    text = (FOLDER / "js" / "words.js").read_text(encoding="utf-8")
+    told = dict(re.findall(r'^  (\w+): "(.*)",$', text, flags=re.MULTILINE))
+    assert told.keys() == FLAGS.keys()
+    assert told["not_unique"] == FLAGS["not_unique"]
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: path.name)

@@ -1,0 +1,116 @@
+"""What a response knows between its points is told, and nothing is claimed of what it does not know."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from typer.testing import CliRunner
+
+import optim
+import solver
+from optim.afterwards import looked_after
+from optim.result import DesignStatus
+from service.cli import campbell_reports, design_reports, reports, sensitivity_command, track_reports
+from service.cli.app import app
+from service.report.responses import Line
+from service.report.sections import branch_table
+from solver.certificate import uncertain
+from solver.notes import FLAGS, NONE_HIGHER, flag_words
+
+WHY = "a resonance was left at 1.5"
+
+
+def doubtful(branch):
+    """The branch, had a place of it not been settled."""
+    return replace(branch, peak_certificate=uncertain(WHY, 0.1))
+
+
+@pytest.fixture(scope="module")
+def branch():
+    return solver.sweep(solver.load_scene("two-dof"), harmonics=3)
+
+
+def test_the_sweep_says_it(branch, capsys):
+    reports.branch(branch.to_json())
+    assert NONE_HIGHER in capsys.readouterr().out
+    assert NONE_HIGHER in str(branch.summary())
+    found = doubtful(branch).to_json()
+    assert found["band_known"] is False
+    reports.branch(found)
+    assert WHY in " ".join(capsys.readouterr().out.split())
+    assert WHY in str(doubtful(branch).summary())
+
+
+def test_a_sweep_of_an_earlier_version_is_read(branch, capsys):
+    found = branch.to_json()
+    for key in ("peak_certificate", "band_known", "flags", "mean_undetermined"):
+        del found[key]
+    reports.branch(found)
+    printed = capsys.readouterr().out
+    assert "between points" not in printed
+    assert "peak" in printed
+
+
+def test_the_report_says_it(branch):
+    told = branch_table([Line(name="as given", branch=doubtful(branch), color="black")])
+    assert "not known" in told
+    assert WHY in told
+    assert WHY not in branch_table([Line(name="as given", branch=branch, color="black")])
+
+
+def test_flags_are_told_in_words(branch, capsys):
+    flagged = replace(branch, flags=("travelling_wave_assumed", "of_a_newer_version"))
+    reports.branch(flagged.to_json())
+    printed = " ".join(capsys.readouterr().out.split())
+    for words in (FLAGS["travelling_wave_assumed"], "of a newer version"):
+        assert words in printed
+        assert words in str(flagged.summary())
+    assert flag_words(()) == []
+
+
+def test_an_optimum_is_claimed_only_of_what_is_known(capsys):
+    found = optim.design(
+        solver.load_scene("two-dof"), variables={"damper.N0": (50.0, 200.0)}, harmonics=1, basins=1
+    )
+    assert found.status is DesignStatus.OPTIMAL
+    assert not any("between its points" in words for words in found.warnings)
+    responses = tuple(replace(one, branch=doubtful(one.branch)) for one in found.evaluation.responses)
+    evaluation = replace(found.evaluation, responses=responses)
+    again = looked_after(replace(found, evaluation=evaluation, status=DesignStatus.AT_BOUND), None)
+    assert again.status is DesignStatus.LOCAL
+    assert not again.reached
+    assert any(WHY in words for words in again.warnings)
+    design_reports.design(again.to_json())
+    assert WHY in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_diagram_is_clear_only_if_that_is_known(capsys):
+    diagram = optim.campbell_diagram(
+        solver.load_scene("two-dof"), speeds_rpm=(20.0, 30.0), limit=5.0, harmonics=1
+    )
+    assert diagram.clear is True
+    orders = tuple(replace(one, branch=doubtful(one.branch)) for one in diagram.orders)
+    open_ended = replace(diagram, orders=orders)
+    assert open_ended.clear is None
+    assert WHY in str(open_ended.summary())
+    campbell_reports.diagram(open_ended.to_json())
+    assert WHY in " ".join(capsys.readouterr().out.split())
+
+
+def test_tracks_and_sensitivities_warn(capsys):
+    track = solver.track_peak(solver.load_scene("two-dof"), "damper.N0", 80.0, 120.0, harmonics=1)
+    assert track.peaks_open == ()
+    track = replace(track, branches=tuple(doubtful(one) for one in track.branches))
+    assert len(track.to_json()["peaks_open"]) == 1
+    track_reports.track(track.to_json())
+    assert WHY in " ".join(capsys.readouterr().out.split())
+    shares = optim.sensitivities(solver.load_scene("two-dof"), harmonics=1)
+    sensitivity_command._show(replace(shares, branch=doubtful(shares.branch)).to_json())
+    assert WHY in " ".join(capsys.readouterr().out.split())
+
+
+def test_the_command_prints_it():
+    said = CliRunner().invoke(app, ["sweep", "two-dof", "--harmonics", "3"])
+    assert said.exit_code == 0
+    assert "between points" in said.output
