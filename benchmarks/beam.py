@@ -7,7 +7,7 @@ import numpy as np
 import solver
 from benchmarks.harness import check, expect, table, timed
 from solver import Scene
-from solver.balance import build
+from solver.balance.balance import build
 
 EI, MASS, LENGTH = 100.0, 1.0, 1.0  # N m², kg, m: a cantilever
 SLIDERS = 4

@@ -21,8 +21,8 @@ def mistuning_study() -> None:
     # Loaded here: an extra, which the other benchmarks do without.
     from distributed import LocalCluster
 
-    from service.embedded import EmbeddedService
-    from service.settings import load_settings
+    from service.client.embedded import EmbeddedService
+    from service.settings.settings import load_settings
 
     with (
         tempfile.TemporaryDirectory() as folder,

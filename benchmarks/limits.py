@@ -15,9 +15,9 @@ import numpy as np
 from scipy.linalg import lapack
 
 from solver import Branch
-from solver.fourier import Integer, Real
-from solver.kernels.events import LIFTING, SEGMENT_COLUMNS, SLIPPING, segment_capacity
-from solver.kernels.force import contact_force
+from solver.contacts.kernels.coulomb import contact_force
+from solver.contacts.kernels.stick_slip_events import LIFTING, SEGMENT_COLUMNS, SLIPPING, segment_capacity
+from solver.jit.fourier import Integer, Real
 
 SAMPLES = 12  # points of a branch at which its contacts are timed
 LEAST_SECONDS = 2e-3  # a measurement is repeated until it lasts as long

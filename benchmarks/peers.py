@@ -15,7 +15,7 @@ from typing import Any
 
 from benchmarks.harness import WrongResultError
 from solver import Scene
-from solver.parametric import linear_model
+from solver.linear.assembly import linear_model
 
 RUNNER = Path(__file__).with_name("pyharm_runner.py")
 INTERPRETER = "PYHARM_PYTHON"

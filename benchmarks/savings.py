@@ -9,7 +9,7 @@ import solver
 from benchmarks.harness import check, expect, table, timed
 from benchmarks.problems import case_a, chain, graded_chain
 from solver import Scene
-from solver.savings import Effects
+from solver.balance.simplifications import Effects
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

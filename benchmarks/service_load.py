@@ -20,8 +20,8 @@ from sqlalchemy import func, select
 from benchmarks.harness import expect, table
 from benchmarks.service_process import Cpu, ServiceProcess, serving
 from benchmarks.stored_sweeps import fill
-from service.db import Database
-from service.models import Job, JobResult, JobState, Sweep
+from service.db.engine import Database
+from service.db.models import Job, JobResult, JobState, Sweep
 
 JOBS = 10_000
 CLIENTS = 16
@@ -145,10 +145,10 @@ def seconds_of_one_job(runs: int = 200) -> float:
 
 
 def _time_jobs(runs: int) -> float:
-    from service.checkpoints import Checkpoints
-    from service.kinds import SHIPPED, warm_up
-    from service.kinds.scenes import shipped_scene
-    from service.worker import Throttle, checked
+    from service.jobs.checkpoints import Checkpoints
+    from service.jobs.kinds import SHIPPED, warm_up
+    from service.jobs.kinds.scenes import shipped_scene
+    from service.workers.worker import Throttle, checked
 
     warm_up()
     scene = shipped_scene("two-dof")

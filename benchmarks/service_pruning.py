@@ -14,8 +14,8 @@ from benchmarks.harness import expect, table
 from benchmarks.service_load import small_job
 from benchmarks.service_process import ServiceProcess, serving
 from benchmarks.stored_sweeps import fill
-from service.db import Database
-from service.models import Sweep
+from service.db.engine import Database
+from service.db.models import Sweep
 
 SWEEPS = 100_000
 _PAUSE_SECONDS = 0.01

@@ -24,18 +24,18 @@ from pathlib import Path
 from sqlalchemy import Connection, func, select, text
 
 from benchmarks.harness import WrongResultError, expect, table
-from service import revisions
-from service.checkpoints import Checkpoints
-from service.core import Service
-from service.db import Database, is_sqlite
-from service.executors.base import ExecutorStatus, Finished, Sink, Stopped
-from service.jobs import JobOutput
-from service.kinds import SHIPPED
-from service.models import Job, JobResult, JobState
-from service.queue import JobQueue
-from service.repository import Attempt
-from service.settings import load_settings
-from service.worker import Throttle, checked
+from service.db import revisions
+from service.db.engine import Database, is_sqlite
+from service.db.models import Job, JobResult, JobState
+from service.db.repositories import Attempt
+from service.jobs.checkpoints import Checkpoints
+from service.jobs.kinds import SHIPPED
+from service.jobs.registry import JobOutput
+from service.queue.core import Service
+from service.queue.queue import JobQueue
+from service.settings.settings import load_settings
+from service.workers.base import ExecutorStatus, Finished, Sink, Stopped
+from service.workers.worker import Throttle, checked
 
 TIMES = 100
 CORES = os.cpu_count() or 1
@@ -133,7 +133,7 @@ class Work:
 
 def _one_output() -> tuple[dict[str, object], JobOutput]:
     """Return spec and output of a real small job."""
-    from service.kinds.scenes import shipped_scene
+    from service.jobs.kinds.scenes import shipped_scene
 
     scene = shipped_scene("two-dof")
     spec: dict[str, object] = {

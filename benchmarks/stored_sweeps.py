@@ -8,11 +8,11 @@ from typing import Any
 
 from sqlalchemy import insert
 
-from service import revisions
-from service.clock import utc_now
-from service.db import Database
-from service.ids import new_id
-from service.models import Job, JobState, Sweep, SweepContact
+from service.db import revisions
+from service.db.clock import utc_now
+from service.db.engine import Database
+from service.db.models import Job, JobState, Sweep, SweepContact
+from service.jobs.ids import new_id
 
 _EACH = 10
 _CHUNK = 1000

@@ -11,7 +11,7 @@ from jinja2.runtime import Context
 from pdoc import pdoc
 from pdoc.render import configure, env
 
-MODULES = ("solver", "optim", "service.client", "service.answers")
+MODULES = ("solver", "optim", "service.client", "service.schemas.answers")
 
 # pdoc takes what stands behind a colon for a type. Here it is one where a sentence follows on the next line,
 # and the description itself otherwise.

@@ -9,9 +9,9 @@ from __future__ import annotations
 from alembic import context
 from sqlalchemy import Connection
 
-from service.db import migration_engine
-from service.models import Base
-from service.settings import load_settings
+from service.db.engine import migration_engine
+from service.db.models import Base
+from service.settings.settings import load_settings
 
 
 def run(connection: Connection) -> None:

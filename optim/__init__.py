@@ -6,25 +6,25 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from optim.campbell import campbell_diagram, forbidden_hz
-    from optim.crossings import CampbellDiagram, CampbellStatus
-    from optim.elasticities import SensitivityResult, SensitivityStatus, sensitivities
     from optim.errors import DesignError
-    from optim.pareto import pareto_front
-    from optim.pareto_result import ParetoResult, ParetoStatus
-    from optim.result import DesignResult, DesignStatus
-    from optim.robust import robust_design
-    from optim.robust_result import RobustResult, RobustStatus
+    from optim.results.design import DesignResult, DesignStatus
+    from optim.robust.result import RobustResult, RobustStatus
+    from optim.robust.robust import robust_design
     from optim.search import design
+    from optim.studies.campbell import campbell_diagram, forbidden_hz
+    from optim.studies.crossings import CampbellDiagram, CampbellStatus
+    from optim.studies.elasticities import SensitivityResult, SensitivityStatus, sensitivities
+    from optim.studies.pareto import pareto_front
+    from optim.studies.pareto_result import ParetoResult, ParetoStatus
 
 _HOME = {
-    "design": "search", "DesignResult": "result", "DesignStatus": "result", "DesignError": "errors",
-    "CampbellDiagram": "crossings", "CampbellStatus": "crossings", "campbell_diagram": "campbell",
-    "forbidden_hz": "campbell",
-    "sensitivities": "elasticities", "SensitivityResult": "elasticities",
-    "SensitivityStatus": "elasticities",
-    "pareto_front": "pareto", "ParetoResult": "pareto_result", "ParetoStatus": "pareto_result",
-    "robust_design": "robust", "RobustResult": "robust_result", "RobustStatus": "robust_result",
+    "design": "search", "DesignResult": "results.design", "DesignStatus": "results.design",
+    "DesignError": "errors", "CampbellDiagram": "studies.crossings", "CampbellStatus": "studies.crossings",
+    "campbell_diagram": "studies.campbell", "forbidden_hz": "studies.campbell",
+    "sensitivities": "studies.elasticities", "SensitivityResult": "studies.elasticities",
+    "SensitivityStatus": "studies.elasticities", "pareto_front": "studies.pareto",
+    "ParetoResult": "studies.pareto_result", "ParetoStatus": "studies.pareto_result",
+    "robust_design": "robust.robust", "RobustResult": "robust.result", "RobustStatus": "robust.result",
 }  # fmt: skip
 
 __all__ = [

@@ -8,18 +8,18 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from optim.afterwards import looked_after, settled_status
-from optim.eased import Eased
-from optim.evaluation import natural_scales
-from optim.evaluator import Search, StoppedError
-from optim.local import FLAT_SLOPE, Local, LocalSearch
-from optim.look import WholeRange
-from optim.model import conditions, model_of
-from optim.problem import Method, Problem, pose
-from optim.result import Basin, DesignResult, DesignStatus
-from optim.tracked import Tracked, tracked_optimum
-from optim.watch import OnProgress, ShouldStop
-from solver.scene import Scene
+from optim.criteria.evaluation import natural_scales
+from optim.criteria.linearised import conditions, model_of
+from optim.methods.afterwards import looked_after, settled_status
+from optim.methods.eased import Eased
+from optim.methods.evaluator import Search, StoppedError
+from optim.methods.global_look import WholeRange
+from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
+from optim.methods.peak_tracking import Tracked, tracked_optimum
+from optim.problem.problem import Method, Problem, pose
+from optim.problem.watch import OnProgress, ShouldStop
+from optim.results.design import Basin, DesignResult, DesignStatus
+from solver.scene.scene import Scene
 
 SAME_HEIGHT = 1e-9  # relative, of two levels that are one
 SAME_PLACE = 1e-3  # scaled distance within which two optima are one
@@ -54,7 +54,7 @@ def design(
     variables : parameter path to (low, high), paths that share a value separated by commas; the N0 of the
         contact with a tied N1 if left out.
     scaling : variable to ``linear`` or ``logarithmic``; by the bounds if left out.
-    cases : the responses that count, see `optim.cases.read_cases`; the scene as it is if left out.
+    cases : the responses that count, see `optim.problem.cases.read_cases`; the scene as it is if left out.
     limit : amplitude [m] above which the resonance band is measured; half power of the peak if left out.
     weights : of ``peak`` [1/m] and ``band`` [1/Hz] in what is minimised; the peak alone if left out.
     max_peak : largest amplitude allowed [m].
@@ -134,10 +134,10 @@ def _search(whole: WholeRange, found: list[Local], starts: Sequence[Mapping[str,
 def local_search_of(method: Method) -> LocalSearch:
     """Return the local search of a method; CasADi and CVXPY are loaded when they are needed."""
     if method is Method.IPOPT:
-        from optim.nlp import ipopt_search
+        from optim.methods.ipopt import ipopt_search
 
         return ipopt_search
-    from optim.minimax import thorough_search
+    from optim.methods.minimax import thorough_search
 
     return thorough_search
 

@@ -1,6 +1,6 @@
 """The exceptions of the service: one root, and one class for each thing a caller can mend.
 
-What each of them becomes over HTTP is decided in one place, `service.problems`.
+What each of them becomes over HTTP is decided in one place, `service.schemas.problems`.
 """
 
 from __future__ import annotations

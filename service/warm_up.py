@@ -7,8 +7,8 @@ serves every process from then on.
 from __future__ import annotations
 
 import solver
-from service.kinds import warm_up
-from solver.kernels.together import compile_together
+from service.jobs.kinds import warm_up
+from solver.jit.parallel import compile_together
 
 
 def referee() -> None:

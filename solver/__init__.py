@@ -9,69 +9,74 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from solver.accuracy import ErrorEstimate, branch_errors
-    from solver.accuracy_cost import AccuracyRow, AccuracyStudy, accuracy_study
-    from solver.branch import Band, Branch, BranchStatus, Peak
-    from solver.continuation import sweep
-    from solver.continuation_settings import ContinuationSettings, Predictor
-    from solver.corners import PeakGradient, PeakKind, peak_gradient
-    from solver.curvature import AmplitudeHessian, EdgeHessian, PeakHessian
-    from solver.dataset import Dataset, Variable
-    from solver.effects import Plan, plan
-    from solver.energy import PowerBalance, power_balance
+    from solver.balance.simplifications import Effects
+    from solver.branches.sweep import sweep
+    from solver.contacts.segments import Shares
+    from solver.continuation.branch import Band, Branch, BranchStatus, Peak
+    from solver.continuation.segment import Stretch, joined
+    from solver.continuation.settings import ContinuationSettings, Predictor
     from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
-    from solver.floquet import Growth, Stability, branch_stability, stability
-    from solver.histories import hysteresis_loop, motion, time_history
-    from solver.least import least_peak
-    from solver.maps import MapStatus, ResponseMap, response_map
-    from solver.marching import march
-    from solver.mistuned_disks import MistunedDisk, MistuningStatus, MistuningStudy, mistuning_study
-    from solver.mistuning import BladeAmplitudes, BladePeaks, blade_amplitudes, blade_peaks, mistuned
-    from solver.peak_tracks import Basin, LeastPeak, PeakTrack, TrackStatus
-    from solver.response import Solution, SolutionStatus, solve
-    from solver.saving import load, save
-    from solver.savings import Effects
-    from solver.scene import Scene, load_scene, shipped_scenes
-    from solver.sectors import Extent, annulus, sectors_needed
-    from solver.segments_of import Shares
-    from solver.sensitivity import Gradient, Sensitivities
-    from solver.shown import Shown, Summary, progress_bar
-    from solver.stretches import Stretch, joined
-    from solver.tracking import track_peak
-    from solver.wear import ContactWear, Measured, WearSensitivity, contact_wear
-    from solver.wear_corners import worst_slopes
-    from solver.wear_peaks import Measure, WorstWear, worst_friction_work, worst_wear
+    from solver.extrema.error_estimate import ErrorEstimate, branch_errors
+    from solver.marching.march import march
+    from solver.peaks.minimise_peak import least_peak
+    from solver.peaks.results import Basin, LeastPeak, PeakTrack, TrackStatus
+    from solver.peaks.track_peak import track_peak
+    from solver.response.floquet import Growth, Stability, branch_stability, stability
+    from solver.response.power_balance import PowerBalance, power_balance
+    from solver.response.solve import Solution, SolutionStatus, solve
+    from solver.response.time_history import hysteresis_loop, motion, time_history
+    from solver.response.wear import ContactWear, Measured, WearSensitivity, contact_wear
+    from solver.response.wear_nonsmooth import worst_slopes
+    from solver.response.worst_wear import Measure, WorstWear, worst_friction_work, worst_wear
+    from solver.results.base import Shown, Summary, progress_bar
+    from solver.results.dataset import Dataset, Variable
+    from solver.scene.annulus import Extent, annulus, sectors_needed
+    from solver.scene.scene import Scene, load_scene, shipped_scenes
+    from solver.sensitivity.gradient import Gradient, Sensitivities
+    from solver.sensitivity.hessian import AmplitudeHessian, EdgeHessian, PeakHessian
+    from solver.sensitivity.nonsmooth import PeakGradient, PeakKind, peak_gradient
+    from solver.studies.blades import BladeAmplitudes, BladePeaks, blade_amplitudes, blade_peaks, mistuned
+    from solver.studies.convergence import AccuracyRow, AccuracyStudy, accuracy_study
+    from solver.studies.mistuning import MistunedDisk, MistuningStatus, MistuningStudy, mistuning_study
+    from solver.studies.plan import Plan, plan
+    from solver.studies.response_map import MapStatus, ResponseMap, response_map
+    from solver.views.io import load, save
 
 _HOME = {
-    "AccuracyRow": "accuracy_cost", "AccuracyStudy": "accuracy_cost", "accuracy_study": "accuracy_cost",
-    "ErrorEstimate": "accuracy", "branch_errors": "accuracy",
-    "Band": "branch", "Branch": "branch", "BranchStatus": "branch", "Peak": "branch",
-    "ContinuationSettings": "continuation_settings", "Predictor": "continuation_settings",
-    "sweep": "continuation",
-    "Dataset": "dataset", "Variable": "dataset", "Shown": "shown", "Summary": "shown",
-    "progress_bar": "shown", "load": "saving", "save": "saving",
-    "MissingExtraError": "errors", "ResultFileError": "errors",
-    "Issue": "errors", "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
-    "Effects": "savings", "Plan": "effects", "plan": "effects",
-    "Scene": "scene", "load_scene": "scene", "shipped_scenes": "scene",
-    "Solution": "response", "SolutionStatus": "response", "solve": "response",
-    "Growth": "floquet", "Stability": "floquet", "branch_stability": "floquet", "stability": "floquet",
-    "BladePeaks": "mistuning", "blade_peaks": "mistuning", "MistunedDisk": "mistuned_disks",
-    "MistuningStatus": "mistuned_disks", "MistuningStudy": "mistuned_disks",
-    "mistuning_study": "mistuned_disks",
-    "BladeAmplitudes": "mistuning", "blade_amplitudes": "mistuning", "mistuned": "mistuning",
-    "Extent": "sectors", "sectors_needed": "sectors", "annulus": "sectors",
-    "Gradient": "sensitivity", "Sensitivities": "sensitivity", "AmplitudeHessian": "curvature",
-    "EdgeHessian": "curvature", "PeakHessian": "curvature",
-    "PeakGradient": "corners", "PeakKind": "corners", "peak_gradient": "corners",
-    "march": "marching", "PowerBalance": "energy", "power_balance": "energy",
-    "hysteresis_loop": "histories", "motion": "histories", "time_history": "histories",
-    "MapStatus": "maps", "ResponseMap": "maps", "response_map": "maps", "LeastPeak": "peak_tracks",
-    "Basin": "peak_tracks", "PeakTrack": "peak_tracks", "TrackStatus": "peak_tracks", "least_peak": "least",
-    "track_peak": "tracking", "Shares": "segments_of",
-    "ContactWear": "wear", "Measured": "wear", "WearSensitivity": "wear", "contact_wear": "wear",
-    "Measure": "wear_peaks", "WorstWear": "wear_peaks", "worst_friction_work": "wear_peaks",
-    "worst_wear": "wear_peaks", "worst_slopes": "wear_corners", "Stretch": "stretches", "joined": "stretches",
+    "AccuracyRow": "studies.convergence", "AccuracyStudy": "studies.convergence",
+    "accuracy_study": "studies.convergence", "ErrorEstimate": "extrema.error_estimate",
+    "branch_errors": "extrema.error_estimate", "Band": "continuation.branch",
+    "Branch": "continuation.branch", "BranchStatus": "continuation.branch", "Peak": "continuation.branch",
+    "ContinuationSettings": "continuation.settings", "Predictor": "continuation.settings",
+    "sweep": "branches.sweep", "Dataset": "results.dataset", "Variable": "results.dataset",
+    "Shown": "results.base", "Summary": "results.base", "progress_bar": "results.base", "load": "views.io",
+    "save": "views.io", "MissingExtraError": "errors", "ResultFileError": "errors", "Issue": "errors",
+    "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
+    "Effects": "balance.simplifications", "Plan": "studies.plan", "plan": "studies.plan",
+    "Scene": "scene.scene", "load_scene": "scene.scene", "shipped_scenes": "scene.scene",
+    "Solution": "response.solve", "SolutionStatus": "response.solve", "solve": "response.solve",
+    "Growth": "response.floquet", "Stability": "response.floquet", "branch_stability": "response.floquet",
+    "stability": "response.floquet", "BladePeaks": "studies.blades", "blade_peaks": "studies.blades",
+    "MistunedDisk": "studies.mistuning", "MistuningStatus": "studies.mistuning",
+    "MistuningStudy": "studies.mistuning", "mistuning_study": "studies.mistuning",
+    "BladeAmplitudes": "studies.blades", "blade_amplitudes": "studies.blades", "mistuned": "studies.blades",
+    "Extent": "scene.annulus", "sectors_needed": "scene.annulus", "annulus": "scene.annulus",
+    "Gradient": "sensitivity.gradient", "Sensitivities": "sensitivity.gradient",
+    "AmplitudeHessian": "sensitivity.hessian", "EdgeHessian": "sensitivity.hessian",
+    "PeakHessian": "sensitivity.hessian", "PeakGradient": "sensitivity.nonsmooth",
+    "PeakKind": "sensitivity.nonsmooth", "peak_gradient": "sensitivity.nonsmooth",
+    "march": "marching.march", "PowerBalance": "response.power_balance",
+    "power_balance": "response.power_balance", "hysteresis_loop": "response.time_history",
+    "motion": "response.time_history", "time_history": "response.time_history",
+    "MapStatus": "studies.response_map", "ResponseMap": "studies.response_map",
+    "response_map": "studies.response_map", "LeastPeak": "peaks.results", "Basin": "peaks.results",
+    "PeakTrack": "peaks.results", "TrackStatus": "peaks.results", "least_peak": "peaks.minimise_peak",
+    "track_peak": "peaks.track_peak", "Shares": "contacts.segments", "ContactWear": "response.wear",
+    "Measured": "response.wear", "WearSensitivity": "response.wear", "contact_wear": "response.wear",
+    "Measure": "response.worst_wear", "WorstWear": "response.worst_wear",
+    "worst_friction_work": "response.worst_wear", "worst_wear": "response.worst_wear",
+    "worst_slopes": "response.wear_nonsmooth", "Stretch": "continuation.segment",
+    "joined": "continuation.segment",
 }  # fmt: skip
 
 __all__ = [

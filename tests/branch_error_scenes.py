@@ -14,7 +14,7 @@ from random_scenes import K0
 from scipy.linalg import eigvalsh
 
 from solver import Scene
-from solver.parametric import linear_model
+from solver.linear.assembly import linear_model
 
 
 def branch_scene(seed: int) -> Scene:

@@ -9,10 +9,10 @@ from functools import cache
 import numba
 import numpy as np
 
-from solver import fourier
-from solver.kernels import events
-from solver.kernels.force import contact_force
-from solver.kernels.trigpoly import grid_size, grid_tables
+from solver.contacts.kernels import stick_slip_events as events
+from solver.contacts.kernels.coulomb import contact_force
+from solver.jit import fourier
+from solver.jit.trig_polynomial import grid_size, grid_tables
 
 STATES = {0: "separated", 1: "stuck", 2: "slipping", 3: "lifting"}
 

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.linalg import eigvalsh
 
 from solver import Scene
-from solver.parametric import linear_model
-from solver.scene import CyclicStructure
+from solver.linear.assembly import linear_model
+from solver.scene.scene import CyclicStructure
 
 K0 = 4e5  # N/m, of a blade of 0.1 kg
 

@@ -12,8 +12,8 @@ import numba
 import numpy as np
 
 from solver import Scene
-from solver.parametric import linear_model
-from solver.scene import FrictionContact
+from solver.linear.assembly import linear_model
+from solver.scene.scene import FrictionContact
 
 
 @numba.njit

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from contact_cases import central_difference, tables
 
-from solver import fourier
-from solver.kernels import laws_columns as columns
-from solver.kernels.events import SEGMENT_COLUMNS
-from solver.kernels.laws import law_force
+from solver.contacts.kernels import columns
+from solver.contacts.kernels.laws import law_force
+from solver.contacts.kernels.stick_slip_events import SEGMENT_COLUMNS
+from solver.jit import fourier
 
 LOAD_KS = fourier.all_harmonics(1)
 
@@ -42,7 +42,7 @@ class Force:
 
 
 def row_of(**values: float) -> np.ndarray:
-    """Return a row of the contact table with the named columns of `solver.kernels.laws_columns`."""
+    """Return a row of the contact table with the named columns of `solver.contacts.kernels.columns`."""
     row = np.zeros(columns.COLUMNS)
     for name, value in values.items():
         row[getattr(columns, name)] = value

@@ -12,15 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from solver import Scene
-from solver.balance import build
-from solver.fourier import Complex, Real, to_complex, to_full
-from solver.histories import matrices
-from solver.kernels.newton import newton
-from solver.kernels.receptance import receptance
-from solver.kernels.system import evaluation_by_value
-from solver.parametric import LinearModel, linear_model
-from solver.structure import force_amplitudes
-from solver.workspace import Workspace
+from solver.balance.balance import build
+from solver.balance.kernels.newton import newton
+from solver.balance.workspace import Workspace
+from solver.contacts.kernels.system import evaluation_by_value
+from solver.jit.fourier import Complex, Real, to_complex, to_full
+from solver.linear.assembly import LinearModel, linear_model
+from solver.linear.condensation import force_amplitudes
+from solver.linear.kernels.receptance import receptance
+from solver.response.time_history import matrices
 
 SAMPLES = 256  # instants of a period at least
 STEPS = 12  # of a walk from a known solution to another frequency, at most

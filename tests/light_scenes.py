@@ -15,9 +15,9 @@ import numpy as np
 from scipy.linalg import eigvalsh
 
 from solver import Scene
-from solver.balance import build
-from solver.histories import matrices
-from solver.parametric import linear_model
+from solver.balance.balance import build
+from solver.linear.assembly import linear_model
+from solver.response.time_history import matrices
 
 Rng = np.random.Generator
 Tables = dict[str, Any]

@@ -18,10 +18,10 @@ from light_points import PointSolver
 from scipy import linalg
 
 from solver import Scene
-from solver.contact_rows import port_stiffnesses
-from solver.fourier import Real
-from solver.histories import matrices
-from solver.parametric import LinearModel
+from solver.jit.fourier import Real
+from solver.linear.assembly import LinearModel
+from solver.linear.contact_table import port_stiffnesses
+from solver.response.time_history import matrices
 
 BASE = 160  # points over the band, half of them evenly spaced, half of them evenly in the logarithm
 WIDEST = 3e-2  # relative distance from a natural frequency at which the cluster round it ends

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 Array = np.ndarray
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import eigvalsh
 
 from solver import Scene
-from solver.parametric import linear_model
+from solver.linear.assembly import linear_model
 
 
 class OneVariable(NamedTuple):

@@ -6,7 +6,7 @@ import math
 from functools import cache
 
 import solver
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 K1, K2 = 4.0 * math.pi**2, 2.0 * math.pi**2
 

@@ -12,12 +12,12 @@ import numpy as np
 from scipy.linalg import eigvalsh
 
 import solver
-from optim.evaluation import evaluate, natural_scales
-from optim.problem import Problem, pose
-from optim.rows import Evaluation
-from optim.variables import unscaled
+from optim.criteria.evaluation import evaluate, natural_scales
+from optim.criteria.rows import Evaluation
+from optim.problem.problem import Problem, pose
+from optim.problem.variables import unscaled
 from solver import Scene
-from solver.parametric import linear_model
+from solver.linear.assembly import linear_model
 
 KEPT = 1e-6  # relative excess over a bound up to which it counts as kept
 HARMONICS = 3

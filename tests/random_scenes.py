@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import eigvalsh
 
 from solver import Scene
-from solver.parametric import linear_model
+from solver.linear.assembly import linear_model
 
 K0 = (2.0 * math.pi) ** 2  # N/m: about 1 Hz with 1 kg
 

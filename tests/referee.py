@@ -12,10 +12,10 @@ import numba
 import numpy as np
 
 from solver import Solution, power_balance
-from solver.fourier import to_complex, to_real
-from solver.histories import matrices
-from solver.parametric import linear_model
-from solver.structure import force_amplitudes
+from solver.jit.fourier import to_complex, to_real
+from solver.linear.assembly import linear_model
+from solver.linear.condensation import force_amplitudes
+from solver.response.time_history import matrices
 
 SAMPLES = 1 << 15
 PERIODS = 4

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.scene import Scene, load_scene
+from solver.scene.scene import Scene, load_scene
 
 DATA = Path(__file__).parent / "data"
 TWO_DOF_ROWS: list[dict[str, Any]] = json.loads((DATA / "two_dof.json").read_text())["rows"]

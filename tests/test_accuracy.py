@@ -10,11 +10,11 @@ from random_scenes import random_scene
 from scene_cases import bladed_disk, loose_mass, mixed_disk, oscillator, two_dof
 
 from solver import Scene, branch_errors, march, solve, sweep
-from solver.accuracy import ErrorEstimator, truncation_error
-from solver.balance import build
-from solver.kernels.observe import HALF_RANGE, MAX_ABS
-from solver.widening import more_harmonics, pad
-from solver.workspace import Workspace
+from solver.balance.balance import build
+from solver.balance.kernels.output import HALF_RANGE, MAX_ABS
+from solver.balance.more_harmonics import more_harmonics, pad
+from solver.balance.workspace import Workspace
+from solver.extrema.error_estimate import ErrorEstimator, truncation_error
 
 TRUTH = 121  # harmonics
 ROUNDING = 1e-9  # of the amplitude: what Newton's tolerance allows

@@ -12,7 +12,8 @@ from random_scenes import random_scene
 from scene_cases import bladed_disk, loose_mass, oscillator, two_dof
 
 from service.cli import main
-from solver import BranchStatus, Scene, SettingError, SolutionStatus, adaptive, branch_errors, solve, sweep
+from solver import BranchStatus, Scene, SettingError, SolutionStatus, branch_errors, solve, sweep
+from solver.branches import adaptive_harmonics as adaptive
 
 CASES = {
     "slipping": (two_dof(), 1.2),

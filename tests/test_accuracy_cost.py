@@ -14,7 +14,7 @@ from scene_cases import bladed_disk, loose_mass, oscillator, two_dof
 
 from service.cli import main
 from solver import AccuracyRow, AccuracyStudy, SettingError, accuracy_study, solve, sweep
-from solver.plots.accuracy import accuracy_figure
+from solver.views.plots.accuracy import accuracy_figure
 
 
 @pytest.fixture(scope="module")

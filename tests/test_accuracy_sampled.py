@@ -11,13 +11,14 @@ import pytest
 from contact_cases import Case, central_difference, evaluate, random_case
 from scene_cases import bladed_disk, loose_mass, two_dof
 
-from solver import Scene, SettingError, fourier, solve
-from solver.accuracy_cost import sampled
-from solver.balance import build
-from solver.kernels import events
-from solver.kernels.observe import MAX_ABS
-from solver.kernels.sampled import sampled_force
-from solver.workspace import Workspace
+from solver import Scene, SettingError, solve
+from solver.balance.balance import build
+from solver.balance.kernels.output import MAX_ABS
+from solver.balance.workspace import Workspace
+from solver.contacts.kernels import stick_slip_events as events
+from solver.contacts.kernels.aft import sampled_force
+from solver.jit import fourier
+from solver.studies.convergence import sampled
 
 REFERENCE = json.loads((Path(__file__).parent / "data" / "contact_force.json").read_text())
 NAMES = [name for name in REFERENCE if name != "about"]

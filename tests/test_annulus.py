@@ -9,9 +9,9 @@ import pytest
 from scipy.linalg import eigvalsh
 
 from solver.errors import SettingError
-from solver.parametric import linear_model
-from solver.scene import CyclicStructure, LumpedStructure, Scene, load_scene
-from solver.sectors import annulus
+from solver.linear.assembly import linear_model
+from solver.scene.annulus import annulus
+from solver.scene.scene import CyclicStructure, LumpedStructure, Scene, load_scene
 
 
 def disk(sectors: int = 8, order: int = 3) -> Scene:

@@ -20,17 +20,17 @@ from scene_cases import (
     two_dof,
 )
 
-from solver import fourier
-from solver.balance import build, for_parameter
+from solver.balance.balance import build, for_parameter
+from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, RANGE_SLOPE, SLOPE
+from solver.balance.parameter import Kind, resolve
+from solver.balance.workspace import Workspace
+from solver.contacts.kernels.system import DENSE, MODES, POLES
 from solver.errors import SettingError
-from solver.histories import matrices
-from solver.kernels.observe import HALF_RANGE, MAX_ABS, RANGE_SLOPE, SLOPE
-from solver.kernels.system import DENSE, MODES, POLES
-from solver.parameter import Kind, resolve
-from solver.parametric import linear_model
-from solver.scene import Scene
-from solver.structure import force_amplitudes
-from solver.workspace import Workspace
+from solver.jit import fourier
+from solver.linear.assembly import linear_model
+from solver.linear.condensation import force_amplitudes
+from solver.response.time_history import matrices
+from solver.scene.scene import Scene
 
 HARMONICS = 5
 SCENES = {

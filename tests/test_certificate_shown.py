@@ -9,14 +9,18 @@ from typer.testing import CliRunner
 
 import optim
 import solver
-from optim.afterwards import looked_after
-from optim.result import DesignStatus
-from service.cli import campbell_reports, design_reports, reports, sensitivity_command, track_reports
+from optim.methods.afterwards import looked_after
+from optim.results.design import DesignStatus
 from service.cli.app import app
-from service.report.responses import Line
-from service.report.sections import branch_table
-from solver.certificate import uncertain
-from solver.notes import FLAGS, NONE_HIGHER, flag_words
+from service.cli.commands import sensitivities as sensitivity_command
+from service.rendering.report.responses import Line
+from service.rendering.report.sections import branch_table
+from service.rendering.tables import campbell as campbell_reports
+from service.rendering.tables import design as design_reports
+from service.rendering.tables import results as reports
+from service.rendering.tables import track as track_reports
+from solver.continuation.certificate import uncertain
+from solver.views.notes import FLAGS, NONE_HIGHER, flag_words
 
 WHY = "a resonance was left at 1.5"
 

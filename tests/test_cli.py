@@ -19,7 +19,7 @@ import solver
 from service.cli import main
 
 Run = Callable[..., tuple[int, str, str]]
-GOOD = Path(solver.__file__).parent / "scenes" / "two-dof.toml"
+GOOD = Path(solver.__file__).parent / "scene" / "shipped" / "two-dof.toml"
 
 KEYS = {
     "scenes": {"scenes"},

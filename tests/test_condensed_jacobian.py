@@ -8,13 +8,20 @@ import numpy as np
 import pytest
 from scene_cases import bladed_disk, mixed_disk, two_dof
 
-from solver.balance import build
-from solver.kernels.jacobian import FREE, HELD, factorise, fill_jacobian, step_back, step_back_transposed
-from solver.kernels.linear import back_substitute, back_substitute_transposed
-from solver.kernels.linear import factorise as factorise_block
-from solver.kernels.system import evaluation_by_value
-from solver.scene import Scene
-from solver.workspace import Workspace
+from solver.balance.balance import build
+from solver.balance.kernels.jacobian import (
+    FREE,
+    HELD,
+    factorise,
+    fill_jacobian,
+    step_back,
+    step_back_transposed,
+)
+from solver.balance.workspace import Workspace
+from solver.contacts.kernels.system import evaluation_by_value
+from solver.jit.lapack import back_substitute, back_substitute_transposed
+from solver.jit.lapack import factorise as factorise_block
+from solver.scene.scene import Scene
 
 # Scene, frequency [Hz], harmonics, free and held contacts.
 CASES = [

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from contact_cases import Case, crude_force, derivative_errors, evaluate, load_zeros, random_case, values
 
-from solver import fourier
-from solver.kernels import events
+from solver.contacts.kernels import stick_slip_events as events
+from solver.jit import fourier
 
 REFERENCE = json.loads((Path(__file__).parent / "data" / "contact_force.json").read_text())
 NAMES = [name for name in REFERENCE if name != "about"]

@@ -18,10 +18,10 @@ from contact_cases import central_difference
 from scene_cases import bladed_disk, loose_mass, mixed_disk, oscillator, two_dof
 
 from solver import BranchStatus, ContinuationSettings, Predictor, Scene, march, solve, sweep
-from solver.balance import Balance, build
-from solver.continuation import Stretch, walk
-from solver.kernels.observe import RESIDUAL
-from solver.workspace import Workspace
+from solver.balance.balance import Balance, build
+from solver.balance.kernels.output import RESIDUAL
+from solver.balance.workspace import Workspace
+from solver.branches.sweep import Stretch, walk
 
 RESPONSES: dict[str, Callable[[], Scene]] = {
     **{f"two-dof N1={N1:g}": lambda N1=N1: two_dof(N1=N1) for N1 in (0.0, 30.0, 200.0)},

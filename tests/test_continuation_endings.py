@@ -11,8 +11,8 @@ import pytest
 from scene_cases import bladed_disk, oscillator, two_dof
 
 from solver import BranchStatus, ContinuationSettings, SettingError, sweep
-from solver.fourier import to_complex
-from solver.kernels.observe import MAX_ABS
+from solver.balance.kernels.output import MAX_ABS
+from solver.jit.fourier import to_complex
 
 
 def test_stalled():

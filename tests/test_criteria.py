@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import solver
-from optim.evaluation import evaluate
-from optim.problem import pose
-from optim.rows import Evaluation
+from optim.criteria.evaluation import evaluate
+from optim.criteria.rows import Evaluation
+from optim.problem.problem import pose
 
 # scene, changed values, design point; the bladed disk in three regimes and with separation.
 CASES = {

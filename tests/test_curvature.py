@@ -14,13 +14,13 @@ from test_law_scenes import scene as two_directions
 from test_sensitivity import BEAM, TWO_DOF, disk, loose, two_dof
 
 import solver
-from solver.balance import Balance, build
+from solver.balance.balance import Balance, build
+from solver.balance.simplifications import Effects
+from solver.balance.workspace import Workspace
 from solver.errors import SettingError
-from solver.peaks import HALF_POWER
-from solver.savings import Effects
-from solver.scene import Scene
-from solver.sensitivity import Sensitivities
-from solver.workspace import Workspace
+from solver.extrema.extrema import HALF_POWER
+from solver.scene.scene import Scene
+from solver.sensitivity.gradient import Sensitivities
 
 HARMONICS = 7
 ALL = Effects(even_harmonics=True)

@@ -9,10 +9,10 @@ import pytest
 
 import solver
 from service.cli import main
+from service.cli.demo import CASES, REMOVED, STUCK, Case, run
 from service.cli.failures import ShortfallError
-from service.demo import CASES, REMOVED, STUCK, Case, run
-from service.embedded import EmbeddedService
-from service.settings import load_settings
+from service.client.embedded import EmbeddedService
+from service.settings.settings import load_settings
 
 SMALL = Case(scene="two-dof", contact="damper", bounds=(80.0, 130.0), shown=(90.0, 120.0), steps=3)
 

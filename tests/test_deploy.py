@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from service.settings import Settings, load_settings
-from service.settings_table import with_table
+from service.settings.settings import Settings, load_settings
+from service.settings.table import with_table
 
 ROOT = Path(__file__).resolve().parent.parent
 DEPLOY = ROOT / "deploy"
@@ -23,7 +23,7 @@ VARIABLE = re.compile(r"STICKSLIP_[A-Z_]+")
 
 def test_the_table_of_settings_is_up_to_date() -> None:
     text = OPERATIONS.read_text(encoding="utf-8")
-    assert text == with_table(text), "run: python -m service.settings_table docs/operations.md"
+    assert text == with_table(text), "run: python -m service.settings.table docs/operations.md"
 
 
 @pytest.mark.parametrize("path", [*sorted(DEPLOY.iterdir()), OPERATIONS], ids=lambda path: path.name)
@@ -96,7 +96,7 @@ def test_what_the_image_is_made_of_is_there() -> None:
 
 
 def test_the_image_runs_as_nobody_in_particular_and_is_looked_after() -> None:
-    from service.app import create_app
+    from service.http.app import create_app
 
     last = instructions()
     stage = last[max(index for index, words in enumerate(last) if words[0] == "FROM") :]

@@ -10,10 +10,10 @@ import pytest
 
 import optim
 import solver
+from optim.criteria.evaluation import evaluate
 from optim.errors import DesignError
-from optim.evaluation import evaluate
-from optim.problem import pose
-from optim.result import DesignStatus
+from optim.problem.problem import pose
+from optim.results.design import DesignStatus
 
 
 def peak_of(scene: solver.Scene, values: dict[str, float]) -> float:

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import solver
-from optim.evaluation import evaluate
-from optim.problem import Problem, pose
-from optim.rows import Evaluation, Quantity, Row, nearest
+from optim.criteria.evaluation import evaluate
+from optim.criteria.rows import Evaluation, Quantity, Row, nearest
+from optim.problem.problem import Problem, pose
 
 DISK_OPTIMUM = 185.46090223680778
 

@@ -7,11 +7,11 @@ import pytest
 
 import optim
 import solver
+from optim.criteria.evaluation import evaluate
+from optim.criteria.rows import Quantity
 from optim.errors import DesignError
-from optim.evaluation import evaluate
-from optim.problem import pose
-from optim.result import DesignStatus
-from optim.rows import Quantity
+from optim.problem.problem import pose
+from optim.results.design import DesignStatus
 
 TWO, DISK = {"damper.N0": (20.0, 500.0)}, {"shroud.N0": (20.0, 3000.0)}
 
@@ -31,7 +31,7 @@ def test_several_bands_levels_and_orders_are_judged_together() -> None:
     assert result.reached
     N0 = result.optimum["shroud.N0"]
     here = scene.with_values({"shroud.N0": N0})
-    from optim.cases import with_engine_order
+    from optim.problem.cases import with_engine_order
 
     second = highest(with_engine_order(here, 2))
     third = highest(here.with_values({"excitation.amplitude": 80.0}), start=700.0, stop=800.0)

@@ -10,7 +10,7 @@ import pytest
 from scene_cases import bladed_disk, critically_damped, loose_mass, mixed_disk, oscillator, two_dof
 
 from solver import Effects, Plan, Scene, SettingError, plan
-from solver.balance import build
+from solver.balance.balance import build
 
 
 def effect(scene: Scene, name: str) -> Any:

@@ -21,10 +21,10 @@ from solver import (
     solve,
     time_history,
 )
-from solver.fourier import basis, derivative, to_complex
-from solver.histories import matrices
-from solver.parametric import linear_model
-from solver.structure import force_amplitudes
+from solver.jit.fourier import basis, derivative, to_complex
+from solver.linear.assembly import linear_model
+from solver.linear.condensation import force_amplitudes
+from solver.response.time_history import matrices
 
 CASES = {
     "slipping": (two_dof(), 1.198),

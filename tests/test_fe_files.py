@@ -11,8 +11,8 @@ from fe_files import abaqus_input, ansys_mapping, coordinate, dmig, hbmat, op4_b
 
 from solver.matrices.files import MatrixFileError, array_names, read_labelled, read_matrix
 from solver.matrices.labels import Label, label, read_labels
-from solver.matrices.sets import in_si, read_set
-from solver.matrices.text import FormatError
+from solver.matrices.load_set import in_si, read_set
+from solver.matrices.readers.numbers_in_text import FormatError
 
 A = np.array(
     [[4.0, -1.5, 0, 0, 1e-3], [-1.5, 3, 0.25, 0, 0], [0, 0.25, 2, 0, 0], [0, 0, 0, 7, 0], [1e-3, 0, 0, 0, 1]]

@@ -21,15 +21,15 @@ from solver import (
     stability,
     sweep,
 )
-from solver.balance import build
-from solver.by_points import walk_by_points
-from solver.continuation import walk
-from solver.kernels.system import UNHELD
-from solver.loose_parts import balanced_part
-from solver.march_result import MarchStatus
-from solver.rigid import loose_motions
-from solver.stretches import joined
-from solver.workspace import Workspace
+from solver.balance.balance import build
+from solver.balance.workspace import Workspace
+from solver.branches.point_by_point import walk_by_points
+from solver.branches.sweep import walk
+from solver.contacts.kernels.system import UNHELD
+from solver.continuation.loose_parts import balanced_part
+from solver.continuation.segment import joined
+from solver.linear.rigid_body_modes import loose_motions
+from solver.marching.result import MarchStatus
 
 DAMPER = json.loads((Path(__file__).parent / "data" / "floating.json").read_text())
 ENDED = (BranchStatus.COMPLETED, BranchStatus.RATCHETS)

@@ -13,9 +13,9 @@ from test_floating import pulled, two_blades, underplatform
 from test_floquet import Return
 
 import optim
-from optim.crossings import CampbellStatus
-from optim.result import DesignStatus
-from optim.robust_result import RobustStatus
+from optim.results.design import DesignStatus
+from optim.robust.result import RobustStatus
+from optim.studies.crossings import CampbellStatus
 from service.cli import main
 from solver import (
     BranchStatus,
@@ -27,8 +27,8 @@ from solver import (
     sweep,
     track_peak,
 )
-from solver.maps import MapStatus
-from solver.peak_tracks import TrackStatus
+from solver.peaks.results import TrackStatus
+from solver.studies.response_map import MapStatus
 
 H = 3
 LOADS = (30.0, 800.0)

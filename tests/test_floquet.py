@@ -19,22 +19,22 @@ from solver import (
     annulus,
     branch_stability,
     march,
-    marching,
     mistuned,
     solve,
     stability,
     sweep,
 )
-from solver.balance import Balance, build
-from solver.continuation import walk
-from solver.floquet import Growth, coulomb_pieces, growth_of, scene_monodromy
-from solver.fourier import to_full
-from solver.kernels import march as kernel
-from solver.monodromy import PERIOD, Element, Monodromy, Piece, Structure, monodromy
-from solver.parametric import linear_model
-from solver.response import Solution
-from solver.scene import CyclicStructure
-from solver.workspace import Workspace
+from solver.balance.balance import Balance, build
+from solver.balance.workspace import Workspace
+from solver.branches.sweep import walk
+from solver.jit.fourier import to_full
+from solver.linear.assembly import linear_model
+from solver.marching import march as marching
+from solver.marching.kernels import taylor as kernel
+from solver.response.floquet import Growth, coulomb_pieces, growth_of, scene_monodromy
+from solver.response.monodromy import PERIOD, Element, Monodromy, Piece, Structure, monodromy
+from solver.response.solve import Solution
+from solver.scene.scene import CyclicStructure
 
 UNSTABLE = oscillator({"kt": 0.5, "mu": 0.3, "N0": 5.0}, k=1.0, c=0.05)
 

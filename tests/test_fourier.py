@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver import fourier
+from solver.jit import fourier
 
 RNG = np.random.default_rng(0)
 SUBSETS = [np.array(ks) for ks in ([0], [1], [0, 1, 2, 3], [1, 3, 5], [0, 2, 4, 6])]

@@ -12,9 +12,9 @@ from random_scenes import random_scene
 
 import optim
 import solver
-from solver.least import least_peak
-from solver.peak_tracks import LeastPeak, TrackStatus
-from solver.ridges import Tracker
+from solver.peaks.minimise_peak import least_peak
+from solver.peaks.results import LeastPeak, TrackStatus
+from solver.peaks.tracker import Tracker
 
 DISK = ("bladed-disk", "shroud.N0", 20.0, 3000.0)
 
@@ -100,7 +100,7 @@ def test_stopped_before_the_look_the_optimum_is_proven_all_the_same(monkeypatch:
         swept.append(solver.sweep(*args, **more))
         return swept[-1]
 
-    monkeypatch.setattr("solver.lines.sweep", sweep)
+    monkeypatch.setattr("solver.peaks.track.sweep", sweep)
     best = least_peak(scene_of(name), path, low, high, basins=2, should_stop=lambda: len(swept) >= 2)
     assert best.status is TrackStatus.TRACKED
     assert best.sweeps == 2

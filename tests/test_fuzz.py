@@ -22,7 +22,7 @@ from test_fe_files import files
 import solver
 from solver.errors import SceneError
 from solver.matrices.files import MatrixFileError, array_names, read_matrix, read_modes
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 MEMORY = 2 * 1024**3
 FEW = settings(
@@ -132,7 +132,7 @@ def saved(write: Callable[[Any], object]) -> bytes:
 
 TEXTS = {
     "scene.json": json.dumps(solver.load_scene("two-dof").to_dict()).encode(),
-    "scene.toml": (Path(solver.__file__).parent / "scenes" / "bladed-disk.toml").read_bytes(),
+    "scene.toml": (Path(solver.__file__).parent / "scene" / "shipped" / "bladed-disk.toml").read_bytes(),
 }
 FILES: dict[str, bytes] = {
     "M.npz": saved(lambda f: np.savez(f, M=M, K=M)),

@@ -24,12 +24,12 @@ from random_designs import (
 
 import optim
 import solver
-from optim.coarse import corners, places
-from optim.result import DesignResult, DesignStatus
-from optim.robust_result import RobustResult, RobustStatus
-from optim.rows import Quantity
-from optim.scenarios import outcome
-from optim.surrogate import Taylor, promising
+from optim.criteria.rows import Quantity
+from optim.methods.multistart import corners, places
+from optim.methods.surrogate import Taylor, promising
+from optim.results.design import DesignResult, DesignStatus
+from optim.robust.result import RobustResult, RobustStatus
+from optim.robust.scenarios import outcome
 
 DATA = Path(__file__).parent / "data"
 PROBLEM = Path(__file__).parent.parent / "docs" / "problem.toml"

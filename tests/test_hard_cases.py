@@ -18,12 +18,12 @@ from scene_cases import bladed_disk, two_dof
 from test_continuation import UNSTABLE, Walked, walked, with_damping
 
 from solver import BranchStatus, ContinuationSettings, Solution, SolutionStatus, march, solve, sweep
-from solver.balance import build
-from solver.continuation import walk
-from solver.kernels.events import LIFTING
-from solver.kernels.observe import RESIDUAL
-from solver.march_result import MarchStatus
-from solver.workspace import Workspace
+from solver.balance.balance import build
+from solver.balance.kernels.output import RESIDUAL
+from solver.balance.workspace import Workspace
+from solver.branches.sweep import walk
+from solver.contacts.kernels.stick_slip_events import LIFTING
+from solver.marching.result import MarchStatus
 
 LAW = 3e-4  # of the largest friction force: what sampling leaves
 BALANCED = 1e-8

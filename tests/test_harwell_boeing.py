@@ -10,8 +10,8 @@ from matrix_cases import hb_text
 from scipy.io import hb_read, hb_write
 from scipy.sparse import csc_array, random_array
 
-from solver.matrices.harwell_boeing import read_harwell_boeing
-from solver.matrices.text import FormatError
+from solver.matrices.readers.harwell_boeing import read_harwell_boeing
+from solver.matrices.readers.numbers_in_text import FormatError
 
 DATA = Path(__file__).parent / "data"
 WIDTHS = ("{:24.16E}", "{:25.16E}", "{:26.17E}", "{:23.15E}")

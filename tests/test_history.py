@@ -12,8 +12,8 @@ from history_scenes import history_scene
 from scene_cases import bladed_disk, oscillator, two_dof
 
 from solver import Effects, Scene, SettingError, Solution, load_scene, march, solve, sweep
-from solver.march_result import MarchResult
-from solver.scene import FrictionContact
+from solver.marching.result import MarchResult
+from solver.scene.scene import FrictionContact
 
 DATA = Path(__file__).parent / "data"
 MARCHED = {"tolerance": 1e-9, "max_periods": 1500}

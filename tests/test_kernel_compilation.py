@@ -14,8 +14,8 @@ ROOT = Path(__file__).parent.parent
 KERNELS = """
 from __future__ import annotations
 import numpy as np
-from solver.kernels.apart import apart
-from solver.kernels.compiled import compiled
+from solver.jit.separate import apart
+from solver.jit.decorators import compiled
 
 @apart
 def half(x: float) -> float:
@@ -130,7 +130,7 @@ def test_what_a_call_might_need_is_compiled_too(tmp_path: Path, processes: int) 
     """Kernels not reached by the calls made are compiled with the rest, and what goes wrong there is said."""
     program = f"""
 import little
-from solver.kernels.together import compile_together
+from solver.jit.parallel import compile_together
 
 def one():
     assert little.use(3.0) == 6.5
@@ -161,7 +161,7 @@ def test_without_a_home_code_is_kept_where_nobody_else_can_write(tmp_path: Path,
     own.chmod(mode)
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     found = subprocess.run(
-        [sys.executable, "-c", "from solver.kernels.cache import CACHE_FOLDER; print(CACHE_FOLDER)"],
+        [sys.executable, "-c", "from solver.jit.cache import CACHE_FOLDER; print(CACHE_FOLDER)"],
         env=environment | {"XDG_CACHE_HOME": "/dev/null/none", "TMPDIR": str(tmp_path)},
         cwd=ROOT,
         capture_output=True,

@@ -13,14 +13,14 @@ from scipy import sparse
 
 import solver
 from service.cli import main
-from solver.balance import build
-from solver.decomposition import decompose
+from solver.balance.balance import build
+from solver.balance.workspace import Workspace
+from solver.contacts.kernels.system import DENSE, MODES, POLES
 from solver.errors import SceneError, SettingError
-from solver.kernels.system import DENSE, MODES, POLES
-from solver.matrices.harwell_boeing import read_harwell_boeing
-from solver.scene import Scene, load_scene
-from solver.undamped import undamped_modes
-from solver.workspace import Workspace
+from solver.linear.modal import decompose
+from solver.matrices.normal_modes import undamped_modes
+from solver.matrices.readers.harwell_boeing import read_harwell_boeing
+from solver.scene.scene import Scene, load_scene
 
 
 def with_contacts(n: int, structure: dict[str, Any], seed: int = 3) -> Scene:
@@ -50,7 +50,7 @@ def with_contacts(n: int, structure: dict[str, Any], seed: int = 3) -> Scene:
     ],
 )
 def test_the_sum_over_modes_is_the_inverse_to_rounding(n: int, structure: dict[str, Any], form: int) -> None:
-    from solver.parametric import linear_model
+    from solver.linear.assembly import linear_model
 
     scene = with_contacts(n, structure)
     workspace = Workspace.of(build(scene, harmonics=5))

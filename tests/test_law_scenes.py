@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver import annulus, fourier, hysteresis_loop, march, plan, power_balance, solve, sweep
-from solver.balance import build
+from solver import annulus, hysteresis_loop, march, plan, power_balance, solve, sweep
+from solver.balance.balance import build
+from solver.balance.workspace import Workspace
 from solver.errors import SceneError, SettingError
-from solver.scene import GapSpring, PolynomialSpring, Scene
-from solver.workspace import Workspace
+from solver.jit import fourier
+from solver.scene.scene import GapSpring, PolynomialSpring, Scene
 
 RUB: dict[str, Any] = {
     "law": "elastic-normal", "normal_between": ["v", "ground"], "kt": 2.0, "mu": 0.4, "kn": 1.5, "N0": 0.2,

@@ -12,9 +12,9 @@ from contact_cases import Case, crude_force, values
 from contact_cases import evaluate as coulomb
 from law_cases import Element, derivative_errors, evaluate, row_of
 
-from solver import fourier
-from solver.kernels import laws_columns as columns
-from solver.kernels.events import FAILED, LIFTING, SEPARATED, SLIPPING, STUCK
+from solver.contacts.kernels import columns
+from solver.contacts.kernels.stick_slip_events import FAILED, LIFTING, SEPARATED, SLIPPING, STUCK
+from solver.jit import fourier
 
 Random = np.random.Generator
 FINE = 2**15

@@ -13,8 +13,8 @@ from scene_cases import oscillator
 
 import solver
 from solver.errors import SettingError
-from solver.least import least_peak
-from solver.peak_tracks import LeastPeak, TrackStatus
+from solver.peaks.minimise_peak import least_peak
+from solver.peaks.results import LeastPeak, TrackStatus
 
 DESIGNS = [
     ("two-dof", "damper.N0", 10.0, 500.0),

@@ -18,10 +18,10 @@ from scipy import linalg
 
 from optim import campbell_diagram
 from solver import Scene, least_peak, load_scene, response_map, solve
-from solver.balance import build
-from solver.histories import matrices
-from solver.parametric import linear_model
-from solver.structure import force_amplitudes
+from solver.balance.balance import build
+from solver.linear.assembly import linear_model
+from solver.linear.condensation import force_amplitudes
+from solver.response.time_history import matrices
 
 DEFECTS = Path(__file__).parent / "data" / "defects"
 NARROW = ["twolumped", "C_missed_peak_142", "D_second_peak", "D_band_0"]

@@ -10,12 +10,12 @@ import pytest
 from light_scenes import light_scene
 
 import solver
-from service.kinds.previews import run_limits
-from service.linear_limits import linear_limit
-from solver.contact_rows import port_stiffnesses
-from solver.histories import matrices
-from solver.parametric import linear_model
-from solver.structure import force_amplitudes
+from service.jobs.kinds.previews import run_limits
+from service.jobs.linear_limits import linear_limit
+from solver.linear.assembly import linear_model
+from solver.linear.condensation import force_amplitudes
+from solver.linear.contact_table import port_stiffnesses
+from solver.response.time_history import matrices
 
 DEFECTS = Path(__file__).parent / "data" / "defects"
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import solver
-from solver import maps
+from solver.balance.workspace import PointSolution, Workspace
 from solver.errors import SettingError
-from solver.maps import MapStatus, response_map
-from solver.workspace import PointSolution, Workspace
+from solver.studies import response_map as maps
+from solver.studies.response_map import MapStatus, response_map
 
 
 @pytest.fixture(scope="module")

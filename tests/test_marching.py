@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver import marching
 from solver.errors import SettingError
-from solver.kernels import march as kernel
-from solver.kernels.falls import NONE, first_fall
-from solver.march_result import MarchStatus
-from solver.marching import MarchResult, march
-from solver.scene import Scene, load_scene
+from solver.marching import march as marching
+from solver.marching.kernels import taylor as kernel
+from solver.marching.kernels.event_roots import NONE, first_fall
+from solver.marching.march import MarchResult, march
+from solver.marching.result import MarchStatus
+from solver.scene.scene import Scene, load_scene
 
 DATA = Path(__file__).parent / "data"
 TWO_DOF = json.loads((DATA / "two_dof.json").read_text())["rows"]

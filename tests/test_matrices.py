@@ -16,9 +16,9 @@ from scipy.io import mmread, mmwrite, savemat
 import solver
 from solver.errors import SceneError, SettingError
 from solver.matrices.files import MatrixFileError, read_matrix, read_modes
-from solver.matrices.matrix_market import read_matrix_market
-from solver.matrices.text import FormatError
-from solver.scene import Scene, load_scene
+from solver.matrices.readers.matrix_market import read_matrix_market
+from solver.matrices.readers.numbers_in_text import FormatError
+from solver.scene.scene import Scene, load_scene
 
 A = np.array([[4.0, -1.5, 0.0], [-1.5, 3.0, 0.25], [0.0, 0.25, 2.0]])
 # Laid out by hand after the guide: 5I14 in line 2; A3, 11X, 4I14 in line 3; 2A16, 2A20 in line 4.

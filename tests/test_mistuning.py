@@ -29,10 +29,10 @@ from solver import (
     solve,
     sweep,
 )
-from solver.contact_response import ContactState
-from solver.fourier import to_complex
-from solver.parametric import linear_model
-from solver.sectors import written_out
+from solver.jit.fourier import to_complex
+from solver.linear.assembly import linear_model
+from solver.response.contact_response import ContactState
+from solver.scene.annulus import written_out
 
 VALUES = (1.03, 0.98, 1.01, 0.95, 1.0, 1.06)
 
@@ -235,7 +235,7 @@ def test_sectors_needed(scene: Scene, sectors: int, says: str):
 
 def test_a_scene_file_says_it_too(tmp_path: Path):
     scene = load_scene("bladed-disk")
-    text = (Path(__file__).parents[1] / "solver" / "scenes" / "bladed-disk.toml").read_text()
+    text = (Path(__file__).parents[1] / "solver" / "scene" / "shipped" / "bladed-disk.toml").read_text()
     table = '\n[structure.mistuning]\nof = ["tip_middle", "tip"]\nspread = 0.03\nseed = 5\n\n[[contacts]]'
     file = tmp_path / "disk.toml"
     file.write_text(text.replace("\n[[contacts]]", table, 1))

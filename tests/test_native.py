@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 
 import optim
 import solver
-from solver.dataset import Dataset
-from solver.saving import SUFFIXES
-from solver.shown import Piece, Shown, Told
+from solver.results.base import Piece, Shown, Told
+from solver.results.dataset import Dataset
+from solver.views.io import SUFFIXES
 
 
 def two_dof() -> solver.Scene:

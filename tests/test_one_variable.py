@@ -12,11 +12,11 @@ import pytest
 from one_variable_scenes import OneVariable, one_variable
 
 import solver
-from solver import allowance
-from solver.least import least_peak
-from solver.peak_tracks import ChosenBy, LeastPeak, TrackStatus
-from solver.scene import Scene
-from solver.tracking import track_peak
+from solver.peaks import work_limit as allowance
+from solver.peaks.minimise_peak import least_peak
+from solver.peaks.results import ChosenBy, LeastPeak, TrackStatus
+from solver.peaks.track_peak import track_peak
+from solver.scene.scene import Scene
 
 HARMONICS = 3
 LIGHTEST = 2e-3  # damping ratio
@@ -228,7 +228,7 @@ def test_peaks_that_come_and_go_at_the_ends_of_the_band_are_followed_once() -> N
 
 
 def test_work_that_is_used_up_gives_the_best_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("solver.least.RESPONSES", 8.0)
+    monkeypatch.setattr("solver.peaks.minimise_peak.RESPONSES", 8.0)
     scene = three_contacts()
     best = least_peak(scene, "c0.N0", 0.17, 17.0, harmonics=5)
     assert best.status is TrackStatus.WORK_USED_UP
@@ -241,7 +241,7 @@ def test_work_that_is_used_up_gives_the_best_seen(monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_track_whose_work_is_used_up_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("solver.tracking.RESPONSES", 4.0)
+    monkeypatch.setattr("solver.peaks.track_peak.RESPONSES", 4.0)
     track = track_peak(three_contacts(), "c0.N0", 0.17, 17.0, harmonics=5)
     assert track.status is TrackStatus.WORK_USED_UP
     assert not track.completed

@@ -11,7 +11,7 @@ import pytest
 import optim
 import solver
 from service.cli import main
-from service.plots.results import NothingToDrawError, result_figure
+from service.rendering.plots import NothingToDrawError, result_figure
 
 COMMANDS = {
     "solve": "two-dof --frequency 1.2 --harmonics 3",

@@ -11,8 +11,8 @@ import pytest
 from scipy.linalg import eigvalsh
 
 from solver.errors import SettingError
-from solver.parametric import LinearModel, linear_model, structure_derivative
-from solver.scene import Scene, load_scene
+from solver.linear.assembly import LinearModel, linear_model, structure_derivative
+from solver.scene.scene import Scene, load_scene
 
 
 def frequencies(scene: Scene, diameter: int, stuck: tuple[int, ...] = ()) -> np.ndarray:

@@ -14,8 +14,8 @@ import pytest
 
 import optim
 import solver
-from optim.pareto_result import ParetoStatus, front_of
-from optim.plots.pareto import pareto_figure
+from optim.studies.pareto_result import ParetoStatus, front_of
+from optim.views.plots.pareto import pareto_figure
 
 LIMIT = 0.08e-3
 DISK = solver.load_scene("bladed-disk")

@@ -11,13 +11,13 @@ from scene_cases import bladed_disk, oscillator, two_dof
 from scipy.optimize import minimize_scalar
 
 from solver import Scene, solve, sweep
-from solver.balance import build
-from solver.branch import Branch, Peak
-from solver.kernels.intervals import WORTH_POLISHING
-from solver.kernels.observe import MAX_ABS, SLOPE
-from solver.parameter import Kind
-from solver.peaks import HALF_POWER, band_limit
-from solver.workspace import Workspace
+from solver.balance.balance import build
+from solver.balance.kernels.output import MAX_ABS, SLOPE
+from solver.balance.parameter import Kind
+from solver.balance.workspace import Workspace
+from solver.continuation.branch import Branch, Peak
+from solver.extrema.extrema import HALF_POWER, band_limit
+from solver.extrema.kernels.intervals import WORTH_POLISHING
 
 HARMONICS = 7
 SCENES = {

@@ -14,12 +14,12 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 import solver
-from solver import units
-from solver.files import whole
-from solver.plots import SUFFIXES, style
-from solver.plots.curves import Response, above, with_peak
-from solver.plots.motion import Motion, motion_figure
-from solver.plots.responses import Demands, Family, family_figure, peak_figure, response_figure
+from solver.results import units
+from solver.results.files import whole
+from solver.views.plots import SUFFIXES, style
+from solver.views.plots.curves import Response, above, with_peak
+from solver.views.plots.motion import Motion, motion_figure
+from solver.views.plots.responses import Demands, Family, family_figure, peak_figure, response_figure
 
 
 def bump(height: float, at: float = 2.0) -> Response:

@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import eigvalsh
 
 from solver import annulus, solve, sweep
-from solver.parametric import linear_model
-from solver.scene import Scene
+from solver.linear.assembly import linear_model
+from solver.scene.scene import Scene
 
 RAD = 2.0 * math.pi
 

@@ -19,11 +19,11 @@ from scipy.io import mmwrite
 import solver
 from service.cli import main
 from service.cli.app import app
-from service.cli.problem_inputs import OPTIONS
-from service.kinds.design import DesignRequest, design_issues
-from service.kinds.problem import arguments
-from service.settings import Settings
-from service.validation import validated
+from service.cli.options.problem_inputs import OPTIONS
+from service.jobs.kinds.design import DesignRequest, design_issues
+from service.jobs.kinds.problem import arguments
+from service.jobs.validation import validated
+from service.settings.settings import Settings
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

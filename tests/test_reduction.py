@@ -15,11 +15,11 @@ from scipy import linalg, sparse
 import solver
 from service.cli import main
 from solver.matrices.files import read_matrix
-from solver.matrices.reduction import Reduced, craig_bampton
-from solver.matrices.structure import DofTable
-from solver.matrices.writing import write_reduced
-from solver.scene import load_scene
-from solver.undamped import undamped_modes
+from solver.matrices.normal_modes import undamped_modes
+from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton
+from solver.matrices.reduction.writing import write_reduced
+from solver.matrices.validation import DofTable
+from solver.scene.scene import load_scene
 
 ROWS = 2 * 350  # above `interior.DENSE`: shift-invert
 

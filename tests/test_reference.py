@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 SCRIPT = ROOT / "docs" / "reference.py"
-MODULES = ("solver", "optim", "service.client", "service.answers")
+MODULES = ("solver", "optim", "service.client", "service.schemas.answers")
 
 
 def public_names(module: str) -> list[str]:
@@ -78,7 +78,7 @@ def test_parameters_read_as_they_are_written(site: Path) -> None:
     text = " ".join(re.sub("<[^>]+>", "", page).split())
     for part in (
         "scene: what vibrates, with the values that stay fixed. ",
-        "that the harmonics are chosen for; see solver.adaptive.harmonics_for for where",
+        "that the harmonics are chosen for; see solver.branches.adaptive_harmonics.harmonics_for for where",
         "frequency_hz (float): Excitation frequency [Hz].",
     ):
         assert part in text

@@ -13,7 +13,7 @@ import pytest
 import optim
 import solver
 from service.cli import main
-from service.report.pdf import BROWSERS
+from service.rendering.report.pdf import BROWSERS
 
 PROBLEM = """scene = "two-dof"
 limit = 2.5
@@ -147,7 +147,7 @@ def test_a_robust_design_has_a_report_and_a_picture(
 def test_a_report_keeps_the_matrices_of_a_job_when_the_upload_is_gone(
     server: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from service.client import Client
+    from service.client.client import Client
 
     fe = Path(__file__).resolve().parent.parent / "docs" / "fe"
     words = ["design", str(fe / "blade.toml"), "--variable", "damper.N0", "10", "1000", "--harmonics", "1"]
@@ -161,8 +161,8 @@ def test_a_report_keeps_the_matrices_of_a_job_when_the_upload_is_gone(
 
 
 def test_a_report_of_several_cases_is_of_the_one_with_the_highest_peak() -> None:
-    from service.report.design import design_report
-    from service.report.sections import Designed
+    from service.rendering.report.design import design_report
+    from service.rendering.report.sections import Designed
 
     scene = solver.load_scene("two-dof")
     problem = {
@@ -176,8 +176,8 @@ def test_a_report_of_several_cases_is_of_the_one_with_the_highest_peak() -> None
 
 
 def test_a_report_of_a_search_that_found_nothing_says_so() -> None:
-    from service.report.robust import robust_report
-    from service.report.sections import Designed
+    from service.rendering.report.robust import robust_report
+    from service.rendering.report.sections import Designed
 
     scene = solver.load_scene("two-dof")
     problem = {"variables": {"damper.N0": [20, 500]}, "uncertain": {"damper.mu": [0.2, 0.4]}, "harmonics": 1}
@@ -188,9 +188,9 @@ def test_a_report_of_a_search_that_found_nothing_says_so() -> None:
 
 @pytest.mark.long
 def test_a_mistuned_robust_design_shows_its_worst_blade() -> None:
-    from service.report.responses import Sweeps, in_scenario
-    from service.report.robust import robust_report
-    from service.report.sections import Designed
+    from service.rendering.report.responses import Sweeps, in_scenario
+    from service.rendering.report.robust import robust_report
+    from service.rendering.report.sections import Designed
 
     scene = solver.load_scene("bladed-disk")
     problem = {
@@ -231,8 +231,8 @@ def test_without_a_browser_a_pdf_is_refused_in_words(
 @pytest.mark.long
 def test_a_report_without_linear_limits() -> None:
     """A law without a load to remove: the responses alone."""
-    from service.report.design import design_report
-    from service.report.sections import Designed
+    from service.rendering.report.design import design_report
+    from service.rendering.report.sections import Designed
 
     raw = solver.load_scene("two-dof").to_dict()
     spring = {"name": "stop", "law": "gap", "between": ["m1", "ground"], "k": 50.0, "gap": 0.5}

@@ -10,8 +10,8 @@ from scene_cases import bladed_disk, two_dof
 
 import solver
 from solver import ContinuationSettings, SettingError, Stretch, joined, sweep
-from solver.branch import Branch, BranchStatus
-from solver.scene import Scene
+from solver.continuation.branch import Branch, BranchStatus
+from solver.scene.scene import Scene
 
 FINE = ContinuationSettings(largest_step=0.05)
 

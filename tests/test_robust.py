@@ -13,14 +13,14 @@ import pytest
 
 import optim
 import solver
-from optim.pessimise import Aspect, UnknownScenarioError, pessimise
-from optim.problem import pose
-from optim.robust_result import RobustStatus
-from optim.rows import Quantity, Row
-from optim.scenarios import Outcome, outcome
-from optim.uncertain import Scenario, Shape
-from optim.uncertainty import read_uncertain
-from solver.observations import observing
+from optim.criteria.rows import Quantity, Row
+from optim.problem.problem import pose
+from optim.problem.uncertainty_input import read_uncertain
+from optim.problem.uncertainty_set import Scenario, Shape
+from optim.robust.result import RobustStatus
+from optim.robust.scenarios import Outcome, outcome
+from optim.robust.worst_case import Aspect, UnknownScenarioError, pessimise
+from solver.branches.observation import observing
 
 N0 = {"damper.N0": (60.0, 300.0)}
 KT_AND_MU = {"damper.kt": {"deviation": 0.2}, "damper.mu": [0.2, 0.4]}
@@ -272,12 +272,12 @@ def test_without_any_response_it_says_so() -> None:
 
 
 def test_a_search_that_runs_out_says_how_far_it_came(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("optim.cutting.MOST_CUTS", 1)
+    monkeypatch.setattr("optim.robust.cutting_sets.MOST_CUTS", 1)
     open_gap = optim.robust_design(
         TWO, uncertain={"half_axes": {"damper.mu": 0.3, "damper.kt": 0.2}, "relative": True}, variables=N0,
         samples=2,
     )  # fmt: skip
-    monkeypatch.setattr("optim.robust_search.MOST_RESPONSES", 40)
+    monkeypatch.setattr("optim.robust.search.MOST_RESPONSES", 40)
     spent = optim.robust_design(TWO, uncertain=KT_AND_MU, variables=N0, harmonics=3)
     assert open_gap.status is RobustStatus.NOT_CLOSED
     assert open_gap.gap > 1e-6

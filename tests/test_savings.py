@@ -10,9 +10,9 @@ from scene_cases import bladed_disk, loose_mass, two_dof
 
 import solver
 from solver import Effects, Scene, SettingError, shipped_scenes, solve, sweep
-from solver.balance import build, for_parameter
+from solver.balance.balance import build, for_parameter
+from solver.balance.workspace import Workspace
 from solver.errors import SolverError
-from solver.workspace import Workspace
 
 SWITCHES = [field.name for field in fields(Effects)]
 SCENES = [

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from solver.errors import SceneError, SettingError
-from solver.scene import Contact, Mass, Scene, load_scene, parse_end, shipped_scenes
+from solver.scene.scene import Contact, Mass, Scene, load_scene, parse_end, shipped_scenes
 
 Raw = dict[str, Any]
 

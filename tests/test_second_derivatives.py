@@ -12,10 +12,11 @@ from contact_cases import STATES, Case, central_difference, evaluate, random_cas
 from test_contact_force import NAMES, TRANSITIONS, critical, reference_case
 
 import solver
-from solver import fourier
-from solver.balance import build
-from solver.kernels.second import second_along
-from solver.kernels.stationary import (
+from solver.balance.balance import build
+from solver.balance.workspace import Workspace
+from solver.contacts.kernels.coulomb_hessian import second_along
+from solver.contacts.kernels.system import by_reference
+from solver.extrema.kernels.amplitude_hessian import (
     balance_at,
     choose_extremum,
     curvatures_at,
@@ -24,7 +25,7 @@ from solver.kernels.stationary import (
     slopes_at,
     solve_responses,
 )
-from solver.kernels.summit import (
+from solver.extrema.kernels.peak_state import (
     AMPLITUDE,
     CURVE,
     DA_DP,
@@ -36,9 +37,8 @@ from solver.kernels.summit import (
     summit_numbers,
     summit_step,
 )
-from solver.kernels.system import by_reference
-from solver.scene import Scene
-from solver.workspace import Workspace
+from solver.jit import fourier
+from solver.scene.scene import Scene
 
 _STATE_NUMBERS = {name: number for number, name in STATES.items()}
 
@@ -146,7 +146,7 @@ class Response:
         self._tau = float(self.here[TAU])
 
     def at(self, omega: float, p: float) -> np.ndarray:
-        """The numbers of `solver.kernels.summit` at the solution for (omega, p)."""
+        """The numbers of `solver.extrema.kernels.peak_state` at the solution for (omega, p)."""
         system, summit, u = self._system, self._summit, self._u.copy()
         numbers = summit_numbers(summit)
         for _ in range(20):

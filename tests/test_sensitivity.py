@@ -13,15 +13,15 @@ from test_law_scenes import CUBIC, GAP, PLANE, RUB
 from test_law_scenes import scene as two_directions
 
 import solver
-from solver.balance import Balance, build, for_parameter
-from solver.corners import PeakKind, peak_gradient
+from solver.balance.balance import Balance, build, for_parameter
+from solver.balance.kernels.output import MAX_ABS, SLOPE
+from solver.balance.simplifications import Effects
+from solver.balance.workspace import Workspace
 from solver.errors import SettingError
-from solver.kernels.observe import MAX_ABS, SLOPE
-from solver.savings import Effects
-from solver.scene import Scene
-from solver.scene_paths import parameter_paths
-from solver.sensitivity import Sensitivities
-from solver.workspace import Workspace
+from solver.scene.parameter_paths import parameter_paths
+from solver.scene.scene import Scene
+from solver.sensitivity.gradient import Sensitivities
+from solver.sensitivity.nonsmooth import PeakKind, peak_gradient
 
 HARMONICS = 7
 TWO_DOF = ("damper.N0", "damper.N1_ratio", "damper.N1_phase", "damper.kt", "damper.mu", "structure.k1",

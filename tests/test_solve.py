@@ -21,11 +21,11 @@ from scene_cases import (
 )
 
 from solver import Scene, SettingError, SolutionStatus, march, solve
-from solver.accuracy import truncation_error
-from solver.balance import build
-from solver.contact_response import ContactState
-from solver.march_result import MarchStatus
-from solver.workspace import Workspace
+from solver.balance.balance import build
+from solver.balance.workspace import Workspace
+from solver.extrema.error_estimate import truncation_error
+from solver.marching.result import MarchStatus
+from solver.response.contact_response import ContactState
 
 ROWS = TWO_DOF_ROWS + DISK_ROWS
 

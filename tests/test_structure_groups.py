@@ -11,7 +11,7 @@ from scene_cases import two_dof
 from test_mistuning import VALUES, disk, with_mistuning
 
 from solver import Scene, SceneError, SettingError, annulus, mistuned, solve, sweep
-from solver.parametric import linear_model, structure_derivative
+from solver.linear.assembly import linear_model, structure_derivative
 
 
 def grouped() -> Scene:

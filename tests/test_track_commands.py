@@ -10,7 +10,7 @@ import pytest
 
 import solver
 from service.cli import main
-from solver.plots.tracks import ridge_lines
+from solver.views.plots.tracks import ridge_lines
 
 PEAKS = ["peaks", "two-dof", "--parameter", "damper.N0", "--from", "80", "--to", "130", "--checks", "0"]
 MAP = [
@@ -99,7 +99,7 @@ def test_the_ridge_is_broken_only_where_another_peak_becomes_the_highest() -> No
 def test_contacts_of_other_laws_are_mapped_but_not_tracked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = (Path(solver.__file__).parent / "scenes" / "two-dof.toml").read_text()
+    text = (Path(solver.__file__).parent / "scene" / "shipped" / "two-dof.toml").read_text()
     stop = '[[contacts]]\nname = "stop"\nlaw = "gap"\nbetween = ["m1", "ground"]\nk = 10.0\ngap = 1.0\n\n'
     scene = tmp_path / "stop.toml"
     scene.write_text(text.replace("[excitation]", f"{stop}[excitation]"))

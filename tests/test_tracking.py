@@ -12,9 +12,9 @@ from peak_cases import case_a, highest, scene_of
 import optim
 import solver
 from solver.errors import SettingError
-from solver.least import least_peak
-from solver.peak_tracks import TrackStatus
-from solver.tracking import track_peak
+from solver.peaks.minimise_peak import least_peak
+from solver.peaks.results import TrackStatus
+from solver.peaks.track_peak import track_peak
 
 
 @cache

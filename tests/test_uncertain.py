@@ -9,8 +9,8 @@ import pytest
 
 import optim
 import solver
-from optim.uncertain import Shape, UncertainSet
-from optim.uncertainty import read_uncertain
+from optim.problem.uncertainty_input import read_uncertain
+from optim.problem.uncertainty_set import Shape, UncertainSet
 
 N0 = {"damper.N0": (60.0, 300.0)}
 TWO = solver.load_scene("two-dof")

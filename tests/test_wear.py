@@ -31,9 +31,9 @@ from solver import (
     worst_slopes,
     worst_wear,
 )
-from solver.fourier import derivative
-from solver.savings import Effects
-from solver.workspace import Workspace
+from solver.balance.simplifications import Effects
+from solver.balance.workspace import Workspace
+from solver.jit.fourier import derivative
 
 RUB_LIFTING = {**RUB, "N0": -0.1, "N1": 0.3, "N1_phase": 0.5}
 BOX = {**PLANE, "limit": "box", "N1_ratio": 0.4}

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import solver
-from solver.plots.style import BLUE, GREEN, GREY, INK, VERMILION, plain_log, styled
+from solver.views.plots.style import BLUE, GREEN, GREY, INK, VERMILION, plain_log, styled
 
 FOUR = dict(zip("abcd", (BLUE, VERMILION, GREEN, "#CC79A7"), strict=True))  # points a, b, c and d
 FREE: dict[str, Any] = {"color": GREY, "linestyle": ":", "linewidth": 1.2}

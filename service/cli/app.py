@@ -8,25 +8,23 @@ from typing import Annotated
 
 import typer
 
-from service.cli import (
-    campbell_command,
-    database_commands,
-    design_commands,
-    import_command,
-    key_commands,
-    mistuning_command,
-    report_command,
-    schema_command,
-    sensitivity_command,
-    service_commands,
-    solver_commands,
-    submit_commands,
-    submit_studies,
-    track_commands,
-)
+from service.cli.commands import campbell as campbell_command
+from service.cli.commands import database as database_commands
+from service.cli.commands import design as design_commands
+from service.cli.commands import import_matrices as import_command
+from service.cli.commands import jobs as submit_commands
+from service.cli.commands import keys as key_commands
+from service.cli.commands import mistuning as mistuning_command
+from service.cli.commands import report as report_command
+from service.cli.commands import schema as schema_command
+from service.cli.commands import sensitivities as sensitivity_command
+from service.cli.commands import service as service_commands
+from service.cli.commands import solver as solver_commands
+from service.cli.commands import submit_studies
+from service.cli.commands import track as track_commands
 from service.cli.failures import REPORTED, report
-from service.cli.inputs import join_words
-from service.cli.keyed import keyed
+from service.cli.options.inputs import join_words
+from service.cli.options.keyed import keyed
 
 app = typer.Typer(
     name="stickslip",

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from scipy.io import loadmat
 from scipy.sparse import coo_array, issparse
 
-from solver.matrices.abaqus import is_matrix_market, read_abaqus
-from solver.matrices.calculix import CALCULIX, read_calculix
-from solver.matrices.dmig import DMIG, read_dmig
-from solver.matrices.harwell_boeing import read_harwell_boeing
-from solver.matrices.matrix_market import read_matrix_market
-from solver.matrices.output4 import read_output4
-from solver.matrices.triplets import MOST_ROWS, Labelled
+from solver.matrices.readers.abaqus import is_matrix_market, read_abaqus
+from solver.matrices.readers.calculix import CALCULIX, read_calculix
+from solver.matrices.readers.dmig import DMIG, read_dmig
+from solver.matrices.readers.harwell_boeing import read_harwell_boeing
+from solver.matrices.readers.matrix_market import read_matrix_market
+from solver.matrices.readers.output4 import read_output4
+from solver.matrices.readers.triplets import MOST_ROWS, Labelled
 from solver.matrices.values import Modes
 
 FloatArray = NDArray[np.float64]

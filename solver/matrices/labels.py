@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from solver.matrices.text import LARGEST, FormatError, ascii_lines
+from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines
 
 COMPONENTS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
 LABEL_SUFFIXES = (".mapping", ".dof")

@@ -1,7 +1,7 @@
 """Matrices and modes as values of a scene: frozen, compared by content, written as plain lists.
 
 In a request they are lists or a table of entries; only `solver.load_scene` replaces the names of files by
-what they hold (`solver.matrices.loading`), so that a scene from somewhere else never opens a path.
+what they hold (`solver.matrices.scene_files`), so that a scene from somewhere else never opens a path.
 """
 
 from __future__ import annotations

@@ -10,10 +10,10 @@ from postgresql_cluster import Cluster, binaries
 from private_kinds import PRIVATE
 from service_helpers import MakeSettings, serving, settings_of
 
-from service import revisions
-from service.db import Database
-from service.embedded import EmbeddedService
-from service.kinds import SHIPPED
+from service.client.embedded import EmbeddedService
+from service.db import revisions
+from service.db.engine import Database
+from service.jobs.kinds import SHIPPED
 
 BACKENDS = ("sqlite", "postgresql")
 

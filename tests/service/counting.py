@@ -6,7 +6,7 @@ import sys
 
 from sqlalchemy import text
 
-from service.db import write_engine
+from service.db.engine import write_engine
 
 
 def main(url: str, times: int) -> None:

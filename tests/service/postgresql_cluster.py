@@ -18,7 +18,7 @@ from typing import Any, Self
 import psycopg
 from psycopg import sql
 
-from service import revisions
+from service.db import revisions
 
 _START_SECONDS = 60.0
 _MIGRATED = "migrated"

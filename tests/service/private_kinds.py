@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from service.arrays import encode
-from service.checkpoints import Checkpoints, RunParts
-from service.jobs import (
+from service.jobs.arrays import encode
+from service.jobs.checkpoints import Checkpoints, RunParts
+from service.jobs.kinds import sweep
+from service.jobs.kinds.map import MAP
+from service.jobs.registry import (
     ContactValues,
     JobKind,
     JobOutput,
@@ -25,8 +27,6 @@ from service.jobs import (
     ShouldStop,
     SweepRecord,
 )
-from service.kinds import sweep
-from service.kinds.map import MAP
 from solver.errors import Issue, SceneError, SettingError
 
 

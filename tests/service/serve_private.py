@@ -6,8 +6,8 @@ import sys
 
 from private_kinds import PRIVATE
 
-from service.server import serve, work
-from service.settings import load_settings
+from service.http.server import serve, work
+from service.settings.settings import load_settings
 
 if __name__ == "__main__":
     url, what = sys.argv[1:]

@@ -13,13 +13,13 @@ import pytest
 from fastapi import FastAPI
 from sqlalchemy import text
 
-from service.app import create_app
-from service.core import Service
-from service.db import Database
-from service.jobs import Registry
-from service.repository import NewJob
-from service.server import _bind, _config, _Server
-from service.settings import Settings, load_settings
+from service.db.engine import Database
+from service.db.repositories import NewJob
+from service.http.app import create_app
+from service.http.server import _bind, _config, _Server
+from service.jobs.registry import Registry
+from service.queue.core import Service
+from service.settings.settings import Settings, load_settings
 
 MakeSettings = Callable[..., Settings]
 

@@ -16,16 +16,16 @@ from private_kinds import PRIVATE
 from service_helpers import ServedClient, is_problem, serving, until
 from sqlalchemy import text
 
-from service.access import keys
-from service.access.buckets import Buckets
-from service.access.callers import KeyLimits, Scope
-from service.access.doorkeeper import _neighbourhood
+from service.auth import keys
+from service.auth.authenticator import _neighbourhood
+from service.auth.callers import KeyLimits, Scope
+from service.auth.rate_limit import Buckets
 from service.cli import main
-from service.client import Client
-from service.clock import utc_now
-from service.db import Database
+from service.client.client import Client
+from service.db.clock import utc_now
+from service.db.engine import Database
+from service.db.repositories.keys import KeyRepository
 from service.errors import InvalidRequestError
-from service.repository.keys import KeyRepository
 
 SLOW = {"kind": "iteration", "seconds": 60.0, "fresh": True}
 

@@ -20,16 +20,16 @@ from service_helpers import MakeSettings, settings_of, until
 from sqlalchemy import func, select, update
 
 import solver
-from service.arrays import decode
-from service.checkpoints import Checkpoints, Kept, UnusableError, packed, unpacked
-from service.clock import utc_now
-from service.core import Service
-from service.db import Database
-from service.jobs import FailureKind, JobFailure, JobOutput, Pace, Piece, ShouldStop
-from service.kinds import SHIPPED
-from service.models import Checkpoint, JobState
-from service.parts import PartStoppedError
-from service.repository import Attempt, JobRepository, NewJob
+from service.db.clock import utc_now
+from service.db.engine import Database
+from service.db.models import Checkpoint, JobState
+from service.db.repositories import Attempt, JobRepository, NewJob
+from service.jobs.arrays import decode
+from service.jobs.checkpoints import Checkpoints, Kept, UnusableError, packed, unpacked
+from service.jobs.kinds import SHIPPED
+from service.jobs.parts import PartStoppedError
+from service.jobs.registry import FailureKind, JobFailure, JobOutput, Pace, Piece, ShouldStop
+from service.queue.core import Service
 
 DISK = solver.annulus(solver.load_scene("bladed-disk")).to_dict()
 SWEEP = {"scene": DISK, "from": 600, "to": 800, "harmonics": 13}
@@ -352,6 +352,6 @@ def test_pieces_are_numbers_of_this_version(monkeypatch: pytest.MonkeyPatch) -> 
     garbage = b"PK\x03\x04 no archive"
     with pytest.raises(UnusableError, match="cannot be read"):
         unpacked(Piece(part=0, sha256=sha256(garbage).hexdigest(), data=garbage))
-    monkeypatch.setattr("service.checkpoints.version", lambda _name: "99.0")
+    monkeypatch.setattr("service.jobs.checkpoints.version", lambda _name: "99.0")
     with pytest.raises(UnusableError, match="of another version"):
         unpacked(one)

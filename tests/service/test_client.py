@@ -15,11 +15,11 @@ import pytest
 from matrix_cases import beam
 from service_helpers import ServedClient
 
-from service.answers import FinishedJob, JobAnswer
-from service.client import Client
+from service.client.client import Client
+from service.db.models import JobState
 from service.errors import ServiceProblem
-from service.event_answers import JobPoints, JobProgress
-from service.models import JobState
+from service.schemas.answers import FinishedJob, JobAnswer
+from service.schemas.event_answers import JobPoints, JobProgress
 
 SLOW = {"kind": "iteration", "seconds": 60.0, "fresh": True}
 

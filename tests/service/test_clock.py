@@ -11,11 +11,11 @@ import pytest
 from private_kinds import PRIVATE
 from service_helpers import settings_of, until
 
-from service.clock import SharedClock, utc_now
-from service.core import Service
-from service.db import Database
-from service.models import JobState
-from service.repository import JobRepository
+from service.db.clock import SharedClock, utc_now
+from service.db.engine import Database
+from service.db.models import JobState
+from service.db.repositories import JobRepository
+from service.queue.core import Service
 
 
 class SteppedClock:
@@ -80,7 +80,7 @@ def test_machines_whose_clocks_disagree_leave_each_other_their_jobs(
         make: Callable[..., object] = settings_of(url)
         first = Service(make(workers=1, lease_seconds=2.0, poll_seconds=0.1), PRIVATE)
         first.start()
-        monkeypatch.setattr("service.clock.utc_now", an_hour_ahead)
+        monkeypatch.setattr("service.db.clock.utc_now", an_hour_ahead)
         second = Service(make(workers=1, lease_seconds=2.0, poll_seconds=0.1), PRIVATE)
         second.start()
         try:

@@ -23,16 +23,16 @@ from service_helpers import pids, until
 from sqlalchemy import select
 
 import solver
-from service import strict_json
-from service.embedded import EmbeddedService
+from service.client.embedded import EmbeddedService
+from service.db.models import Checkpoint, JobState
 from service.errors import ConfigurationError
-from service.executors import executor_of
-from service.health import check
-from service.jobs import Registry
-from service.kinds import SHIPPED
-from service.models import Checkpoint, JobState
-from service.settings import Settings, load_settings
-from service.validation import validated
+from service.jobs import strict_json
+from service.jobs.kinds import SHIPPED
+from service.jobs.registry import Registry
+from service.jobs.validation import validated
+from service.queue.health import check
+from service.settings.settings import Settings, load_settings
+from service.workers import executor_of
 
 BOTH = PRIVATE.extended(*SHIPPED)
 DISK: dict[str, Any] = dict(solver.load_scene("bladed-disk").to_dict())

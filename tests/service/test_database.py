@@ -18,17 +18,17 @@ from service_helpers import MakeSettings, new_job
 from sqlalchemy import CheckConstraint, insert, inspect, select, text
 from sqlalchemy.exc import DBAPIError, StatementError
 
-from service import revisions
-from service.arrays import decode, encode
-from service.clock import utc_now
-from service.core import Service
-from service.db import Database, backup, is_sqlite, migrating, sqlite_note, write_engine
-from service.embedded import EmbeddedService
+from service.client.embedded import EmbeddedService
+from service.db import revisions
+from service.db.clock import utc_now
+from service.db.engine import Database, backup, is_sqlite, migrating, sqlite_note, write_engine
+from service.db.models import NOBODY, Base, Job, JobState
+from service.db.repositories import Attempt, JobRepository, SceneRepository
 from service.errors import DatabaseError, DatabaseInUseError, WrongRevisionError
-from service.ids import new_id
-from service.jobs import FailureKind, JobFailure, JobOutput, StoredArray
-from service.models import NOBODY, Base, Job, JobState
-from service.repository import Attempt, JobRepository, SceneRepository
+from service.jobs.arrays import decode, encode
+from service.jobs.ids import new_id
+from service.jobs.registry import FailureKind, JobFailure, JobOutput, StoredArray
+from service.queue.core import Service
 
 
 @pytest.fixture
@@ -211,7 +211,7 @@ def test_a_second_service_is_refused(make_settings: MakeSettings) -> None:
         with pytest.raises(DatabaseInUseError, match=r"in use by another stickslip service \(process \d+\)"):
             Service(settings, PRIVATE).start()
         code = (
-            "from service.core import Service; from service.settings import load_settings; "
+            "from service.queue.core import Service; from service.settings.settings import load_settings; "
             f"Service(load_settings(database={settings.database!r})).open()"
         )
         other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -19,21 +19,21 @@ from sqlalchemy import Connection, func, insert, inspect, select
 
 import optim
 import solver
-from service import revisions
-from service.answers import DesignDetail
-from service.client import Client
-from service.clock import utc_now
-from service.db import Database, migrating
-from service.design_queries import DesignQuery, design_page
+from service.client.client import Client
+from service.db import revisions
+from service.db.clock import utc_now
+from service.db.engine import Database, migrating
+from service.db.models import Base, Job, JobState
+from service.db.repositories import DesignRepository
+from service.db.repositories.designs import insert_design
 from service.errors import InvalidRequestError
-from service.ids import new_id
-from service.jobs import DesignRecord, VariableValues
-from service.kinds.records import design_record
-from service.models import Base, Job, JobState
-from service.repository import DesignRepository
-from service.repository.designs import insert_design
-from service.settings import load_settings
-from service.validation import validated
+from service.jobs.ids import new_id
+from service.jobs.kinds.records import design_record
+from service.jobs.registry import DesignRecord, VariableValues
+from service.jobs.validation import validated
+from service.schemas.answers import DesignDetail
+from service.schemas.design_queries import DesignQuery, design_page
+from service.settings.settings import load_settings
 
 WAIT = {"Prefer": "wait=60"}
 ONE = DesignRecord(

@@ -14,9 +14,9 @@ from postgresql_cluster import Cluster
 from private_kinds import PRIVATE
 from service_helpers import is_problem, serving, settings_of, until
 
-from service.access.callers import KEYLESS
-from service.core import Service
-from service.events import job_events
+from service.auth.callers import KEYLESS
+from service.http.events import job_events
+from service.queue.core import Service
 
 SLOW = {"kind": "iteration", "seconds": 60.0, "fresh": True}
 

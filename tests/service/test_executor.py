@@ -13,12 +13,12 @@ import pytest
 from private_kinds import PRIVATE, IterationRequest, as_it_is
 from service_helpers import pids, until
 
-from service.executors.base import Finished, Lost, Outcome, Stopped
-from service.executors.local import LocalExecutor
-from service.executors.slot import MOST_AHEAD
-from service.jobs import Piece, Point
-from service.repository import Attempt
-from service.settings import load_settings
+from service.db.repositories import Attempt
+from service.jobs.registry import Piece, Point
+from service.settings.settings import load_settings
+from service.workers.base import Finished, Lost, Outcome, Stopped
+from service.workers.local import LocalExecutor
+from service.workers.slot import MOST_AHEAD
 
 
 class Heard:

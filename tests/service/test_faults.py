@@ -34,9 +34,9 @@ from fault_site import Site, clients, free_port
 from postgresql_cluster import Cluster
 from sqlalchemy import func, select
 
-from service.db import Database
-from service.integrity import check
-from service.models import Job, JobResult, JobState, Sweep
+from service.db.engine import Database
+from service.db.integrity import check
+from service.db.models import Job, JobResult, JobState, Sweep
 
 COMMON: dict[str, Fault] = {
     "worker killed": child_killed,

@@ -11,12 +11,12 @@ from service_helpers import new_job, until
 from sqlalchemy import Connection, event, func, insert, select, text
 from sqlalchemy.exc import DBAPIError
 
-from service.clock import utc_now
-from service.db import Database
+from service.db.clock import utc_now
+from service.db.engine import Database
+from service.db.models import Job, JobState, Scene
+from service.db.repositories import JobRepository
 from service.errors import QueueFullError
-from service.jobs import JobOutput
-from service.models import Job, JobState, Scene
-from service.repository import JobRepository
+from service.jobs.registry import JobOutput
 
 
 def scene(connection: Connection, name: str) -> str:

@@ -18,7 +18,7 @@ from private_kinds import PRIVATE
 from service_helpers import ServedClient, serving, until
 
 import solver
-from service.patience import patient
+from service.http.header_timeout import patient
 
 BODY_SECONDS = 1.0
 HEADER_SECONDS = 1.0

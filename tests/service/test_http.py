@@ -13,11 +13,11 @@ import pytest
 from service_helpers import is_problem, job_ids, until
 from starlette.requests import Request
 
-from service import revisions
-from service.client import Client
+from service.client.client import Client
+from service.db import revisions
+from service.db.models import JobState
 from service.errors import QueueFullError, ServiceProblem
-from service.models import JobState
-from service.problems import service_problem
+from service.schemas.problems import service_problem
 
 SLOW = {"kind": "iteration", "seconds": 60.0}
 

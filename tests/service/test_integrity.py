@@ -11,10 +11,10 @@ from private_kinds import PRIVATE
 from service_helpers import MakeSettings, settings_of
 
 from service.cli import main
-from service.embedded import EmbeddedService
+from service.client.embedded import EmbeddedService
+from service.db.integrity import check
+from service.db.models import JobState
 from service.errors import DatabaseError
-from service.integrity import check
-from service.models import JobState
 
 SWEEP = {"scene": "two-dof", "parameter": "frequency", "from": 0.9, "to": 1.2, "harmonics": 3}
 
@@ -22,7 +22,7 @@ SWEEP = {"scene": "two-dof", "parameter": "frequency", "from": 0.9, "to": 1.2, "
 @pytest.fixture(scope="module")
 def used(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A database with a finished sweep."""
-    from service.settings import load_settings
+    from service.settings.settings import load_settings
 
     path = tmp_path_factory.mktemp("used") / "jobs.db"
     with EmbeddedService(load_settings(database=f"sqlite:///{path}", workers=1)) as service:

@@ -11,10 +11,10 @@ import pytest
 from service_helpers import is_problem, job_ids
 
 import solver
-from service.kinds import SHIPPED
-from service.kinds.records import contact_values
-from service.kinds.scenes import MAX_HARMONICS
-from service.validation import validated
+from service.jobs.kinds import SHIPPED
+from service.jobs.kinds.records import contact_values
+from service.jobs.kinds.scenes import MAX_HARMONICS
+from service.jobs.validation import validated
 
 
 class Shipped:

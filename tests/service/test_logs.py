@@ -10,9 +10,9 @@ import threading
 import httpx
 import pytest
 
-from service import logs
-from service.embedded import EmbeddedService
-from service.logs import JsonFormatter, TextFormatter
+from service.client.embedded import EmbeddedService
+from service.settings import logs
+from service.settings.logs import JsonFormatter, TextFormatter
 
 
 @pytest.fixture

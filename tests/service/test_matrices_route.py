@@ -14,7 +14,7 @@ from service_helpers import is_problem
 from test_uploads import npz, upload
 
 import solver
-from service import inspection
+from service.uploads import inspection
 
 M, K = beam(8)
 NODES = [(2 + row // 2, (2, 6)[row % 2]) for row in range(len(M))]

@@ -10,13 +10,13 @@ import pytest
 import sqlalchemy as sa
 from alembic import command
 
-from service import revisions
-from service.arrays import decode
-from service.core import Service
-from service.db import database_path, is_sqlite, migrating
-from service.integrity import check
-from service.models import JobState
-from service.settings import load_settings
+from service.db import revisions
+from service.db.engine import database_path, is_sqlite, migrating
+from service.db.integrity import check
+from service.db.models import JobState
+from service.jobs.arrays import decode
+from service.queue.core import Service
+from service.settings.settings import load_settings
 
 # Written by the version with revision 0001: two sweeps (the second answered by the first), solve, march, a
 # design that was found and one that was not, a dismissed and a waiting job, a stored scene.

@@ -9,13 +9,13 @@ import pytest
 from private_kinds import PRIVATE
 from service_helpers import settings_of
 
-from service.access.callers import KEYLESS, Caller, Scope, included
-from service.core import Service
+from service.auth.callers import KEYLESS, Caller, Scope, included
+from service.db.models import JobState
 from service.errors import ConflictError, IdempotencyError, InvalidRequestError, NotFoundError
-from service.kinds.scenes import HarmonicRequest, resolve_scene
-from service.kinds.sweep import SWEEP
-from service.models import JobState
-from solver.scene import load_scene
+from service.jobs.kinds.scenes import HarmonicRequest, resolve_scene
+from service.jobs.kinds.sweep import SWEEP
+from service.queue.core import Service
+from solver.scene.scene import load_scene
 
 ANN, BEN = (Caller(owner=name, key_id=name) for name in ("ann", "ben"))
 CHIEF = Caller(owner="chief", key_id="chief", scopes=included([Scope.ADMIN]))

@@ -9,11 +9,11 @@ import httpx
 import pytest
 from service_helpers import is_problem
 
-from service.routes import page
-from solver.notes import FLAGS
+from service.http.routes import page
+from solver.views.notes import FLAGS
 
-FOLDER = Path(page.__file__).resolve().parent.parent / "page"
-MODULES = sorted((FOLDER / "js").glob("*.js"))
+FOLDER = Path(page.__file__).resolve().parents[2] / "page"
+MODULES = sorted((FOLDER / "js").rglob("*.js"))
 LONGEST_FILE = 400
 
 

@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 
 import solver
-from service.arrays import decode
-from service.jobs import JobKind, JobOutput
-from service.kinds import SHIPPED
-from service.parts import Account, Part, PartOutput, Parts, PartStoppedError, final_one
+from service.jobs.arrays import decode
+from service.jobs.kinds import SHIPPED
+from service.jobs.parts import Account, Part, PartOutput, Parts, PartStoppedError, final_one
+from service.jobs.registry import JobKind, JobOutput
 
 DISK: dict[str, Any] = dict(solver.load_scene("bladed-disk").to_dict())
 DISK["structure"] = {**DISK["structure"], "sectors": 3}

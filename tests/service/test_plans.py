@@ -8,9 +8,9 @@ import pytest
 from sqlalchemy import Select, Update
 from sqlalchemy.dialects import sqlite
 
-from service import revisions
-from service.db import Database
-from service.repository import job_statements as statements
+from service.db import revisions
+from service.db.engine import Database
+from service.db.repositories import job_statements as statements
 
 BY_KEY = "sqlite_autoindex_job_1"
 

@@ -19,17 +19,17 @@ from private_kinds import PRIVATE
 from service_helpers import pids, settings_of, until
 from sqlalchemy import select, text, update
 
-from service import postgresql, revisions
 from service.cli import main
-from service.client import Client
-from service.clock import utc_now
-from service.core import Service
-from service.db import Database
+from service.client.client import Client
+from service.db import postgresql, revisions
+from service.db.clock import utc_now
+from service.db.engine import Database
+from service.db.models import Job, JobState
+from service.db.repositories import JobRepository, NewJob
 from service.errors import DatabaseError, DatabaseInUseError, ServiceProblem
-from service.health import check
-from service.jobs import JobOutput
-from service.models import Job, JobState
-from service.repository import JobRepository, NewJob
+from service.jobs.registry import JobOutput
+from service.queue.core import Service
+from service.queue.health import check
 
 SCRIPT = Path(__file__).with_name("serve_private.py")
 NEW = NewJob(kind="iteration", request={}, spec={}, spec_hash="", request_hash="", max_attempts=3, fresh=True)
@@ -260,7 +260,7 @@ def test_names_that_cannot_be_stored_are_refused(start: Start) -> None:
 
 def test_services_tell_each_other_without_polling(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A new job, the end of one and a cancel reach another service long before it would look by itself."""
-    monkeypatch.setattr("service.core._LOOK_AGAIN_SECONDS", 60.0)
+    monkeypatch.setattr("service.queue.core._LOOK_AGAIN_SECONDS", 60.0)
     with ExitStack() as stack:
         services = [Service(settings_of(url)(poll_seconds=60.0, lease_seconds=300.0), PRIVATE) for _ in "ab"]
         for service in services:

@@ -15,9 +15,18 @@ from service_helpers import is_problem, until
 
 import solver
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, PreviewError, QueueFullError
-from service.jobs import JobKind, JobOutput, JobRequest, Progress, Registry, Resolved, SceneSource, ShouldStop
-from service.kinds.previews import LIVE_UNKNOWNS, POINT_UNKNOWNS, harmonics_in_time
-from service.previews import MOST_WAITING, Previews
+from service.jobs.kinds.previews import LIVE_UNKNOWNS, POINT_UNKNOWNS, harmonics_in_time
+from service.jobs.registry import (
+    JobKind,
+    JobOutput,
+    JobRequest,
+    Progress,
+    Registry,
+    Resolved,
+    SceneSource,
+    ShouldStop,
+)
+from service.workers.preview_workers import MOST_WAITING, Previews
 from solver.errors import SettingError, SolverError
 
 TWO_DOF = {"scene": "two-dof"}

@@ -12,13 +12,13 @@ from service_helpers import is_problem, job_ids
 
 import optim
 import solver
-from optim.problem import Method, pose
+from optim.problem.problem import Method, pose
 from service.errors import InvalidRequestError
-from service.kinds.design import DesignRequest, resolve
-from service.kinds.pareto import ParetoRequest
-from service.kinds.pareto import resolve as resolve_front
-from service.kinds.problem import arguments, problem_of
-from service.validation import validated
+from service.jobs.kinds.design import DesignRequest, resolve
+from service.jobs.kinds.pareto import ParetoRequest
+from service.jobs.kinds.pareto import resolve as resolve_front
+from service.jobs.kinds.problem import arguments, problem_of
+from service.jobs.validation import validated
 
 VARIABLES = {"damper.N0": [20, 1000]}
 EVERY_KEY: dict[str, Any] = {

@@ -12,12 +12,12 @@ from private_kinds import PRIVATE, cannot_warm_up
 from service_helpers import MakeSettings, pids, settings_of, until
 from sqlalchemy import update
 
-from service.core import Service
-from service.embedded import EmbeddedService
+from service.client.embedded import EmbeddedService
+from service.db.models import Job, JobState
 from service.errors import ConflictError, JobFailedError, QueueFullError
-from service.health import check
-from service.jobs import Registry
-from service.models import Job, JobState
+from service.jobs.registry import Registry
+from service.queue.core import Service
+from service.queue.health import check
 
 
 @pytest.fixture

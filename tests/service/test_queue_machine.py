@@ -26,12 +26,12 @@ from hypothesis.stateful import (
 )
 from sqlalchemy import Integer, String, bindparam, delete, select
 
-from service import revisions
-from service.db import Database
+from service.db import revisions
+from service.db.engine import Database
+from service.db.models import Job, JobResult, JobState
+from service.db.repositories import Attempt, JobRepository, NewJob, job_statements
 from service.errors import IdempotencyError, QueueFullError
-from service.jobs import FailureKind, JobFailure, JobOutput
-from service.models import Job, JobResult, JobState
-from service.repository import Attempt, JobRepository, NewJob, job_statements
+from service.jobs.registry import FailureKind, JobFailure, JobOutput
 
 LEASE = timedelta(seconds=60)
 ROOM = 4
@@ -295,7 +295,7 @@ def unguarded() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         weak = (Job.id == bindparam("job")) & (Job.state == JobState.RUNNING) & forgotten
         for module in ("guarding", "jobs"):
-            patch.setattr(f"service.repository.{module}.OWNED", weak)
+            patch.setattr(f"service.db.repositories.{module}.OWNED", weak)
         importlib.reload(job_statements)
         yield
     importlib.reload(job_statements)

@@ -16,8 +16,8 @@ from service_helpers import is_problem
 
 import solver
 from service.cli import main
-from service.negotiation import preferred
-from solver.dataset import Dataset
+from service.rendering.negotiation import preferred
+from solver.results.dataset import Dataset
 
 OFFERED = ("application/json", "text/csv", "application/x-npz")
 FORMS = {

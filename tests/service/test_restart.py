@@ -17,11 +17,11 @@ import pytest
 from service_helpers import pids, until
 
 import solver
-from service.client import Client
-from service.db import Database
-from service.models import JobState
-from service.repository import JobRepository
-from solver.scene import Scene
+from service.client.client import Client
+from service.db.engine import Database
+from service.db.models import JobState
+from service.db.repositories import JobRepository
+from solver.scene.scene import Scene
 
 SCRIPT = Path(__file__).with_name("serve_private.py")
 

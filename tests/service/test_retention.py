@@ -13,19 +13,19 @@ from service_helpers import MakeSettings, until
 from sqlalchemy import func, select, text, update
 from test_database import new_job
 
-from service.arrays import encode
 from service.cli import main
-from service.clock import utc_now
-from service.db import Database
-from service.embedded import EmbeddedService
+from service.client.embedded import EmbeddedService
+from service.db.clock import utc_now
+from service.db.engine import Database
+from service.db.integrity import check
+from service.db.models import Design, Job, JobResult, JobState, Sweep, SweepArray, Upload
+from service.db.repositories import JobRepository, UploadRepository
+from service.db.repositories.retention import Pruned, RetentionRepository
 from service.errors import DatabaseError
-from service.integrity import check
-from service.jobs import DesignRecord, JobOutput, SweepRecord
-from service.models import Design, Job, JobResult, JobState, Sweep, SweepArray, Upload
-from service.pruning import prune_database
-from service.repository import JobRepository, UploadRepository
-from service.repository.retention import Pruned, RetentionRepository
-from service.retention import prune, prune_uploads
+from service.jobs.arrays import encode
+from service.jobs.registry import DesignRecord, JobOutput, SweepRecord
+from service.queue.pruning import prune_database
+from service.queue.retention import prune, prune_uploads
 
 DAY = timedelta(days=1)
 

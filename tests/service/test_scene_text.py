@@ -10,7 +10,7 @@ import pytest
 from service_helpers import is_problem
 
 import solver
-from solver.toml_text import toml_text
+from solver.scene.toml import toml_text
 
 
 @pytest.mark.parametrize("name", solver.shipped_scenes())

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from schemathesis import GenerationMode
 from service_helpers import ServedClient, serving
 
-from service.kinds import SHIPPED
+from service.jobs.kinds import SHIPPED
 
 schemathesis.checks.load_all_checks()
 CHECKS = schemathesis.checks.CHECKS.get_by_names(

@@ -6,10 +6,10 @@ import socket
 
 import pytest
 
-from service.db import database_name
+from service.db.engine import database_name
 from service.errors import ConfigurationError
-from service.server import _bind
-from service.settings import Settings, is_loopback, load_settings
+from service.http.server import _bind
+from service.settings.settings import Settings, is_loopback, load_settings
 
 
 def test_defaults_and_environment(monkeypatch: pytest.MonkeyPatch) -> None:

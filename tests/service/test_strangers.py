@@ -17,15 +17,15 @@ from private_kinds import PRIVATE
 from service_helpers import ServedClient, is_problem, serving
 from sqlalchemy import insert
 
-from service.access import keys
-from service.access.callers import Scope
-from service.clock import utc_now
-from service.ids import new_id
-from service.jobs import DesignRecord
-from service.models import Job, JobResult, JobState
-from service.repository.designs import insert_design
-from service.routes import page
-from solver.scene import load_scene
+from service.auth import keys
+from service.auth.callers import Scope
+from service.db.clock import utc_now
+from service.db.models import Job, JobResult, JobState
+from service.db.repositories.designs import insert_design
+from service.http.routes import page
+from service.jobs.ids import new_id
+from service.jobs.registry import DesignRecord
+from solver.scene.scene import load_scene
 
 ROLES = ("none", "wrong", "another", "revoked", "expired", "read", "submit", "admin")
 # What each of them is answered; `another` is a key of another owner, `read` and `submit` are the owner's.

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from service_helpers import analyse
 
-from service.answers import SweepDetail
-from service.arrays import encode
-from service.clock import utc_now
-from service.db import Database
+from service.db.clock import utc_now
+from service.db.engine import Database
+from service.db.models import NOBODY
+from service.db.repositories import JobRepository, NewJob, SweepRepository
+from service.db.repositories.sweeps import insert_sweeps
 from service.errors import InvalidRequestError
-from service.jobs import ContactValues, JobOutput, SweepRecord
-from service.models import NOBODY
-from service.repository import JobRepository, NewJob, SweepRepository
-from service.repository.sweeps import insert_sweeps
-from service.settings import load_settings
-from service.sweep_queries import SweepQuery, sweep_page
-from service.validation import validated
+from service.jobs.arrays import encode
+from service.jobs.registry import ContactValues, JobOutput, SweepRecord
+from service.jobs.validation import validated
+from service.schemas.answers import SweepDetail
+from service.schemas.sweep_queries import SweepQuery, sweep_page
+from service.settings.settings import load_settings
 
 ONE = SweepRecord(
     scene_name="disk",

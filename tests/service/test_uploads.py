@@ -22,10 +22,10 @@ from scipy.sparse import coo_array, save_npz
 from service_helpers import is_problem
 
 import solver
-from service import inspection
-from service.db import Database
+from service.db.engine import Database
+from service.db.repositories import UploadRepository
 from service.errors import NotFoundError, UnreadableUploadError
-from service.repository import UploadRepository
+from service.uploads import inspection
 
 M, K = beam(4)
 MARKET = b"%%%%MatrixMarket matrix %s real general\n%s"

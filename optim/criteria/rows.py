@@ -1,0 +1,152 @@
+"""What a design is judged by, as rows: one number with its gradient each, minimised, limited, or both.
+
+Every peak that competes is a row of its own, and so is every band, every local maximum of friction work:
+each is smooth, only the largest of them is not. That is what the methods of this package work on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from optim.problem.variables import Real
+from solver.continuation.branch import Branch
+
+
+class Quantity(Enum):
+    """What a row measures; the value is the word users read."""
+
+    PEAK = "peak"
+    BAND = "band"
+    FORBIDDEN = "amplitude in a forbidden range"
+    FRICTION_WORK = "friction work"
+    SEPARATION = "separation"
+
+
+UNITS = {
+    Quantity.PEAK: "m", Quantity.BAND: "Hz", Quantity.FORBIDDEN: "m", Quantity.FRICTION_WORK: "J",
+    Quantity.SEPARATION: "N",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One smooth number of a design.
+
+    Attributes
+    ----------
+    quantity : Quantity
+        What it measures.
+    case : str
+        Name of the load case.
+    what : str
+        In words, for example ``peak at 753.28 Hz``.
+    value : float
+        In the unit of `UNITS`.
+    gradient : (n_variables,) array
+        By each variable, per unit of it; NaN where it does not exist.
+    at_hz : float
+        Its frequency; NaN for what has none.
+    weight : float
+        Multiplies it in what is minimised; 0 if it is only limited.
+    bound : float or None
+        The most it may be.
+    second : callable or None
+        Computes the exact second derivatives by the variables, (n_variables, n_variables), NaN where they do
+        not exist; None where the solver has none.
+    """
+
+    quantity: Quantity
+    case: str
+    what: str
+    value: float
+    gradient: Real
+    at_hz: float
+    weight: float
+    bound: float | None
+    second: Callable[[], Real] | None = field(default=None, compare=False, repr=False)
+
+    def excess(self, scale: float) -> float:
+        """Return how far it is above its bound, relative to the bound (to `scale` if that is 0)."""
+        if self.bound is None:
+            return -math.inf
+        return (self.value - self.bound) / self.unit_of(scale)
+
+    def unit_of(self, scale: float) -> float:
+        """Return what an excess is relative to."""
+        return abs(self.bound) if self.bound else scale
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Response:
+    """A frequency response computed for a design: its case and the branch."""
+
+    case: str
+    branch: Branch
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evaluation:
+    """One design with everything it is judged by.
+
+    Attributes
+    ----------
+    values : mapping
+        Variable name to value.
+    responses : tuple of Response
+        The frequency responses behind the numbers, in the order of the cases.
+    rows : tuple of Row
+        Empty unless every response covered its whole range.
+    """
+
+    values: Mapping[str, float]
+    responses: tuple[Response, ...]
+    rows: tuple[Row, ...]
+
+    @property
+    def good(self) -> bool:
+        """Whether every number is known."""
+        return bool(self.rows) and all(math.isfinite(row.value) for row in self.rows)
+
+    def of(self, quantity: Quantity) -> tuple[Row, ...]:
+        """Return the rows of one quantity, largest first."""
+        return tuple(sorted((r for r in self.rows if r.quantity is quantity), key=lambda row: -row.value))
+
+    @property
+    def peaks(self) -> tuple[Row, ...]:
+        """The peaks that compete, highest first."""
+        return self.of(Quantity.PEAK)
+
+    @property
+    def band(self) -> Row | None:
+        """The widest resonance band."""
+        return next(iter(self.of(Quantity.BAND)), None)
+
+    @property
+    def objective(self) -> float:
+        """What is minimised: for each quantity the largest weighted row, summed."""
+        total = 0.0
+        for quantity in Quantity:
+            weighted = [row.weight * row.value for row in self.of(quantity) if row.weight > 0.0]
+            total += max(weighted, default=0.0)
+        return total if self.rows else math.inf
+
+    @property
+    def branch(self) -> Branch:
+        """The response of the first case."""
+        return self.responses[0].branch
+
+    def violation(self, scales: Mapping[Quantity, float]) -> float:
+        """Return the largest relative excess over a bound; −inf without bounds."""
+        return max((row.excess(scales[row.quantity]) for row in self.rows), default=math.inf)
+
+
+def nearest(row: Row, rows: Sequence[Row]) -> int | None:
+    """Return which of some rows of another design measures the same: quantity, case, nearest frequency."""
+    same = [i for i, r in enumerate(rows) if (r.quantity, r.case) == (row.quantity, row.case)]
+    same = [i for i in same if math.isnan(row.at_hz) == math.isnan(rows[i].at_hz)]
+    if math.isnan(row.at_hz):
+        return next((i for i in same if rows[i].what == row.what), same[0] if same else None)
+    return min(same, key=lambda i: abs(rows[i].at_hz - row.at_hz), default=None)

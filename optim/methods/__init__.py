@@ -1,0 +1,1 @@
+"""Search methods: local, global, tracked."""

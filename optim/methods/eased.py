@@ -1,0 +1,76 @@
+"""One variable with limits or several cases: the tracked optimum of each case without limits, to begin from.
+
+Where that of a single case keeps all limits it is the optimum with them as well, and as well proven.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from optim.criteria.rows import Quantity
+from optim.methods.evaluator import Search, StoppedError
+from optim.methods.peak_tracking import Tracked, tracked_optimum
+from optim.problem.problem import Limits, Method, Problem
+from optim.results.design import DesignStatus
+
+NO_LIMITS = Limits(peak=None, band_hz=None, forbidden_hz={}, friction_work={}, in_contact=())
+MOST_CASES = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Eased:
+    """What a problem without its limits says about it.
+
+    Attributes
+    ----------
+    starts : tuple of designs
+        The one asked for, and the local optima of single cases without limits.
+    proven : Tracked or None
+        The optimum without limits, if it keeps them all.
+    """
+
+    starts: tuple[dict[str, float], ...]
+    proven: Tracked | None = None
+
+    @classmethod
+    def of(cls, search: Search) -> Eased:
+        """Return it; tracking goes on for `search` and is counted by it."""
+        problem = search.problem
+        starts = [] if problem.start is None else [dict(problem.start)]
+        if problem.method is not Method.AUTO or len(problem.cases) > MOST_CASES:
+            return cls(starts=tuple(starts))
+        for eased in _cases(problem):
+            tracked = tracked_optimum(eased, should_stop=search.should_stop)
+            search.scouted += tracked.sweeps
+            starts += [dict(basin.values) for basin in tracked.basins]
+            if len(problem.cases) == 1 and tracked.status is DesignStatus.OPTIMAL and starts:
+                proven = _kept(search, tracked)
+                if proven is not None:
+                    return cls(starts=tuple(starts), proven=proven)
+        return cls(starts=tuple(starts))
+
+
+def _cases(problem: Problem) -> list[Problem]:
+    """Return the plain problems of the single cases that can be tracked."""
+    if problem.weights[Quantity.BAND] > 0.0:
+        return []
+    plain = [
+        replace(problem, cases=(case,), limits=NO_LIMITS, start=None, limit=None) for case in problem.cases
+    ]
+    return [one for one in plain if one.why_not_tracked is None]
+
+
+def _kept(search: Search, tracked: Tracked) -> Tracked | None:
+    """Return the tracked optimum with the rows of its limits if it keeps them all."""
+    if tracked.evaluation is None:
+        return None
+    try:
+        evaluation = search(tracked.evaluation.values)
+    except StoppedError:
+        return None
+    if not evaluation.good or evaluation.violation(search.scales) > 0.0:
+        return None
+    responses = len(evaluation.responses)
+    return replace(
+        tracked, evaluation=evaluation, sweeps=tracked.sweeps + responses, work=tracked.work + responses
+    )

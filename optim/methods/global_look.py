@@ -1,0 +1,260 @@
+"""The search of the whole range: a look that fills the space, local searches from it, and a second look.
+
+The look takes corners, middles and a Sobol sequence of designs; local searches begin from those that no
+neighbour beats; then designs are added wherever the slopes of what was seen say that something better than
+the best end may lie (`optim.methods.surrogate`), until nothing does, or a few rounds have found nothing. What
+the local searches found is compared with every design looked at. With several variables half the harmonics
+serve for the look: it only ranks designs, by as much as both differ where both were computed, and none of its
+numbers is kept.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from optim.criteria.rows import Evaluation
+from optim.methods.evaluator import Search
+from optim.methods.kkt import (
+    KEPT,
+    Local,
+    LocalSearch,
+    ModelOf,
+    ended,
+    is_flat,
+    of_limits,
+    standing,
+    without_limits,
+)
+from optim.methods.multistart import places
+from optim.methods.polish import polished
+from optim.methods.surrogate import candidates, promising, taylor_of
+from optim.problem.variables import Real, scaled, unscaled
+
+FEWEST = 3  # harmonics of a look with several variables, at least
+WORTH = 1.3  # how much higher than the best end the potential of a design to start from may be
+BETTER = 1e-6  # relative difference from which a design is better than another
+BATCH = 4  # designs a round and variable
+IDLE = 3  # rounds in a row that find nothing, after which a look is finished
+IDLE_MANY = 2  # the same with more than two variables
+MOST_ROUNDS = 16
+MOST_BEGINS = 4  # designs that the first local searches begin from
+APART = {1: 1.0 / 256.0, 2: 0.02}  # scaled distance from which two designs of a look are two
+APART_MANY = 0.05
+
+
+class WholeRange:
+    """A search of the whole range of a problem."""
+
+    def __init__(self, search: Search, local_search: LocalSearch, found: list[Local]) -> None:
+        self.search, self.found = search, found
+        self.finished = False
+        self._local_search = local_search
+        self._n = len(search.variables)
+        few = max(FEWEST, (search.problem.harmonics + 1) // 2)
+        whole = self._n == 1 or few >= search.problem.harmonics
+        self._scout = search if whole else search.scout(few)
+        self._seen: list[Evaluation] = []
+        self._starts: list[Real] = []
+        self._apart = APART.get(self._n, APART_MANY)
+        self._off = 0.0  # natural logarithm by which the look's harmonics are off
+
+    @property
+    def looked_at(self) -> tuple[Evaluation, ...]:
+        """Every design of the look, in order."""
+        return tuple(self._seen)
+
+    def run(self, given: Iterable[Mapping[str, float]]) -> bool | None:
+        """Search; `given`: designs to begin from besides those of the look.
+
+        Returns
+        -------
+        True if nothing depends on the variables, None if no response could be computed.
+        """
+        try:
+            for z in places(self._n):
+                self._look(z)
+            begins = [e for values in given if (e := self.search(values)).good]
+            if not self._seen and not begins:
+                return None
+            if self._flat():
+                return True
+            self._starts_given(begins)
+            self._rounds()
+            self._last()
+        finally:
+            if self._scout is not self.search:
+                self.search.scouting_done(self._scout)
+        return False
+
+    def _flat(self) -> bool:
+        """Return whether no design depends on any variable, with all harmonics too."""
+        if not self._seen or not all(is_flat(self._scout.model(e)) for e in self._seen):
+            return False
+        return all(is_flat(self.search.model(e)) for e in self._exact(self._seen[:2]))
+
+    def _look(self, z: Real) -> None:
+        """Look at a design."""
+        evaluation = self._scout(unscaled(self.search.variables, z))
+        if evaluation.good:
+            self._seen.append(evaluation)
+
+    def _exact(self, some: Iterable[Evaluation]) -> list[Evaluation]:
+        """Return designs of the look with all harmonics, those that can be computed."""
+        if self._scout is self.search:
+            return list(some)
+        exact = [self.search(e.values) for e in some]
+        return [e for e in exact if e.good]
+
+    def _starts_given(self, begins: list[Evaluation]) -> None:
+        for begin in begins:
+            self._descend(begin)
+        known = bool(begins) and self._n == 1  # the tracked optima without limits are among them
+        if self.search.problem.limits.any and self._seen and not known:
+            # Limits that do not bind must not make a search worse: begin from what is best without them.
+            least = min(self._seen, key=lambda e: e.objective)
+            for begin in self._exact([least]):
+                free = self._local(begin, lambda e: without_limits(self.search.model(e)))
+                self._descend(free)
+
+    def _rounds(self) -> None:
+        """Alternate between local searches and further looks until these find nothing."""
+        idle, most = 0, max(self.search.problem.basins, min(2 + self._n, MOST_BEGINS))
+        for turn in range(MOST_ROUNDS):
+            before = self._best()
+            for begin in self._begins(most):
+                for exact in self._exact([begin]):
+                    self._descend(exact)
+            after = self._best()
+            idle = 0 if turn == 0 or _beats(after, before) else idle + 1
+            enough = IDLE if self._n <= 2 else IDLE_MANY
+            more = [] if idle >= enough else self._further(turn)
+            if not more:
+                self.finished = True
+                return
+            for z in more:
+                self._look(z)
+            most = 2
+
+    def _best(self) -> tuple[float, float]:
+        return min((local.standing for local in self.found), default=(math.inf, math.inf))
+
+    def _descend(self, begin: Evaluation) -> None:
+        """Search locally from a design, for the limits alone where it ends without keeping them."""
+        self._starts.append(scaled(self.search.variables, begin.values))
+        here, ends = begin, []
+        if self.search.model(begin).violation > KEPT and not any(local.feasible for local in self.found):
+            here = self._eased(begin)
+            ends.append(self._ended(here))
+        if not ends or ends[0].feasible:
+            ends.append(self._ended(self._local(here, self.search.model)))
+        best = min(ends, key=lambda local: local.standing)
+        self.found.append(best)
+        there = best.evaluation
+        if self._scout is not self.search:
+            there = self._scout(best.evaluation.values)
+        if there.good:
+            if self._scout is not self.search:
+                exact, rough = best.evaluation.objective, there.objective
+                self._off = max(self._off, abs(math.log(max(exact, 1e-300) / max(rough, 1e-300))))
+            self._seen.append(there)
+
+    def _eased(self, begin: Evaluation) -> Evaluation:
+        """Return the end of a search for a design that keeps all limits: the first that does."""
+        from optim.methods.minimax import thorough_search
+
+        return thorough_search(
+            self.search, self.search.variables, begin, lambda e: of_limits(self.search.model(e)),
+            enough=1.0 + KEPT,
+        ).evaluation  # fmt: skip
+
+    def _local(self, begin: Evaluation, model_of: ModelOf) -> Evaluation:
+        return self._local_search(self.search, self.search.variables, begin, model_of).evaluation
+
+    def _ended(self, there: Evaluation) -> Local:
+        return ended(there, self.search.model(there), self.search.variables)
+
+    def _infeasible(self) -> bool:
+        """Return whether no design known keeps all limits."""
+        known = (*self._seen, *(local.evaluation for local in self.found))
+        return all(self._scout.model(e).violation > 0.0 for e in known)
+
+    def _begins(self, most: int) -> list[Evaluation]:
+        """Return designs of the look to start from: beaten by no neighbour, and may lead below the best."""
+        feasibility = self._infeasible()
+        models = [taylor_of(self._scout.model(e), feasibility=feasibility) for e in self._seen]
+        if not models:
+            return []
+        known = np.array([model.place for model in models])
+        values = np.array([model.value for model in models])
+        distance = np.abs(known[:, None, :] - known).max(axis=2)
+        count = min(2 * self._n + 1, len(models))
+        near = np.argpartition(distance, count - 1, axis=1)[:, :count]
+        reach = np.sort(distance, axis=1)[:, min(2, len(models) - 1)]
+        minima = np.flatnonzero(values <= values[near].min(axis=1))
+        if self._n == 1:
+            order = np.argsort(known[:, 0])
+            line = np.concatenate([[np.inf], values[order], [np.inf]])
+            minima = order[(line[1:-1] <= line[:-2]) & (line[1:-1] <= line[2:])]
+        potential: dict[int, float] = {}
+        for i in minima.tolist():
+            around = np.clip(known[i] + reach[i] * self._around(), 0.0, 1.0)
+            potential[i] = float(models[i].at(around).min())
+        best = values.min() * math.exp(self._off)
+        ends = [scaled(self.search.variables, local.evaluation.values) for local in self.found]
+        started = np.array([*self._starts, *ends]).reshape(-1, self._n)
+        chosen: list[Evaluation] = []
+        for i in sorted(potential, key=lambda i: potential[i]):
+            fresh = not len(started) or np.abs(started - known[i]).max(axis=1).min() >= self._apart
+            wanted = self._distinct() + len(chosen) < self.search.problem.basins
+            if fresh and len(chosen) < most and (wanted or potential[i] <= WORTH * best):
+                chosen.append(self._seen[i])
+        return chosen
+
+    def _distinct(self) -> int:
+        """Return how many ends differ."""
+        places: list[Real] = []
+        for local in self.found:
+            z = scaled(self.search.variables, local.evaluation.values)
+            if all(np.abs(z - other).max() > self._apart for other in places):
+                places.append(z)
+        return len(places)
+
+    def _around(self) -> Real:
+        return np.vstack([np.zeros(self._n), 2.0 * candidates(self._n, 1)[:64] - 1.0])
+
+    def _further(self, turn: int) -> list[Real]:
+        """Return places to look at, where what is known leaves room for something better than the best."""
+        feasibility = self._infeasible()
+        models = [taylor_of(self._scout.model(e), feasibility=feasibility) for e in self._seen]
+        if not models:
+            return []
+        enough = min(model.value for model in models)
+        enough *= (1.0 - BETTER) * math.exp(self._off)
+        return promising(models, candidates(self._n, turn), enough, self._apart, BATCH * min(self._n, 3))
+
+    def _last(self) -> None:
+        """Go on from a design that beats every end; without slopes from an end that did not settle."""
+        for _ in range(3):
+            good = self.search.good()
+            if not good:
+                return
+            best = min(good, key=lambda e: standing(self.search.model(e)))
+            if not _beats(standing(self.search.model(best)), self._best()):
+                break
+            self._descend(best)
+        end = min(self.found, key=lambda local: local.standing)
+        if not end.settled:
+            better = polished(self.search, end)
+            self.found.append(better)
+            if not better.settled:
+                self._descend(better.evaluation)
+
+
+def _beats(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Return whether a standing is better than another, by more than rounding."""
+    if one[0] != other[0]:
+        return one[0] < other[0] - BETTER
+    return one[1] < other[1] - BETTER * abs(other[1])

@@ -1,0 +1,94 @@
+"""Where a local search ended, judged by the first-order conditions themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from optim.criteria.linearised import Conditions, Model, conditions
+from optim.criteria.rows import Evaluation
+from optim.problem.variables import Variable
+
+Evaluate = Callable[[Mapping[str, float]], Evaluation]
+ModelOf = Callable[[Evaluation], Model]
+
+KKT_TOLERANCE = 1e-3  # relative objective per scaled variable
+KEPT = 1e-6  # relative excess over a bound up to which it counts as kept
+FLAT_SLOPE = 1e-9  # relative objective per scaled variable below which there is nothing to choose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Local:
+    """Where a local search ended.
+
+    Attributes
+    ----------
+    evaluation : Evaluation
+        The best design.
+    merit : float
+        Its objective, with the penalty on the limits it does not keep.
+    settled : bool
+        Whether the first-order conditions hold: of the objective, or, if limits are not kept, of the largest
+        excess over them.
+    feasible : bool
+        Whether the limits are kept.
+    conditions : Conditions
+        Multipliers and residual.
+    standing : (float, float)
+        What designs are compared by; see `standing`.
+    """
+
+    evaluation: Evaluation
+    merit: float
+    settled: bool
+    feasible: bool
+    conditions: Conditions
+    standing: tuple[float, float]
+
+
+def standing(model: Model) -> tuple[float, float]:
+    """Return what designs are compared by: the excess over the limits that are not kept, then the objective.
+
+    No penalty is large enough for every limit: a design that keeps all of them goes before any that does not.
+    """
+    violation = model.violation
+    return (0.0 if violation <= KEPT else violation), model.objective
+
+
+def ended(here: Evaluation, model: Model, variables: Sequence[Variable]) -> Local:
+    """Return the end of a search at a design."""
+    feasible = model.violation <= KEPT
+    found = conditions(model, variables, feasibility=not feasible)
+    return Local(
+        evaluation=here, merit=model.merit, settled=found.residual <= KKT_TOLERANCE, feasible=feasible,
+        conditions=found, standing=standing(model),
+    )  # fmt: skip
+
+
+def is_flat(model: Model) -> bool:
+    """Return whether no row depends on any variable."""
+    both = np.concatenate([model.slopes.reshape(-1), model.excess_slopes.reshape(-1)])
+    return bool(np.all(np.abs(both) <= FLAT_SLOPE))
+
+
+def of_limits(model: Model) -> Model:
+    """Return the model whose objective is the largest relative excess over a limit, counted from 1."""
+    rows = tuple(
+        replace(row, weight=model.unit / unit)
+        for row, unit in zip(model.limited, model.units.tolist(), strict=True)
+    )
+    return replace(
+        without_limits(model), rows=rows, heights=1.0 + model.excess, slopes=model.excess_slopes,
+        groups=np.zeros(model.excess.size),
+    )  # fmt: skip
+
+
+def without_limits(model: Model) -> Model:
+    """Return the model of what is minimised alone."""
+    none = np.zeros(0)
+    return replace(model, limited=(), excess=none, excess_slopes=np.zeros((0, model.z.size)), units=none)
+
+
+LocalSearch = Callable[[Evaluate, tuple[Variable, ...], Evaluation, ModelOf], Local]

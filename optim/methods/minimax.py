@@ -1,0 +1,194 @@
+"""Trust-region search for the design whose largest row is least, subject to limits on others.
+
+Each step solves the convex subproblem of `optim.methods.subproblem` at the present design: every competing
+peak, every band is a row, so an exchange of the highest peak is nothing special. The curvature between
+exchanges is that of the Lagrangian: exact where every row that pulls has second derivatives, else a damped
+BFGS matrix. Reference: Conn, Gould, Toint, Trust-Region Methods (SIAM
+2000), chapter 14, and Powell's damping (Math. Program. 14 (1978) 224).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from optim.criteria.bundle import with_cuts
+from optim.criteria.linearised import PENALTY, Model
+from optim.criteria.rows import Evaluation, Row, nearest
+from optim.methods.conic import Step
+from optim.methods.kkt import KEPT, Evaluate, Local, ModelOf, ended
+from optim.methods.subproblem import solve_subproblem
+from optim.problem.variables import Real, Variable, snapped, unscaled
+
+Subproblem = Callable[[Model, Real, float], Step | None]
+
+FIRST_RADIUS = 0.2
+LARGEST_RADIUS = 0.5
+SMALLEST_RADIUS = 1e-9
+STATIONARY = 1e-11  # predicted relative decrease below which a design is optimal
+MOST_STEPS = 40
+FIRST_PENALTY = 1.0  # times the objective: far above the multipliers, it makes limits that bend too steep
+STRONGER = 10.0  # factor of a penalty that leaves limits broken
+ENOUGH = 1e-4  # share of the predicted decrease from which a step is taken
+REMEMBERED = 8  # designs whose rows are kept as cuts
+CUTS_REACH = 10.0  # times the radius, as far as cuts reach
+SAME_DESIGN = 1e-5  # scaled distance within which the rows of another design tell of the optimum
+NOTHING = 1e-9  # multipliers below it are rounding of the conic solver
+
+
+def minimax_search(
+    evaluate: Evaluate, variables: tuple[Variable, ...], begin: Evaluation, model_of: ModelOf, *,
+    solve: Subproblem | None = None, norm: float = np.inf, remembered: int = REMEMBERED,
+    enough: float = -np.inf,
+) -> Local:  # fmt: skip
+    """Improve a design until no first-order decrease is left.
+
+    Parameters
+    ----------
+    evaluate : the rows of a design, with gradients.
+    variables : the design variables.
+    begin : a good evaluation to start from.
+    model_of : the model of an evaluation.
+    solve : the convex subproblem; that of `optim.methods.subproblem` if left out.
+    norm : in which its trust region is round.
+    remembered : designs whose rows are kept as cuts.
+    enough : merit from which on nothing better is looked for.
+    """
+    solve = solve or solve_subproblem
+    n = len(variables)
+    here, model = begin, model_of(begin)
+    model = replace(model, penalty=min(FIRST_PENALTY * abs(model.objective) or PENALTY, PENALTY))
+    hessian, radius = np.zeros((n, n)), FIRST_RADIUS
+    seen: deque[Model] = deque(maxlen=remembered)
+    for _ in range(MOST_STEPS):
+        known = with_cuts(model, seen, CUTS_REACH * radius)
+        step = solve(known, _root(hessian), radius)
+        if step is None:
+            break
+        if _too_weak(model, step):
+            model = replace(model, penalty=min(STRONGER * model.penalty, PENALTY))
+            continue
+        decrease = model.merit - step.predicted
+        if decrease <= STATIONARY * model.merit or radius <= SMALLEST_RADIUS:
+            break
+        trial = evaluate(unscaled(variables, snapped(model.z + step.step)))
+        if not trial.good:
+            radius *= 0.25
+            continue
+        fresh = replace(model_of(trial), penalty=model.penalty)
+        moved = fresh.z - model.z
+        ratio = (model.merit - fresh.merit) / max(decrease - 0.5 * float(moved @ hessian @ moved), 1e-300)
+        if fresh.smooth:
+            hessian = _curvature(model, fresh, _pulls(known, step), hessian, accepted=ratio > ENOUGH)
+            seen.append(model if ratio > ENOUGH else fresh)
+        size = float(np.linalg.norm(step.step, norm))
+        if ratio > 0.75 and size > 0.9 * radius:
+            radius = min(2.0 * radius, LARGEST_RADIUS)
+        elif ratio < 0.25:
+            radius = 0.5 * size if ratio > 0.0 else 0.25 * size
+        if ratio > ENOUGH and fresh.smooth:
+            here, model = trial, fresh
+            if model.merit <= enough:
+                break
+    return ended(here, replace(with_cuts(model, seen, SAME_DESIGN), penalty=PENALTY), variables)
+
+
+def _too_weak(model: Model, step: Step) -> bool:
+    """Return whether the penalty is what leaves limits broken: they pull as hard as it lets them."""
+    pull = float(step.limit_multipliers.sum())
+    left = float((model.excess + model.excess_slopes @ step.step).max(initial=0.0))
+    return left > KEPT and pull >= 0.99 * model.penalty and model.penalty < PENALTY
+
+
+def thorough_search(
+    evaluate: Evaluate, variables: tuple[Variable, ...], begin: Evaluation, model_of: ModelOf,
+    enough: float = -np.inf,
+) -> Local:  # fmt: skip
+    """Improve a design with cuts, and go on without them where that does not settle.
+
+    A row bent over a long step may pass for a new one and hold a search where nothing is.
+    """
+    found = minimax_search(evaluate, variables, begin, model_of, enough=enough)
+    if found.settled or found.merit <= enough:
+        return found
+    again = minimax_search(evaluate, variables, found.evaluation, model_of, remembered=0, enough=enough)
+    return min(found, again, key=lambda local: (local.standing, not local.settled))
+
+
+def _curvature(
+    model: Model, fresh: Model, pulls: list[tuple[Row, float]], hessian: Real, *, accepted: bool
+) -> Real:
+    """Return the Hessian of the Lagrangian for the next step: exact where the solver has it, else updated.
+
+    Only its convex part serves; a step that was not taken leaves the design, and so the exact Hessian of it.
+    """
+    exact = _exact(fresh if accepted else model, pulls)
+    if exact is not None:
+        return _convex(exact)
+    return _update(hessian, fresh.z - model.z, _gradient(fresh, pulls) - _gradient(model, pulls))
+
+
+def _exact(model: Model, pulls: list[tuple[Row, float]]) -> Real | None:
+    """Return the Hessian of the Lagrangian whose multipliers belong to rows of another design."""
+    total = np.zeros((model.z.size, model.z.size))
+    for row, multiplier in pulls:
+        limited = row.weight == 0.0
+        near = nearest(row, model.limited if limited else model.rows)
+        second = None if near is None else model.limited_second(near) if limited else model.second(near)
+        if second is None:
+            return None
+        total += multiplier * second
+    return total
+
+
+def _convex(hessian: Real) -> Real:
+    """Return the nearest positive semidefinite matrix."""
+    values, vectors = np.linalg.eigh(hessian)
+    convex: Real = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    return convex
+
+
+def _gradient(model: Model, pulls: list[tuple[Row, float]]) -> Real:
+    """Return the gradient of the Lagrangian whose multipliers belong to rows of another design."""
+    total = np.zeros(model.z.size)
+    for row, multiplier in pulls:
+        near = nearest(row, model.limited if row.weight == 0.0 else model.rows)
+        if near is not None:
+            total += multiplier * (model.excess_slopes if row.weight == 0.0 else model.slopes)[near]
+    return total
+
+
+def _pulls(model: Model, step: Step) -> list[tuple[Row, float]]:
+    """Return the rows that hold a step, with their multipliers."""
+    found = [(row, float(x)) for row, x in zip(model.rows, step.multipliers, strict=True) if x > NOTHING]
+    limits = zip(model.limited, step.limit_multipliers, strict=True)
+    return found + [(replace(row, weight=0.0), float(x)) for row, x in limits if x > NOTHING]
+
+
+def _update(hessian: Real, s: Real, y: Real) -> Real:
+    """Return the damped BFGS update; the first one scales the matrix."""
+    curvature = float(s @ y)
+    if not np.any(hessian):
+        if curvature <= 0.0 or not np.any(s):
+            return hessian
+        return np.eye(s.size) * curvature / float(s @ s)
+    Bs = hessian @ s
+    quadratic = float(s @ Bs)
+    if quadratic <= 0.0:
+        return hessian
+    if curvature < 0.2 * quadratic:
+        theta = 0.8 * quadratic / (quadratic - curvature)
+        y = theta * y + (1.0 - theta) * Bs
+        curvature = float(s @ y)
+    updated: Real = hessian - np.outer(Bs, Bs) / quadratic + np.outer(y, y) / curvature
+    return updated
+
+
+def _root(hessian: Real) -> Real:
+    """Return R with RᵀR = hessian."""
+    values, vectors = np.linalg.eigh(hessian)
+    root: Real = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+    return root

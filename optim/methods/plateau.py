@@ -1,0 +1,273 @@
+"""Where what is minimised does not change along a variable: the interval, and what to choose within it.
+
+A sharp number would be one of many as good: the ends are found by bisection, and within them the next peak
+is made least, then the resonance band, then the variable itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from optim.criteria.evaluation import evaluate, natural_scales
+from optim.criteria.rows import Evaluation, Quantity, Row
+from optim.methods.evaluator import StoppedError
+from optim.methods.kkt import KEPT
+from optim.problem.problem import Problem
+from optim.problem.variables import Variable, parameter_values
+from optim.problem.watch import ShouldStop
+from optim.results.design import DesignStatus
+from solver.response.solve import solve
+
+LEVEL = 1e-6  # relative change below which what is minimised counts as constant
+STEP = 0.01  # scaled, to the first designs that are compared
+END = 1e-8  # scaled, to which the ends of a plateau are known
+PLACES = 9  # designs on a plateau that the next criterion is compared at
+PRECISE = 1e-7  # scaled, to which its least place is known
+BROAD = 1e-5  # scaled width from which the next criterion is level too
+
+Along = Callable[[float], Evaluation]
+Criterion = Callable[[Evaluation], float | None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plateau:
+    """What is as good as an optimum, and the design chosen of it.
+
+    Attributes
+    ----------
+    intervals : mapping of variable name to (low, high)
+        Along each variable that has one, the others as chosen.
+    evaluation : Evaluation
+        The design chosen.
+    chosen_by : str
+        The criterion it was chosen by.
+    better : Evaluation or None
+        A design met on the way that is better than the optimum: then that was none.
+    responses : int
+        Frequency responses computed.
+    """
+
+    intervals: Mapping[str, tuple[float, float]]
+    evaluation: Evaluation
+    chosen_by: str
+    better: Evaluation | None
+    responses: int
+
+
+def plateau_of(problem: Problem, best: Evaluation, should_stop: ShouldStop) -> Plateau | None:
+    """Return the plateau an optimum lies on; None if it is sharp in every variable.
+
+    Raises
+    ------
+    StoppedError
+        The caller asked to stop.
+    """
+    level = _Level(problem, best, should_stop)
+    here, chosen_by = best, ""
+    for variable in problem.variables:
+        if level.may_be_level(here, variable):
+            found = level.chosen(here, variable)
+            if found is not None:
+                here, chosen_by = found[0], chosen_by or found[1]
+            if level.better is not None:
+                break
+    if level.better is None and not chosen_by:
+        return None
+    if level.better is not None:
+        better = level.exact(level.better.values)
+        return Plateau(intervals={}, evaluation=best, chosen_by="", better=better, responses=level.responses)
+    intervals = {v.name: level.interval(here, v) for v in problem.variables}
+    here = here if here is best else level.exact(here.values)
+    return Plateau(
+        intervals={name: found for name, found in intervals.items() if found is not None}, evaluation=here,
+        chosen_by=chosen_by, better=None, responses=level.responses,
+    )  # fmt: skip
+
+
+class _Level:
+    """Designs as good as an optimum."""
+
+    def __init__(self, problem: Problem, best: Evaluation, should_stop: ShouldStop) -> None:
+        self._problem, self._should_stop = problem, should_stop
+        self._scales = natural_scales(problem)
+        self._enough = best.objective * (1.0 + LEVEL)
+        self._allowed = max(best.violation(self._scales), KEPT)
+        self._found: dict[tuple[str, float], tuple[float, float]] = {}
+        self._lower = best.objective * (1.0 - LEVEL)
+        self.better: Evaluation | None = None
+        self.responses = 0
+
+    def exact(self, values: Mapping[str, float]) -> Evaluation:
+        """Return a design with gradients."""
+        return self._evaluated(values, gradients=True)
+
+    def _evaluated(self, values: Mapping[str, float], *, gradients: bool = False) -> Evaluation:
+        if self._should_stop is not None and self._should_stop():
+            raise StoppedError(DesignStatus.STOPPED)
+        found = evaluate(self._problem, values, gradients=gradients, should_stop=self._should_stop)
+        self.responses += len(found.responses)
+        if found.good and found.objective < self._lower and self._good(found):
+            self.better, self._lower = found, found.objective
+        return found
+
+    def _good(self, there: Evaluation) -> bool:
+        """Return whether a design is as good as the optimum."""
+        return (
+            there.good and there.objective <= self._enough and there.violation(self._scales) <= self._allowed
+        )
+
+    def may_be_level(self, here: Evaluation, variable: Variable) -> bool:
+        """Return whether the amplitude at the highest peak stays when a variable moves to a side.
+
+        Necessary for a plateau, and one solved frequency instead of a response: most optima end here.
+        """
+        i = self._problem.variables.index(variable)
+        slope = abs(variable.slope(here.values[variable.name]))
+        held = [
+            row
+            for row in _holding(here)
+            if not abs(row.gradient[i]) * slope > LEVEL * abs(row.value)
+        ]  # fmt: skip
+        return any(self._stays(here, variable, row, side) for row in held for side in (-STEP, STEP))
+
+    def _stays(self, here: Evaluation, variable: Variable, row: Row, side: float) -> bool:
+        z = variable.inside(here.values[variable.name]) + side
+        if not 0.0 <= z <= 1.0:
+            return False
+        if row.quantity is not Quantity.PEAK:
+            return True
+        case = next(case for case in self._problem.cases if case.name == row.case)
+        values = {**here.values, variable.name: variable.outside(z)}
+        scene = case.scene.with_values(parameter_values(self._problem.variables, values))
+        there = solve(scene, frequency_hz=row.at_hz, harmonics=self._problem.harmonics)
+        # Where it did not converge the responses decide.
+        return not abs(there.max_abs - row.value) > LEVEL * abs(row.value)
+
+    def _along(self, here: Evaluation, variable: Variable) -> Along:
+        """Return what evaluates designs along a variable."""
+        known: dict[float, Evaluation] = {variable.inside(here.values[variable.name]): here}
+
+        def along(z: float) -> Evaluation:
+            if z not in known:
+                known[z] = self._evaluated({**here.values, variable.name: variable.outside(z)})
+            return known[z]
+
+        return along
+
+    def interval(self, here: Evaluation, variable: Variable) -> tuple[float, float] | None:
+        """Return the interval of a variable in which designs are as good; None if it is none."""
+        z = variable.inside(here.values[variable.name])
+        known = [(low, high) for (name, _), (low, high) in self._found.items() if name == variable.name]
+        found = next((pair for pair in known if pair[0] <= z <= pair[1]), None)
+        if found is None or len(self._problem.variables) > 1:
+            if not self.may_be_level(here, variable):
+                return None
+            found = _ends(self._along(here, variable), self._good, z, (0.0, 1.0))
+        if found[1] - found[0] < STEP:
+            return None
+        self._found[variable.name, z] = found
+        return variable.outside(found[0]), variable.outside(found[1])
+
+    def chosen(self, here: Evaluation, variable: Variable) -> tuple[Evaluation, str] | None:
+        """Return the design chosen on the plateau along a variable, and by what; None if there is none."""
+        along, z = self._along(here, variable), variable.inside(here.values[variable.name])
+        low, high = _ends(along, self._good, z, (0.0, 1.0))
+        if high - low < STEP:
+            return None
+        self._found[variable.name, z] = low, high
+        held = _holding(here)[0]
+        criteria: dict[str, Criterion] = {
+            "the next highest peak": lambda there: _next_peak(self._problem, there, held),
+            "the resonance band": lambda there: None if there.band is None else there.band.value,
+        }
+        for words, criterion in criteria.items():
+            least = _least(along, criterion, low, high)
+            if least is None:
+                continue
+            best, enough = least
+            low, high = _ends(along, _at_most(criterion, enough), best, (low, high))
+            if high - low <= BROAD:
+                return along(best), words
+        return along(low), f"the least {variable.name}"
+
+
+def _at_most(criterion: Criterion, enough: float) -> Callable[[Evaluation], bool]:
+    """Return whether a criterion is no larger than what counts as its least."""
+
+    def kept(there: Evaluation) -> bool:
+        value = criterion(there)
+        return value is not None and value <= enough
+
+    return kept
+
+
+def _ends(
+    along: Along, good: Callable[[Evaluation], bool], z: float, within: tuple[float, float]
+) -> tuple[float, float]:
+    """Return how far designs are good on both sides of a place, by doubled steps and bisection."""
+    ends = []
+    for bound, sign in ((within[0], -1.0), (within[1], 1.0)):
+        inside, step = z, STEP
+        outside = None
+        while inside != bound and outside is None:
+            trial = max(inside - step, bound) if sign < 0.0 else min(inside + step, bound)
+            if good(along(trial)):
+                inside, step = trial, 2.0 * step
+            else:
+                outside = trial
+        while outside is not None and abs(outside - inside) > END:
+            middle = 0.5 * (inside + outside)
+            if good(along(middle)):
+                inside = middle
+            else:
+                outside = middle
+        ends.append(inside)
+    return ends[0], ends[1]
+
+
+def _least(along: Along, criterion: Criterion, low: float, high: float) -> tuple[float, float] | None:
+    """Return where a criterion is least and what counts as that; None where it is not known or level."""
+    places = np.linspace(low, high, PLACES)
+    values = [criterion(along(float(z))) for z in places]
+    known = [value for value in values if value is not None]
+    if len(known) < len(values) or max(known) - min(known) <= LEVEL * abs(max(known)):
+        return None
+    i = int(np.argmin(known))
+    best, least = float(places[i]), known[i]
+    found = minimize_scalar(
+        lambda z: criterion(along(float(z))) or 0.0, method="bounded",
+        bounds=(places[max(i - 1, 0)], places[min(i + 1, PLACES - 1)]), options={"xatol": PRECISE},
+    )  # fmt: skip
+    if found.fun < least:
+        best, least = float(found.x), float(found.fun)
+    return best, least + LEVEL * 1e-3 * abs(least)
+
+
+def _holding(here: Evaluation) -> list[Row]:
+    """Return the rows that hold what is minimised, the highest first."""
+    held: list[Row] = []
+    for quantity in (Quantity.PEAK, Quantity.BAND):
+        rows = [row for row in here.of(quantity) if row.weight > 0.0]
+        top = max((row.weight * row.value for row in rows), default=0.0)
+        held += [row for row in rows if row.weight * row.value >= top * (1.0 - LEVEL)]
+    return held
+
+
+def _next_peak(problem: Problem, there: Evaluation, held: Row) -> float | None:
+    """Return the highest weighted peak of all responses besides the one that holds the optimum."""
+    weights = {case.name: case.weight for case in problem.cases}
+    seen: set[str] = set()
+    others: list[float] = []
+    for response in there.responses:
+        if response.case in seen:
+            continue  # of a forbidden range
+        seen.add(response.case)
+        for peak in response.branch.peaks:
+            mine = response.case == held.case and abs(peak.at - held.at_hz) <= LEVEL * abs(held.at_hz)
+            if not mine:
+                others.append(weights[response.case] * peak.value)
+    return max(others, default=None)

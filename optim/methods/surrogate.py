@@ -1,0 +1,141 @@
+"""What is known between the designs looked at: Taylor models of the nearest ones, and how far they differ.
+
+Every design looked at has its rows with their slopes. Between designs each of the nearest ones predicts the
+number by its own rows, positive ones along exponentials (Shepard's inverse-distance weights of Taylor models:
+Franke, Nielson, Int. J. Numer. Methods Eng. 15 (1980) 1691, doi:10.1002/nme.1620151110); where these
+predictions differ, little is known. A place is worth a look where the mean less a few times the spread may
+beat the best design (lower confidence bound: Cox, John, in Multidisciplinary Design Optimization, SIAM 1997,
+p. 105).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import qmc
+
+from optim.criteria.linearised import Model
+from optim.problem.variables import Real
+
+NEAREST = 2  # designs a variable, and two more, whose models predict a place
+DOUBT = 1.0  # spreads by which a prediction may be too high
+MOST_GROWTH = 3.0  # exponent at most
+CANDIDATES = 256  # places a variable that are compared, one variable: all of them in steps
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Taylor:
+    """First-order model of a number: Σ over groups of the largest row, a price on the largest limited row.
+
+    Attributes
+    ----------
+    place : (n,) array
+        Where it was looked at.
+    groups : tuple of ((m,), (m, n)) arrays
+        Rows with their slopes.
+    limited : ((c,), (c, n)) arrays or None
+        Relative excesses over bounds.
+    price : float
+        On the largest excess above 0.
+    """
+
+    place: Real
+    groups: tuple[tuple[Real, Real], ...]
+    limited: tuple[Real, Real] | None = None
+    price: float = 0.0
+
+    @property
+    def value(self) -> float:
+        """The number here."""
+        return float(self.at(self.place[None, :])[0])
+
+    def at(self, places: Real) -> Real:
+        """Return the predictions at (k, n) places."""
+        steps = places - self.place
+        total = np.zeros(len(places))
+        for values, slopes in self.groups:
+            total += _grown(values, steps @ slopes.T).max(axis=1)
+        if self.limited is not None:
+            excess, slopes = self.limited
+            total += self.price * np.maximum(_grown(1.0 + excess, steps @ slopes.T).max(axis=1) - 1.0, 0.0)
+        return total
+
+
+def _grown(values: Real, changes: Real) -> Real:
+    """Return rows after first-order changes (k, m): along exponentials where they are positive."""
+    positive = values > 0.0
+    safe = np.where(positive, values, 1.0)
+    exponents = np.clip(changes / safe, -MOST_GROWTH, MOST_GROWTH)
+    grown: Real = np.where(positive, safe * np.exp(exponents), values + changes)
+    return grown
+
+
+def taylor_of(model: Model, *, feasibility: bool = False) -> Taylor:
+    """Return the model of a design's merit, or of its largest excess."""
+    if feasibility:
+        return Taylor(place=model.z, groups=((1.0 + model.excess, model.excess_slopes),))
+    groups = tuple(
+        (model.heights[model.groups == g], model.slopes[model.groups == g]) for g in np.unique(model.groups)
+    )
+    limited = (model.excess, model.excess_slopes) if model.excess.size else None
+    return Taylor(place=model.z, groups=groups, limited=limited, price=model.penalty)
+
+
+def candidates(n: int, seed: int) -> Real:
+    """Return places of the unit box that are compared, (k, n); other ones for another seed."""
+    if n == 1:
+        return np.linspace(0.0, 1.0, 2 * CANDIDATES + 1)[:, None]
+    places = qmc.Sobol(n, scramble=True, seed=seed).random(2 ** int(np.ceil(np.log2(CANDIDATES * n))))
+    # A share of them on the faces: the best design often lies on one.
+    faces = np.arange(0, len(places), 4)
+    places[faces, faces // 4 % n] = (faces // 4 // n) % 2
+    return np.asarray(places)
+
+
+def promising(
+    models: Sequence[Taylor], places: Real, enough: float, apart: float, most: int, *, above: bool = False
+) -> list[Real]:
+    """Return the places where a number may be below (above) `enough`, the most promising first.
+
+    Parameters
+    ----------
+    models : of the places looked at.
+    places : (k, n) candidates.
+    enough : the number to be beaten.
+    apart : least distance, the largest over the coordinates, from what was looked at and from each other.
+    most : how many.
+    above : what is looked for is larger than `enough`.
+    """
+    known = np.array([model.place for model in models])
+    far = np.abs(places[:, None, :] - known).max(axis=2)
+    places = places[far.min(axis=1) >= apart]
+    if not len(places):
+        return []
+    mean, spread = between(models, known, places)
+    low = (-mean if above else mean) - DOUBT * spread
+    chosen: list[Real] = []
+    for i in np.argsort(low):
+        if low[i] >= (-enough if above else enough) or len(chosen) >= most:
+            break
+        if all(np.abs(places[i] - other).max() >= apart for other in chosen):
+            chosen.append(places[i])
+    return chosen
+
+
+def between(models: Sequence[Taylor], known: Real, places: Real) -> tuple[Real, Real]:
+    """Return the mean of the predictions of the nearest models at (k, n) places, and their spread."""
+    distance = np.linalg.norm(places[:, None, :] - known, axis=2)
+    count = min(NEAREST * known.shape[1] + 2, len(models))
+    nearest = np.argpartition(distance, count - 1, axis=1)[:, :count]
+    weights = 1.0 / np.maximum(np.take_along_axis(distance, nearest, axis=1), 1e-9) ** (known.shape[1] + 2)
+    weights /= weights.sum(axis=1, keepdims=True)
+    predicted = np.zeros(nearest.shape)
+    for j, model in enumerate(models):
+        which = nearest == j
+        rows = np.flatnonzero(which.any(axis=1))
+        if rows.size:
+            predicted[which] = model.at(places[rows])
+    mean = (weights * predicted).sum(axis=1)
+    return mean, np.sqrt((weights * (predicted - mean[:, None]) ** 2).sum(axis=1))

@@ -1,1 +1,0 @@
-"""Pictures of designs, in the style of `solver.plots`."""

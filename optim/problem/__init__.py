@@ -1,0 +1,1 @@
+"""The design problem: variables, load cases, uncertainty."""

@@ -1,0 +1,319 @@
+"""Uncertain parameters: what is not known of a scene, and in which scenarios that may end.
+
+A set of scenarios is given as intervals, as an ellipsoid, or as a list of samples; the blades of a disk may
+be mistuned on top. Points of an interval box or an ellipsoid are numbered by ξ, of the unit box or the unit
+ball: δ = centre + axes ξ, where δ is the value of a parameter or its deviation from the nominal one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from scipy.special import ndtri
+
+from optim.problem.variables import Real
+from solver.errors import SettingError
+from solver.scene.scene import CyclicStructure, Scene
+
+
+class How(Enum):
+    """What the number of an uncertain parameter means."""
+
+    VALUE = "value"
+    RELATIVE = "relative deviation"
+    OFFSET = "deviation"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coordinate:
+    """One uncertain number; several parameter paths may share it.
+
+    Attributes
+    ----------
+    name : str
+        The paths as the user wrote them.
+    paths : tuple of str
+        The parameter paths it acts on.
+    how : How
+        Its value, or its deviation from the nominal value (of a variable: from the design's).
+    """
+
+    name: str
+    paths: tuple[str, ...]
+    how: How
+
+    def value(self, nominal: float, delta: float) -> float:
+        """Return the value of a path."""
+        if self.how is How.VALUE:
+            return delta
+        return nominal * (1.0 + delta) if self.how is How.RELATIVE else nominal + delta
+
+    def by_delta(self, nominal: float) -> float:
+        """Return d value / dδ."""
+        return nominal if self.how is How.RELATIVE else 1.0
+
+    def by_nominal(self, delta: float) -> float:
+        """Return d value / d nominal."""
+        return {How.VALUE: 0.0, How.RELATIVE: 1.0 + delta, How.OFFSET: 1.0}[self.how]
+
+    def words(self, delta: float) -> str:
+        """Return a number of it in words."""
+        if self.how is How.VALUE:
+            return f"{self.name} = {delta:.6g}"
+        return (
+            f"{self.name} {100.0 * delta:+.4g} %" if self.how is How.RELATIVE else f"{self.name} {delta:+.6g}"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disk:
+    """A disk whose blades are not quite equal; the keys are those of ``[structure.mistuning]`` in a scene.
+
+    Attributes
+    ----------
+    of : tuple of str
+        The parts that differ.
+    spread, seed : float, int
+        Of the random factors, unless `values` are given.
+    values : tuple of float
+        The factors themselves.
+    """
+
+    of: tuple[str, ...]
+    spread: float = 0.0
+    seed: int = 0
+    values: tuple[float, ...] = ()
+
+    def table(self) -> dict[str, object]:
+        """Return the table of a scene."""
+        if self.values:
+            return {"of": list(self.of), "values": list(self.values)}
+        return {"of": list(self.of), "spread": self.spread, "seed": self.seed}
+
+    def on(self, scene: Scene) -> Scene:
+        """Return the disk of a scene, mistuned.
+
+        Raises
+        ------
+        SettingError, SceneError
+            The scene is not cyclic, or the factors do not fit it.
+        """
+        if not isinstance(scene.structure, CyclicStructure):
+            raise SettingError("scene", scene.name, "must have a cyclic structure to be mistuned")
+        raw = scene.to_dict()
+        structure = scene.structure.model_dump(mode="json", exclude_none=True)
+        raw["structure"] = {**structure, "mistuning": self.table()}
+        return Scene.from_dict(raw)
+
+    def words(self) -> str:
+        """Return it in words."""
+        given = (
+            f"factors {min(self.values):.4g} to {max(self.values):.4g}"
+            if self.values
+            else f"seed {self.seed}"
+        )
+        return f"disk mistuned in {', '.join(self.of)}, {given}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario:
+    """One thing that may be the case.
+
+    Attributes
+    ----------
+    settings : tuple of (Coordinate, float)
+        The uncertain parameters with their δ; all others are nominal.
+    disk : Disk or None
+        The mistuned disk; None for the scene's own.
+    xi : tuple of float
+        Its place in the unit box or ball; empty for a sample of a list.
+    """
+
+    settings: tuple[tuple[Coordinate, float], ...] = ()
+    disk: Disk | None = None
+    xi: tuple[float, ...] = ()
+
+    def words(self) -> str:
+        """Return it in words."""
+        said = [coordinate.words(delta) for coordinate, delta in self.settings]
+        return ", ".join(said + ([] if self.disk is None else [self.disk.words()])) or "nominal"
+
+    def to_json(self) -> dict[str, object]:
+        """Return it as one JSON object."""
+        answer: dict[str, object] = {
+            "parameters": [
+                {"path": coordinate.name, "how": coordinate.how.value, "value": delta}
+                for coordinate, delta in self.settings
+            ],
+            "words": self.words(),
+        }
+        return answer if self.disk is None else {**answer, "mistuning": self.disk.table()}
+
+
+class Shape(Enum):
+    """Which set ξ comes from, and how it is distributed when it is drawn."""
+
+    BOX = "intervals"
+    BALL = "ellipsoid"
+    NORMAL = "ellipsoid of a normal distribution"
+    LIST = "samples"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UncertainSet:
+    """All scenarios that count.
+
+    Attributes
+    ----------
+    shape : Shape
+        Of the set of ξ.
+    coordinates : tuple of Coordinate
+        The n uncertain parameters.
+    centre, axes : (n,), (n, n) arrays as nested tuples
+        δ = centre + axes ξ.
+    deviations : float
+        How many standard deviations the ellipsoid of a normal distribution reaches to.
+    ends : tuple of (low, high)
+        The intervals as they were given, so that their ends are met to the last digit.
+    disks : tuple of Disk
+        Each of them may be the disk at hand; empty if the scene's own is.
+    listed : tuple of Scenario
+        The samples of a list.
+    """
+
+    shape: Shape
+    coordinates: tuple[Coordinate, ...] = ()
+    centre: tuple[float, ...] = ()
+    axes: tuple[tuple[float, ...], ...] = ()
+    deviations: float = 1.0
+    ends: tuple[tuple[float, float], ...] = ()
+    disks: tuple[Disk, ...] = ()
+    listed: tuple[Scenario, ...] = ()
+
+    @property
+    def finite(self) -> bool:
+        """Whether the scenarios can be counted: a list, or mistuned disks alone."""
+        return self.shape is Shape.LIST or not self.coordinates
+
+    def all(self) -> tuple[Scenario, ...]:
+        """Return every scenario of a finite set."""
+        return self.listed if self.shape is Shape.LIST else tuple(Scenario(disk=disk) for disk in self.disks)
+
+    def scenario(self, xi: Real | Sequence[float], disk: Disk | None = None) -> Scenario:
+        """Return the scenario of a place in the unit box or ball."""
+        place = self.inside(np.asarray(xi, dtype=np.float64))
+        delta = np.array(self.centre) + np.array(self.axes) @ place
+        return Scenario(
+            settings=tuple((c, float(d)) for c, d in zip(self.coordinates, delta, strict=True)), disk=disk,
+            xi=tuple(float(x) for x in place),
+        )  # fmt: skip
+
+    def middle(self) -> tuple[Scenario, ...]:
+        """Return the scenario in the middle, of every disk; of a finite set the first scenario."""
+        if self.finite:
+            return self.all()[:1]
+        return tuple(self.scenario([0.0] * len(self.centre), disk) for disk in self.disks or (None,))
+
+    def inside(self, xi: Real) -> Real:
+        """Return the nearest place of the unit box or ball."""
+        if self.shape is Shape.BOX:
+            return np.clip(xi, -1.0, 1.0)
+        reach = float(np.linalg.norm(xi))
+        return xi / reach if reach > 1.0 else xi
+
+    def inside_of(self, scenario: Scenario) -> bool:
+        """Return whether a scenario is one of an infinite set, a place of its unit box or ball."""
+        xi = np.array(scenario.xi)
+        return xi.size == len(self.centre) and bool(np.abs(xi - self.inside(xi)).max(initial=0.0) <= 1e-9)
+
+    def extreme(self, slope: Real) -> Real:
+        """Return the place ξ at which slopeᵀ ξ is largest."""
+        if self.shape is Shape.BOX:
+            return np.where(slope >= 0.0, 1.0, -1.0)
+        reach = float(np.linalg.norm(slope))
+        return slope / reach if reach > 0.0 else np.zeros(slope.size)
+
+    def by_xi(self, by_delta: Real) -> Real:
+        """Return derivatives by ξ, (…, n), from those by δ."""
+        return np.asarray(by_delta @ np.array(self.axes))
+
+    def draw(self, count: int, seed: int) -> tuple[Scenario, ...]:
+        """Draw scenarios: those of a finite set themselves, else by Latin hypercube sampling.
+
+        Uniform over intervals and over an ellipsoid, normal where a covariance was given (McKay, Beckman,
+        Conover, Technometrics 21 (1979) 239). The same seed gives the same scenarios.
+        """
+        if self.finite:
+            return self.all()
+        rng = np.random.default_rng(seed)
+        n = len(self.coordinates)
+        strata = np.array([rng.permutation(count) for _ in range(n + 1)]).T
+        share = (strata + rng.random((count, n + 1))) / count
+        if self.shape is Shape.BOX:
+            places = 2.0 * share[:, :n] - 1.0
+        else:
+            normal = ndtri(np.clip(share[:, :n], 1e-15, 1.0 - 1e-15))
+            if self.shape is Shape.NORMAL:
+                places = normal / self.deviations
+            else:
+                reach = np.linalg.norm(normal, axis=1)
+                places = normal * (share[:, n] ** (1.0 / n) / np.maximum(reach, 1e-300))[:, None]
+        disks = self.disks or (None,)
+        return tuple(self._at(place, disks[i % len(disks)]) for i, place in enumerate(places))
+
+    def _at(self, place: Real, disk: Disk | None) -> Scenario:
+        """Return the scenario of a place; one drawn from a normal distribution may lie outside the ball."""
+        delta = (np.array(self.centre) + np.array(self.axes) @ place).tolist()
+        for i, (low, high) in enumerate(self.ends):
+            delta[i] = low if place[i] == -1.0 else high if place[i] == 1.0 else delta[i]
+        settings = tuple((c, d) for c, d in zip(self.coordinates, delta, strict=True))
+        return Scenario(settings=settings, disk=disk, xi=tuple(float(x) for x in place))
+
+    def corners(self, most: int) -> tuple[tuple[float, ...], ...]:
+        """Return the corners of the box, or the ends of the axes of the ball; none if more than `most`."""
+        n = len(self.coordinates)
+        count = 2**n if self.shape is Shape.BOX else 2 * n
+        if self.finite or count > most:
+            return ()
+        if self.shape is Shape.BOX:
+            return tuple(tuple(1.0 if i >> j & 1 else -1.0 for j in range(n)) for i in range(count))
+        return tuple(
+            tuple(sign if i == j else 0.0 for i in range(n)) for j in range(n) for sign in (-1.0, 1.0)
+        )
+
+    def reach(self) -> Real:
+        """Return the largest |δ − centre| of every coordinate, (n,)."""
+        axes = np.abs(np.array(self.axes))
+        if self.shape is Shape.BOX:
+            return np.asarray(axes.sum(axis=1))
+        return np.asarray(np.linalg.norm(np.array(self.axes), axis=1))
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Every parameter path that is uncertain."""
+        listed = [coordinate for scenario in self.listed for coordinate, _ in scenario.settings]
+        return tuple(dict.fromkeys(path for c in (*self.coordinates, *listed) for path in c.paths))
+
+    def to_json(self) -> dict[str, object]:
+        """Return it as one JSON object."""
+        answer: dict[str, object] = {"kind": self.shape.value}
+        if self.coordinates:
+            reach = self.reach()
+            answer["parameters"] = [
+                {"path": c.name, "how": c.how.value, "low": m - r, "high": m + r}
+                for c, m, r in zip(self.coordinates, self.centre, reach.tolist(), strict=True)
+            ]
+        if self.listed:
+            answer["samples"] = [scenario.to_json() for scenario in self.listed]
+        if self.disks:
+            answer["disks"] = [disk.table() for disk in self.disks]
+        return answer
+
+
+def is_number(value: object) -> bool:
+    """Return whether a value is a finite number."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

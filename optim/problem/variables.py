@@ -1,0 +1,213 @@
+"""Design variables in the units the search works in: 0 to 1 between the bounds, logarithmic over decades."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optim.errors import DesignError
+from solver.balance.parameter import Kind, resolve
+from solver.scene.scene import FrictionContact, Scene
+
+Real = NDArray[np.float64]
+SNAP = 1e-7  # scaled distance within which a variable is put on its bound
+LOGARITHMIC_FROM = 5.0  # ratio of the bounds from which a variable is scaled logarithmically
+
+
+class Scaling(Enum):
+    """Whether equal steps or equal ratios of a variable count equally; AUTO chooses by the bounds."""
+
+    AUTO = "auto"
+    LINEAR = "linear"
+    LOGARITHMIC = "logarithmic"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variable:
+    """One number to choose, with bounds; several parameter paths may share it.
+
+    Attributes
+    ----------
+    name : str
+        The paths as the user wrote them, separated by commas: ``shroud.N0`` or ``shroud.N0,root.N0``.
+    paths : tuple of str
+        The parameter paths that get the value.
+    low, high : float
+        Bounds, in the parameter's unit.
+    logarithmic : bool
+        Whether equal ratios count equally.
+    """
+
+    name: str
+    paths: tuple[str, ...]
+    low: float
+    high: float
+    logarithmic: bool
+
+    def inside(self, value: float) -> float:
+        """Return the scaled value, 0 at the lower bound and 1 at the upper."""
+        if self.logarithmic:
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+    def outside(self, scaled: float) -> float:
+        """Return the value of a scaled one, kept within the bounds."""
+        if self.logarithmic:
+            value = self.low * math.exp(scaled * math.log(self.high / self.low))
+        else:
+            value = self.low + scaled * (self.high - self.low)
+        return min(max(value, self.low), self.high)
+
+    def slope(self, value: float) -> float:
+        """Return d value / d scaled at `value`."""
+        if self.logarithmic:
+            return value * math.log(self.high / self.low)
+        return self.high - self.low
+
+    def bend(self, value: float) -> float:
+        """Return d² value / d scaled² at `value`."""
+        return value * math.log(self.high / self.low) ** 2 if self.logarithmic else 0.0
+
+
+def parameter_values(variables: Sequence[Variable], values: Mapping[str, float]) -> dict[str, float]:
+    """Return the parameter path to value of a design given by the names of the variables."""
+    return {path: values[variable.name] for variable in variables for path in variable.paths}
+
+
+def by_variables(variables: Sequence[Variable], by_path: Real) -> Real:
+    """Return a gradient by the variables from one by all their paths, (n,)."""
+    gathered: Real = _members(variables) @ by_path
+    return gathered
+
+
+def by_variables_twice(variables: Sequence[Variable], by_paths: Real) -> Real:
+    """Return second derivatives by the variables from those by all their paths, (n, n)."""
+    members = _members(variables)
+    gathered: Real = members @ by_paths @ members.T
+    return gathered
+
+
+def _members(variables: Sequence[Variable]) -> Real:
+    """Return which variable each path belongs to, (n_variables, n_paths) of 0 and 1."""
+    owners = np.repeat(np.arange(len(variables)), [len(variable.paths) for variable in variables])
+    return np.asarray(np.arange(len(variables))[:, None] == owners, dtype=np.float64)
+
+
+def scaled(variables: Sequence[Variable], values: Mapping[str, float]) -> Real:
+    """Return the scaled variables of a design, (n,)."""
+    return np.array([variable.inside(values[variable.name]) for variable in variables])
+
+
+def unscaled(variables: Sequence[Variable], z: Real | Sequence[float]) -> dict[str, float]:
+    """Return the design of scaled variables, name to value."""
+    return {variable.name: variable.outside(float(x)) for variable, x in zip(variables, z, strict=True)}
+
+
+def snapped(z: Real) -> Real:
+    """Return scaled variables within their bounds; convex solvers stop a hair's breadth inside them."""
+    inside = np.clip(z, 0.0, 1.0)
+    inside[inside <= SNAP] = 0.0
+    inside[inside >= 1.0 - SNAP] = 1.0
+    return inside
+
+
+def slopes(variables: Sequence[Variable], values: Mapping[str, float]) -> Real:
+    """Return d value / d scaled of every variable, (n,)."""
+    return np.array([variable.slope(values[variable.name]) for variable in variables])
+
+
+def check_variables(
+    scene: Scene,
+    variables: Mapping[str, tuple[float, float]] | None,
+    scaling: Mapping[str, str] | None = None,
+) -> tuple[Variable, ...]:
+    """Return the design variables; without any, the N0 of the first contact whose load N1 is tied to.
+
+    Parameters
+    ----------
+    scene : what is designed.
+    variables : paths (several that share a value separated by commas) to (low, high).
+    scaling : names of variables to ``linear``, ``logarithmic`` or ``auto``.
+
+    Raises
+    ------
+    SettingError
+        A path the scene does not have.
+    DesignError
+        Bounds that are not two finite ascending numbers, or a variable that cannot be designed.
+    """
+    if variables is None:
+        variables = _default(scene)
+    if not isinstance(variables, Mapping) or not variables:
+        raise DesignError("variables", variables, "must name at least one parameter path with (low, high)")
+    scaling = {} if scaling is None else scaling
+    for name in scaling:
+        if name not in variables:
+            raise DesignError("scaling", name, f"must name the variables {', '.join(variables)}")
+    taken: dict[str, str] = {}
+    checked = []
+    for name, bounds in variables.items():
+        paths = tuple(part.strip() for part in str(name).split(","))
+        low, high = _bounds(name, bounds)
+        for path in paths:
+            _check_path(scene, path, low, high)
+            if path in taken:
+                raise DesignError(
+                    "variables", path, f"must stand in one variable, it is in {taken[path]} too"
+                )
+            taken[path] = name
+        how = _scaling(name, scaling.get(name, Scaling.AUTO.value), low, high)
+        checked.append(Variable(name=name, paths=paths, low=low, high=high, logarithmic=how))
+    return tuple(checked)
+
+
+def _check_path(scene: Scene, path: str, low: float, high: float) -> None:
+    parameter = resolve(scene, path)
+    if parameter.kind is Kind.FREQUENCY:
+        raise DesignError("variables", path, "cannot be the frequency: the band of the scene is searched")
+    parameter.check(f"variables.{path} (low)", low)
+    parameter.check(f"variables.{path} (high)", high)
+
+
+def _scaling(name: str, wanted: object, low: float, high: float) -> bool:
+    """Return whether a variable is scaled logarithmically."""
+    known = ", ".join(scaling.value for scaling in Scaling)
+    if wanted not in [scaling.value for scaling in Scaling]:
+        raise DesignError(f"scaling.{name}", wanted, f"must be one of {known}")
+    how = Scaling(wanted)
+    if how is Scaling.LOGARITHMIC and low <= 0.0:
+        raise DesignError(f"scaling.{name}", wanted, f"needs a lower bound > 0, which is {low:g}")
+    return how is Scaling.LOGARITHMIC or (
+        how is Scaling.AUTO and low > 0.0 and high / low >= LOGARITHMIC_FROM
+    )
+
+
+def _bounds(path: str, bounds: object) -> tuple[float, float]:
+    name = f"variables.{path}"
+    if not isinstance(bounds, Sequence) or isinstance(bounds, str) or len(bounds) != 2:
+        raise DesignError(name, bounds, "must be two numbers, low and high")
+    low, high = bounds
+    for value in (low, high):
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not number or not math.isfinite(value):
+            raise DesignError(name, bounds, "must be two finite numbers, low and high")
+    if not low < high:
+        raise DesignError(name, bounds, "must have low < high")
+    return float(low), float(high)
+
+
+def _default(scene: Scene) -> dict[str, tuple[float, float]]:
+    """Return N0 of the first contact with a tied load (else of the first), a tenth to 15 times its value."""
+    rubbing = [contact for contact in scene.contacts if isinstance(contact, FrictionContact)]
+    if not rubbing:
+        raise DesignError("variables", None, "must be given: the scene has no friction contact to design")
+    tied = [contact for contact in rubbing if contact.N1_ratio is not None]
+    contact = (tied or rubbing)[0]
+    if contact.N0 <= 0.0:
+        raise DesignError("variables", None, f"must be given: {contact.name}.N0 is 0, it suggests no range")
+    return {f"{contact.group or contact.name}.N0": (contact.N0 / 10.0, contact.N0 * 15.0)}

@@ -1,0 +1,384 @@
+"""What a design search returns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING
+
+from optim.criteria.linearised import Conditions
+from optim.criteria.rows import UNITS, Evaluation, Quantity, Row
+from optim.problem.problem import Method, Problem
+from optim.results.doubts import doubts_of
+from optim.results.json import (
+    bands_json,
+    basin_json,
+    checked_json,
+    conditions_json,
+    errors_of,
+    looked_json,
+    number,
+    row_json,
+)
+from solver.continuation.branch import Branch
+from solver.results.base import Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.results.dataset import Dataset
+    from solver.views.plots.style import Into
+
+
+SAME_HEIGHT = 1e-5  # relative distance within which rows count as equally high
+AT_LIMIT = 1e-4  # relative distance from a bound within which a limited row holds the design
+
+
+class DesignStatus(Enum):
+    """How a search ended; the value is a sentence a user can act on."""
+
+    OPTIMAL = "What is minimised can not be lowered further."
+    AT_BOUND = (
+        "What is minimised can not be lowered further within the bounds, and a variable lies on a bound that "
+        "holds the design: wider bounds would do better."
+    )
+    KINK = (
+        "The search could not improve the design, but the first-order conditions do not hold there: the "
+        "response has a kink at this design, or more harmonics are needed."
+    )
+    LOCAL = (
+        "No better design is near, but there may be a better one elsewhere: the look over the whole range "
+        "did not come to its end, or, as a warning then says, a response may have a higher peak than those "
+        "found. Give a start there, narrower bounds, fewer variables, or more harmonics."
+    )
+    FLAT = (
+        "The peak does not depend on these variables (no friction, or contacts that never slip): "
+        "choose others."
+    )
+    INFEASIBLE = (
+        "No design within the bounds keeps all limits; the one that breaks them least is given, with what "
+        "each limit would have to be: relax one of those, or allow wider bounds."
+    )
+    NO_RESPONSE = (
+        "The frequency response could not be computed over the whole band for any design tried: "
+        "use more harmonics or a narrower band."
+    )
+    NOT_TRACKED = (
+        "The peaks could not be followed over the whole range; the best design seen is given: use the method "
+        "minimax, or a narrower range."
+    )
+    TOO_MANY = "The largest number of responses was used up before the search settled: allow more."
+    STOPPED = "The search was stopped by the caller."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignPeak:
+    """A peak of the response of a design: max|x| of the observed DOF [m] and its frequency [Hz]."""
+
+    value: float
+    at: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Basin:
+    """A local optimum.
+
+    Attributes
+    ----------
+    values : mapping
+        Variable name to value.
+    peak : float
+        Highest peak [m].
+    objective : float
+        What is minimised.
+    settled, feasible : bool
+        Whether the first-order conditions hold and the limits are kept there.
+    proven : bool
+        Whether a response there was computed, so that no peak is higher than `peak`. A further basin of the
+        tracked peak is solved for along the peaks that were followed: it is at least that high.
+    """
+
+    values: Mapping[str, float]
+    peak: float
+    objective: float
+    settled: bool
+    feasible: bool
+    proven: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Checked:
+    """A local optimum again with more harmonics.
+
+    Attributes
+    ----------
+    values : mapping
+        Variable name to value.
+    harmonics : int
+        Highest harmonic kept.
+    peak, objective : float
+        Highest peak [m] and what is minimised; NaN where a response could not be computed.
+    feasible : bool
+        Whether the limits are kept.
+    """
+
+    values: Mapping[str, float]
+    harmonics: int
+    peak: float
+    objective: float
+    feasible: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class DesignResult(Shown):
+    """The best design found.
+
+    Attributes
+    ----------
+    problem : Problem
+        What was asked.
+    method : Method
+        How the optimum was found.
+    status : DesignStatus
+        How the search ended.
+    evaluation : Evaluation or None
+        Rows and responses of the optimum.
+    conditions : Conditions or None
+        First-order conditions there.
+    basins : tuple of Basin
+        Every local optimum found, best first.
+    looked_at : tuple of Evaluation
+        The designs of the look over the whole range, in order, some of them with fewer harmonics.
+    history : tuple of Evaluation
+        Every design evaluated, in order; the optimum is among them (of a tracked peak the optimum alone).
+    plateau : mapping of variable name to (low, high)
+        Along each variable, how far every value is as good (to 1e-6); empty for a sharp optimum.
+    chosen_by : str or None
+        What the design was chosen by on a plateau.
+    checked : tuple of Checked
+        The local optima again with twice the harmonics, where the estimated error of a peak is large.
+    evaluations : int
+        Frequency responses computed.
+    work : float
+        What the search cost in all, in frequency responses.
+    seconds : float
+        Time in all.
+    """
+
+    problem: Problem
+    method: Method
+    status: DesignStatus
+    evaluation: Evaluation | None
+    conditions: Conditions | None
+    basins: tuple[Basin, ...]
+    looked_at: tuple[Evaluation, ...] = ()
+    plateau: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    chosen_by: str | None = None
+    checked: tuple[Checked, ...] = ()
+    history: tuple[Evaluation, ...]
+    evaluations: int
+    work: float
+    seconds: float
+
+    @property
+    def scene(self) -> str:
+        """Name of the scene."""
+        return self.problem.scene.name
+
+    @property
+    def optimum(self) -> Mapping[str, float]:
+        """Variable name to value; empty when no design could be evaluated."""
+        return {} if self.evaluation is None else dict(self.evaluation.values)
+
+    @property
+    def reached(self) -> bool:
+        """Whether the goal was reached."""
+        return self.status in (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)
+
+    @property
+    def peak(self) -> DesignPeak | None:
+        """The highest peak of the optimum."""
+        if self.evaluation is None or not self.evaluation.peaks:
+            return None
+        return DesignPeak(value=self.evaluation.peaks[0].value, at=self.evaluation.peaks[0].at_hz)
+
+    @property
+    def held_by(self) -> Row | None:
+        """The row that holds what is minimised: the highest weighted peak, or else the widest band."""
+        if self.evaluation is None:
+            return None
+        for quantity in (Quantity.PEAK, Quantity.BAND):
+            rows = [row for row in self.evaluation.of(quantity) if row.weight > 0.0]
+            if rows:
+                return max(rows, key=lambda row: row.weight * row.value)
+        return None
+
+    @property
+    def error_estimate(self) -> float:
+        """Estimated error [m] of the highest peak of the case that holds the optimum; NaN if not known."""
+        held = self.held_by
+        if held is None or self.evaluation is None:
+            return math.nan
+        return next((e for case, _, e in errors_of(self.evaluation) if case == held.case), math.nan)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What makes the numbers doubtful, in words."""
+        return doubts_of(self)
+
+    @property
+    def band_hz(self) -> float | None:
+        """Width of the widest resonance band of the optimum [Hz]."""
+        band = None if self.evaluation is None else self.evaluation.band
+        return None if band is None else band.value
+
+    @property
+    def limit(self) -> float | None:
+        """Amplitude at which the band is measured [m]."""
+        if self.evaluation is None or self.evaluation.band is None:
+            return None
+        branches = [r.branch for r in self.evaluation.responses if r.case == self.evaluation.band.case]
+        return None if branches[0].band is None else branches[0].band.limit
+
+    @property
+    def optimality(self) -> float:
+        """Largest component of the gradient of the Lagrangian, relative objective per scaled variable."""
+        return math.nan if self.conditions is None else self.conditions.residual
+
+    @property
+    def multipliers(self) -> tuple[float, ...]:
+        """Of the active peaks; they sum to 1."""
+        if self.conditions is None:
+            return ()
+        return tuple(x for row, x in self.conditions.rows if row.quantity is Quantity.PEAK and x > 1e-6)
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """What holds the optimum in place, in words: equally high peaks, bounds, limits."""
+        if self.evaluation is None or not self.evaluation.rows:
+            return ()
+        held = [row.what for row in _highest(self.evaluation)]
+        for variable in self.problem.variables:
+            value = self.evaluation.values[variable.name]
+            for bound, name in ((variable.low, "lower"), (variable.high, "upper")):
+                if abs(value - bound) <= 1e-9 * max(abs(bound), 1e-300):
+                    held.append(f"{name} bound of {variable.name}")
+        return (*held, *(limit_words(row) for row in self.evaluation.rows if at_limit(row)))
+
+    @property
+    def broken(self) -> tuple[Row, ...]:
+        """The limited rows that the design does not keep, worst first."""
+        if self.evaluation is None:
+            return ()
+        rows = [row for row in self.evaluation.rows if row.bound is not None and row.value > row.bound]
+        return tuple(sorted(rows, key=lambda row: -row.excess(1.0)))
+
+    @property
+    def sweeps(self) -> tuple[Branch, ...]:
+        """Every frequency response computed, those of the optimum last."""
+        return tuple(branch for _, branch in self._responses())
+
+    @property
+    def sweep_values(self) -> tuple[Mapping[str, float], ...]:
+        """The designs of `sweeps`, in the same order."""
+        return tuple(values for values, _ in self._responses())
+
+    def _responses(self) -> list[tuple[Mapping[str, float], Branch]]:
+        others = [evaluation for evaluation in self.history if evaluation is not self.evaluation]
+        last = [] if self.evaluation is None else [self.evaluation]
+        return [(e.values, response.branch) for e in [*others, *last] for response in e.responses]
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from optim.views.summary import of_design
+
+        return of_design(self)
+
+    def to_dataset(self) -> Dataset:
+        """A design that was tried a row, the optimum marked."""
+        from optim.views.to_dataset import design_dataset
+
+        return design_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the response of the optimum; `ax`: axes to draw into, else a new figure."""
+        from optim.views.plots.designs import design_figure
+
+        return design_figure(self, ax=ax)
+
+    def to_json(self) -> dict[str, object]:
+        """Return the result as one JSON object."""
+        peak, evaluation = self.peak, self.evaluation
+        peaks = () if evaluation is None else evaluation.peaks
+        return {
+            "scene": self.scene,
+            "method": self.method.value,
+            "optimum": dict(self.optimum),
+            "peak": None if peak is None else {"value": peak.value, "at": peak.at},
+            "peaks": [{"value": p.value, "at": p.at_hz, "case": p.case} for p in peaks],
+            "band_hz": self.band_hz,
+            "limit": self.limit,
+            "bands": [] if evaluation is None else bands_json(evaluation),
+            "objective": None if evaluation is None or not evaluation.rows else evaluation.objective,
+            "rows": [] if evaluation is None else [row_json(row) for row in evaluation.rows],
+            "held_by": None if self.held_by is None else row_json(self.held_by),
+            "error_estimate": number(self.error_estimate),
+            "errors": [
+                {"case": case, "peak": peak, "error_estimate": number(error)}
+                for case, peak, error in (() if evaluation is None else errors_of(evaluation))
+            ],
+            "warnings": list(self.warnings),
+            "plateau": {name: list(ends) for name, ends in self.plateau.items()},
+            "chosen_by": self.chosen_by,
+            "checked": [checked_json(one) for one in self.checked],
+            "looked_at": [looked_json(one) for one in self.looked_at if one.good],
+            "evaluations": self.evaluations,
+            "newton_iterations": sum(branch.newton_iterations for branch in self.sweeps),
+            "tried": [
+                {"values": dict(e.values), "peak": e.peaks[0].value, "at": e.peaks[0].at_hz}
+                for e in self.history
+                if e.good and e.peaks
+            ],
+            "basins": [basin_json(basin) for basin in self.basins],
+            "seconds": self.seconds,
+            "work": number(self.work),
+            "active": list(self.active),
+            "optimality": number(self.optimality),
+            "multipliers": list(self.multipliers),
+            "conditions": None if self.conditions is None else conditions_json(self.conditions),
+            "broken": [{**row_json(row), "by": row.value - (row.bound or 0.0)} for row in self.broken],
+            "reached": self.reached,
+            "status": self.status.value,
+        }
+
+
+def at_limit(row: Row) -> bool:
+    """Return whether a limited row holds a design in place."""
+    if row.bound is None:
+        return False
+    return row.value >= row.bound - AT_LIMIT * (abs(row.bound) or 1.0)
+
+
+def limit_words(row: Row) -> str:
+    """Return the limit of a row in words."""
+    words = {
+        Quantity.PEAK: "peak limit",
+        Quantity.BAND: "band limit",
+        Quantity.FORBIDDEN: "limit in a forbidden range",
+        Quantity.FRICTION_WORK: "friction work limit",
+        Quantity.SEPARATION: "separation limit",
+    }
+    where = "" if row.quantity in (Quantity.BAND, Quantity.PEAK) else f" ({row.what})"
+    return f"{words[row.quantity]} of {row.bound:g} {UNITS[row.quantity]}{where}"
+
+
+def _highest(evaluation: Evaluation) -> list[Row]:
+    """Return the rows that are equally high, of every quantity that is minimised."""
+    found: list[Row] = []
+    for quantity in Quantity:
+        rows = [row for row in evaluation.of(quantity) if row.weight > 0.0]
+        top = max((row.weight * row.value for row in rows), default=0.0)
+        found += [row for row in rows if row.weight * row.value >= top * (1.0 - SAME_HEIGHT)]
+    return found

@@ -1,0 +1,87 @@
+"""Parts of a design's result as objects of JSON."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from optim.criteria.linearised import Conditions
+from optim.criteria.rows import UNITS, Evaluation, Row
+from solver.continuation.branch import Branch
+
+if TYPE_CHECKING:
+    from optim.results.design import Basin, Checked
+
+
+def bands_json(evaluation: Evaluation) -> list[dict[str, object]]:
+    """Return where the resonance band of each case lies; the first response of a case is that of its band."""
+    first: dict[str, Branch] = {}
+    for response in evaluation.responses:
+        first.setdefault(response.case, response.branch)
+    return [
+        {
+            "case": case, "limit": branch.band.limit, "width_hz": branch.band.width,
+            "intervals_hz": [list(interval) for interval in branch.band.intervals],
+        }
+        for case, branch in first.items()
+        if branch.band is not None
+    ]  # fmt: skip
+
+
+def row_json(row: Row) -> dict[str, object]:
+    """Return a row."""
+    return {
+        "quantity": row.quantity.value, "case": row.case, "what": row.what, "value": row.value,
+        "unit": UNITS[row.quantity], "at": number(row.at_hz), "bound": row.bound, "weight": row.weight,
+    }  # fmt: skip
+
+
+def errors_of(evaluation: Evaluation) -> list[tuple[str, float, float]]:
+    """Return for the response of each case over its band its name, highest peak [m] and the error of that."""
+    first: dict[str, Branch] = {}
+    for response in evaluation.responses:
+        first.setdefault(response.case, response.branch)
+    return [(case, b.peak.value, b.error_estimate) for case, b in first.items() if b.peak is not None]
+
+
+def looked_json(one: Evaluation) -> dict[str, object]:
+    """Return a design of the look over the whole range."""
+    kept = all(row.bound is None or row.value <= row.bound for row in one.rows)
+    harmonics = one.responses[0].branch.balance.n_harmonics if one.responses else None
+    return {
+        "values": dict(one.values), "objective": one.objective, "feasible": kept, "n_harmonics": harmonics
+    }  # fmt: skip
+
+
+def checked_json(one: Checked) -> dict[str, object]:
+    """Return a local optimum computed again."""
+    return {
+        "values": dict(one.values), "n_harmonics": one.harmonics, "peak": number(one.peak),
+        "objective": number(one.objective), "feasible": one.feasible,
+    }  # fmt: skip
+
+
+def basin_json(basin: Basin) -> dict[str, object]:
+    """Return a local optimum."""
+    return {
+        "values": dict(basin.values), "peak": basin.peak, "objective": basin.objective,
+        "settled": basin.settled, "feasible": basin.feasible, "proven": basin.proven,
+    }  # fmt: skip
+
+
+def conditions_json(found: Conditions) -> dict[str, object]:
+    """Return the first-order conditions of a design."""
+    return {
+        "residual": number(found.residual),
+        "violation": found.violation,
+        "rows": [
+            {"what": row.what, "case": row.case, "quantity": row.quantity.value, "multiplier": x}
+            for row, x in found.rows
+        ],
+        "bounds": [{"variable": name, "side": side, "multiplier": x} for name, side, x in found.bounds],
+    }
+
+
+def number(value: float) -> float | None:
+    """Return a float that JSON can carry (null for NaN)."""
+    return value if math.isfinite(value) else None

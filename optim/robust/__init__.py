@@ -1,0 +1,1 @@
+"""Robust designs: the worst case, the mean or a quantile over what is not known."""

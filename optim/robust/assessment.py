@@ -1,0 +1,78 @@
+"""A design over the uncertainty: nominal peak, worst peak with its scenario, mean and quantiles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from optim.criteria.rows import Quantity, Row
+from optim.methods.kkt import KEPT
+from optim.problem.uncertainty_set import Scenario
+from optim.robust.result import Side, Spread
+from optim.robust.risk_measure import Aim, rank_of
+from optim.robust.scenarios import Outcome
+from optim.robust.search import RobustSearch
+from optim.robust.worst_case import Aspect, UnknownScenarioError, pessimise
+
+CHECKED = 4  # of the samples, the worst, that the worst case is also climbed from
+
+
+def side_of(
+    search: RobustSearch, values: Mapping[str, float], drawn: Sequence[Scenario], known: Sequence[Scenario]
+) -> Side:
+    """Return a design over the uncertainty.
+
+    Parameters
+    ----------
+    search : what is judged, and over what.
+    values : the design.
+    drawn : the samples.
+    known : scenarios that may be the worst.
+    """
+    nominal = search.outcome(values, Scenario(), gradients=False)
+    samples = [search.outcome(values, scenario, gradients=False) for scenario in drawn]
+    peaks = [found.highest(Quantity.PEAK) if found.good else None for found in samples]
+    worst, unknown = _worst(search, values, samples, known)
+    peak, band = nominal.highest(Quantity.PEAK), nominal.highest(Quantity.BAND)
+    return Side(
+        values=dict(values), peak=math.nan if peak is None else peak.value,
+        at_hz=math.nan if peak is None else peak.at_hz, band_hz=math.nan if band is None else band.value,
+        worst=worst, spread=Spread(peaks=tuple(math.nan if row is None else row.value for row in peaks)),
+        feasible=unknown is None and _feasible(search, values, samples, known), unknown=unknown,
+    )  # fmt: skip
+
+
+def _worst(
+    search: RobustSearch, values: Mapping[str, float], samples: Sequence[Outcome], known: Sequence[Scenario]
+) -> tuple[Outcome | None, Scenario | None]:
+    """Return the design in the scenario of the highest peak; or None and the scenario that is not known."""
+    aspect = Aspect(quantity=Quantity.PEAK, limited=False, plain=True)
+    ranked = sorted((o for o in samples if o.good), key=lambda found: -aspect.worst(found.rows))
+    besides = [found.scenario for found in ranked[:CHECKED]]
+    try:
+        finding = pessimise(
+            lambda scenario: search.outcome(values, scenario),
+            search.uncertain,
+            aspect,
+            known,
+            besides=besides,
+            thorough=True,
+        )
+    except UnknownScenarioError as error:
+        return None, error.scenario
+    return finding.worst, None
+
+
+def _feasible(
+    search: RobustSearch, values: Mapping[str, float], samples: Sequence[Outcome], known: Sequence[Scenario]
+) -> bool:
+    """Return whether the limits are kept in every scenario tried, with a quantile in its share of samples."""
+    excess = [_excess(search, found.rows) for found in samples]
+    if search.aim is Aim.QUANTILE:
+        return sorted(excess)[rank_of(search.quantile, len(excess)) - 1] <= KEPT
+    excess += [_excess(search, search.outcome(values, scenario).rows) for scenario in known]
+    return max(excess, default=-math.inf) <= KEPT
+
+
+def _excess(search: RobustSearch, rows: Sequence[Row]) -> float:
+    return max((row.excess(search.scales[row.quantity]) for row in rows), default=math.inf)

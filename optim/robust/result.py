@@ -1,0 +1,315 @@
+"""What a robust design returns: the nominal and the robust optimum side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from optim.criteria.linearised import Conditions
+from optim.criteria.rows import Quantity
+from optim.problem.problem import Problem
+from optim.problem.uncertainty_set import Scenario, UncertainSet
+from optim.results.design import DesignResult
+from optim.robust.risk_measure import Aim, rank_of
+from optim.robust.scenarios import Outcome
+from solver.results.base import Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.results.dataset import Dataset
+    from solver.views.plots.style import Into
+
+
+QUANTILES = (0.05, 0.5, 0.95)
+
+
+class RobustStatus(Enum):
+    """How a robust search ended; the value is a sentence a user can act on."""
+
+    OPTIMAL = "What is minimised over the uncertainty can not be lowered further within the bounds."
+    KINK = (
+        "The search could not improve the design, but the first-order conditions do not hold there: the "
+        "response has a kink at this design, or more harmonics are needed."
+    )
+    LOCAL = (
+        "No scenario looked at is worse, but the look over the whole uncertainty did not come to its end: a "
+        "worse one may be left. Use narrower intervals or fewer uncertain parameters."
+    )
+    FLAT = (
+        "The peak does not depend on these variables in any scenario (no friction, or contacts that never "
+        "slip): choose others."
+    )
+    INFEASIBLE = (
+        "No design within the bounds keeps all limits in the scenarios that count; the one that breaks them "
+        "least is given: relax the limits, narrow the uncertainty, or allow wider bounds."
+    )
+    NO_RESPONSE = (
+        "The frequency response could not be computed over the whole band for any design tried: use more "
+        "harmonics or a narrower band."
+    )
+    UNKNOWN_SCENARIO = (
+        "The response could not be computed in a scenario that counts, so the worst case is not known: use "
+        "more harmonics, a narrower band, or a smaller uncertainty."
+    )
+    NOT_CLOSED = (
+        "The cuts did not close: worse scenarios than those the design was made for are left, the gap says "
+        "by how much; narrow the uncertainty or use more harmonics."
+    )
+    TOO_MANY = "The largest number of responses was used up before the search settled: allow more."
+    STOPPED = "The search was stopped by the caller."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spread:
+    """The highest peak over samples of the uncertainty.
+
+    Attributes
+    ----------
+    peaks : (n,) tuple of float
+        One a sample [m], in the order they were drawn; NaN where a response could not be computed.
+    """
+
+    peaks: tuple[float, ...]
+
+    @property
+    def mean(self) -> float:
+        """Mean [m]; NaN if a sample is not known."""
+        return float(np.mean(self.peaks)) if self.peaks else math.nan
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation [m]."""
+        return float(np.std(self.peaks, ddof=1)) if len(self.peaks) > 1 else math.nan
+
+    def quantile(self, share: float) -> float:
+        """Return the least peak that at least this share of the samples does not exceed [m]."""
+        if not self.peaks or not all(math.isfinite(peak) for peak in self.peaks):
+            return math.nan
+        return sorted(self.peaks)[rank_of(share, len(self.peaks)) - 1]
+
+    def to_json(self, quantile: float) -> dict[str, object]:
+        """Return it as one JSON object."""
+        shares = sorted({*QUANTILES, quantile})
+        return {
+            "count": len(self.peaks),
+            "mean": _number(self.mean),
+            "deviation": _number(self.deviation),
+            "quantiles": [{"share": share, "peak": _number(self.quantile(share))} for share in shares],
+            "peaks": [_number(peak) for peak in self.peaks],
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Side:
+    """One design, nominal and over the uncertainty.
+
+    Attributes
+    ----------
+    values : mapping
+        Variable name to value.
+    peak, at_hz, band_hz : float
+        Highest peak [m], its frequency and the widest band [Hz] with every parameter at its nominal value.
+    worst : Outcome or None
+        The design in the scenario with the highest peak; None if that is not known.
+    spread : Spread
+        Over samples.
+    feasible : bool
+        Whether the limits are kept in every scenario that counts.
+    unknown : Scenario or None
+        The scenario that could not be computed, if the worst peak is not known for that.
+    """
+
+    values: Mapping[str, float]
+    peak: float
+    at_hz: float
+    band_hz: float
+    worst: Outcome | None
+    spread: Spread
+    feasible: bool
+    unknown: Scenario | None
+
+    @property
+    def worst_peak(self) -> float:
+        """Highest peak over the uncertainty [m]; NaN if it is not known."""
+        row = None if self.worst is None else self.worst.highest(Quantity.PEAK)
+        return math.nan if row is None else row.value
+
+    @property
+    def worst_scenario(self) -> Scenario | None:
+        """The scenario that gives it."""
+        return None if self.worst is None else self.worst.scenario
+
+    def to_json(self, quantile: float) -> dict[str, object]:
+        """Return it as one JSON object."""
+        row = None if self.worst is None else self.worst.highest(Quantity.PEAK)
+        worst = None
+        if self.worst is not None and row is not None:
+            worst = {"peak": row.value, "at": row.at_hz, "scenario": self.worst.scenario.to_json()}
+        return {
+            "values": dict(self.values),
+            "peak": {"value": _number(self.peak), "at": _number(self.at_hz)},
+            "band_hz": _number(self.band_hz),
+            "worst": worst,
+            "samples": self.spread.to_json(quantile),
+            "feasible": self.feasible,
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cut:
+    """A scenario the master problem was given, and what brought it in.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        What is the case.
+    peak : float
+        Highest peak [m] of the design it was found at.
+    exceeds : float
+        By how much, relative, it was worse than all scenarios before; NaN for those the search began with.
+    multiplier : float
+        With which force it holds the robust optimum; those of all scenarios sum to 1 for a peak alone.
+    """
+
+    scenario: Scenario
+    peak: float
+    exceeds: float
+    multiplier: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class RobustResult(Shown):
+    """The nominal and the robust optimum side by side.
+
+    Attributes
+    ----------
+    problem : Problem
+        What was asked.
+    uncertain : UncertainSet
+        Over what.
+    aim, quantile : Aim, float
+        What was minimised over it.
+    status : RobustStatus
+        How the search ended.
+    design : DesignResult
+        The search without uncertainty.
+    nominal, robust : Side or None
+        Both optima over the uncertainty; None where no design is known.
+    objective : float
+        What was minimised, at the robust optimum.
+    conditions : Conditions or None
+        First-order conditions there.
+    cuts : tuple of Cut
+        The scenarios the robust optimum was made for.
+    gap : float
+        Worst case: by how much, relative, the worst scenario found exceeds the worst of the cuts. The latter
+        bounds the optimum of its basin from below, the former from above. NaN for other aims.
+    inner_look : bool
+        Worst case: whether the look over the whole uncertainty, at the robust optimum, came to its end: the
+        gap is that of the worst scenario of all, as far as corners, middles, a space-filling sequence and
+        climbs from these tell. False for other aims.
+    unknown : Scenario or None
+        The scenario that could not be computed.
+    designs, responses : int
+        Designs tried over the uncertainty, and frequency responses in all.
+    seconds : float
+        Time in all.
+    """
+
+    problem: Problem
+    uncertain: UncertainSet
+    aim: Aim
+    quantile: float
+    status: RobustStatus
+    design: DesignResult
+    nominal: Side | None
+    robust: Side | None
+    objective: float
+    conditions: Conditions | None
+    cuts: tuple[Cut, ...]
+    gap: float
+    inner_look: bool = False
+    unknown: Scenario | None
+    designs: int
+    responses: int
+    seconds: float
+
+    @property
+    def reached(self) -> bool:
+        """Whether the goal was reached."""
+        return self.status is RobustStatus.OPTIMAL
+
+    @property
+    def optimum(self) -> Mapping[str, float]:
+        """Variable name to value of the robust optimum; empty when there is none."""
+        return {} if self.robust is None else dict(self.robust.values)
+
+    @property
+    def gain(self) -> float:
+        """By which share the robust optimum lowers the worst peak of the nominal one."""
+        if self.nominal is None or self.robust is None:
+            return math.nan
+        return 1.0 - self.robust.worst_peak / self.nominal.worst_peak
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from optim.views.summary import of_robust
+
+        return of_robust(self)
+
+    def to_dataset(self) -> Dataset:
+        """A sample of the uncertainty a row."""
+        from optim.views.to_dataset import robust_dataset
+
+        return robust_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the peaks of both optima over the uncertainty; `ax`: axes to draw into, else a new figure."""
+        from optim.views.plots.designs import robust_figure
+
+        return robust_figure(self.to_json(), ax=ax)
+
+    def to_json(self) -> dict[str, object]:
+        """Return the result as one JSON object."""
+        found = self.conditions
+        return {
+            "scene": self.problem.scene.name,
+            "aim": self.aim.value,
+            "quantile": self.quantile if self.aim is Aim.QUANTILE else None,
+            "uncertain": self.uncertain.to_json(),
+            "optimum": dict(self.optimum),
+            "nominal": None if self.nominal is None else self.nominal.to_json(self.quantile),
+            "robust": None if self.robust is None else self.robust.to_json(self.quantile),
+            "objective": _number(self.objective),
+            "gain": _number(self.gain),
+            "cuts": [
+                {
+                    "scenario": cut.scenario.to_json(), "peak": _number(cut.peak),
+                    "exceeds": _number(cut.exceeds), "multiplier": cut.multiplier,
+                }
+                for cut in self.cuts
+            ],
+            "gap": _number(self.gap),
+            "inner_look": self.inner_look,
+            "optimality": None if found is None else _number(found.residual),
+            "violation": None if found is None else found.violation,
+            "unknown": None if self.unknown is None else self.unknown.to_json(),
+            "designs": self.designs,
+            "responses": self.responses,
+            "seconds": self.seconds,
+            "nominal_status": self.design.status.value,
+            "warnings": list(self.design.warnings),
+            "reached": self.reached,
+            "status": self.status.value,
+        }  # fmt: skip
+
+
+def _number(value: float) -> float | None:
+    """Return a float that JSON can carry (null for NaN)."""
+    return value if math.isfinite(value) else None

@@ -1,0 +1,208 @@
+"""`robust_design`: the best damper when not everything is known.
+
+Worst case: cutting sets (Mutapcic, Boyd, Optim. Methods Softw. 24:3 (2009) 381, doi
+10.1080/10556780802712889). A master problem over the scenarios so far gives a design and a lower bound; the
+worst scenario of that design (`optim.robust.worst_case`) gives an upper bound and joins the master problem,
+until both agree. The problem is not convex: several basins of the master problem are kept, and the one with
+the least value is worked on, which that of the others can only exceed when they get more scenarios too.
+
+Mean and quantile: sample average approximation with common random numbers (Shapiro, Dentcheva, Ruszczyński,
+Lectures on Stochastic Programming, SIAM 2009, chapter 5): the same samples for every design.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from optim.criteria.rows import Quantity
+from optim.errors import DesignError
+from optim.methods.evaluator import StoppedError
+from optim.problem.problem import Method, pose
+from optim.problem.uncertainty_input import check_settings, read_uncertain
+from optim.problem.uncertainty_set import Scenario, is_number
+from optim.results.design import DesignResult, DesignStatus
+from optim.robust.assessment import side_of
+from optim.robust.cutting_sets import CLOSED, Progress, cutting_sets, sampled
+from optim.robust.result import RobustResult, RobustStatus, Side
+from optim.robust.risk_measure import Aim
+from optim.robust.search import RobustSearch
+from optim.robust.worst_case import Aspect, UnknownScenarioError
+from optim.search import solve_problem
+from solver.scene.scene import Scene
+
+SAMPLES = {Aim.WORST_CASE: 32, Aim.MEAN: 64, Aim.QUANTILE: 64}
+FEWEST_SAMPLES = 2
+
+
+def robust_design(
+    scene: Scene,
+    *,
+    uncertain: object,
+    aim: str | Aim = Aim.WORST_CASE,
+    quantile: float = 0.95,
+    samples: int | None = None,
+    seed: int = 0,
+    variables: Mapping[str, tuple[float, float]] | None = None,
+    scaling: Mapping[str, str] | None = None,
+    cases: Sequence[Mapping[str, object]] | None = None,
+    limit: float | None = None,
+    weights: Mapping[str, float] | None = None,
+    max_peak: float | None = None,
+    max_band_hz: float | None = None,
+    forbidden_hz: Sequence[Sequence[float]] | None = None,
+    speeds_rpm: Sequence[Sequence[float]] | None = None,
+    max_friction_work: Mapping[str, float] | float | None = None,
+    contact_states: Mapping[str, str] | None = None,
+    harmonics: int = 11,
+    start: Mapping[str, float] | None = None,
+    method: str | Method = Method.AUTO,
+    basins: int = 2,
+    on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> RobustResult:
+    """Choose parameters so that the peak is least over an uncertainty, and compare with the nominal optimum.
+
+    Parameters
+    ----------
+    scene : the scene; `observe` says which DOF and which band.
+    uncertain : what is not known, see `optim.problem.uncertainty_input.read_uncertain`.
+    aim : ``worst-case``, ``mean`` or ``quantile`` of what is minimised. Limits are kept in every scenario,
+        with a quantile in that share of the samples that is minimised over.
+    quantile : the share of the samples, for the aim of that name.
+    samples : how many scenarios are drawn: for the mean and quantiles shown, and minimised with these aims;
+        64, of a worst case 32 if left out.
+    seed : of the random numbers.
+    on_progress : called with (share done, responses so far).
+    should_stop : asked between responses and within them.
+    method : of the search without uncertainty; the robust one is always the cone programme.
+    basins : how many local optima are looked for, without and with uncertainty.
+
+    All other arguments are those of `optim.design`.
+
+    Returns
+    -------
+    Both optima over the uncertainty; look at the status.
+
+    Raises
+    ------
+    SettingError, SceneError, DesignError
+        Bad paths, bounds, uncertainty, cases, limits or start.
+    """
+    begun = time.perf_counter()
+    problem = pose(
+        scene, variables=variables, scaling=scaling, cases=cases, limit=limit, weights=weights,
+        max_peak=max_peak, max_band_hz=max_band_hz, forbidden_hz=forbidden_hz, speeds_rpm=speeds_rpm,
+        max_friction_work=max_friction_work, contact_states=contact_states, harmonics=harmonics, start=start,
+        method=method, basins=basins,
+    )  # fmt: skip
+    over = read_uncertain(scene, problem.variables, uncertain)
+    search = RobustSearch(problem, over, _aim(aim), _quantile(quantile), on_progress, should_stop)
+    wanted = SAMPLES[search.aim] if samples is None else _count("samples", samples, FEWEST_SAMPLES)
+    drawn = over.draw(wanted, _count("seed", seed, 0))
+    for scenario in drawn:
+        check_settings(scene, problem.variables, scenario.settings)
+    found = _run(search, drawn, should_stop)
+    if on_progress is not None:
+        on_progress(1.0, search.responses)
+    return replace(found, seconds=time.perf_counter() - begun)
+
+
+def _aim(aim: object) -> Aim:
+    if isinstance(aim, Aim):
+        return aim
+    known = [one.value for one in Aim]
+    if aim not in known:
+        raise DesignError("aim", aim, f"must be one of {', '.join(known)}")
+    return Aim(aim)
+
+
+def _quantile(share: object) -> float:
+    if not is_number(share) or not 0.0 < share < 1.0:  # type: ignore[operator]
+        raise DesignError("quantile", share, "must be a number between 0 and 1")
+    return float(share)  # type: ignore[arg-type]
+
+
+def _count(name: str, value: object, least: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise DesignError(name, value, f"must be a whole number >= {least}")
+    return value
+
+
+@dataclass(slots=True, kw_only=True)
+class _State:
+    """What is known so far, for a result at any time."""
+
+    nominal: DesignResult
+    progress: Progress = field(default_factory=Progress)
+    sides: dict[str, Side] = field(default_factory=dict)
+    unknown: Scenario | None = None
+
+
+def _run(
+    search: RobustSearch, drawn: tuple[Scenario, ...], should_stop: Callable[[], bool] | None
+) -> RobustResult:
+    """Search without and with uncertainty, then judge both optima."""
+    before = search.responses
+
+    def count(_share: float, evaluations: int) -> None:
+        search.count(before + evaluations - search.responses)
+
+    state = _State(nominal=solve_problem(search.problem, on_progress=count, should_stop=should_stop))
+    try:
+        status = _search(search, drawn, state)
+    except StoppedError as stop:
+        stopped = stop.status is DesignStatus.STOPPED
+        status = RobustStatus.STOPPED if stopped else RobustStatus.TOO_MANY
+    except UnknownScenarioError as unknown:
+        status, state.unknown = RobustStatus.UNKNOWN_SCENARIO, unknown.scenario
+    return _result(search, state, status)
+
+
+def _search(search: RobustSearch, drawn: tuple[Scenario, ...], state: _State) -> RobustStatus:
+    """Run the search of the aim and look at both optima; fills the state."""
+    if state.nominal.status is DesignStatus.STOPPED:
+        return RobustStatus.STOPPED
+    method = cutting_sets if search.aim is Aim.WORST_CASE else sampled
+    status = method(search, state.nominal, drawn, state.progress)
+    known = [] if state.progress.best is None else state.progress.scenarios
+    if state.nominal.evaluation is not None and state.nominal.evaluation.good:
+        state.sides["nominal"] = side_of(search, state.nominal.optimum, drawn, known)
+    if state.progress.best is not None:
+        state.sides["robust"] = side_of(search, state.progress.best.evaluation.values, drawn, known)
+        unknown = state.sides["robust"].unknown
+        if unknown is not None:
+            raise UnknownScenarioError(unknown)
+        status = _honest(search, state, status)
+    return status
+
+
+def _honest(search: RobustSearch, state: _State, status: RobustStatus) -> RobustStatus:
+    """Return the status once the worst scenario of all looks is known: it may be worse than all cuts."""
+    best, side = state.progress.best, state.sides["robust"]
+    if search.aim is not Aim.WORST_CASE or best is None or side.worst is None:
+        return status
+    plain = Aspect(quantity=Quantity.PEAK, limited=False, plain=True)
+    known = plain.worst(best.evaluation.rows)
+    excess = side.worst_peak / known - 1.0 if known > 0.0 else 0.0
+    weighted = search.problem.weights[Quantity.PEAK] > 0.0 and len(search.problem.cases) == 1
+    if weighted and excess > CLOSED:
+        state.progress.gap = max(state.progress.gap, excess)
+        return RobustStatus.NOT_CLOSED if status is RobustStatus.OPTIMAL else status
+    return status
+
+
+def _result(search: RobustSearch, state: _State, status: RobustStatus) -> RobustResult:
+    """Put the result together."""
+    best = state.progress.best
+    return RobustResult(
+        problem=search.problem, uncertain=search.uncertain, aim=search.aim, quantile=search.quantile,
+        status=status, design=state.nominal, nominal=state.sides.get("nominal"),
+        robust=state.sides.get("robust"),
+        objective=math.nan if best is None else search.objective(best, len(state.progress.scenarios)),
+        conditions=None if best is None else best.conditions, cuts=state.progress.cuts(),
+        gap=state.progress.gap, inner_look=state.progress.finished, unknown=state.unknown,
+        designs=search.designs, responses=search.responses, seconds=0.0,
+    )  # fmt: skip

@@ -1,0 +1,207 @@
+"""Evaluating a design in a scenario: the rows it is judged by, with slopes by design and by uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from optim.criteria.evaluation import Judge, effects_of, evaluate
+from optim.criteria.rows import Evaluation, Quantity, Row
+from optim.problem.cases import Case
+from optim.problem.problem import Problem
+from optim.problem.uncertainty_set import Coordinate, Scenario
+from optim.problem.variables import Real, Variable, parameter_values
+from solver.branches.observation import observing
+from solver.branches.sweep import sweep
+from solver.scene.scene import CyclicStructure
+
+ShouldStop = Callable[[], bool] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """A design in a scenario.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        What is the case.
+    rows : tuple of Row
+        What it is judged by, gradients by the variables; empty unless every response covered its range.
+    by_delta : (n_rows, n) array
+        Their derivatives by the δ of the scenario's settings.
+    responses : int
+        Frequency responses computed.
+    """
+
+    scenario: Scenario
+    rows: tuple[Row, ...]
+    by_delta: Real
+    responses: int
+
+    @property
+    def good(self) -> bool:
+        """Whether every number is known."""
+        return bool(self.rows) and all(np.isfinite(row.value) for row in self.rows)
+
+    def highest(self, quantity: Quantity) -> Row | None:
+        """Return the largest row of a quantity."""
+        return max((r for r in self.rows if r.quantity is quantity), key=lambda r: r.value, default=None)
+
+
+def outcome(
+    problem: Problem, values: Mapping[str, float], scenario: Scenario, *, gradients: bool = True,
+    should_stop: ShouldStop = None,
+) -> Outcome:  # fmt: skip
+    """Compute what a design is judged by in a scenario.
+
+    Parameters
+    ----------
+    problem : what is judged.
+    values : the design, variable name to value.
+    scenario : what is the case.
+    gradients : compute them (otherwise they are NaN).
+    should_stop : asked while the responses are computed.
+    """
+    design = parameter_values(problem.variables, values)
+    rows: list[Row] = []
+    by_delta: list[Real] = []
+    responses = 0
+    for case in problem.cases:
+        nominal = case.scene.with_values(design)
+        chain = _Chain(problem, scenario, {path: nominal.value(path) for path in _touched(design, scenario)})
+        found, count = chain.rows(case, gradients, should_stop)
+        responses += count
+        if not found:
+            return Outcome(scenario=scenario, rows=(), by_delta=np.zeros((0, 0)), responses=responses)
+        for row in found:
+            second = None if row.second is None else chain.twice(row.second)
+            rows.append(replace(row, gradient=chain.by_variables(row.gradient), second=second))
+            by_delta.append(chain.by_delta(row.gradient))
+    n = len(scenario.settings)
+    return Outcome(
+        scenario=scenario,
+        rows=tuple(rows),
+        by_delta=np.array(by_delta).reshape(len(rows), n),
+        responses=responses,
+    )
+
+
+def _touched(design: Mapping[str, float], scenario: Scenario) -> tuple[str, ...]:
+    """Return every path whose value a design or a scenario sets."""
+    uncertain = [path for coordinate, _ in scenario.settings for path in coordinate.paths]
+    return tuple(dict.fromkeys([*design, *uncertain]))
+
+
+class _Chain:
+    """The values of all paths in one scenario of one case, and the chain rule through them."""
+
+    def __init__(self, problem: Problem, scenario: Scenario, nominal: Mapping[str, float]) -> None:
+        self._problem, self._scenario = problem, scenario
+        self._nominal = nominal
+        self._places = {path: i for i, path in enumerate(nominal)}
+        self._of: dict[str, tuple[Coordinate, float]] = {
+            path: (coordinate, delta) for coordinate, delta in scenario.settings for path in coordinate.paths
+        }
+
+    def _values(self) -> dict[str, float]:
+        values = dict(self._nominal)
+        for path, (coordinate, delta) in self._of.items():
+            values[path] = coordinate.value(self._nominal[path], delta)
+        return values
+
+    def rows(self, case: Case, gradients: bool, should_stop: ShouldStop) -> tuple[list[Row], int]:
+        """Return the rows of a case with their gradients by path, and the responses computed."""
+        disk, values = self._scenario.disk, self._values()
+        scene = case.scene if disk is None else disk.on(case.scene)
+        here = replace(case, scene=scene)
+        problem = replace(self._problem, variables=_single(values), cases=(here,))
+        if disk is not None and isinstance(scene.structure, CyclicStructure) and "@" not in scene.observe.dof:
+            return _of_all_blades(problem, here, values, gradients, should_stop)
+        evaluation = evaluate(problem, values, gradients=gradients, should_stop=should_stop)
+        return list(evaluation.rows), len(evaluation.responses)
+
+    def _members(self) -> Real:
+        """Return d path / d variable, (n_variables, n_paths); its own derivatives are 0."""
+        table = np.zeros((len(self._problem.variables), len(self._places)))
+        for i, variable in enumerate(self._problem.variables):
+            for path in variable.paths:
+                table[i, self._places[path]] = self._by_nominal(path)
+        return table
+
+    def by_variables(self, by_path: Real) -> Real:
+        """Return a gradient by the variables."""
+        return np.asarray(self._members() @ by_path)
+
+    def twice(self, second: Callable[[], Real]) -> Callable[[], Real]:
+        """Return what computes second derivatives by the variables from what does so by the paths."""
+        members = self._members()
+        return lambda: members @ second() @ members.T
+
+    def _by_nominal(self, path: str) -> float:
+        if path not in self._of:
+            return 1.0
+        coordinate, delta = self._of[path]
+        return coordinate.by_nominal(delta)
+
+    def by_delta(self, by_path: Real) -> Real:
+        """Return a gradient by the δ of the scenario's settings."""
+        return np.array([
+            sum(by_path[self._places[p]] * coordinate.by_delta(self._nominal[p]) for p in coordinate.paths)
+            for coordinate, _ in self._scenario.settings
+        ])  # fmt: skip
+
+
+def _single(values: Mapping[str, float]) -> tuple[Variable, ...]:
+    """Return a variable for every path, for their gradients."""
+    return tuple(
+        Variable(name=path, paths=(path,), low=-np.inf, high=np.inf, logarithmic=False) for path in values
+    )
+
+
+def _of_all_blades(
+    problem: Problem, case: Case, values: Mapping[str, float], gradients: bool, should_stop: ShouldStop
+) -> tuple[list[Row], int]:
+    """Return the rows of a mistuned disk: those of the observed DOF in every sector, from one response."""
+    here = case.scene.with_values(values)
+    effects = effects_of(problem, here)
+    sectors, dof = here.structure.sectors, here.observe.dof  # type: ignore[union-attr]
+    ranges = ((None, None), *problem.limits.forbidden_hz.get(case.name, ()))
+    rows: list[Row] = []
+    for low, high in ranges:
+        branch = sweep(
+            here, start=low, stop=high, harmonics=problem.harmonics, limit=problem.limit, effects=effects,
+            should_stop=should_stop,
+        )  # fmt: skip
+        if not branch.completed:
+            return [], len(ranges)
+        for j in range(sectors):
+            name = f"{case.name}, {dof}@{j}"
+            seen = branch if j == 0 else observing(branch, f"{dof}@{j}", limit=problem.limit, effects=effects)
+            judge = Judge(problem=problem, case=replace(case, name=name), gradients=gradients)
+            found = judge.response(seen) if low is None or high is None else judge.forbidden(seen, low, high)
+            blades = (Quantity.PEAK, Quantity.BAND, Quantity.FORBIDDEN)
+            rows += [row for row in found if j == 0 or row.quantity in blades]
+    return rows, len(ranges)
+
+
+def together(values: Mapping[str, float], outcomes: Sequence[Outcome]) -> Evaluation:
+    """Return an evaluation over several scenarios: the rows of all, each case under its scenario's number.
+
+    Without rows if one of the scenarios could not be computed.
+    """
+    if not all(found.good for found in outcomes):
+        return Evaluation(values=dict(values), responses=(), rows=())
+    rows = tuple(
+        replace(row, case=f"{row.case} [{number}]")
+        for number, found in enumerate(outcomes, start=1)
+        for row in found.rows
+    )
+    return Evaluation(values=dict(values), responses=(), rows=rows)
+
+
+def number_of(row: Row) -> int:
+    """Return the number of the scenario a row of `together` belongs to, from 1 on."""
+    return int(row.case.rpartition("[")[2].rstrip("]"))

@@ -1,0 +1,145 @@
+"""Evaluations of a robust search: every design in every scenario once, counted, and stopped when asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from optim.criteria.evaluation import natural_scales
+from optim.criteria.linearised import Model
+from optim.criteria.rows import Evaluation, Quantity
+from optim.methods.evaluator import StoppedError
+from optim.methods.kkt import Local
+from optim.methods.minimax import REMEMBERED, minimax_search
+from optim.problem.problem import Problem
+from optim.problem.uncertainty_set import Scenario, UncertainSet
+from optim.problem.variables import Variable
+from optim.results.design import DesignStatus
+from optim.robust.risk_measure import Aim, aim_model
+from optim.robust.scenarios import Outcome, outcome, together
+from optim.robust.socp import solve_cone
+from optim.robust.worst_case import Aspect
+
+MOST_RESPONSES = 20_000
+USUAL = 200.0  # responses of a usual search; what is left is not known beforehand
+EUCLIDEAN = 2.0
+
+Key = tuple[tuple[float, ...], Scenario, bool]
+
+
+class RobustSearch:
+    """A problem over its uncertainty; keeps every outcome."""
+
+    def __init__(
+        self, problem: Problem, uncertain: UncertainSet, aim: Aim, quantile: float,
+        on_progress: Callable[[float, int], None] | None = None,
+        should_stop: Callable[[], bool] | None = None,
+    ) -> None:  # fmt: skip
+        self.problem, self.uncertain, self.aim, self.quantile = problem, uncertain, aim, quantile
+        self.scales = natural_scales(problem)
+        self.responses = 0
+        self._on_progress, self._should_stop = on_progress, should_stop
+        self._outcomes: dict[Key, Outcome] = {}
+        self._scale: float | None = None
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """What may be chosen."""
+        return self.problem.variables
+
+    @property
+    def designs(self) -> int:
+        """Designs tried."""
+        return len({key[0] for key in self._outcomes})
+
+    @property
+    def scale(self) -> float:
+        """The objective that counts as 1: that of the first design."""
+        return self._scale or 1.0
+
+    def outcome(self, values: Mapping[str, float], scenario: Scenario, *, gradients: bool = True) -> Outcome:
+        """Return a design in a scenario.
+
+        Raises
+        ------
+        StoppedError
+            The caller asked to stop, or the responses are used up.
+        """
+        place = tuple(values[variable.name] for variable in self.variables)
+        for known in ((place, scenario, True), (place, scenario, gradients)):
+            if known in self._outcomes:
+                return self._outcomes[known]
+        if self._should_stop is not None and self._should_stop():
+            raise StoppedError(DesignStatus.STOPPED)
+        if self.responses >= MOST_RESPONSES:
+            raise StoppedError(DesignStatus.TOO_MANY)
+        found = outcome(self.problem, values, scenario, gradients=gradients, should_stop=self._should_stop)
+        if not found.good and self._should_stop is not None and self._should_stop():
+            raise StoppedError(DesignStatus.STOPPED)
+        self._outcomes[place, scenario, gradients] = found
+        self.count(found.responses)
+        return found
+
+    def count(self, responses: int) -> None:
+        """Count responses and report them."""
+        self.responses += responses
+        if self._on_progress is not None:
+            self._on_progress(self.responses / (self.responses + USUAL), self.responses)
+
+    def evaluation(self, values: Mapping[str, float], scenarios: Sequence[Scenario]) -> Evaluation:
+        """Return a design over several scenarios."""
+        found: list[Outcome] = []
+        for scenario in scenarios:
+            found.append(self.outcome(values, scenario))
+            if not found[-1].good:
+                break
+        evaluation = together(values, found)
+        if self._scale is None and evaluation.good:
+            self._scale = evaluation.objective or 1.0
+        return evaluation
+
+    def model(self, evaluation: Evaluation, count: int) -> Model:
+        """Return the model of a good evaluation over `count` scenarios."""
+        return aim_model(self.aim, self.quantile, count, self.variables, self.scale, self.scales)(evaluation)
+
+    def improve(self, values: Mapping[str, float], scenarios: Sequence[Scenario]) -> Local | None:
+        """Return the end of the master problem's search from a design; None if that can not be evaluated."""
+        begin = self.evaluation(values, scenarios)
+        if not begin.good:
+            return None
+        found = self._searched(begin, scenarios, 0)
+        # Cuts help at kinks, but with many scenarios a row bent over a long step passes for one of its own;
+        # rows of scenarios that a quantile leaves out must not come back as cuts at all.
+        if not found.settled and self.aim is not Aim.QUANTILE:
+            again = self._searched(found.evaluation, scenarios, REMEMBERED)
+            found = min(found, again, key=lambda local: (local.standing, not local.settled))
+        return found
+
+    def _searched(self, begin: Evaluation, scenarios: Sequence[Scenario], remembered: int) -> Local:
+        """Return the end of the minimax search over scenarios that keeps so many designs' rows as cuts."""
+        return minimax_search(
+            lambda there: self.evaluation(there, scenarios), self.variables, begin,
+            lambda evaluation: self.model(evaluation, len(scenarios)), solve=solve_cone, norm=EUCLIDEAN,
+            remembered=remembered,
+        )  # fmt: skip
+
+    def objective(self, local: Local, count: int) -> float:
+        """Return what was minimised at a design over `count` scenarios, in its own unit."""
+        return self.model(local.evaluation, count).objective * self.scale
+
+    def aspects(self) -> tuple[Aspect, ...]:
+        """Return every number whose worst case counts: what is minimised first, then what is limited."""
+        limits = self.problem.limits
+        limited = {
+            Quantity.PEAK: limits.peak is not None, Quantity.BAND: limits.band_hz is not None,
+            Quantity.FORBIDDEN: bool(limits.forbidden_hz), Quantity.FRICTION_WORK: bool(limits.friction_work),
+            Quantity.SEPARATION: bool(limits.in_contact),
+        }  # fmt: skip
+        minimised = [
+            Aspect(quantity=quantity, limited=False)
+            for quantity, weight in self.problem.weights.items()
+            if weight > 0.0
+        ]
+        return (
+            *minimised,
+            *(Aspect(quantity=q, limited=True, unit=self.scales[q]) for q, given in limited.items() if given),
+        )

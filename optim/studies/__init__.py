@@ -1,0 +1,1 @@
+"""Studies of designs: Campbell diagrams, sensitivities, Pareto fronts."""

@@ -1,0 +1,225 @@
+"""Campbell diagrams: where the orders of a running speed meet the resonances of a scene with friction.
+
+An excitation that repeats n times a revolution has the frequency n · speed / 60. Friction moves a resonance
+between its places with all contacts stuck and all contacts open, so what an order meets are the peaks of its
+own frequency response, not natural frequencies; those are given beside them.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from optim.errors import DesignError
+from optim.problem.cases import number_pair, with_engine_order
+from optim.studies.crossings import CampbellDiagram, CampbellStatus, Crossing, OrderResponse, Ranges
+from solver.balance.kernels.output import MAX_ABS
+from solver.balance.workspace import Workspace
+from solver.branches.sweep import sweep
+from solver.continuation.branch import Branch
+from solver.jit.fourier import Real
+from solver.linear.assembly import linear_model
+from solver.matrices.normal_modes import undamped_modes
+from solver.response.time_history import matrices
+from solver.scene.annulus import written_out
+from solver.scene.scene import Scene
+
+_MOST_ORDERS = 100
+
+
+def campbell_diagram(
+    scene: Scene,
+    *,
+    speeds_rpm: Sequence[float] | Sequence[Sequence[float]],
+    orders: Sequence[int] | None = None,
+    limit: float | None = None,
+    band_hz: Sequence[float] | None = None,
+    harmonics: int = 11,
+    on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> CampbellDiagram:
+    """Compute the Campbell diagram of a scene.
+
+    Parameters
+    ----------
+    scene : what vibrates. In a cyclic one order n excites as a wave of that engine order; elsewhere it is the
+        n-th multiple of the speed.
+    speeds_rpm : the running speeds [1/min], [low, high] or a list of such ranges.
+    orders : excitations a revolution; the scene's engine order, or 1, if left out.
+    limit : amplitude [m] that counts as resonance; half power of the highest peak of each order if left out.
+    band_hz : frequencies looked at [Hz]; the scene's band and those of the running speeds if left out.
+    harmonics : highest harmonic kept.
+    on_progress : called with (share done, points so far).
+    should_stop : asked now and then; True ends the diagram with the status STOPPED.
+
+    Raises
+    ------
+    DesignError, SettingError
+        Bad speeds, orders, band, limit or number of harmonics.
+    """
+    begun = time.perf_counter()
+    speeds, chosen = _speeds(speeds_rpm), _orders(scene, orders)
+    looked_at = None if band_hz is None else _positive_pair("band_hz", band_hz, "Hz")
+    cyclic = scene.structure.kind == "cyclic"
+    groups = [(order,) for order in chosen] if cyclic else [chosen]
+    found: list[OrderResponse] = []
+    stopped, count = False, 0
+    for i, group in enumerate(groups):
+        here = with_engine_order(scene, group[0]) if cyclic else scene
+        low, high = looked_at or _needed(scene, speeds, group)
+
+        def progress(share: float, points: int, done: int = i, before: int = count) -> None:
+            if on_progress is not None:
+                on_progress((done + share) / len(groups), before + points)
+
+        branch = sweep(
+            here, start=low, stop=high, harmonics=harmonics, limit=limit, on_progress=progress,
+            should_stop=should_stop,
+        )  # fmt: skip
+        count += len(branch.values)
+        stuck, free = (natural_frequencies(here, stuck=each) for each in (True, False))
+        found += [_response(branch, order, speeds, stuck, free) for order in group]
+        stopped = should_stop is not None and should_stop()
+        if stopped:
+            break
+    status = CampbellStatus.COMPLETED
+    if stopped and not (len(found) == len(chosen) and found[-1].branch.completed):
+        status = CampbellStatus.STOPPED
+    elif not all(one.branch.completed for one in found):
+        status = CampbellStatus.INCOMPLETE
+    return CampbellDiagram(
+        scene=scene, speeds_rpm=speeds, limit=limit, orders=tuple(found), n_harmonics=harmonics,
+        status=status, seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def forbidden_hz(speeds_rpm: Sequence[float] | Sequence[Sequence[float]], order: int) -> Ranges:
+    """Return the frequencies [Hz] that an order excites at running speeds, [low, high] · order / 60.
+
+    Parameters
+    ----------
+    speeds_rpm : [low, high] in 1/min, or a list of such ranges.
+    order : excitations a revolution.
+
+    Raises
+    ------
+    DesignError
+        Speeds that are not ranges above 0, or an order that is not a whole number above 0.
+    """
+    return _scaled(_speeds(speeds_rpm), _order("order", order) / 60.0)
+
+
+def natural_frequencies(scene: Scene, *, stuck: bool) -> Real:
+    """Return the undamped natural frequencies [Hz], ascending, of the nodal diameter that is excited.
+
+    Parameters
+    ----------
+    scene : its dashpots and forces do not count.
+    stuck : with all contacts closed and stuck, so that each is its springs; otherwise with all open.
+    """
+    scene = written_out(scene)
+    model = linear_model(scene)
+    K, _, L = matrices(model, 1)
+    if stuck:
+        stiffness = np.array([k for contact in scene.contacts for k in contact.stiffnesses])
+        K = K + L.conj().T @ (stiffness[:, None] * L)
+    modes = undamped_modes(K if np.any(K.imag) else K.real, model.M)
+    return np.sort(np.sqrt(np.maximum(modes.omega2, 0.0))) / (2.0 * math.pi)
+
+
+def _response(branch: Branch, order: int, speeds: Ranges, stuck: Real, free: Real) -> OrderResponse:
+    """Return what a response means for one order."""
+    per_hz = 60.0 / order
+    bands = () if branch.band is None else branch.band.intervals
+    exceeded = _scaled(bands, per_hz)
+    inside = tuple((max(a, c), min(b, d)) for a, b in exceeded for c, d in speeds if max(a, c) < min(b, d))
+    peaks = sorted((peak for peak in branch.peaks if peak.interior), key=lambda peak: peak.at)
+    top = max(branch.start, branch.stop)
+    return OrderResponse(
+        order=order, branch=branch, running_hz=_scaled(speeds, 1.0 / per_hz),
+        limit=math.nan if branch.band is None else branch.band.limit, bands_hz=bands, exceeded_rpm=exceeded,
+        exceeded_running_rpm=inside,
+        crossings=tuple(_crossing(peak.at, peak.value, order, speeds) for peak in peaks),
+        highest_running=_highest_running(branch, order, speeds),
+        stuck_hz=tuple(stuck[stuck <= top].tolist()), open_hz=tuple(free[free <= top].tolist()),
+    )  # fmt: skip
+
+
+def _highest_running(branch: Branch, order: int, speeds: Ranges) -> Crossing | None:
+    """Return the largest amplitude at running speeds: a peak there, or the response at an end of them."""
+    candidates = [(peak.value, peak.at) for peak in branch.peaks]
+    if len(branch.values):
+        workspace = Workspace.of(branch.balance)
+        low, high = float(branch.values.min()), float(branch.values.max())
+        for end in {order * speed / 60.0 for pair in speeds for speed in pair}:
+            if low <= end <= high:
+                nearest = branch.solutions[int(np.argmin(np.abs(branch.values - end)))]
+                found = workspace.solve(2.0 * math.pi * end, nearest[:-1])
+                measured = workspace.measure(found.u, 2.0 * math.pi * end) if found.converged else None
+                if measured is not None:
+                    candidates.append((float(measured.values[MAX_ABS]), end))
+    running = [one for one in candidates if _is_running(one[1] * 60.0 / order, speeds)]
+    if not running:
+        return None
+    value, at = max(running)
+    return _crossing(at, value, order, speeds)
+
+
+def _crossing(at_hz: float, amplitude: float, order: int, speeds: Ranges) -> Crossing:
+    speed = at_hz * 60.0 / order
+    inside = _is_running(speed, speeds)
+    nearest = min((end for pair in speeds for end in pair), key=lambda end: abs(end - speed))
+    margin = 0.0 if inside else abs(speed - nearest) / nearest
+    return Crossing(speed_rpm=speed, frequency_hz=at_hz, amplitude=amplitude, inside=inside, margin=margin)
+
+
+def _is_running(speed: float, speeds: Ranges) -> bool:
+    """Return whether a speed is a running speed; an end of a range is, whatever its rounding."""
+    return any(low * (1.0 - 1e-12) <= speed <= high * (1.0 + 1e-12) for low, high in speeds)
+
+
+def _needed(scene: Scene, speeds: Ranges, orders: Sequence[int]) -> tuple[float, float]:
+    """Return the range of the scene's band and of the frequencies of the running speeds."""
+    ends = [order * speed / 60.0 for order in orders for pair in speeds for speed in pair]
+    return min(scene.observe.band[0], *ends), max(scene.observe.band[1], *ends)
+
+
+def _scaled(ranges: Ranges, factor: float) -> Ranges:
+    return tuple((low * factor, high * factor) for low, high in ranges)
+
+
+def _speeds(speeds_rpm: object) -> Ranges:
+    """Return the running speeds, ascending."""
+    if not isinstance(speeds_rpm, Sequence) or isinstance(speeds_rpm, str) or not speeds_rpm:
+        raise DesignError("speeds_rpm", speeds_rpm, "must be [low, high] in 1/min, or a list of such ranges")
+    if isinstance(speeds_rpm[0], Sequence):
+        pairs = enumerate(speeds_rpm)
+        return tuple(sorted(_positive_pair(f"speeds_rpm[{i}]", pair, "1/min") for i, pair in pairs))
+    return (_positive_pair("speeds_rpm", speeds_rpm, "1/min"),)
+
+
+def _positive_pair(name: str, pair: object, unit: str) -> tuple[float, float]:
+    low, high = number_pair(name, pair)
+    if not 0.0 < low < high:
+        raise DesignError(name, pair, f"must have 0 < low < high [{unit}]")
+    return low, high
+
+
+def _orders(scene: Scene, orders: object) -> tuple[int, ...]:
+    """Return the orders, ascending, none twice."""
+    if orders is None:
+        return (max(scene.engine_order, 1),)
+    if not isinstance(orders, Sequence) or isinstance(orders, str) or not orders:
+        raise DesignError("orders", orders, "must be a list of at least one whole number >= 1")
+    if len(orders) > _MOST_ORDERS:
+        raise DesignError("orders", len(orders), f"must be at most {_MOST_ORDERS} numbers")
+    return tuple(sorted({_order(f"orders[{i}]", order) for i, order in enumerate(orders)}))
+
+
+def _order(name: str, order: object) -> int:
+    if isinstance(order, bool) or not isinstance(order, int) or order < 1:
+        raise DesignError(name, order, "must be a whole number >= 1, the excitations a revolution")
+    return order

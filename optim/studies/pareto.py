@@ -1,0 +1,270 @@
+"""The Pareto front of peak against resonance band: what each costs in terms of the other.
+
+Epsilon-constraint (Haimes, Lasdon, Wismer, IEEE Trans. SMC 1 (1971) 296): the least peak with the band at
+most so wide, for widths between the two optima of one criterion alone. The multiplier of that limit is the
+slope of the front, d peak / d band; points are added where the front is longest, and each search starts from
+the best of all designs seen so far and of one predicted between the neighbours on the front.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import linprog
+
+from optim.criteria.linearised import ACTIVE, Model, bounds_held
+from optim.criteria.rows import Evaluation, Quantity
+from optim.errors import DesignError
+from optim.methods.evaluator import Search, StoppedError
+from optim.methods.kkt import Local
+from optim.problem.problem import Method, Problem, pose
+from optim.problem.variables import Variable, scaled, unscaled
+from optim.results.design import DesignResult, DesignStatus
+from optim.search import judge, local_search_of, solve_problem
+from optim.studies.pareto_result import ParetoPoint, ParetoResult, ParetoStatus, front_of
+from solver.scene.scene import Scene
+
+POINTS = 9
+FEWEST = 3
+FAR_APART = 0.02  # scaled distance from which the optima of two neighbours are both searched from
+JUMP = 0.01  # share of the band's range within which two neighbours need no point between them
+RESIDUAL = 1e-6  # of the first-order conditions, relative objective per scaled variable
+NOTHING_TO_TRADE = 1e-6  # relative width of the front below which the two optima are one
+MOST_EVALUATIONS = 5000
+FOUND = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK, DesignStatus.LOCAL)
+
+
+def pareto_front(
+    scene: Scene,
+    *,
+    variables: Mapping[str, tuple[float, float]] | None = None,
+    limit: float | None = None,
+    points: int = POINTS,
+    scaling: Mapping[str, str] | None = None,
+    cases: Sequence[Mapping[str, object]] | None = None,
+    max_peak: float | None = None,
+    forbidden_hz: Sequence[Sequence[float]] | None = None,
+    speeds_rpm: Sequence[Sequence[float]] | None = None,
+    max_friction_work: Mapping[str, float] | float | None = None,
+    contact_states: Mapping[str, str] | None = None,
+    harmonics: int = 11,
+    start: Mapping[str, float] | None = None,
+    method: str | Method = Method.AUTO,
+    on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> ParetoResult:
+    """Return the designs of which none has both a lower peak and a narrower band than another.
+
+    Parameters
+    ----------
+    scene : the scene; `observe` says which DOF and which band.
+    variables : parameter path to (low, high); see `optim.design`.
+    limit : amplitude [m] above which the resonance band is measured; half power of the peak if left out.
+    points : how many, both ends included.
+    on_progress : called with (share done, designs evaluated so far).
+    should_stop : asked between responses and within them.
+
+    All other arguments are those of `optim.design`; what is minimised and the limit on the band are the
+    front's own.
+
+    Returns
+    -------
+    The front from the least peak to the narrowest band; look at its status.
+
+    Raises
+    ------
+    SettingError, SceneError, DesignError
+        Bad paths, bounds, cases, limits, start or number of points.
+    """
+    begun = time.perf_counter()
+    problem = pose(
+        scene, variables=variables, scaling=scaling, cases=cases, limit=limit, max_peak=max_peak,
+        forbidden_hz=forbidden_hz, speeds_rpm=speeds_rpm, max_friction_work=max_friction_work,
+        contact_states=contact_states, harmonics=harmonics, start=start, method=method,
+    )  # fmt: skip
+    if isinstance(points, bool) or not isinstance(points, int) or points < FEWEST:
+        raise DesignError("points", points, f"must be a whole number >= {FEWEST}")
+    front = _Front(problem, points, on_progress, should_stop)
+    status = front.run()
+    if on_progress is not None:
+        on_progress(1.0, max(front.reported, front.evaluations))
+    kept, dominated = front_of(front.found)
+    return ParetoResult(
+        problem=problem, status=status, ends=tuple(front.ends), points=kept, dominated=dominated,
+        missed=tuple(front.missed), evaluations=front.evaluations, seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+class _Front:
+    """A front on its way."""
+
+    def __init__(
+        self, problem: Problem, points: int, on_progress: Callable[[float, int], None] | None,
+        should_stop: Callable[[], bool] | None,
+    ) -> None:  # fmt: skip
+        self.problem, self.points = problem, points
+        self.ends: list[DesignResult] = []
+        self.found: list[ParetoPoint] = []
+        self.missed: list[float] = []
+        self.evaluations = self.reported = 0
+        self._pool: list[Evaluation] = []
+        self._on_progress, self._should_stop = on_progress, should_stop
+
+    def run(self) -> ParetoStatus:
+        """Find both ends, then points between."""
+        narrow = replace(self.problem, weights={Quantity.PEAK: 0.0, Quantity.BAND: 1.0})
+        for problem in (self.problem, narrow):
+            end = solve_problem(problem, on_progress=self._report, should_stop=self._should_stop)
+            self.ends.append(end)
+            self._keep(end.history)
+            if end.status is DesignStatus.STOPPED:
+                return ParetoStatus.STOPPED
+            if end.status not in FOUND or end.band_hz is None:
+                return ParetoStatus.NO_END
+            self.found.append(ParetoPoint.of(end, math.nan if self.found else 0.0))
+            if end.band_hz == 0.0 and len(self.found) == 1:
+                return ParetoStatus.NO_TRADE_OFF
+        least, narrowest = self.found
+        self.found[0] = replace(least, slope=self._first_slope(least))
+        if least.band_hz - narrowest.band_hz <= NOTHING_TO_TRADE * least.band_hz:
+            return ParetoStatus.NO_TRADE_OFF
+        try:
+            for _ in range(self.points - 2):
+                self._add(*self._longest())
+        except StoppedError:
+            return ParetoStatus.STOPPED
+        return ParetoStatus.PARTIAL if self.missed else ParetoStatus.COMPLETE
+
+    def _first_slope(self, least: ParetoPoint) -> float:
+        """Return the slope of the front as it leaves the least peak: 0, or steeper where peaks are equal."""
+        search = Search(self.problem)
+        evaluation = _at_limit(least.design.evaluation, least.band_hz)  # type: ignore[arg-type]
+        search.keep(evaluation)
+        return -steepest(search.model(evaluation), self.problem.variables) * least.peak / least.band_hz
+
+    def _report(self, _share: float, _count: int) -> None:
+        if self._on_progress is not None:
+            done = len(self.ends) + max(len(self.found) - 2, 0) + len(self.missed)
+            # A tracked end reports its responses, of which one is a design: the count must not fall back.
+            self.reported = max(self.reported, self.evaluations + _count)
+            self._on_progress(min(done / self.points, 0.99), self.reported)
+
+    def _keep(self, history: Sequence[Evaluation]) -> None:
+        """Add evaluated designs to the pool of starts; what they are judged by is the same at every limit."""
+        self.evaluations += len(history)
+        weights = {case.name: case.weight for case in self.problem.cases}
+        for evaluation in history:
+            rows = tuple(
+                replace(row, weight=weights[row.case] if row.quantity is Quantity.PEAK else 0.0)
+                for row in evaluation.rows
+            )
+            if evaluation.good and all(np.all(np.isfinite(row.gradient)) for row in rows):
+                self._pool.append(replace(evaluation, rows=rows))
+
+    def _longest(self) -> tuple[ParetoPoint, ParetoPoint, float]:
+        """Return the neighbours farthest apart on the front and the width to search between them."""
+        ordered = sorted(self.found, key=lambda point: -point.band_hz)
+        tall = max(p.peak for p in ordered) - min(p.peak for p in ordered) or 1.0
+        wide = ordered[0].band_hz - ordered[-1].band_hz
+
+        def length(pair: tuple[ParetoPoint, ParetoPoint]) -> float:
+            one, other = pair
+            missed = sum(other.band_hz < width < one.band_hz for width in self.missed)
+            across = (one.band_hz - other.band_hz) / wide
+            # Two basins may lie on either side of a jump, with nothing on the front between them.
+            up = (one.peak - other.peak) / tall if across > JUMP else 0.0
+            return math.hypot(across, up) / 4.0**missed
+
+        one, other = max(pairwise(ordered), key=length)
+        between = [one.band_hz, *(w for w in self.missed if other.band_hz < w < one.band_hz), other.band_hz]
+        gaps = list(pairwise(between))
+        high, low = max(sorted(gaps, reverse=True), key=lambda gap: abs(gap[0] - gap[1]))
+        return one, other, 0.5 * (high + low)
+
+    def _add(self, one: ParetoPoint, other: ParetoPoint, width: float) -> None:
+        """Search the least peak with the band at most so wide."""
+        limited = replace(self.problem, limits=replace(self.problem.limits, band_hz=width))
+        search = Search(limited, self._report, self._should_stop, MOST_EVALUATIONS)
+        rebound = [_at_limit(evaluation, width) for evaluation in self._pool]
+        search.keep(_at_limit(self.ends[0].evaluation or rebound[0], width))
+        try:
+            local = self._searched(search, one, other, width, rebound)
+        finally:
+            self._keep(search.history[1:])
+        if not local.feasible:
+            self.missed.append(width)
+            return
+        result = DesignResult(
+            problem=limited, method=_used(self.problem.method), status=judge(local),
+            evaluation=local.evaluation, conditions=local.conditions, basins=(),
+            history=tuple(search.history[1:]),
+            evaluations=len(search.history) - 1, work=float(len(search.history) - 1), seconds=0.0,
+        )  # fmt: skip
+        self.found.append(ParetoPoint.of(result, _slope(search, local, width)))
+
+    def _searched(
+        self, search: Search, one: ParetoPoint, other: ParetoPoint, width: float, pool: list[Evaluation]
+    ) -> Local:
+        """Return the best end of the local searches from the promising starts."""
+        share = (one.band_hz - width) / (one.band_hz - other.band_hz)
+        z = [scaled(search.variables, point.values) for point in (one, other)]
+        middle = search(unscaled(search.variables, z[0] + share * (z[1] - z[0])))
+        starts = sorted([*pool, *([middle] if middle.good else [])], key=search.merit)
+        begin = [starts[0]]
+        for evaluation in starts[1:]:
+            place = scaled(search.variables, evaluation.values)
+            apart = math.dist(place, scaled(search.variables, begin[0].values))
+            if len(begin) < 2 and FAR_APART < apart <= math.dist(*z) + FAR_APART:
+                begin.append(evaluation)
+        local_search = local_search_of(search.problem.method)
+        ends = [local_search(search, search.variables, evaluation, search.model) for evaluation in begin]
+        return min(ends, key=lambda local: (local.standing, not local.settled))
+
+
+def _used(method: Method) -> Method:
+    """Return the method that a search with a limit uses."""
+    return method if method is Method.IPOPT else Method.MINIMAX
+
+
+def _at_limit(evaluation: Evaluation, width: float) -> Evaluation:
+    """Return an evaluation judged by another limit on the band."""
+    rows = [replace(row, bound=width) if row.quantity is Quantity.BAND else row for row in evaluation.rows]
+    return replace(evaluation, rows=tuple(rows))
+
+
+def steepest(model: Model, variables: Sequence[Variable]) -> float:
+    """Return the largest multiplier a limit on the band, just reached, can have; NaN where it has no end.
+
+    At a kink the multipliers are not unique; the largest is the slope by which the optimum rises when the
+    band is made narrower (Bonnans, Shapiro, Perturbation Analysis of Optimization Problems, Springer 2000,
+    section 4.3).
+    """
+    near = model.heights >= model.heights.max() * (1.0 - ACTIVE)
+    band = [row.quantity is Quantity.BAND for row in model.limited]
+    held = [unit for _, _, unit in bounds_held(model.z, variables)]
+    columns = np.vstack([model.slopes[near], model.excess_slopes[band], *held]).T
+    count, limits = int(near.sum()), int(sum(band))
+    sums = np.zeros(columns.shape[1])
+    sums[:count] = 1.0
+    price = np.zeros(columns.shape[1])
+    price[count : count + limits] = -1.0
+    # The optimum is known to a residual: its conditions hold within that, not exactly.
+    both = np.vstack([columns, -columns])
+    found = linprog(
+        price, A_ub=both, b_ub=np.full(len(both), RESIDUAL), A_eq=sums[None, :], b_eq=[1.0],
+        bounds=(0.0, None),
+    )  # fmt: skip
+    return -float(found.fun) if found.success else math.nan
+
+
+def _slope(search: Search, local: Local, width: float) -> float:
+    """Return d peak / d band along the front [m/Hz] from the multipliers of the limit on the band."""
+    found = [x for row, x in local.conditions.rows if row.quantity is Quantity.BAND]
+    if not local.settled:
+        return math.nan
+    return -sum(found) * search.model(local.evaluation).unit / width

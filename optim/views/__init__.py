@@ -1,0 +1,1 @@
+"""Designs and studies in words, as named arrays and as pictures."""

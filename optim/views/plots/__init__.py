@@ -1,0 +1,1 @@
+"""Pictures of designs, in the style of `solver.views.plots`."""

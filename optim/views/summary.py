@@ -1,0 +1,94 @@
+"""Designs and studies in a few words, with units."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from solver.results import units
+from solver.results.base import Summary
+from solver.views.notes import unsettled
+from solver.views.summary import Pairs, made
+
+if TYPE_CHECKING:
+    from optim.results.design import DesignResult
+    from optim.robust.result import RobustResult
+    from optim.studies.crossings import CampbellDiagram
+    from optim.studies.elasticities import SensitivityResult
+    from optim.studies.pareto_result import ParetoResult
+
+_MOST_ROWS = 12
+
+
+def of_design(result: DesignResult) -> Summary:
+    """The optimum, its peak and band, and what holds it."""
+    pairs: Pairs = [(name, units.parameter(name, value)) for name, value in result.optimum.items()]
+    for name, (low, high) in result.plateau.items():
+        pairs.append((f"{name}, as good", f"{units.parameter(name, low)} to {units.parameter(name, high)}"))
+    if result.chosen_by is not None:
+        pairs.append(("chosen by", result.chosen_by))
+    if result.peak is not None:
+        pairs.append(("peak", f"{units.length(result.peak.value)} at {result.peak.at:.6g} Hz"))
+    if not math.isnan(result.error_estimate):
+        pairs.append(("estimated error", units.length(result.error_estimate)))
+    pairs += [("warning", words) for words in result.warnings]
+    if result.band_hz is not None and result.limit is not None:
+        pairs.append(("band", f"{result.band_hz:.4g} Hz above {units.length(result.limit)}"))
+    if result.active:
+        pairs.append(("held by", "; ".join(result.active)))
+    pairs.append(("responses", str(result.evaluations)))
+    pairs.append(("time", units.duration(result.seconds)))
+    return made(f"{result.scene}, {result.method.value}", pairs, result.status.value)
+
+
+def of_robust(result: RobustResult) -> Summary:
+    """Both optima with their peaks, nominal and worst."""
+    pairs: Pairs = []
+    for name, side in (("nominal", result.nominal), ("robust", result.robust)):
+        if side is not None:
+            values = ", ".join(f"{path} = {units.parameter(path, v)}" for path, v in side.values.items())
+            worst = "unknown" if math.isnan(side.worst_peak) else units.length(side.worst_peak)
+            pairs.append((f"{name} optimum", f"{values}: peak {units.length(side.peak)}, worst {worst}"))
+    pairs += [("warning", words) for words in result.design.warnings]
+    pairs.append(("time", units.duration(result.seconds)))
+    return made(f"{result.problem.scene.name}, {result.aim.value}", pairs, result.status.value)
+
+
+def of_front(result: ParetoResult) -> Summary:
+    """Both ends of a front and its knee."""
+    points, pairs = result.points, []
+    places = {"least peak": 0, "knee": result.knee, "narrowest band": len(points) - 1}
+    for name, place in places.items():
+        if points and place is not None:
+            point = points[place]
+            pairs.append((name, f"{units.length(point.peak)}, band {point.band_hz:.4g} Hz"))
+    pairs += [("points", str(len(points))), ("time", units.duration(result.seconds))]
+    return made(f"peak against band of {result.problem.scene.name}", pairs, result.status.value)
+
+
+def of_campbell(diagram: CampbellDiagram) -> Summary:
+    """What every order does at running speeds."""
+    pairs: Pairs = []
+    for one in diagram.orders:
+        highest = one.highest_running
+        text = "no response at running speeds"
+        if highest is not None:
+            text = f"at most {units.length(highest.amplitude)}, at {highest.speed_rpm:.6g} rpm"
+        pairs.append((f"order {one.order}", text))
+    pairs += [("warning", reason) for reason in unsettled(one.branch for one in diagram.orders)]
+    pairs.append(("time", units.duration(diagram.seconds)))
+    low, high = diagram.speeds_rpm[0][0], diagram.speeds_rpm[-1][1]
+    return made(f"{diagram.scene.name}, {low:g} to {high:g} rpm", pairs, diagram.status.value)
+
+
+def of_sensitivities(result: SensitivityResult) -> Summary:
+    """Per cent of the highest peak and of the band for one per cent of what matters most."""
+    pairs: Pairs = []
+    for row in result.rows[:_MOST_ROWS]:
+        if row.relative and result.peaks:
+            band = result.band_elasticity(row)
+            text = f"peak {result.peak_elasticities(row)[0]:+.4f} %"
+            pairs.append((row.path, text if math.isnan(band) else f"{text}, band {band:+.4f} %"))
+    pairs += [("warning", reason) for reason in unsettled([result.branch])]
+    pairs.append(("time", units.duration(result.seconds)))
+    return made(f"{result.scene.name}, for 1 % more of each", pairs, result.status.value)

@@ -1,0 +1,180 @@
+"""Who is behind a request: its key looked up, compared and kept in mind for a second."""
+
+from __future__ import annotations
+
+import ipaddress
+import logging
+import math
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from datetime import timedelta
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from service.auth.callers import KEYLESS, Caller, Scope
+from service.auth.keys import caller_of_row, id_of, matches
+from service.auth.rate_limit import Buckets
+from service.db.clock import Clock
+from service.db.repositories.keys import KeyRepository, KeyRow
+from service.errors import ForbiddenError, TooManyRequestsError, UnauthorizedError
+from service.settings.settings import Settings
+
+log = logging.getLogger("stickslip.service")
+
+REMEMBERED_SECONDS = 1.0
+"""How long a revoked key may still work in a service process."""
+STRANGER = Caller(scopes=frozenset())
+"""Somebody without a key where one is needed."""
+
+_MOST_REMEMBERED = 4096
+_USED_EVERY = timedelta(minutes=1)
+_HALF_OF_IPV6 = 64
+
+
+class Doorkeeper:
+    """Turns keys into callers.
+
+    Parameters
+    ----------
+    keys : KeyRepository
+        The keys.
+    settings : Settings
+        Whether keys are needed, and how often they may be used or guessed.
+    now : callable
+        The clock that expiry is judged by.
+    steady : callable
+        Seconds that never jump.
+    """
+
+    def __init__(
+        self,
+        keys: KeyRepository,
+        settings: Settings,
+        now: Clock,
+        steady: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._keys = keys
+        self._settings = settings
+        self._now = now
+        self._steady = steady
+        self._remembered: OrderedDict[str, tuple[KeyRow | None, float]] = OrderedDict()
+        self._lock = threading.Lock()
+        self._requests = Buckets(steady=steady)
+        self._failures = Buckets(steady=steady)
+
+    def known(self, token: str | None) -> bool:
+        """Whether `admit` can answer at once, without the database."""
+        key_id = None if token is None else id_of(token)
+        return key_id is None or self._recall(key_id) is not None
+
+    def admit(self, token: str | None, address: str) -> Caller:
+        """Who asks.
+
+        Raises
+        ------
+        UnauthorizedError
+            The key is none, or does not work.
+        TooManyRequestsError
+            Too many keys that do not work came from this address.
+        """
+        if token is None:
+            return STRANGER if self._settings.keys_required else KEYLESS
+        key_id = id_of(token)
+        row = None if key_id is None else self._look_up(key_id)
+        if not matches(token, row) or row is None:
+            raise self._failed("the key is not known", address)
+        if row.revoked is not None:
+            raise self._failed("the key was revoked", address)
+        if row.expires is not None and row.expires <= self._now():
+            raise self._failed(f"the key expired at {row.expires.isoformat()}", address)
+        return caller_of_row(row)
+
+    def require(self, caller: Caller, scope: Scope) -> None:
+        """Refuse who may not do what needs `scope`.
+
+        Raises
+        ------
+        UnauthorizedError
+            There was no key.
+        ForbiddenError
+            The key has not the scope.
+        """
+        if caller.may(scope):
+            return
+        if caller is STRANGER:
+            raise UnauthorizedError("this needs a key: send it as `Authorization: Bearer …`")
+        has = ", ".join(sorted(caller.scopes)) or "none"
+        raise ForbiddenError(f"this needs a key with the scope {scope.value}, this one has {has}")
+
+    def count(self, caller: Caller) -> None:
+        """Count a request with a key.
+
+        Raises
+        ------
+        TooManyRequestsError
+            There were as many as the key may make.
+        """
+        if caller.key_id is None:
+            return
+        most = caller.limits.requests_per_minute or self._settings.requests_per_minute
+        wait = self._requests.take(caller.key_id, most)
+        if wait > 0.0:
+            raise TooManyRequestsError(f"the key may make {most} requests a minute", math.ceil(wait))
+
+    def _failed(self, reason: str, address: str) -> UnauthorizedError | TooManyRequestsError:
+        """The refusal of a key; a working key from the same address is admitted all the same.
+
+        Otherwise a stranger behind the same address could shut everybody else there out.
+        """
+        wait = self._failures.take(_neighbourhood(address), self._settings.failed_keys_per_minute)
+        if wait == 0.0:
+            return UnauthorizedError(reason, presented=True)
+        return TooManyRequestsError("too many keys that do not work came from this address", math.ceil(wait))
+
+    def _recall(self, key_id: str) -> tuple[KeyRow | None, float] | None:
+        with self._lock:
+            found = self._remembered.get(key_id)
+        fresh = found is not None and self._steady() - found[1] < REMEMBERED_SECONDS
+        return found if fresh else None
+
+    def _look_up(self, key_id: str) -> KeyRow | None:
+        """The row of a key, at most a second old; that there is none is remembered as well."""
+        found = self._recall(key_id)
+        if found is not None:
+            return found[0]
+        begun = self._steady()
+        row = self._keys.get(key_id)
+        with self._lock:
+            self._remembered[key_id] = (row, begun)
+            self._remembered.move_to_end(key_id)
+            while len(self._remembered) > _MOST_REMEMBERED:
+                self._remembered.popitem(last=False)
+        return row
+
+    def note_use(self, token: str) -> None:
+        """Write when a key was used last, once a minute at most."""
+        key_id = id_of(token)
+        found = None if key_id is None else self._recall(key_id)
+        row = None if found is None else found[0]
+        now = self._now()
+        if row is None or (row.last_used is not None and now - row.last_used < _USED_EVERY):
+            return
+        try:
+            self._keys.touch(row.id, now)
+        except SQLAlchemyError as error:
+            log.warning("key %s: its use could not be noted: %s", row.id, type(error).__name__)
+
+
+def _neighbourhood(address: str) -> str:
+    """An IPv4 address; of an IPv6 address the half that one customer has whole."""
+    try:
+        parsed = ipaddress.ip_address(address)
+    except ValueError:
+        return address
+    if isinstance(parsed, ipaddress.IPv4Address):
+        return str(parsed)
+    if parsed.ipv4_mapped is not None:
+        return str(parsed.ipv4_mapped)
+    return str(ipaddress.ip_network((parsed, _HALF_OF_IPV6), strict=False).network_address)

@@ -1,0 +1,120 @@
+"""Who asks: what they own, what they see, what they may do."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Protocol, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.db.models import NOBODY
+from service.errors import NotFoundError
+
+
+class Scope(enum.StrEnum):
+    """What a key may do; `submit` includes `read`, `admin` everything."""
+
+    READ = "read"
+    SUBMIT = "submit"
+    MONITOR = "monitor"
+    ADMIN = "admin"
+
+
+_INCLUDED = {
+    Scope.READ: frozenset({Scope.READ}),
+    Scope.SUBMIT: frozenset({Scope.READ, Scope.SUBMIT}),
+    Scope.MONITOR: frozenset({Scope.MONITOR}),
+    Scope.ADMIN: frozenset(Scope),
+}
+
+
+class KeyLimits(BaseModel):
+    """Limits of one key; what is not given here, the settings of the service say.
+
+    Attributes
+    ----------
+    requests_per_minute : int or None
+        Requests in a minute.
+    waiting : int or None
+        Jobs of the key's owner that may wait at a time.
+    seconds : float or None
+        Longest time one attempt at a job may take [s].
+    work : int or None
+        Largest job: points × harmonics × DOFs.
+    """
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+    requests_per_minute: int | None = Field(default=None, ge=1, le=1_000_000)
+    waiting: int | None = Field(default=None, ge=1, le=1_000_000)
+    seconds: float | None = Field(default=None, ge=0.1, le=1e7)
+    work: int | None = Field(default=None, ge=1, le=10**15)
+
+
+NO_LIMITS = KeyLimits()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Caller:
+    """Who asks.
+
+    Attributes
+    ----------
+    owner : str
+        Whom what they make belongs to.
+    scopes : frozenset of Scope
+        What they may do, with what is included.
+    key_id : str or None
+        Of their key; None without one.
+    limits : KeyLimits
+        Of their key.
+    """
+
+    owner: str = NOBODY
+    scopes: frozenset[Scope] = frozenset({Scope.READ, Scope.SUBMIT, Scope.MONITOR})
+    key_id: str | None = None
+    limits: KeyLimits = field(default=NO_LIMITS)
+
+    @property
+    def sees(self) -> str | None:
+        """The owner whose things they see; None for everybody's."""
+        return None if Scope.ADMIN in self.scopes else self.owner
+
+    def may(self, scope: Scope) -> bool:
+        """Whether they may do what needs `scope`."""
+        return scope in self.scopes
+
+
+KEYLESS = Caller()
+"""Somebody without a key where none is needed, and a program that embeds the service."""
+
+
+class Owned(Protocol):
+    """A row that belongs to somebody."""
+
+    @property
+    def owner(self) -> str:
+        """Whom it belongs to."""
+
+
+OwnedT = TypeVar("OwnedT", bound=Owned)
+
+
+def included(scopes: Iterable[Scope]) -> frozenset[Scope]:
+    """Scopes with those that they include."""
+    return frozenset().union(*(_INCLUDED[scope] for scope in scopes))
+
+
+def visible(row: OwnedT | None, caller: Caller, missing: str) -> OwnedT:
+    """The row, if there is one and the caller may see it.
+
+    Raises
+    ------
+    NotFoundError
+        With the words `missing`: the same for what is not there and for what is another's.
+    """
+    if row is None or caller.sees not in (None, row.owner):
+        raise NotFoundError(missing, withheld=row is not None)
+    return row

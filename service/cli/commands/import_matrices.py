@@ -1,0 +1,265 @@
+"""`stickslip import`: matrices or modes from a finite-element program become a scene file."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from service.cli.failures import InputError
+from service.cli.importing.files import Sources, dof_table, read_sources, rows_of, sources
+from service.cli.importing.reduction import Written, reduce, reduced_file
+from service.cli.importing.scene import band, toml
+from service.cli.options.inputs import number, output_path, whole_number
+from service.rendering.tables.text import print_json, print_pairs
+from solver.results.files import whole
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.matrices.load_set import MatrixSet
+    from solver.scene.scene import Scene
+
+Files = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="FILES",
+        help="M K [C], in this order or named so; or one file with M, K, C or modes; and maybe a file that "
+        "names the rows (.mapping, .dof).",
+    ),
+]
+Out = Annotated[str, typer.Option("--out", metavar="SCENE.toml", help="The scene to write.")]
+Dofs = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--dof", metavar="NAME=ROW",
+        help="A DOF in use and its row, zero-based, or its node and component (tip=1203.UX); repeatable.",
+    ),
+]  # fmt: skip
+Excite = Annotated[
+    str | None,
+    typer.Option("--excite", metavar="NAME", help="DOF of the force; the first --dof if left out."),
+]
+Observed = Annotated[
+    str | None,
+    typer.Option("--observe", metavar="NAME", help="DOF to observe; that of the force if left out."),
+]
+From = Annotated[
+    float | None, typer.Option("--from", metavar="HZ", parser=number, help="Start of the band of interest.")
+]
+To = Annotated[
+    float | None, typer.Option("--to", metavar="HZ", parser=number, help="End of the band of interest.")
+]
+Keep = Annotated[
+    int | None,
+    typer.Option(
+        "--keep-modes", metavar="N", parser=whole_number,
+        help="Let the scene refer to the full matrices and reduce them whenever it is loaded.",
+    ),
+]  # fmt: skip
+Reduce = Annotated[
+    bool,
+    typer.Option("--reduce", help="Reduce a large model once, onto the DOFs in use and modes of the rest."),
+]
+ModesKept = Annotated[
+    int | None,
+    typer.Option(
+        "--modes", metavar="N", parser=whole_number, help="With --reduce: modes of the rest to keep."
+    ),
+]
+UpTo = Annotated[
+    float | None,
+    typer.Option("--up-to", metavar="HZ", parser=number, help="With --reduce: keep all modes up to here."),
+]
+ReducedFile = Annotated[
+    str | None,
+    typer.Option("--reduced", metavar="F", help="Where the reduced model goes (.npz, .mat)."),
+]
+Units = Annotated[
+    str,
+    typer.Option("--units", metavar="U", help="Units of the files: SI, mm (mm, t, N, s), in (in, lbf, s)."),
+]
+Mapping = Annotated[
+    str | None,
+    typer.Option("--mapping", metavar="F", help="Names the rows: .mapping of Ansys, .dof of CalculiX."),
+]
+
+
+def import_scene(
+    files: Files,
+    out: Out,
+    dofs: Dofs = None,
+    excite: Excite = None,
+    observe: Observed = None,
+    start: From = None,
+    stop: To = None,
+    keep_modes: Keep = None,
+    reduce_once: Reduce = False,
+    modes: ModesKept = None,
+    up_to: UpTo = None,
+    reduced: ReducedFile = None,
+    units: Units = "SI",
+    mapping: Mapping = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Make a scene of matrices or modes in files.
+
+    The files are read and checked first. The scene refers to them or, with --reduce, to the reduced model,
+    which is written beside it. Contacts are then added by hand: a template stands in the scene.
+    """
+    target = output_path("--out", out, (".toml",))
+    if target is None or target.exists():
+        raise InputError(f"`--out`: {out!r} exists already; give another name or remove it")
+    if not reduce_once and not (modes is None and up_to is None and reduced is None):
+        raise InputError("`--modes`, `--up-to` and `--reduced` go with --reduce")
+    if reduce_once and keep_modes is not None:
+        raise InputError("`--keep-modes` reduces on every load, --reduce once: keep one of them")
+    found = sources(files, mapping, units)
+    given = read_sources(found)
+    table = dof_table(dofs, found, given)
+    with ExitStack() as undo:
+        structure, written = found.table(target), None
+        if reduce_once:
+            path = reduced_file(reduced, target)
+            undo.callback(path.unlink, missing_ok=True)
+            written = _reduced(given, table, modes, up_to, path)
+            structure = written.table(target)
+            table = dict(written.rows)
+        else:
+            _checked(given, reduced=keep_modes is not None)
+            if keep_modes is not None:
+                structure["keep_modes"] = keep_modes
+        force = excite or next(iter(table))
+        raw = _Parts(
+            target=target, structure={**structure, "dofs": table}, force=force, observe=observe or force
+        )
+        omega2 = _omega2(_load(raw.table([1.0, 2.0]), target.parent))
+        frequencies = [math.sqrt(max(float(value), 0.0)) / (2.0 * math.pi) for value in omega2]
+        scene = _write(target, raw.table(band(start, stop, frequencies)), found, written)
+        undo.pop_all()
+    _report(scene, target, frequencies, written, given, _notes(given, omega2), as_json)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Parts:
+    """The tables of the scene, but for the band."""
+
+    target: Path
+    structure: dict[str, object]
+    force: str
+    observe: str
+
+    def table(self, between: list[float]) -> dict[str, Any]:
+        return {
+            "name": re.sub(r"[^A-Za-z0-9_-]", "-", self.target.stem)[:100],
+            "structure": self.structure,
+            "excitation": {"dof": self.force, "amplitude": 1.0},
+            "observe": {"dof": self.observe, "band": between},
+        }
+
+
+def _reduced(
+    given: MatrixSet | None, table: dict[str, int | str], modes: int | None, up_to: float | None, path: Path
+) -> Written:
+    if given is None:
+        raise InputError("`--reduce` is for matrices; modes are reduced already")
+    return reduce(given, rows_of(table, given), modes, up_to, path)
+
+
+def _checked(given: MatrixSet | None, *, reduced: bool) -> None:
+    """Refuse what is no structure."""
+    from solver.matrices.diagnostics import refuse
+
+    if given is None:
+        return
+    try:
+        refuse(given, reduced=reduced)
+    except ValueError as error:
+        raise InputError(f"`FILES`: {error}") from error
+
+
+def _notes(given: MatrixSet | None, omega2: NDArray[Any]) -> list[str]:
+    from solver.matrices.diagnostics import notes
+    from solver.matrices.load_set import MatrixSet
+
+    return notes(given if given is not None else MatrixSet(matrices={}), omega2)
+
+
+def _load(raw: dict[str, object], folder: Path) -> Scene:
+    from solver.matrices.scene_files import with_files
+    from solver.scene.scene import Scene
+
+    return Scene.from_dict(with_files(raw, folder))
+
+
+def _omega2(scene: Scene) -> NDArray[Any]:
+    """Squares of the natural frequencies without contacts [rad²/s²], ascending."""
+    import numpy as np
+
+    from solver.linear.assembly import linear_model
+    from solver.matrices.normal_modes import undamped_modes
+
+    model = linear_model(scene)
+    return np.sort(undamped_modes(model.K0, model.M).omega2)
+
+
+def _write(target: Path, raw: dict[str, Any], found: Sources, written: Written | None) -> Scene:
+    """Write the scene, whole or not at all, and read it as anyone would."""
+    import solver
+
+    remarks = []
+    if written is not None:
+        made = ", ".join(path.name for path in dict.fromkeys(found.roles.values()))
+        remarks.append(
+            f"Reduced from {written.full} rows of {made}; good to "
+            f"{written.reduced.quality.good_to_hz:.5g} Hz (frequencies exact to 0.1 %)."
+        )
+    with whole(target) as temporary:
+        temporary.write_text(toml(raw, remarks), encoding="utf-8")
+        return solver.load_scene(temporary)
+
+
+def _report(
+    scene: Scene, target: Path, frequencies: Sequence[float], written: Written | None,
+    given: MatrixSet | None, notes: list[str], as_json: bool,
+) -> None:  # fmt: skip
+    from solver.matrices.diagnostics import total_mass
+    from solver.scene.parts import MatricesStructure
+
+    structure = scene.structure
+    mass = None if given is None else total_mass(given)
+    reduction = structure.reduction if isinstance(structure, MatricesStructure) else None
+    if as_json:
+        loaded = None if reduction is None else reduction.model_dump()
+        print_json(
+            {
+                "scene": scene.name, "file": str(target), "dofs": list(structure.dofs),
+                "frequencies_hz": list(frequencies[:10]), "notes": notes,
+                "mass_kg": None if mass is None else mass[1],
+                "reduction": loaded if written is None else written.facts(),
+            }
+        )  # fmt: skip
+        return
+    pairs = [
+        ("DOFs in use", ", ".join(structure.dofs[:10]) + (", …" if len(structure.dofs) > 10 else "")),
+        ("first frequencies", ", ".join(f"{f:.5g} Hz" for f in frequencies[:6])),
+    ]
+    if mass is not None:
+        pairs.append(("mass", f"{mass[1]:.4g} kg in {mass[0]}, without what is held"))
+    if reduction is not None:
+        kept = f"{reduction.dofs} DOFs to {len(structure.dofs)} and {reduction.modes} modes"
+        pairs.append(("reduced", f"{kept} up to {reduction.highest_hz:.5g} Hz"))
+    if written is not None:
+        pairs += written.pairs()
+    pairs += [("note", note) for note in notes]
+    pairs += [
+        ("compare", "frequencies and mass with those of your program; else see --units"),
+        ("next", "add [[contacts]] and a damping in the file, then `stickslip plan`"),
+    ]
+    print_pairs(f"Scene {scene.name} in {target}", pairs)

@@ -1,0 +1,101 @@
+"""`stickslip mistuning`: the blades of many disks that are not quite equal, against the tuned disk."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import typer
+
+from service.cli.failures import FELL_SHORT
+from service.cli.options import inputs
+from service.cli.options import shared as options
+from service.cli.options.inputs import number, whole_number
+from service.cli.output_files import Outputs
+from service.cli.progress import bar
+from service.rendering.tables.text import print_json, print_pairs
+from solver.results import units
+
+Parts = Annotated[
+    list[str],
+    typer.Option(
+        "--of", metavar="NAME",
+        help="What has factors, repeatable: springs, dashpots and masses by name, or DOFs.",
+    ),
+]  # fmt: skip
+Spread = Annotated[
+    float, typer.Option("--spread", metavar="S", parser=number, help="Standard deviation of the factors.")
+]
+Samples = Annotated[int, typer.Option("--samples", metavar="N", parser=whole_number, help="How many disks.")]
+Seed = Annotated[
+    int,
+    typer.Option(
+        "--seed", metavar="N", parser=whole_number, help="Of the first disk; those of the others follow."
+    ),
+]
+Dof = Annotated[
+    str | None,
+    typer.Option("--dof", metavar="DOF", help="DOF of one sector; the observed one if left out."),
+]
+
+
+def mistuning(
+    name: options.Scene,
+    of: Parts,
+    spread: Spread = 0.02,
+    samples: Samples = 100,
+    seed: Seed = 1,
+    dof: Dof = None,
+    start: options.From = None,
+    stop: options.To = None,
+    values: options.Values = None,
+    harmonics: options.Harmonics = 11,
+    plot: options.Plot = None,
+    out: options.Out = None,
+    as_json: options.Json = False,
+) -> None:
+    """Study disks whose blades are not quite equal.
+
+    Of each disk the highest peak of every blade, and how much higher it is than that of the tuned disk.
+    """
+    import solver
+
+    outputs = Outputs.asked(plot, out)
+    scene = inputs.scene(name, values)
+    with bar("mistuning", "disks") as on_progress:
+        study = solver.mistuning_study(
+            scene, of=of, spread=spread, samples=samples, seed=seed, dof=dof, start=start, stop=stop,
+            harmonics=harmonics, on_progress=on_progress,
+        )  # fmt: skip
+    outputs.write(study, study.plot if study.worst is not None else None, scene=scene)
+    if as_json:
+        print_json(study.to_json())
+    else:
+        report(study.to_json())
+    if not study.completed:
+        typer.echo(f"stickslip: {study.status.value}", err=True)
+        raise typer.Exit(FELL_SHORT)
+
+
+def report(found: Mapping[str, Any]) -> None:
+    """The amplitude magnification over the disks, and the worst of them."""
+    disks, tuned, worst = found["samples"], found["tuned"], found["worst"]
+    title = f"{found['scene']}, {len(disks)} disks, spread {found['spread']:g} of {', '.join(found['of'])}"
+    pairs = []
+    if tuned["peak"] is not None:
+        height = units.length(tuned["peak"])
+        pairs.append((f"tuned, max |{found['dof']}|", f"{height} at {tuned['at_hz']:.6g} Hz"))
+    if found["mean"] is not None:
+        spread = "" if found["deviation"] is None else f" ± {found['deviation']:.2g}"
+        pairs.append(("magnification", f"{found['mean']:.4g}{spread} in the mean"))
+    pairs += [
+        (f"  {100.0 * quantile['share']:g} % below", f"{quantile['magnification']:.4g}")
+        for quantile in found["quantiles"]
+    ]
+    if worst is not None:
+        blade, factors = worst["worst_blade"], ", ".join(f"{factor:.4f}" for factor in worst["factors"])
+        place = f"blade {blade} at {worst['at_hz'][blade]:.6g} Hz"
+        pairs.append(("worst", f"{worst['magnification']:.4g}: {units.length(worst['largest'])}, {place}"))
+        pairs.append(("  its disk", f"seed {worst['seed']}, factors {factors}"))
+    pairs.append(("time", units.duration(found["seconds"])))
+    print_pairs(f"{title}, {found['n_harmonics']} harmonics", pairs)

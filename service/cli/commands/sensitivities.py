@@ -1,0 +1,79 @@
+"""`stickslip sensitivities`: what one per cent of every parameter does to the highest peaks and the band."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from service.cli.commands.design import end
+from service.cli.options import inputs
+from service.cli.options import shared as options
+from service.cli.output_files import Outputs
+from service.cli.progress import patience
+from service.rendering.tables.text import print_json, print_table, say
+from solver.results import units
+
+
+def sensitivities(
+    name: options.Scene,
+    values: options.Values = None,
+    limit: options.Limit = None,
+    harmonics: options.Harmonics = 11,
+    plot: options.Plot = None,
+    out: options.Out = None,
+    as_json: options.Json = False,
+) -> None:
+    """Say what matters: per cent of the peaks and the band for one per cent of each parameter.
+
+    Exact derivatives through the whole solve; what matters most for the highest peak comes first.
+    """
+    outputs = Outputs.asked(plot, out)
+    scene = inputs.scene(name, values)
+    with patience():
+        import optim
+
+        found = optim.sensitivities(scene, limit=limit, harmonics=harmonics)
+    answer: Mapping[str, Any] = found.to_json()
+    drawn = any(row["peak_percent"] is not None for row in answer["rows"])
+    outputs.write(found, found.plot if drawn else None)
+    if as_json:
+        print_json(answer)
+    else:
+        _show(answer)
+    end(found.reached, found.status.value)
+
+
+def _show(found: Mapping[str, Any]) -> None:
+    """The peaks, and a row for every parameter."""
+    peaks = [f"{units.length(peak['value'])} at {peak['at']:.6g} Hz" for peak in found["peaks"]]
+    title = f"{found['scene']}: {'; '.join(peaks) or 'no peak'}"
+    if found["band_hz"] is not None:
+        title += f"; band {units.number(found['band_hz'])} Hz above {units.length(found['limit'])}"
+    many = len(peaks) > 1
+    columns = (
+        "parameter", "value",
+        *(f"peak {i + 1} [%]" if many else "peak [%]" for i in range(len(peaks))), "band [%]",
+    )  # fmt: skip
+    rows = [
+        (
+            row["path"],
+            f"{units.number(row['value'], 6)} {row['unit']}".rstrip(),
+            *(_share(share) for share in row["peaks_percent"]),
+            _share(row["band_percent"]),
+        )
+        for row in found["rows"]
+    ]
+    print_table(title, columns, rows, right="".join(str(i) for i in range(1, min(len(columns), 10))))
+    say("for 1 % more of the parameter; an angle, or what is 0, has no per cent")
+    if any(row["peak_slope"] is None for row in found["rows"]):
+        say(found["status"])
+    certificate = found["peak_certificate"]
+    if peaks and not certificate["known"]:
+        say(f"there may be higher peaks. {certificate['reason']}")
+    for one in found["left_out"]:
+        say(f"left out: {one['path']}: {one['reason']}")
+
+
+def _share(share: float | None) -> str:
+    # Added to 0: a share that rounds to nothing has no sign.
+    return "" if share is None else f"{round(share, 4) + 0.0:+.4f}"

@@ -1,0 +1,181 @@
+"""The commands that compute here and now: scenes, plan, solve, sweep, march.
+
+What is heavy is imported inside the commands: `stickslip solve` starts without CVXPY, Matplotlib or the
+service.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import typer
+
+from service.cli.failures import FELL_SHORT, InputError
+from service.cli.options import inputs
+from service.cli.options import shared as options
+from service.cli.output_files import Outputs
+from service.cli.progress import bar, patience
+from service.rendering.tables import results as reports
+from service.rendering.tables.text import print_json
+
+
+def scenes(as_json: options.Json = False) -> None:
+    """List the shipped scenes."""
+    import solver
+
+    known = [solver.load_scene(name) for name in solver.shipped_scenes()]
+    if as_json:
+        print_json({"scenes": [scene.name for scene in known]})
+    else:
+        reports.scenes(known)
+
+
+def plan(
+    name: options.Scene,
+    values: options.Values = None,
+    harmonics: options.Harmonics = 11,
+    effects: options.Effects = "auto",
+    as_json: options.Json = False,
+) -> None:
+    """Say which effects a scene calls for, and why."""
+    import solver
+
+    asked = solver.Effects.read(effects)
+    found = solver.plan(inputs.scene(name, values), harmonics=harmonics, effects=asked)
+    if as_json:
+        print_json(found.to_json())
+    else:
+        reports.plan(found.to_json())
+
+
+def solve(
+    name: options.Scene,
+    frequency: options.Frequency,
+    values: options.Values = None,
+    harmonics: options.Harmonics = 11,
+    accuracy: options.Accuracy = None,
+    effects: options.Effects = "auto",
+    plot: options.Plot = None,
+    out: options.Out = None,
+    as_json: options.Json = False,
+) -> None:
+    """Compute one periodic response."""
+    import solver
+
+    outputs = Outputs.asked(plot, out)
+    scene, asked = inputs.scene(name, values), solver.Effects.read(effects)
+    with patience():
+        solution = solver.solve(
+            scene, frequency_hz=frequency, harmonics=harmonics, accuracy=accuracy, effects=asked
+        )
+    if solution.converged:
+        outputs.write(solution, solution.plot)
+    if as_json:
+        print_json(solution.to_json())
+    else:
+        reports.solution(solution.to_json())
+    _end(solution.reached, solution.status.value)
+
+
+def sweep(
+    name: options.Scene,
+    parameter: options.Parameter = "frequency",
+    start: options.From = None,
+    stop: options.To = None,
+    frequency: options.FixedFrequency = None,
+    values: options.Values = None,
+    limit: options.Limit = None,
+    harmonics: options.Harmonics = 11,
+    accuracy: options.Accuracy = None,
+    effects: options.Effects = "auto",
+    plot: options.Plot = None,
+    out: options.Out = None,
+    as_json: options.Json = False,
+) -> None:
+    """Follow the response over a parameter.
+
+    By continuation: folds are passed, and only converged points count.
+    """
+    import solver
+
+    outputs = Outputs.asked(plot, out)
+    if parameter == "frequency" and frequency is not None:
+        raise InputError(
+            f"`--frequency` is for sweeps of another --parameter, got {frequency!r}: try --from, --to"
+        )
+    scene, asked = inputs.scene(name, values), solver.Effects.read(effects)
+    with inputs.path_of("--parameter"), bar("sweep") as on_progress:
+        branch = solver.sweep(
+            scene, parameter, start, stop, harmonics=harmonics, accuracy=accuracy, frequency_hz=frequency,
+            limit=limit, effects=asked, on_progress=on_progress,
+        )  # fmt: skip
+    outputs.write(branch, partial(branch.plot, limit=limit) if len(branch.values) else None)
+    if as_json:
+        print_json(branch.to_json())
+    else:
+        reports.branch(branch.to_json())
+    _end(branch.completed, branch.status.value)
+
+
+def accuracy(
+    name: options.Scene,
+    frequency: options.StudyFrequency = None,
+    values: options.Values = None,
+    plot: options.Plot = None,
+    out: options.Out = None,
+    as_json: options.Json = False,
+) -> None:
+    """Measure what accuracy costs.
+
+    Error against time of one point, for numbers of harmonics, contact forces in closed form and by samples.
+    """
+    import solver
+
+    outputs = Outputs.asked(plot, out)
+    scene = inputs.scene(name, values)
+    with bar("accuracy", "rows") as on_progress:
+        study = solver.accuracy_study(scene, frequency, on_progress=on_progress)
+    outputs.write(study, study.plot, scene=scene)
+    if as_json:
+        print_json(study.to_json())
+    else:
+        reports.accuracy(study.to_json())
+
+
+def march(
+    name: options.Scene,
+    frequency: options.Frequency,
+    values: options.Values = None,
+    steps: options.Steps = None,
+    max_periods: options.MaxPeriods = 20_000,
+    plot: options.Plot = None,
+    out: options.Out = None,
+    as_json: options.Json = False,
+) -> None:
+    """March in time until the motion repeats.
+
+    The independent referee of solve; of a cyclic scene the whole annulus is marched.
+    """
+    import solver
+
+    outputs = Outputs.asked(plot, out)
+    scene = inputs.scene(name, values)
+    with bar("march", "periods") as on_progress:
+        marched = solver.march(
+            scene, frequency_hz=frequency, steps_per_period=steps, max_periods=max_periods,
+            on_progress=on_progress,
+        )  # fmt: skip
+    if marched.converged:
+        outputs.write(marched, partial(marched.plot, scene=scene), scene=scene)
+    if as_json:
+        print_json(marched.to_json())
+    else:
+        reports.march(marched.to_json())
+    _end(marched.converged, marched.status.value)
+
+
+def _end(reached: bool, status: str) -> None:
+    """Leave with status 1 and the reason, if the goal was not reached."""
+    if not reached:
+        typer.echo(f"stickslip: {status}", err=True)
+        raise typer.Exit(FELL_SHORT)

@@ -1,0 +1,112 @@
+"""The commands over a parameter and the frequency at once: peaks and map."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from service.cli.failures import FELL_SHORT
+from service.cli.options import inputs
+from service.cli.options import shared as options
+from service.cli.options.inputs import number, whole_number
+from service.cli.output_files import Outputs
+from service.cli.progress import bar
+from service.rendering.tables import track as track_reports
+from service.rendering.tables.text import print_json
+
+Followed = Annotated[
+    str, typer.Option("--parameter", metavar="PATH", help="What changes, for example shroud.N0.")
+]
+Start = Annotated[float, typer.Option("--from", metavar="A", parser=number, help="Start of the range.")]
+Stop = Annotated[float, typer.Option("--to", metavar="B", parser=number, help="End of the range.")]
+Checks = Annotated[
+    int,
+    typer.Option(
+        "--checks", metavar="N", parser=whole_number,
+        help="Sweeps between the ends that look for peaks nothing has followed.",
+    ),
+]  # fmt: skip
+Steps = Annotated[
+    int, typer.Option("--steps", metavar="N", parser=whole_number, help="Values of the parameter.")
+]
+Frequencies = Annotated[
+    int, typer.Option("--frequencies", metavar="N", parser=whole_number, help="Frequencies over the band.")
+]
+
+NoRidge = Annotated[
+    bool, typer.Option("--no-ridge", help="Do not track the peaks: faster, and for contacts of every law.")
+]
+
+
+def peaks(
+    name: options.Scene,
+    parameter: Followed,
+    start: Start,
+    stop: Stop,
+    values: options.Values = None,
+    checks: Checks = 3,
+    harmonics: options.Harmonics = 11,
+    plot: options.Plot = None,
+    out: options.Out = None,
+    as_json: options.Json = False,
+) -> None:
+    """Track the highest peak over a parameter.
+
+    With exact derivatives; sweeps check that no peak was missed, and the least highest peak is found.
+    """
+    import solver
+
+    outputs = Outputs.asked(plot, out)
+    scene = inputs.scene(name, values)
+    with inputs.path_of("--parameter"), bar("peaks", "sweeps") as on_progress:
+        track = solver.track_peak(
+            scene, parameter, start, stop, harmonics=harmonics, checks=checks, on_progress=on_progress
+        )
+    outputs.write(track, track.plot if track.parameter.size else None)
+    if as_json:
+        print_json(track.to_json())
+    else:
+        track_reports.track(track.to_json())
+    _end(track.completed, track.status.value)
+
+
+def response_map(
+    name: options.Scene,
+    parameter: Followed,
+    start: Start,
+    stop: Stop,
+    steps: Steps = 60,
+    frequencies: Frequencies = 400,
+    values: options.Values = None,
+    harmonics: options.Harmonics = 11,
+    no_ridge: NoRidge = False,
+    plot: options.Plot = None,
+    out: options.Out = None,
+    as_json: options.Json = False,
+) -> None:
+    """Map the response over frequency and a parameter, with the ridge of its peaks."""
+    import numpy as np
+
+    import solver
+
+    outputs = Outputs.asked(plot, out)
+    scene = inputs.scene(name, values)
+    with inputs.path_of("--parameter"), bar("map") as on_progress:
+        found = solver.response_map(
+            scene, parameter, start, stop, steps=steps, frequencies=frequencies, harmonics=harmonics,
+            ridge=not no_ridge, on_progress=on_progress,
+        )  # fmt: skip
+    outputs.write(found, found.plot if np.isfinite(found.amplitude).any() else None)
+    if as_json:
+        print_json(found.to_json())
+    else:
+        track_reports.response_map(found.to_json())
+    _end(found.completed, found.status.value)
+
+
+def _end(reached: bool, status: str) -> None:
+    """Leave with status 1 and the reason, if the goal was not reached."""
+    if not reached:
+        typer.echo(f"stickslip: {status}", err=True)
+        raise typer.Exit(FELL_SHORT)

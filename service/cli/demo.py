@@ -1,0 +1,205 @@
+"""The main job end to end: designs through the embedded service, stored sweeps read back, pictures.
+
+This is what ``stickslip demo`` and ``make demo`` run, and an example of the service inside a program.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import solver
+from service.cli.failures import InputError, ShortfallError
+from service.cli.progress import OnProgress, bars, patience
+from service.client.embedded import EmbeddedService
+from service.db.models import JobState
+from service.jobs.kinds import warm_up
+from service.rendering.stored_curves import response_of
+from service.rendering.tables import design as design_reports
+from service.rendering.tables.text import say
+from service.schemas.answers import JobAnswer, SweepDetail
+from service.settings.settings import load_settings
+from solver.views.plots.responses import Family, family_figure, peak_figure
+from solver.views.plots.style import save
+
+REMOVED, STUCK = 0.0, 1e9
+"""Normal loads [N] at which a contact does nothing, and never slips."""
+
+_LOOK_SECONDS = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """What the demonstration designs and draws of a scene.
+
+    Attributes
+    ----------
+    scene : str
+        Name of a shipped scene.
+    contact : str
+        The contact whose normal load is chosen.
+    bounds : (float, float)
+        Between which it is chosen [N].
+    shown : tuple of float
+        Loads whose responses are drawn beside the optimum's [N].
+    steps : int
+        Loads at which the peak is drawn, over the bounds.
+    """
+
+    scene: str
+    contact: str
+    bounds: tuple[float, float]
+    shown: tuple[float, ...]
+    steps: int = 24
+
+    @property
+    def variable(self) -> str:
+        """Path of the design variable."""
+        return f"{self.contact}.N0"
+
+    @property
+    def loads(self) -> tuple[float, ...]:
+        """The loads responses are wanted for [N]."""
+        grid = np.geomspace(*self.bounds, self.steps)
+        return (*self.shown, *(float(f"{load:.4g}") for load in grid))
+
+    @property
+    def limits(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Values that make the scene linear: the contact removed, and stuck; every other contact stuck."""
+        stuck = {f"{contact.name}.N0": STUCK for contact in solver.load_scene(self.scene).contacts}
+        return {**stuck, self.variable: REMOVED}, stuck
+
+
+CASES = (
+    Case(scene="two-dof", contact="damper", bounds=(20.0, 1000.0), shown=(30.0, 60.0, 200.0, 500.0)),
+    Case(scene="bladed-disk", contact="shroud", bounds=(20.0, 3000.0), shown=(40.0, 90.0, 500.0, 2000.0)),
+)
+
+
+def run(folder: Path, cases: Sequence[Case] = CASES) -> list[Path]:
+    """Design, read back, draw; everything goes into `folder`. Returns the pictures.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be used.
+    ShortfallError
+        A job did not reach its goal.
+    DatabaseError
+        The database in the folder cannot be used.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"`--out`: {str(folder)!r} cannot be used: {error.strerror}") from error
+    # Here first: several workers would otherwise each compile the same kernels on a first run.
+    with patience():
+        warm_up()
+    with EmbeddedService(load_settings(database=f"sqlite:///{folder / 'demo.db'}")) as service:
+        designs = _designs(service, cases)
+        sweeps = _sweeps(service, cases)
+        pictures: list[Path] = []
+        for case, design, jobs in zip(cases, designs, sweeps, strict=True):
+            optimum = service.results(design.id).result["optimum"][case.variable]
+            pictures += _draw(folder, case, optimum, _read_back(service, [design, *jobs]))
+    say("\n".join(["Pictures:", *(f"  {picture}" for picture in pictures)]))
+    return pictures
+
+
+def _designs(service: EmbeddedService, cases: Sequence[Case]) -> list[JobAnswer]:
+    """Have the dampers designed, and say what came out."""
+    specs = [{"scene": c.scene, "variables": {c.variable: list(c.bounds)}, "fresh": True} for c in cases]
+    groups = [[service.submit("design", spec)] for spec in specs]
+    with bars([f"design {case.scene}" for case in cases], "responses") as reporters:
+        ended = [group[0] for group in _follow(service, groups, reporters)]
+    for job in ended:
+        design_reports.design(service.results(job.id).result)
+        say("")
+    return ended
+
+
+def _sweeps(service: EmbeddedService, cases: Sequence[Case]) -> list[list[JobAnswer]]:
+    """Have the other responses of the pictures computed; one that is stored is not computed again."""
+    groups = [
+        [
+            service.submit("sweep", {"scene": case.scene, "set": values})
+            for values in (*case.limits, *({case.variable: load} for load in case.loads))
+        ]
+        for case in cases
+    ]
+    with bars([f"responses {case.scene}" for case in cases], "done") as reporters:
+        return _follow(service, groups, reporters)
+
+
+def _follow(
+    service: EmbeddedService, groups: Sequence[Sequence[str]], reporters: Sequence[OnProgress | None]
+) -> list[list[JobAnswer]]:
+    """Wait for groups of jobs, each with its progress bar; ShortfallError if one was not successful.
+
+    A bar counts the points of a single job, or the jobs that are done.
+    """
+    ended: dict[str, JobAnswer] = {}
+    while True:
+        for group, report in zip(groups, reporters, strict=True):
+            jobs = [ended.get(job) or service.job(job) for job in group]
+            ended |= {job.id: job for job in jobs if job.status.finished}
+            if report is not None:
+                shares = [1.0 if job.status.finished else job.progress for job in jobs]
+                count = jobs[0].points if len(jobs) == 1 else sum(job.status.finished for job in jobs)
+                report(sum(shares) / len(shares), count)
+        if all(job in ended for group in groups for job in group):
+            break
+        time.sleep(_LOOK_SECONDS)
+    for job in ended.values():
+        if job.status is not JobState.SUCCESSFUL:
+            reason = (job.error or {}).get("detail", "for no known reason")
+            raise ShortfallError(f"the {job.kind} of {job.scene} is {job.status.value}: {reason}")
+    return [[ended[job] for job in group] for group in groups]
+
+
+def _read_back(service: EmbeddedService, jobs: Sequence[JobAnswer]) -> list[SweepDetail]:
+    """The stored sweeps of some jobs, in their order."""
+    stored = [service.sweep(sweep.id) for job in jobs for sweep in service.results(job.id).sweeps]
+    points = sum(sweep.points for sweep in stored)
+    say(f"{stored[0].scene}: {len(stored)} stored sweeps read back, {points} points")
+    return stored
+
+
+def _draw(folder: Path, case: Case, optimum: float, stored: Sequence[SweepDetail]) -> tuple[Path, Path]:
+    """Write the two pictures of a case: a family of responses, and the peak against the load."""
+    family, peaks = _select(case, optimum, stored)
+    curve = peak_figure(
+        case.scene,
+        case.variable,
+        np.array(list(peaks)),
+        np.array(list(peaks.values())),
+        optimum=(optimum, peaks[optimum]),
+        dof=family.dof,
+    )
+    pictures = (folder / f"{case.scene}-responses.png", folder / f"{case.scene}-peak.png")
+    save(family_figure(family), pictures[0])
+    save(curve, pictures[1])
+    return pictures
+
+
+def _select(
+    case: Case, optimum: float, stored: Sequence[SweepDetail]
+) -> tuple[Family, Mapping[float, float]]:
+    """The responses to draw together; the highest peak [m] at every load [N] within the bounds, ascending."""
+    loads = [sweep.contacts[case.contact].N0 for sweep in stored]
+    by_load = {load: sweep for load, sweep in zip(loads, stored, strict=True) if load is not None}
+    low, high = case.bounds
+    family = Family(
+        variable=case.variable,
+        members=tuple((load, response_of(by_load[load])) for load in sorted({*case.shown, optimum})),
+        optimum=optimum,
+        free=response_of(by_load[REMOVED]),
+        stuck=response_of(by_load[STUCK]),
+        dof=solver.load_scene(case.scene).observe.dof,
+    )
+    inside = {load: by_load[load].peak for load in sorted(by_load) if low <= load <= high}
+    return family, {load: peak.value for load, peak in inside.items() if peak is not None}

@@ -1,0 +1,147 @@
+"""The files of `stickslip import`: which is M, K and C, which names the rows, and the rows of the DOFs."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from service.cli.failures import InputError
+
+if TYPE_CHECKING:
+    from solver.matrices.load_set import MatrixSet
+
+MOST_UNNAMED = 200
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sources:
+    """What a scene is made of.
+
+    Attributes
+    ----------
+    roles : dict
+        File of each of M, K and C, or of ``modes``.
+    mapping : Path or None
+        File of the labels of the rows.
+    units : str
+        Of the files.
+    """
+
+    roles: dict[str, Path]
+    mapping: Path | None
+    units: str
+
+    def table(self, target: Path) -> dict[str, object]:
+        """The table [structure] of a scene at `target` that refers to the files."""
+        table: dict[str, object] = {"kind": "matrices"}
+        table |= {role: relative(path, target) for role, path in self.roles.items()}
+        if self.mapping is not None:
+            table["mapping"] = relative(self.mapping, target)
+        if self.units != "SI":
+            table["units"] = self.units
+        return table
+
+
+def relative(path: Path, target: Path) -> str:
+    """The name of a file as a scene at `target` refers to it."""
+    return Path(os.path.relpath(path.absolute(), target.absolute().parent)).as_posix()
+
+
+def sources(files: Sequence[str], mapping: str | None, units: str) -> Sources:
+    """Sort the files given by what they are."""
+    from solver.matrices.file_roles import MAPPING, sorted_files
+    from solver.matrices.files import MatrixFileError
+    from solver.matrices.load_set import UNITS
+
+    if units not in UNITS:
+        raise InputError(
+            f"`--units` must be one of {', '.join(UNITS)} (mm: mm, t, N, s; in: in, lbf s²/in, lbf, s), "
+            f"got {units!r}"
+        )
+    for name in [*files, *([mapping] if mapping else [])]:
+        if not Path(name).is_file():
+            raise InputError(f"`FILES`: there is no file {name!r}")
+    given = [Path(name) for name in files]
+    try:
+        roles = sorted_files(given, None if mapping is None else Path(mapping))
+    except MatrixFileError as error:
+        raise InputError(f"`FILES`: {error}") from error
+    rows = roles.pop(MAPPING, None)
+    return Sources(roles=roles, mapping=rows, units=units)
+
+
+def read_sources(found: Sources) -> MatrixSet | None:
+    """The matrices in SI units, checked for size; None for modes."""
+    from solver.matrices.files import MatrixFileError
+    from solver.matrices.load_set import in_si, read_set
+
+    if "modes" in found.roles:
+        return None
+    try:
+        return in_si(read_set(found.roles, found.mapping), found.units)
+    except MatrixFileError as error:
+        raise InputError(f"`FILES`: {error}") from error
+
+
+def dof_table(texts: Sequence[str] | None, found: Sources, given: MatrixSet | None) -> dict[str, int | str]:
+    """Names of DOFs, each with its row or label; all rows of a small model if none is named."""
+    if not texts:
+        return _all_rows(found, given)
+    table: dict[str, int | str] = {}
+    for text in texts:
+        name, row = _dof(text)
+        if name in table:
+            raise InputError(f"`--dof` names {name!r} twice; keep one")
+        table[name] = row
+    return table
+
+
+def _dof(text: str) -> tuple[str, int | str]:
+    from solver.matrices.labels import label
+
+    name, equals, row = text.rpartition("=")
+    if equals and name and re.fullmatch(r"[0-9]{1,12}", row):
+        return name, int(row)
+    wanted = label(row)
+    if wanted is None or bool(equals) != bool(name):
+        raise InputError(
+            "`--dof` takes NAME=ROW with a row from 0 or a label, for example tip=399 or tip=1203.UX, "
+            f"got {text!r}"
+        )
+    return name or str(wanted).replace(".", "-"), str(wanted)
+
+
+def _all_rows(found: Sources, given: MatrixSet | None) -> dict[str, int | str]:
+    from solver.matrices.files import MatrixFileError, read_modes
+
+    if given is not None:
+        size = next(iter(given.matrices.values())).shape[0]
+    else:
+        try:
+            size = read_modes(found.roles["modes"]).size
+        except MatrixFileError as error:
+            raise InputError(f"`FILES`: {error}") from error
+    if size > MOST_UNNAMED:
+        example = "tip=399" if given is None or given.labels is None else f"tip={given.labels[-1]}"
+        raise InputError(f"`--dof` is needed: the model has {size} rows, name those that you use ({example})")
+    if given is not None and given.labels is not None:
+        return {str(label).replace(".", "-"): str(label) for label in given.labels}
+    return {f"x{row}": row for row in range(size)}
+
+
+def rows_of(table: Mapping[str, int | str], given: MatrixSet) -> dict[str, int]:
+    """The rows that a table of DOFs names."""
+    from solver.matrices.labels import label
+
+    rows: dict[str, int] = {}
+    for name, row in table.items():
+        wanted = label(row) if isinstance(row, str) else None
+        at = row if isinstance(row, int) else None if wanted is None else given.row(wanted)
+        if at is None:
+            raise InputError(f"`--dof`: {name!r} {given.no_row(str(row))}")
+        rows[name] = at
+    return rows

@@ -1,0 +1,144 @@
+"""From the words of the command line to values; every refusal names the option and quotes what was given."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from service.cli.failures import InputError
+from solver.errors import SettingError
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+_VARIABLE = "--variable"
+# Repeatable options of several words each, which Typer does not have, and the commands that have them.
+_WORDS = {_VARIABLE: 3, "--forbidden": 2, "--speeds": 2}
+_WITH_WORDS = ("design", "pareto")
+
+
+def number(text: str) -> float:
+    """A number, for an option (NaN is refused later, with the range that holds there)."""
+    try:
+        return float(text)
+    except ValueError:
+        raise typer.BadParameter(f"must be a number, got {text!r}") from None
+
+
+def whole_number(text: str) -> int:
+    """A whole number, for an option."""
+    try:
+        return int(text)
+    except ValueError:
+        raise typer.BadParameter(f"must be a whole number, got {text!r}") from None
+
+
+_UNITS = {"d": 86400.0, "h": 3600.0, "min": 60.0, "s": 1.0}
+
+
+def age(text: str) -> float:
+    """A length of time with its unit, in seconds."""
+    digits = text.rstrip("dhmins")
+    unit = _UNITS.get(text[len(digits) :])
+    with suppress(ValueError):
+        if unit is not None and 0.0 <= float(digits) * unit <= 1e10:
+            return float(digits) * unit
+    raise typer.BadParameter(f"must be a length of time such as 30d, 12h or 90min, got {text!r}")
+
+
+def join_words(arguments: Sequence[str]) -> list[str]:
+    """Make one argument of the words that follow ``--variable``, ``--forbidden`` and ``--speeds``."""
+    command = arguments[1:2] if arguments[:1] == ["submit"] else arguments[:1]
+    if not command or command[0] not in _WITH_WORDS:
+        return list(arguments)
+    joined: list[str] = []
+    waiting, first = 0, False
+    for argument in arguments:
+        if waiting and argument.startswith("--"):
+            waiting = 0
+        if not waiting:
+            joined.append(argument)
+            waiting = _WORDS.get(argument, 0)
+            first = True
+            continue
+        if first:
+            joined.append(argument)
+        else:
+            joined[-1] += f" {argument}"
+        first = False
+        waiting -= 1
+    return joined
+
+
+def bounds(texts: Sequence[str] | None) -> dict[str, tuple[float, float]] | None:
+    """The variables of a design with their bounds; None if there are none."""
+    if not texts:
+        return None
+    variables: dict[str, tuple[float, float]] = {}
+    for text in texts:
+        words = text.split()
+        if len(words) != 3:
+            raise InputError(f"`{_VARIABLE}` takes PATH LO HI, for example shroud.N0 20 3000, got {text!r}")
+        path, low, high = words
+        if path in variables:
+            raise InputError(f"`{_VARIABLE}` names {path!r} twice; keep one")
+        variables[path] = (part(_VARIABLE, text, low), part(_VARIABLE, text, high))
+    return variables
+
+
+def settings(texts: Sequence[str] | None) -> dict[str, float]:
+    """The values of ``--set``, in the given order."""
+    values: dict[str, float] = {}
+    for text in texts or ():
+        path, equals, value = text.partition("=")
+        path = path.strip()
+        if not equals or not path:
+            raise InputError(f"`--set` takes PATH=VALUE, for example shroud.N0=150, got {text!r}")
+        values.pop(path, None)
+        values[path] = part("--set", text, value)
+    return values
+
+
+def scene(name: str, texts: Sequence[str] | None) -> Scene:
+    """A shipped scene or a file, with the values of ``--set``."""
+    import solver
+
+    with path_of("--set"):
+        return solver.load_scene(name).with_values(settings(texts))
+
+
+@contextmanager
+def path_of(option: str) -> Iterator[None]:
+    """Name `option` in the refusal of an unknown parameter path."""
+    try:
+        yield
+    except SettingError as error:
+        if error.name == "path":
+            raise InputError(str(error).replace("`path`", f"`{option}`", 1)) from error
+        raise
+
+
+def output_path(option: str, text: str | None, suffixes: Sequence[str] = ()) -> Path | None:
+    """A file that can be written at the end, checked before the work begins; None if none was asked for."""
+    if text is None:
+        return None
+    path = Path(text)
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise InputError(f"`{option}` must end in {', '.join(suffixes)}, got {text!r}")
+    if path.is_dir():
+        raise InputError(f"`{option}` must be a file, but {text!r} is a folder")
+    if not path.absolute().parent.is_dir():
+        raise InputError(f"`{option}`: there is no folder {str(path.absolute().parent)!r} for {text!r}")
+    return path
+
+
+def part(option: str, text: str, word: str) -> float:
+    """A number that is part of what was given to an option."""
+    try:
+        return float(word)
+    except ValueError:
+        raise InputError(f"`{option}` needs a number where {word.strip()!r} stands, got {text!r}") from None

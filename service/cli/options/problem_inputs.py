@@ -1,0 +1,273 @@
+"""From the options and the file of a design problem to its description: the body that REST takes."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from service.cli.failures import InputError
+from service.cli.options import inputs
+from service.cli.options.problem import ProblemFlags
+from service.cli.options.scene_files import scene_to_submit
+from solver.errors import Issue, SceneError, SettingError
+
+if TYPE_CHECKING:
+    from service.jobs.kinds.problem import ProblemRequest
+    from solver.scene.scene import Scene
+
+IssuesOf = Callable[["Scene", Mapping[str, Any]], list[Issue]]
+
+SCENE_FILES = (".toml", ".json")
+NEVER_SEPARATES = "never-separates"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Description:
+    """A design problem as it was given.
+
+    Attributes
+    ----------
+    body : dict
+        The keys of the REST body, `scene` among them.
+    options : mapping
+        Key to the option that gave it, for what is not the file's.
+    file : Path or None
+        Where the other keys come from.
+    """
+
+    body: dict[str, Any]
+    options: Mapping[str, str]
+    file: Path | None
+
+    def refusal(self, issues: Sequence[Issue]) -> InputError:
+        """What is wrong, with the option or the key of the file that has to change."""
+        return InputError("\nstickslip: ".join(self._told(issue) for issue in issues))
+
+    def _told(self, issue: Issue) -> str:
+        key = issue.pointer.split("/")[1] if issue.pointer else ""
+        if self.file is not None and key not in self.options:
+            message = issue.message.replace("`path`", f"`{issue.pointer.rpartition('/')[2]}`", 1)
+            return f"{self.file}: {issue.pointer}: {message}"
+        option = self.options.get(key, OPTIONS.get(key, key))
+        for name in (key, "path"):
+            if f"`{name}`" in issue.message:
+                return issue.message.replace(f"`{name}`", f"`{option}`", 1)
+        return f"`{option}`: {issue.message}"
+
+
+OPTIONS = {
+    "variables": "--variable", "scaling": "--scaling", "limit": "--limit", "weights": "--weight",
+    "max_peak": "--max-peak", "max_band_hz": "--max-band", "forbidden_hz": "--forbidden",
+    "speeds_rpm": "--speeds", "max_friction_work": "--max-work", "contact_states": "--never-separates",
+    "start": "--start", "method": "--method", "basins": "--basins",
+    "set": "--set", "harmonics": "--harmonics", "scene": "SCENE",
+}  # fmt: skip
+
+
+def description(scene: str | None, flags: ProblemFlags, kind: str, **further: tuple[str, Any]) -> Description:
+    """Put the file and the options together.
+
+    Parameters
+    ----------
+    scene : the argument of the command.
+    flags : the options that all kinds of problem have.
+    kind : of the problem; a file may say it too.
+    further : key to the option that this command has besides, and its value.
+
+    Raises
+    ------
+    InputError
+        An option or the file cannot be read, or there is no scene.
+    """
+    file = None if flags.problem is None else Path(flags.problem)
+    body = {} if file is None else _read(file, kind)
+    given = _of_flags(flags) | ({} if scene is None else {"scene": scene})
+    given |= {key: value for key, (_, value) in further.items() if value is not None}
+    options = OPTIONS | {key: option for key, (option, _) in further.items()}
+    body |= given
+    if "scene" not in body:
+        raise InputError("`SCENE` is missing: name a scene, or a --problem file with the key `scene`")
+    return Description(body=body, options={key: options[key] for key in given}, file=file)
+
+
+def posed(
+    told: Description, model: type[ProblemRequest], issues_of: IssuesOf
+) -> tuple[Scene, dict[str, Any]]:
+    """The scene and the arguments of the design layer, checked as the service checks them.
+
+    Parameters
+    ----------
+    told : what was given.
+    model : its types and ranges.
+    issues_of : what is wrong with the arguments for the scene.
+
+    Raises
+    ------
+    InputError, SceneError
+        What is wrong, by the option or the key that has to change.
+    """
+    from service.jobs.kinds.problem import arguments
+
+    request = checked(told, model)
+    scene = _with_values(told, _scene(told), request)
+    given = arguments(request)
+    issues = issues_of(scene, given)
+    if issues:
+        raise told.refusal(issues)
+    return scene, given
+
+
+def checked(told: Description, model: type[ProblemRequest]) -> ProblemRequest:
+    """The description with types and ranges checked; whether it fits the scene is not.
+
+    Raises
+    ------
+    InputError
+        What is wrong.
+    """
+    from service.errors import InvalidRequestError
+    from service.jobs.validation import validated
+
+    try:
+        # The scene is read by those who need it: here it may be a path, which the service does not take.
+        return validated(model, {**told.body, "scene": {}})
+    except InvalidRequestError as error:
+        raise told.refusal(error.issues) from error
+
+
+def body_to_submit(told: Description) -> dict[str, Any]:
+    """The body for the service; a scene file goes with it, a name is looked up there."""
+    reference = told.body["scene"]
+    if isinstance(reference, str) and reference.endswith(SCENE_FILES):
+        return {**told.body, "scene": scene_to_submit(_reference(told))}
+    return dict(told.body)
+
+
+def _scene(told: Description) -> Scene:
+    """A shipped scene, a scene file (one that the problem file names lies beside it), or the table itself."""
+    import solver
+
+    reference = _reference(told)
+    try:
+        if isinstance(reference, Mapping):
+            return solver.Scene.from_dict(reference)
+        return solver.load_scene(reference)
+    except SceneError as error:
+        if not isinstance(reference, Mapping):
+            raise
+        found = [Issue(pointer=f"/scene{issue.pointer}", message=issue.message) for issue in error.issues]
+        raise told.refusal(found) from error
+
+
+def _reference(told: Description) -> Any:
+    """The scene as it is named, a file of a problem file as a path from here."""
+    reference = told.body["scene"]
+    if isinstance(reference, str) and told.file is not None and "scene" not in told.options:
+        return str(told.file.parent / reference) if reference.endswith(SCENE_FILES) else reference
+    return reference
+
+
+def _with_values(told: Description, scene: Scene, request: ProblemRequest) -> Scene:
+    """The scene with the values of the key `set`."""
+    for path, value in request.set.items():
+        try:
+            scene = scene.with_values({path: value})
+        except SettingError as error:
+            raise told.refusal([Issue(pointer=f"/set/{path}", message=str(error))]) from error
+    return scene
+
+
+def _of_flags(flags: ProblemFlags) -> dict[str, Any]:
+    """The keys the options stand for."""
+    bounds = inputs.bounds(flags.variables)
+    given: dict[str, Any] = {
+        "variables": None if bounds is None else {path: list(pair) for path, pair in bounds.items()},
+        "scaling": _table("--scaling", flags.scaling, "shroud.N0=logarithmic"),
+        "limit": flags.limit,
+        "weights": _numbers("--weight", flags.weights, "peak=1"),
+        "max_peak": flags.max_peak,
+        "max_band_hz": flags.max_band,
+        "forbidden_hz": _ranges("--forbidden", flags.forbidden, "520 560"),
+        "speeds_rpm": _ranges("--speeds", flags.speeds, "2900 3100"),
+        "max_friction_work": _work(flags.max_work),
+        "contact_states": dict.fromkeys(flags.never_separates or (), NEVER_SEPARATES) or None,
+        "start": _numbers("--start", flags.start, "shroud.N0=150"),
+        "method": flags.method,
+        "basins": flags.basins,
+        "set": inputs.settings(flags.values) or None,
+        "harmonics": flags.harmonics,
+    }  # fmt: skip
+    return {key: value for key, value in given.items() if value is not None}
+
+
+def _table(option: str, texts: Sequence[str] | None, example: str) -> dict[str, str] | None:
+    """The names and words of a repeatable option NAME=WORD."""
+    if not texts:
+        return None
+    found: dict[str, str] = {}
+    for text in texts:
+        name, equals, word = text.partition("=")
+        if not equals or not name.strip():
+            raise InputError(f"`{option}` takes NAME=VALUE, for example {example}, got {text!r}")
+        if name.strip() in found:
+            raise InputError(f"`{option}` names {name.strip()!r} twice; keep one")
+        found[name.strip()] = word.strip()
+    return found
+
+
+def _numbers(option: str, texts: Sequence[str] | None, example: str) -> dict[str, float] | None:
+    table = _table(option, texts, example)
+    return None if table is None else {n: inputs.part(option, f"{n}={w}", w) for n, w in table.items()}
+
+
+def _ranges(option: str, texts: Sequence[str] | None, example: str) -> list[list[float]] | None:
+    """The ranges of a repeatable option LO HI."""
+    if not texts:
+        return None
+    found = []
+    for text in texts:
+        words = text.split()
+        if len(words) != 2:
+            raise InputError(f"`{option}` takes LO HI, for example {example}, got {text!r}")
+        found.append([inputs.part(option, text, word) for word in words])
+    return found
+
+
+def _work(texts: Sequence[str] | None) -> float | dict[str, float] | None:
+    """One limit for all, or one by contact."""
+    if not texts:
+        return None
+    if len(texts) == 1 and "=" not in texts[0]:
+        return inputs.part("--max-work", texts[0], texts[0])
+    return _numbers("--max-work", texts, "0.02 or shroud=0.02")
+
+
+def _read(file: Path, kind: str) -> dict[str, Any]:
+    """The tables and lists of a problem file."""
+    from service.errors import InvalidRequestError, MalformedBodyError
+    from service.jobs import strict_json
+
+    if file.suffix.lower() not in SCENE_FILES:
+        raise InputError(f"`--problem` must end in {', '.join(SCENE_FILES)}, got {str(file)!r}")
+    try:
+        data = file.read_bytes()
+        if file.suffix.lower() == ".json":
+            body = strict_json.loads(data)
+        else:
+            body = tomllib.loads(data.decode("utf-8"))
+    except OSError as error:
+        raise InputError(f"`--problem`: {str(file)!r} cannot be read: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"`--problem`: {str(file)!r} is not TOML: {error}") from error
+    except (InvalidRequestError, MalformedBodyError) as error:
+        raise InputError(f"`--problem`: {str(file)!r}: {error}") from error
+    if not isinstance(body, dict):
+        raise InputError(f"`--problem`: {str(file)!r} must hold one table, got {json.dumps(body)[:80]}")
+    named = body.pop("kind", kind)
+    if named != kind:
+        raise InputError(f"{file}: /kind: must be {kind} here or be left out, got {named!r}")
+    return body

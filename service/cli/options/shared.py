@@ -1,0 +1,122 @@
+"""The arguments and options that several commands share, in one wording."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from service.cli.options.inputs import number, whole_number
+
+Scene = Annotated[
+    str, typer.Argument(metavar="SCENE", help="Name of a shipped scene, or a scene file (.toml, .json).")
+]
+AnyScene = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="SCENE", help="Name of a shipped scene, or a scene file; the one of the --problem file."
+    ),
+]
+Values = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="PATH=VALUE", help="Value of a parameter, for example shroud.N0=150; repeatable."
+    ),
+]
+Frequency = Annotated[
+    float, typer.Option("--frequency", metavar="HZ", parser=number, help="Excitation frequency [Hz].")
+]
+FixedFrequency = Annotated[
+    float | None,
+    typer.Option(
+        "--frequency", metavar="HZ", parser=number,
+        help="Excitation frequency [Hz], needed when another parameter is swept.",
+    ),
+]  # fmt: skip
+StudyFrequency = Annotated[
+    float | None,
+    typer.Option(
+        "--frequency", metavar="HZ", parser=number,
+        help="Excitation frequency [Hz]; the highest peak of the scene's band if left out.",
+    ),
+]  # fmt: skip
+Harmonics = Annotated[
+    int, typer.Option("--harmonics", metavar="H", parser=whole_number, help="Highest harmonic kept.")
+]
+Accuracy = Annotated[
+    float | None,
+    typer.Option(
+        "--accuracy", metavar="E", parser=number,
+        help="Estimated error relative to the amplitude; chooses the harmonics, in place of --harmonics.",
+    ),
+]  # fmt: skip
+Effects = Annotated[
+    str,
+    typer.Option(
+        "--effects", metavar="auto|all|NAME,…",
+        help="What to pay for though the scene does not call for it: even-harmonics, every-contact, "
+        "every-sector, whole-matrices.",
+    ),
+]  # fmt: skip
+Parameter = Annotated[
+    str, typer.Option("--parameter", metavar="PATH", help="What is swept: frequency, shroud.N0, …")
+]
+From = Annotated[
+    float | None,
+    typer.Option(
+        "--from", metavar="A", parser=number,
+        help="Start of the range; for the frequency, the scene's band if left out.",
+    ),
+]  # fmt: skip
+To = Annotated[float | None, typer.Option("--to", metavar="B", parser=number, help="End of the range.")]
+Limit = Annotated[
+    float | None,
+    typer.Option(
+        "--limit", metavar="A", parser=number,
+        help="Amplitude [m] above which the resonance band is measured; peak/√2 if left out.",
+    ),
+]  # fmt: skip
+Points = Annotated[
+    int | None,
+    typer.Option("--points", metavar="N", parser=whole_number, help="Points of the front, 9 if left out."),
+]
+Steps = Annotated[
+    int | None,
+    typer.Option("--steps", metavar="N", parser=whole_number, help="Steps per period; chosen if left out."),
+]
+MaxPeriods = Annotated[
+    int,
+    typer.Option("--max-periods", metavar="N", parser=whole_number, help="Periods to march at most."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+Plot = Annotated[
+    str | None,
+    typer.Option("--plot", metavar="F", help="Draw a picture: .png, .svg, .pdf or .html."),
+]
+Out = Annotated[
+    str | None,
+    typer.Option(
+        "--out", metavar="F",
+        help="Write the numbers: F ends in .csv, .parquet, .nc, .npz, .mat or .json.",
+    ),
+]  # fmt: skip
+Database = Annotated[
+    str | None,
+    typer.Option(
+        "--database",
+        metavar="URL",
+        help="sqlite:///path or postgresql://user@host/name; STICKSLIP_DATABASE sets it too.",
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option("--workers", metavar="N", parser=whole_number, help="Worker processes; one a processor."),
+]
+Url = Annotated[
+    str,
+    typer.Option("--url", metavar="URL", envvar="STICKSLIP_URL", help="Where the service is."),
+]
+Wait = Annotated[bool, typer.Option("--wait", help="Wait for the end and print the results.")]
+Job = Annotated[str, typer.Argument(metavar="JOB", help="Id of a job.")]
+
+DEFAULT_URL = "http://127.0.0.1:8000"

@@ -1,0 +1,100 @@
+"""The service inside a program: queue, workers and database without HTTP."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Self
+
+from service.jobs.kinds import SHIPPED
+from service.jobs.registry import OnProgress, Registry
+from service.jobs.validation import validated
+from service.queue.core import Service
+from service.schemas.answers import (
+    DesignAnswer,
+    DesignDetail,
+    JobAnswer,
+    ResultsAnswer,
+    SweepAnswer,
+    SweepDetail,
+)
+from service.schemas.design_queries import DesignQuery, design_detail, design_page
+from service.schemas.sweep_queries import SweepQuery, sweep_page
+from service.settings.settings import Settings, load_settings
+
+
+class EmbeddedService:
+    """A service for the length of a ``with`` block.
+
+    The worker processes import the main module of the program anew: a script that uses this must do so
+    below ``if __name__ == "__main__":``.
+
+    Parameters
+    ----------
+    settings : Settings, optional
+        Its settings; from the environment if not given.
+    registry : Registry, optional
+        The kinds of job; those shipped if not given.
+
+    Raises
+    ------
+    DatabaseInUseError
+        On entering, if another service has the database file.
+    """
+
+    def __init__(self, settings: Settings | None = None, registry: Registry = SHIPPED) -> None:
+        self._service = Service(settings or load_settings(), registry)
+
+    def __enter__(self) -> Self:
+        self._service.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._service.stop()
+
+    def submit(self, kind: str, spec: Mapping[str, Any], *, idempotency_key: str | None = None) -> str:
+        """Accept a job and give back its id; `spec` has the words of the REST body without ``kind``.
+
+        Raises
+        ------
+        InvalidRequestError
+            Lists everything that is wrong, with pointers into `spec`.
+        """
+        row, _ = self._service.submit({**spec, "kind": kind}, idempotency_key)
+        return row.id
+
+    def job(self, job_id: str) -> JobAnswer:
+        """How a job is (NotFoundError if there is none)."""
+        return JobAnswer.of(self._service.job(job_id), self._service.queue.live_progress(job_id))
+
+    def wait(
+        self, job_id: str, on_progress: OnProgress | None = None, timeout: float | None = None
+    ) -> JobAnswer:
+        """Wait until a job has ended; with `timeout` [s] it may be unfinished still."""
+        self._service.wait(job_id, timeout, on_progress)
+        return self.job(job_id)
+
+    def results(self, job_id: str) -> ResultsAnswer:
+        """What a job computed (ConflictError, JobFailedError if there is nothing)."""
+        return ResultsAnswer.of(self._service.results(job_id), self._service.sweeps)
+
+    def dismiss(self, job_id: str) -> JobAnswer:
+        """Cancel a job and wait until it has stopped."""
+        self._service.dismiss(job_id)
+        return self.wait(job_id, timeout=self._service.settings.grace_seconds + 1.0)
+
+    def sweeps(self, **filters: Any) -> list[SweepAnswer]:
+        """Stored sweeps, newest first unless `sort` is given; the filters of ``GET /v1/sweeps``."""
+        return sweep_page(self._service.sweeps, validated(SweepQuery, filters), self._service.settings).items
+
+    def sweep(self, sweep_id: str) -> SweepDetail:
+        """A stored sweep with its arrays (NotFoundError if there is none)."""
+        return SweepDetail.load(self._service.sweep(sweep_id), self._service.sweeps)
+
+    def designs(self, **filters: Any) -> list[DesignAnswer]:
+        """Stored designs, newest first unless `sort` is given; the filters of ``GET /v1/designs``."""
+        asked = validated(DesignQuery, filters)
+        return design_page(self._service.designs, asked, self._service.settings).items
+
+    def design(self, design_id: str) -> DesignDetail:
+        """A stored design with the whole result (NotFoundError if there is none)."""
+        return design_detail(self._service.design(design_id), self._service.designs)

@@ -1,0 +1,290 @@
+"""The database: SQLite with the transactions and the lock it needs, or PostgreSQL (`service.db.postgresql`).
+
+On SQLite, the standard driver's legacy transaction control does not begin a transaction before a SELECT,
+and a deferred BEGIN cannot always become a write transaction later. Read-modify-writes of several
+processes then lose updates or fail with "database is locked". Here the driver's own control is switched
+off (`isolation_level=None`), and SQLAlchemy's `begin` event emits ``BEGIN IMMEDIATE`` on the write engine
+and ``BEGIN`` on the read engine.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, TypeVar
+
+from sqlalchemy import Connection, Engine, create_engine, event, func, select, text
+from sqlalchemy.engine import make_url
+from sqlalchemy.engine.interfaces import DBAPIConnection
+from sqlalchemy.exc import DBAPIError
+from sqlalchemy.pool import ConnectionPoolEntry, NullPool
+
+from service.db import postgresql
+from service.db.clock import utc_now
+from service.db.group_commit import GroupedWrites
+from service.db.lock import FileLock
+from service.errors import DatabaseError
+from service.jobs import strict_json
+
+BUSY_TIMEOUT_SECONDS = 30.0
+SQLITE_WITHOUT_WAL_BUG = (3, 51, 3)
+CONNECTIONS = 16
+# Of the transactions that threads share: PostgreSQL runs several at a time, and each of these collects what
+# comes while its server answers.
+_LEADERS = 4
+
+_Written = TypeVar("_Written")
+
+
+def is_sqlite(url: str) -> bool:
+    """Whether a URL is of SQLite; else it is of PostgreSQL."""
+    return make_url(url).get_backend_name() == "sqlite"
+
+
+def database_name(url: str) -> str:
+    """A database in a sentence: its file, or its URL without the password."""
+    return str(database_path(url)) if is_sqlite(url) else shown(url)
+
+
+def shown(url: str) -> str:
+    """A URL as it may be printed: without the password."""
+    return make_url(url).render_as_string()
+
+
+def database_path(url: str) -> Path:
+    """The file of an SQLite URL."""
+    name = make_url(url).database
+    if name is None:
+        raise DatabaseError(f"`database` must name a file, got {url!r}")
+    return Path(name)
+
+
+def sqlite_note() -> str | None:
+    """What a reader of /health should know about this SQLite library, or None."""
+    if sqlite3.sqlite_version_info >= SQLITE_WITHOUT_WAL_BUG:
+        return None
+    wanted = ".".join(map(str, SQLITE_WITHOUT_WAL_BUG))
+    return f"SQLite {sqlite3.sqlite_version} has a rare bug in its write-ahead log that {wanted} mends"
+
+
+def _on_connect(
+    *, read_only: bool, foreign_keys: bool
+) -> Callable[[DBAPIConnection, ConnectionPoolEntry], None]:
+    """What every new SQLite connection is told, before SQLAlchemy uses it."""
+
+    def configure(connection: DBAPIConnection, _record: ConnectionPoolEntry) -> None:
+        connection.isolation_level = None
+        cursor = connection.cursor()
+        cursor.execute(f"PRAGMA busy_timeout = {int(BUSY_TIMEOUT_SECONDS * 1000)}")
+        cursor.execute("PRAGMA journal_mode = WAL")
+        cursor.execute("PRAGMA synchronous = FULL")
+        cursor.execute(f"PRAGMA foreign_keys = {'ON' if foreign_keys else 'OFF'}")
+        if read_only:
+            cursor.execute("PRAGMA query_only = ON")
+        cursor.close()
+
+    return configure
+
+
+def _begin_with(statement: str) -> Callable[[Connection], None]:
+    def begin(connection: Connection) -> None:
+        connection.exec_driver_sql(statement)
+
+    return begin
+
+
+def write_engine(url: str, connections: int = CONNECTIONS) -> Engine:
+    """An engine whose transactions may write.
+
+    Those of SQLite take the write lock when they begin, and the pool holds one connection: the threads of a
+    process queue for it in memory, fairly and without the sleeps of SQLite's busy handler. `connections` is
+    for PostgreSQL.
+    """
+    if not is_sqlite(url):
+        return postgresql.service_engine(url, connections)
+    engine = create_engine(
+        url,
+        pool_size=1,
+        max_overflow=0,
+        pool_timeout=BUSY_TIMEOUT_SECONDS,
+        json_serializer=strict_json.stored,
+        connect_args={"timeout": BUSY_TIMEOUT_SECONDS},
+    )
+    event.listen(engine, "connect", _on_connect(read_only=False, foreign_keys=True))
+    event.listen(engine, "begin", _begin_with("BEGIN IMMEDIATE"))
+    return engine
+
+
+def read_engine(url: str) -> Engine:
+    """An engine whose transactions read one snapshot and cannot write; not part of a service."""
+    if not is_sqlite(url):
+        return postgresql.reading(postgresql.migration_engine(url))
+    engine = create_engine(
+        url,
+        pool_size=8,
+        max_overflow=32,
+        pool_timeout=BUSY_TIMEOUT_SECONDS,
+        connect_args={"timeout": BUSY_TIMEOUT_SECONDS},
+    )
+    event.listen(engine, "connect", _on_connect(read_only=True, foreign_keys=True))
+    event.listen(engine, "begin", _begin_with("BEGIN"))
+    return engine
+
+
+def migration_engine(url: str) -> Engine:
+    """An engine for changes of the tables.
+
+    Foreign keys of SQLite are off: a table rebuilt by Alembic is dropped on the way, which would delete the
+    rows that refer to it. The keys are checked before the migration commits instead.
+    """
+    if not is_sqlite(url):
+        return postgresql.migration_engine(url)
+    engine = create_engine(url, poolclass=NullPool, connect_args={"timeout": BUSY_TIMEOUT_SECONDS})
+    event.listen(engine, "connect", _on_connect(read_only=False, foreign_keys=False))
+    event.listen(engine, "begin", _begin_with("BEGIN IMMEDIATE"))
+    return engine
+
+
+@contextmanager
+def migrating(url: str) -> Iterator[Connection]:
+    """A transaction for changes of the tables; no other one of this kind runs beside it.
+
+    Raises
+    ------
+    DatabaseError
+        If the database cannot be used.
+    """
+    engine = migration_engine(url)
+    try:
+        with engine.begin() as connection:
+            if not is_sqlite(url):
+                postgresql.lock_tables(connection)
+            yield connection
+    except DBAPIError as error:
+        raise DatabaseError(f"{database_name(url)} cannot be used: {error.orig}") from error
+    finally:
+        engine.dispose()
+
+
+class Database:
+    """An open database: one engine to write and one to read and, on SQLite, the lock of the file.
+
+    Parameters
+    ----------
+    url : str
+        An SQLite or PostgreSQL URL.
+    connections : int
+        Most connections to PostgreSQL at a time.
+    """
+
+    def __init__(self, url: str, connections: int = CONNECTIONS) -> None:
+        self.url = url
+        self.name = database_name(url)
+        self._lock = FileLock(database_path(url)) if is_sqlite(url) else None
+        self._write = write_engine(url, connections)
+        self._read = read_engine(url) if is_sqlite(url) else postgresql.reading(self._write)
+        leaders = 1 if is_sqlite(url) else max(1, min(_LEADERS, connections // 2))
+        self._grouped = GroupedWrites(self.writing, leaders)
+
+    @property
+    def backend(self) -> str:
+        """``sqlite`` or ``postgresql``."""
+        return self._write.dialect.name
+
+    @property
+    def exclusive(self) -> bool:
+        """Whether one service has the database to itself: jobs that others left running are nobody's."""
+        return self._lock is not None
+
+    def acquire(self) -> None:
+        """Lock the file of SQLite for this process (see `FileLock.acquire` for the errors)."""
+        if self._lock is not None:
+            self._lock.acquire()
+
+    def close(self) -> None:
+        """Close every connection and release the lock."""
+        self._read.dispose()
+        self._write.dispose()
+        if self._lock is not None:
+            self._lock.release()
+
+    @contextmanager
+    def writing(self) -> Iterator[Connection]:
+        """A transaction that may write; commits at the end. SQLite's holds the write lock from the start."""
+        with self._write.begin() as connection:
+            yield connection
+
+    def grouped(self, work: Callable[[Connection], _Written]) -> _Written:
+        """Have `work` done in a transaction that it may share with that of other threads (`GroupedWrites`).
+
+        If another service writes the same row meanwhile the work is done once more and finds it.
+        """
+        return self._grouped.do(work)
+
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
+        """A transaction that sees one snapshot of the database."""
+        with self._read.begin() as connection:
+            yield connection
+
+    def settle(self) -> None:
+        """Move what was committed from the log of SQLite into its file; nobody waits for it."""
+        if self.exclusive:
+            with self._read.connect() as connection:
+                connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)").all()
+
+    def own_connection(self) -> Any:
+        """A connection to PostgreSQL outside of the pool (`Notices`)."""
+        return postgresql.own_connection(self._write)
+
+    def time(self) -> datetime:
+        """The time of the PostgreSQL server, for SQLite of this machine."""
+        if self.exclusive:
+            return utc_now()
+        with self.reading() as connection:
+            found: datetime = connection.execute(select(func.clock_timestamp())).scalar_one()
+        return found.astimezone(UTC)
+
+    def version(self) -> str:
+        """The version of the SQLite library or the PostgreSQL server; raises what the database raises."""
+        query = "SELECT sqlite_version()" if self.exclusive else "SHOW server_version"
+        with self.reading() as connection:
+            return str(connection.execute(text(query)).scalar_one())
+
+
+def backup(url: str, target: Path) -> None:
+    """Copy a database to a new file while it may be in use.
+
+    Raises
+    ------
+    DatabaseError
+        If `target` exists, the source does not, or it is not SQLite.
+    """
+    if not is_sqlite(url):
+        raise DatabaseError(f"{database_name(url)} is backed up with PostgreSQL's own pg_dump")
+    source = database_path(url)
+    if not source.exists():
+        raise DatabaseError(f"there is no database {source} to back up")
+    if target.exists():
+        raise DatabaseError(f"{target} exists already: a backup does not overwrite")
+    reader = sqlite3.connect(source, timeout=BUSY_TIMEOUT_SECONDS)
+    try:
+        writer = sqlite3.connect(target)
+        try:
+            reader.backup(writer)
+        finally:
+            writer.close()
+    finally:
+        reader.close()
+
+
+def shrink(url: str) -> None:
+    """Rewrite the file of SQLite without the pages that deleted rows left free; nobody may be using it."""
+    connection = sqlite3.connect(database_path(url), timeout=BUSY_TIMEOUT_SECONDS, isolation_level=None)
+    try:
+        connection.execute("VACUUM")
+    finally:
+        connection.close()

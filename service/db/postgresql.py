@@ -1,0 +1,136 @@
+"""PostgreSQL: pooled connections that wait for nothing for ever, and the locks several services share.
+
+Every connection of a service holds one advisory lock shared with all others; `stickslip db upgrade` takes
+it for itself alone, so that tables never change under a running service, and a service that died, or a
+server that restarted, leaves no lock behind. Making or changing tables takes a second lock, so that of
+several services started on an empty database one makes the tables. Both locks belong to sessions: a
+connection pooler between service and server has to pool sessions, not transactions.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sqlalchemy import Connection, Engine, create_engine, event, text
+from sqlalchemy.engine import URL, make_url
+from sqlalchemy.engine.interfaces import DBAPIConnection
+from sqlalchemy.pool import ConnectionPoolEntry, NullPool
+
+from service.errors import DatabaseError, DatabaseInUseError
+from service.jobs import strict_json
+
+DRIVER = "postgresql+psycopg"
+OLDEST = 15
+
+_WAIT_SECONDS = 30.0
+_CONNECT_SECONDS = 10
+# Two numbers of our own; advisory locks know their holders' agreement by number alone.
+_SERVICES = 0x5354_4943_4B01
+_TABLES = 0x5354_4943_4B02
+_ROOM = 0x5354_4943_4B03
+
+
+def _arguments(url: URL) -> dict[str, Any]:
+    """What libpq is told besides the URL, which has the last word."""
+    defaults = {"application_name": "stickslip", "connect_timeout": _CONNECT_SECONDS, "keepalives_idle": 30}
+    return {name: value for name, value in defaults.items() if name not in url.query}
+
+
+def _create(url: str, **pool: Any) -> Engine:
+    parsed = make_url(url)
+    try:
+        return create_engine(
+            parsed, connect_args=_arguments(parsed), json_serializer=strict_json.stored, **pool
+        )
+    except ModuleNotFoundError as error:
+        raise DatabaseError(
+            f"PostgreSQL needs the package psycopg ({error}): install stickslip[postgresql]"
+        ) from error
+
+
+def _limit_waits(connection: DBAPIConnection, _record: ConnectionPoolEntry) -> None:
+    """No statement waits longer for a lock than SQLite's would."""
+    cursor = connection.cursor()
+    cursor.execute(f"SET lock_timeout = {int(_WAIT_SECONDS * 1000)}")
+    cursor.close()
+    connection.commit()
+
+
+def _join_services(connection: DBAPIConnection, _record: ConnectionPoolEntry) -> None:
+    """Hold the shared lock as long as the connection lives; waits while tables change."""
+    cursor = connection.cursor()
+    cursor.execute(f"SELECT pg_advisory_lock_shared({_SERVICES})")
+    cursor.close()
+    connection.commit()
+
+
+def service_engine(url: str, connections: int) -> Engine:
+    """The pool of a service; a connection that broke while it lay idle is replaced before its use.
+
+    Parameters
+    ----------
+    url : str
+        A PostgreSQL URL.
+    connections : int
+        Most connections at a time; further threads wait for one.
+    """
+    engine = _create(
+        url, pool_size=connections, max_overflow=0, pool_timeout=_WAIT_SECONDS, pool_pre_ping=True
+    )
+    event.listen(engine, "connect", _limit_waits)
+    event.listen(engine, "connect", _join_services)
+    return engine
+
+
+def own_connection(engine: Engine) -> Any:
+    """A connection of psycopg outside of the pool, which commits by itself."""
+    # Loaded here: only services on PostgreSQL need the driver.
+    import psycopg
+
+    words, options = engine.dialect.create_connect_args(engine.url)
+    arguments: dict[str, Any] = {**options, **_arguments(engine.url), "autocommit": True}
+    return psycopg.connect(*words, **arguments)
+
+
+def reading(engine: Engine) -> Engine:
+    """The same pool for transactions that read one snapshot and cannot write."""
+    return engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
+
+
+def migration_engine(url: str) -> Engine:
+    """An engine for changes of the tables, outside of the services' lock."""
+    engine = _create(url, poolclass=NullPool)
+    event.listen(engine, "connect", _limit_waits)
+    return engine
+
+
+def lock_tables(connection: Connection) -> None:
+    """Be the only one, until the transaction ends, who makes or changes tables.
+
+    Raises
+    ------
+    DatabaseError
+        If the server is too old.
+    """
+    found = connection.dialect.server_version_info
+    if found is None or found < (OLDEST,):
+        version = ".".join(map(str, found or ("unknown",)))
+        raise DatabaseError(f"stickslip needs PostgreSQL {OLDEST} or newer, the server is {version}")
+    connection.execute(text(f"SELECT pg_advisory_xact_lock({_TABLES})"))
+
+
+def lock_room(connection: Connection) -> None:
+    """Be the only one, until the transaction ends, who adds jobs to a queue that may be full."""
+    connection.execute(text(f"SELECT pg_advisory_xact_lock({_ROOM})"))
+
+
+def refuse_running(connection: Connection, name: str) -> None:
+    """Keep services out until the transaction ends.
+
+    Raises
+    ------
+    DatabaseInUseError
+        If one is running.
+    """
+    if not connection.execute(text(f"SELECT pg_try_advisory_xact_lock({_SERVICES})")).scalar_one():
+        raise DatabaseInUseError(f"{name} is in use by running stickslip services: stop them first")

@@ -1,0 +1,80 @@
+"""What must hold of the rows of a database: questions whose answers are all 0 of a sound one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import ColumnElement, Connection, Engine, Select, and_, exists, func, select, text
+
+from service.db.models import Job, JobResult, JobState, Sweep, SweepArray
+from service.jobs.registry import StoredArray
+
+# A job that ends as `successful` wrote its result with the same transaction, unless it repeats another's.
+# One that failed may have kept what it computed short of its goal.
+_WITHOUT_RESULT = (JobState.ACCEPTED, JobState.RUNNING, JobState.DISMISSED)
+_WITH_RESULT = exists().where(JobResult.job_id == Job.id)
+_WITH_SWEEPS = exists().where(Sweep.job_id == Job.id)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contents:
+    """How much a database holds: jobs by state, sweeps, arrays."""
+
+    jobs: dict[str, int]
+    sweeps: int
+    arrays: int
+
+
+def damage(connection: Connection) -> list[str]:
+    """Return what the database itself finds wrong with its file; only SQLite has such a check."""
+    if connection.dialect.name != "sqlite":
+        return []
+    found = [str(row[0]) for row in connection.execute(text("PRAGMA integrity_check"))]
+    broken = connection.execute(text("PRAGMA foreign_key_check")).all()
+    trouble = [line for line in found if line != "ok"]
+    return trouble + [
+        f"a row of `{row[0]}` refers to a row of `{row[2]}` that is not there" for row in broken
+    ]
+
+
+def contradictions(connection: Connection) -> list[str]:
+    """Return what rows say against each other."""
+    questions: dict[str, Select[Any]] = {
+        "successful jobs without a result": _jobs(
+            Job.state == JobState.SUCCESSFUL, Job.result_of.is_(None), ~_WITH_RESULT
+        ),
+        "results of jobs that computed none": _jobs(Job.state.in_(_WITHOUT_RESULT), _WITH_RESULT),
+        "sweeps of jobs that computed none": _jobs(Job.state.in_(_WITHOUT_RESULT), _WITH_SWEEPS),
+        "ended jobs without the time they ended": _jobs(
+            Job.state.in_([JobState.SUCCESSFUL, JobState.FAILED, JobState.DISMISSED]), Job.finished.is_(None)
+        ),
+        "sweeps without their arrays": select(func.count())
+        .select_from(Sweep)
+        .where(~exists().where(SweepArray.sweep_id == Sweep.id)),
+    }
+    counts = {words: connection.execute(query).scalar_one() for words, query in questions.items()}
+    return [f"{count} {words}" for words, count in counts.items() if count]
+
+
+def _jobs(*conditions: ColumnElement[bool]) -> Select[Any]:
+    return select(func.count()).select_from(Job).where(and_(*conditions))
+
+
+def arrays(engine: Engine) -> Iterator[tuple[str, str, StoredArray]]:
+    """Yield sweep, name and bytes of every stored array, one at a time."""
+    query = select(SweepArray.sweep_id, SweepArray.name, SweepArray.sha256, SweepArray.data)
+    with engine.connect().execution_options(stream_results=True, max_row_buffer=16) as connection:
+        for sweep_id, name, sha256, data in connection.execute(query):
+            yield sweep_id, name, StoredArray(sha256=sha256, data=data)
+
+
+def contents(connection: Connection) -> Contents:
+    """Return how much there is."""
+    states = connection.execute(select(Job.state, func.count()).group_by(Job.state)).all()
+    return Contents(
+        jobs={state.value: count for state, count in states},
+        sweeps=connection.execute(select(func.count()).select_from(Sweep)).scalar_one(),
+        arrays=connection.execute(select(func.count()).select_from(SweepArray)).scalar_one(),
+    )

@@ -1,0 +1,124 @@
+"""What is deleted when it is old, piece by piece, so that nobody waits for it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+from sqlalchemy import ColumnElement, Text, and_, cast, delete, func, or_, select, update
+from sqlalchemy.orm import aliased
+
+from service.db.engine import Database
+from service.db.models import Design, Job, JobState, Sweep, Upload
+from service.jobs.kinds.scenes import UPLOAD
+
+_ENDED = [state for state in JobState if state.finished]
+_NO_ANSWER = ""
+"""The spec hash of a job that is no answer any more to who asks for the same."""
+_NAMED = re.compile(re.escape(UPLOAD) + r"([0-9a-f-]+)")
+_later = aliased(Job)
+_HAS_DESIGN = select(Design.job_id).where(Design.job_id == Job.id).correlate(Job).exists()
+_HAS_SWEEPS = select(Sweep.id).where(Sweep.job_id == Job.id).correlate(Job).exists()
+_IS_AN_ANSWER = select(_later.id).where(_later.result_of == Job.id).correlate(Job).exists()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pruned:
+    """How much was, or would be, deleted: jobs with their results, sweeps with their arrays, uploads."""
+
+    jobs: int = 0
+    sweeps: int = 0
+    uploads: int = 0
+
+    def __add__(self, other: Pruned) -> Pruned:
+        return Pruned(
+            jobs=self.jobs + other.jobs,
+            sweeps=self.sweeps + other.sweeps,
+            uploads=self.uploads + other.uploads,
+        )
+
+
+class RetentionRepository:
+    """Old jobs and uploads of one database.
+
+    A job is deleted with all it computed; one that a younger job gives as its answer (`result_of`) is kept as
+    long as that. Of designs that are kept, the sweeps are deleted. What is about to lose its sweeps is taken
+    out of the store of results first: nobody gets it as an answer from then on.
+    """
+
+    def __init__(self, database: Database) -> None:
+        self._db = database
+
+    def count(self, before: datetime, *, keep_designs: bool) -> Pruned:
+        """How much `take` and `delete` would delete of jobs that ended before a time."""
+        old = _old(before, keep_designs=keep_designs)
+        gone = and_(old, ~_HAS_DESIGN) if keep_designs else old
+        jobs = select(func.count()).select_from(Job).where(gone)
+        sweeps = select(func.count()).select_from(Sweep).join(Job, Job.id == Sweep.job_id).where(old)
+        with self._db.reading() as connection:
+            return Pruned(
+                jobs=connection.execute(jobs).scalar_one(), sweeps=connection.execute(sweeps).scalar_one()
+            )
+
+    def take(self, before: datetime, most: int, *, keep_designs: bool) -> list[str]:
+        """Take up to `most` old jobs out of the store of results; their ids, oldest first."""
+        query = select(Job.id).where(_old(before, keep_designs=keep_designs)).order_by(Job.id).limit(most)
+        with self._db.reading() as connection:
+            ids = list(connection.execute(query).scalars())
+        if ids:
+            with self._db.writing() as connection:
+                connection.execute(update(Job).where(Job.id.in_(ids)).values(spec_hash=_NO_ANSWER))
+        return ids
+
+    def delete_sweeps(self, jobs: Sequence[str], most: int, *, keep_designs: bool) -> int:
+        """Delete up to `most` sweeps of these jobs; how many were."""
+        free = or_(~_IS_AN_ANSWER, _HAS_DESIGN) if keep_designs else ~_IS_AN_ANSWER
+        query = select(Sweep.id).join(Job, Job.id == Sweep.job_id).where(Job.id.in_(jobs), free).limit(most)
+        with self._db.writing() as connection:
+            ids = list(connection.execute(query).scalars())
+            if ids:
+                connection.execute(delete(Sweep).where(Sweep.id.in_(ids)))
+        return len(ids)
+
+    def delete_jobs(self, jobs: Sequence[str], *, keep_designs: bool) -> int:
+        """Delete these jobs, whose sweeps are deleted, with their results; how many were."""
+        gone = and_(Job.id.in_(jobs), ~_HAS_SWEEPS, ~_IS_AN_ANSWER)
+        query = select(Job.id).where(and_(gone, ~_HAS_DESIGN) if keep_designs else gone)
+        with self._db.writing() as connection:
+            ids = list(connection.execute(query).scalars())
+            if ids:
+                connection.execute(delete(Job).where(Job.id.in_(ids)))
+        return len(ids)
+
+    def old_uploads(self, before: datetime) -> list[str]:
+        """Ids of the uploads that came before a time and that nobody uses, oldest first.
+
+        A job holds what its uploads held from the moment it is accepted. One that a waiting or running job
+        names is kept all the same, and one that a job named which came since: its client may go on with it.
+        """
+        old = select(Upload.id).where(Upload.created < before).order_by(Upload.id)
+        request = cast(Job.request, Text)
+        used = select(request).where(
+            or_(Job.state.not_in(_ENDED), Job.created >= before), request.contains(UPLOAD)
+        )
+        with self._db.reading() as connection:
+            found = list(connection.execute(old).scalars())
+            requests = connection.execute(used).scalars() if found else ()
+            named = {one for text in requests for one in _NAMED.findall(text)}
+        return [one for one in found if one not in named]
+
+    def delete_upload(self, upload: str, before: datetime) -> int:
+        """Delete an upload unless it was sent again since a time; how many were, 0 or 1."""
+        statement = delete(Upload).where(Upload.id == upload, Upload.created < before)
+        with self._db.writing() as connection:
+            return connection.execute(statement).rowcount
+
+
+def _old(before: datetime, *, keep_designs: bool) -> ColumnElement[bool]:
+    """Jobs that ended before a time and have something to be deleted."""
+    ended = and_(Job.state.in_(_ENDED), Job.finished < before)
+    if not keep_designs:
+        return and_(ended, ~_IS_AN_ANSWER)
+    return and_(ended, or_(and_(~_HAS_DESIGN, ~_IS_AN_ANSWER), and_(_HAS_DESIGN, _HAS_SWEEPS)))

@@ -1,0 +1,165 @@
+"""What the repository takes and gives: frozen rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any
+
+from service.db.models import NOBODY, JobState
+from service.jobs.registry import Piece
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobRow:
+    """A job without its spec and its result; `request` is None in lists, it may hold a whole scene."""
+
+    id: str
+    kind: str
+    state: JobState
+    priority: int
+    scene_name: str | None
+    scene_hash: str | None
+    spec_hash: str
+    request_hash: str
+    owner: str
+    idempotency_key: str | None
+    seconds_limit: float | None
+    attempt: int
+    max_attempts: int
+    cancel_requested: bool
+    progress: float
+    points: int
+    created: datetime
+    started: datetime | None
+    finished: datetime | None
+    result_of: str | None
+    error: dict[str, Any] | None
+    request: dict[str, Any] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewJob:
+    """A job to be inserted."""
+
+    kind: str
+    request: dict[str, Any]
+    spec: dict[str, Any]
+    spec_hash: str
+    request_hash: str
+    max_attempts: int
+    scene_name: str | None = None
+    scene_hash: str | None = None
+    priority: int = 0
+    fresh: bool = False
+    idempotency_key: str | None = None
+    owner: str = NOBODY
+    seconds_limit: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attempt:
+    """One attempt at a job: what a worker needs, and what guards the write of its outcome.
+
+    Attributes
+    ----------
+    seconds_limit : float or None
+        Longest time it may take [s], if the job has a limit of its own.
+    progress, points : float, int
+        How far earlier attempts got, as far as `saved` goes; 0 without it.
+    saved : tuple of Piece
+        What they kept.
+    """
+
+    job_id: str
+    kind: str
+    spec: dict[str, Any]
+    attempt: int
+    max_attempts: int
+    lease_owner: str
+    owner: str = NOBODY
+    seconds_limit: float | None = None
+    progress: float = 0.0
+    points: int = 0
+    saved: tuple[Piece, ...] = field(default=(), compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recovered:
+    """What became of running jobs whose owner is gone."""
+
+    accepted: int = 0
+    failed: int = 0
+    dismissed: int = 0
+
+    @property
+    def total(self) -> int:
+        """All of them."""
+        return self.accepted + self.failed + self.dismissed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneRow:
+    """A stored scene."""
+
+    owner: str
+    name: str
+    scene_hash: str
+    created: datetime
+    body: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepRow:
+    """A stored sweep without its arrays and contacts."""
+
+    id: str
+    job_id: str
+    position: int
+    owner: str
+    scene_name: str
+    scene_hash: str
+    parameter: str
+    from_value: float
+    to_value: float
+    frequency_hz: float | None
+    excitation_amplitude: float | None
+    harmonics: int
+    points: int
+    peak: float | None
+    peak_at: float | None
+    limit: float | None
+    band_hz: float | None
+    error_estimate: float | None
+    peaks_known: bool | None
+    newton_iterations: int
+    rejected_steps: int
+    seconds: float
+    completed: bool
+    status: str
+    created: datetime
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignRow:
+    """A stored design without its variables."""
+
+    job_id: str
+    owner: str
+    scene_name: str
+    scene_hash: str
+    method: str
+    robust: bool
+    reached: bool
+    feasible: bool
+    status: str
+    objective: float | None
+    peak: float | None
+    peak_at: float | None
+    limit: float | None
+    band_hz: float | None
+    harmonics: int
+    evaluations: int
+    work: float | None
+    seconds: float
+    created: datetime

@@ -1,0 +1,54 @@
+"""The stored scenes."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from sqlalchemy import Connection, insert, select
+
+from service.db.clock import utc_now
+from service.db.engine import Database
+from service.db.models import Scene
+from service.db.repositories.rows import SceneRow
+
+__all__ = ["SceneRepository", "SceneRow"]
+
+_COLUMNS = (Scene.owner, Scene.name, Scene.scene_hash, Scene.created, Scene.body)
+
+
+class SceneRepository:
+    """Scenes of one database; a stored scene never changes."""
+
+    def __init__(self, database: Database) -> None:
+        self._db = database
+
+    def add(self, owner: str, name: str, scene_hash: str, body: dict[str, Any]) -> tuple[SceneRow, bool]:
+        """Store a scene, or find the one of this owner and name; whether it was stored."""
+
+        def find_or_add(connection: Connection) -> tuple[SceneRow, bool]:
+            query = select(*_COLUMNS).where(Scene.owner == owner, Scene.name == name)
+            known = connection.execute(query).mappings().one_or_none()
+            if known is not None:
+                return SceneRow(**known), False
+            row = SceneRow(owner=owner, name=name, scene_hash=scene_hash, created=utc_now(), body=body)
+            connection.execute(insert(Scene).values(**asdict(row)))
+            return row, True
+
+        return self._db.grouped(find_or_add)
+
+    def get(self, owner: str, name: str) -> SceneRow | None:
+        """The scene that an owner has under a name, or None."""
+        query = select(*_COLUMNS).where(Scene.owner == owner, Scene.name == name)
+        with self._db.reading() as connection:
+            row = connection.execute(query).mappings().one_or_none()
+        return None if row is None else SceneRow(**row)
+
+    def all(self, owner: str | None) -> list[SceneRow]:
+        """All of an owner, or of everybody (None), by name."""
+        query = select(*_COLUMNS).order_by(Scene.name, Scene.owner)
+        if owner is not None:
+            query = query.where(Scene.owner == owner)
+        with self._db.reading() as connection:
+            rows = connection.execute(query).mappings().all()
+        return [SceneRow(**row) for row in rows]

@@ -1,0 +1,148 @@
+"""The revision of a database: what it is, what it must be, and the way there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import Connection, inspect
+from sqlalchemy.exc import DBAPIError
+
+from service.db import postgresql
+from service.db.engine import database_name, database_path, is_sqlite, migrating, read_engine, shown
+from service.db.lock import FileLock
+from service.errors import DatabaseError, WrongRevisionError
+
+# Beside this package, in the source tree and once installed; found by place, since another
+# package of this common name may come first on the path.
+_MIGRATIONS = Path(__file__).resolve().parent.parent.parent / "migrations"
+
+
+def _config() -> Config:
+    config = Config()
+    config.set_main_option("script_location", str(_MIGRATIONS).replace("%", "%%"))
+    config.set_main_option("path_separator", "os")
+    return config
+
+
+@cache
+def head_revision() -> str:
+    """The revision this version works with."""
+    head = ScriptDirectory.from_config(_config()).get_current_head()
+    if head is None:
+        raise DatabaseError("the package `migrations` has no revisions: the installation is damaged")
+    return head
+
+
+def _current(connection: Connection) -> tuple[str | None, bool]:
+    """The revision of a database, and whether it has no tables at all."""
+    revision = MigrationContext.configure(connection).get_current_revision()
+    return revision, not inspect(connection).get_table_names()
+
+
+def current_revision(url: str) -> str:
+    """The revision of an existing database; ``none`` if it has never had one.
+
+    Raises
+    ------
+    DatabaseError
+        If it cannot be used.
+    """
+    engine = read_engine(url)
+    try:
+        with engine.begin() as connection:
+            return _current(connection)[0] or "none"
+    except DBAPIError as error:
+        raise DatabaseError(f"{database_name(url)} cannot be used: {error.orig}") from error
+    finally:
+        engine.dispose()
+
+
+def _migrate(connection: Connection, target: str) -> None:
+    config = _config()
+    config.attributes["connection"] = connection
+    command.upgrade(config, target)
+
+
+@contextmanager
+def _without_services(url: str) -> Iterator[Connection]:
+    """A transaction for changes of the tables while no service runs."""
+    name = database_name(url)
+    if not is_sqlite(url):
+        with migrating(url) as connection:
+            postgresql.refuse_running(connection, name)
+            yield connection
+        return
+    path = database_path(url)
+    if not path.absolute().parent.is_dir():
+        raise DatabaseError(f"there is no folder {path.absolute().parent} for the database {path.name}")
+    with FileLock(path), migrating(url) as connection:
+        yield connection
+
+
+def upgrade(url: str, target: str = "head") -> str:
+    """Bring a database to a revision (`stickslip db upgrade`); returns the revision it has then.
+
+    Raises
+    ------
+    DatabaseInUseError
+        If a service is running on it.
+    DatabaseError
+        If it cannot be used, holds another program's tables, or is newer than this version.
+    """
+    with _without_services(url) as connection:
+        revision, empty = _current(connection)
+        _refuse_foreign(url, revision, empty=empty)
+        _refuse_unknown(url, revision)
+        _migrate(connection, target)
+        now = _current(connection)[0]
+    return now or "base"
+
+
+def prepare(url: str) -> None:
+    """Make a new database's tables, or check those of an existing one.
+
+    On SQLite the caller holds the lock of the file; on PostgreSQL services may run.
+
+    Raises
+    ------
+    WrongRevisionError
+        With the command that brings the database to the right revision.
+    DatabaseError
+        If it cannot be used or holds another program's tables.
+    """
+    with migrating(url) as connection:
+        revision, empty = _current(connection)
+        if revision is None and empty:
+            _migrate(connection, "head")
+            return
+    _refuse_foreign(url, revision, empty=empty)
+    _refuse_unknown(url, revision)
+    if revision != head_revision():
+        name = database_name(url)
+        raise WrongRevisionError(
+            f"{name} is at revision {revision}, this version works with {head_revision()}: "
+            f"back it up, then run `stickslip db upgrade --database {shown(url)}`"
+        )
+
+
+def _refuse_foreign(url: str, revision: str | None, *, empty: bool) -> None:
+    if revision is None and not empty:
+        raise DatabaseError(
+            f"{database_name(url)} holds the tables of another program: use another database (`--database`)"
+        )
+
+
+def _refuse_unknown(url: str, revision: str | None) -> None:
+    known = {script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()}
+    if revision is not None and revision not in known:
+        raise WrongRevisionError(
+            f"{database_name(url)} is at revision {revision}, which this version does not know: it was "
+            "written by a newer stickslip. Install that one, or use another database (`--database`)"
+        )

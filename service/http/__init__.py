@@ -1,0 +1,1 @@
+"""The HTTP application: middleware, errors, events, metrics."""

@@ -1,0 +1,100 @@
+"""The HTTP application."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from fastapi import FastAPI
+from starlette.concurrency import run_in_threadpool
+
+from service.auth.authenticator import Doorkeeper
+from service.http import openapi
+from service.http.dependencies import HostCheck
+from service.http.head import Head
+from service.http.metrics import Measured, Metrics
+from service.http.middleware import Gate
+from service.http.request_log import RequestLog
+from service.http.routes import (
+    designs,
+    events,
+    health,
+    jobs,
+    matrices,
+    metrics,
+    page,
+    plan,
+    previews,
+    reference,
+    scene_text,
+    scenes,
+    sweeps,
+    uploads,
+)
+from service.http.security_headers import Seal
+from service.jobs.kinds import SHIPPED
+from service.jobs.registry import Registry
+from service.queue.core import SOLVER_VERSION, Service
+from service.schemas import problems
+from service.settings.settings import Settings, load_settings
+
+log = logging.getLogger("stickslip.service")
+
+_DESCRIPTION = "Designs friction dampers: jobs, their results, and every frequency response computed."
+
+
+def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -> FastAPI:
+    """The application of one service; its lifespan starts and stops database, queue and workers.
+
+    Parameters
+    ----------
+    settings : Settings, optional
+        Its settings; from the environment if not given.
+    registry : Registry, optional
+        The kinds of job; those shipped if not given.
+    """
+    service = Service(settings or load_settings(), registry)
+
+    @asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        await run_in_threadpool(service.start)
+        await run_in_threadpool(_say_if_nobody_can_come_in, service)
+        try:
+            yield
+        finally:
+            await run_in_threadpool(service.stop)
+
+    app = FastAPI(
+        title="stickslip",
+        description=_DESCRIPTION,
+        version=SOLVER_VERSION,
+        lifespan=lifespan,
+        docs_url=None,
+        generate_unique_id_function=lambda route: route.name,
+        redoc_url=None,
+        telemetry={"tracing": False, "metrics": False, "logs": False, "auto_configure": False},
+    )
+    app.state.service = service
+    app.state.metrics = Metrics(service)
+    # The last one added is the outermost.
+    app.add_middleware(Head)
+    app.add_middleware(Gate, doorkeeper=Doorkeeper(service.keys, service.settings, service.jobs.now))
+    app.add_middleware(HostCheck, hosts=service.settings.hosts)
+    app.add_middleware(Measured, metrics=app.state.metrics)
+    app.add_middleware(RequestLog)
+    problems.install(app)
+    app.add_middleware(Seal, settings=service.settings)
+    events.install(app)
+    for module in (
+        jobs, events, designs, sweeps, scene_text, scenes, uploads, matrices, plan, previews, health, metrics,
+        reference, page,
+    ):  # fmt: skip
+        app.include_router(module.router)
+    openapi.install(app, registry)
+    return app
+
+
+def _say_if_nobody_can_come_in(service: Service) -> None:
+    if service.settings.keys_required and not service.keys.usable(service.jobs.now()):
+        log.warning("requests need a key and there is none: `stickslip keys create --owner NAME`")

@@ -1,0 +1,168 @@
+"""What the routes share: reading bodies strictly, waiting without holding a thread, the host check."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import re
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import Depends, Request, Response
+from starlette.concurrency import run_in_threadpool
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from service.auth.callers import KEYLESS, Caller
+from service.db.repositories import JobRow
+from service.errors import (
+    HostRefusedError,
+    InvalidRequestError,
+    MalformedBodyError,
+    UnsupportedMediaError,
+)
+from service.http.bodies import whole
+from service.jobs import strict_json
+from service.queue.core import Service
+from service.queue.subscriptions import Event
+from service.rendering.representations import JSON, LIST_MEDIA, chosen, csv_of_items
+from service.schemas.answers import DesignPage, JobPage, SweepPage
+from service.schemas.problems import service_problem
+from service.schemas.upload_answers import UploadPage
+from solver.errors import Issue
+
+_PREFER_WAIT = re.compile(r"(?:^|[,;\s])wait\s*=\s*\"?(\d{1,6})\"?(?:$|[,;\s])", re.IGNORECASE)
+_KEY = re.compile(r"[\x21-\x7e]{1,200}")
+_LOOK_AGAIN_SECONDS = 2.0
+
+
+def service_of(request: Request) -> Service:
+    """The service behind the app."""
+    service: Service = request.app.state.service
+    return service
+
+
+ServiceDependency = Annotated[Service, Depends(service_of)]
+
+
+def caller_of(request: Request) -> Caller:
+    """Who asks: the gate has put them there."""
+    caller: Caller = getattr(request.state, "caller", KEYLESS)
+    return caller
+
+
+CallerDependency = Annotated[Caller, Depends(caller_of)]
+
+
+async def json_body(request: Request) -> dict[str, Any]:
+    """The body of a request as a JSON object, no larger than the settings allow.
+
+    Raises
+    ------
+    UnsupportedMediaError, BodyTooLargeError, SlowBodyError, MalformedBodyError, InvalidRequestError
+        For a body that is not that.
+    """
+    kind = request.headers.get("content-type", "").split(";")[0].strip().lower()
+    if kind != "application/json" and not kind.endswith("+json"):
+        raise UnsupportedMediaError(f"`Content-Type` must be application/json, got {kind or 'none'}")
+    settings = service_of(request).settings
+    value = strict_json.loads(await whole(request, settings.max_body_bytes, settings.body_seconds))
+    if not isinstance(value, dict):
+        raise MalformedBodyError(f"the body must be a JSON object, got {type(value).__name__}")
+    return value
+
+
+JsonBody = Annotated[dict[str, Any], Depends(json_body)]
+
+
+def preferred_wait(headers: Mapping[str, str], longest: float) -> float | None:
+    """Seconds of ``Prefer: wait=N`` (RFC 7240), at most `longest`; None without it."""
+    found = _PREFER_WAIT.search(headers.get("prefer", ""))
+    return None if found is None else min(float(found.group(1)), longest)
+
+
+def idempotency_key(headers: Mapping[str, str]) -> str | None:
+    """The Idempotency-Key of a request, or None.
+
+    Raises
+    ------
+    InvalidRequestError
+        If it is empty, longer than 200 characters or not printable ASCII.
+    """
+    key = headers.get("idempotency-key")
+    if key is None or _KEY.fullmatch(key):
+        return key
+    message = (
+        f"`Idempotency-Key` must be 1 to 200 printable ASCII characters without spaces, got {key[:80]!r}"
+    )
+    raise InvalidRequestError([Issue(pointer="/Idempotency-Key", message=message)], source="header")
+
+
+def tagged(
+    request: Request,
+    body: bytes,
+    media_type: str = "application/json",
+    headers: Mapping[str, str] | None = None,
+) -> Response:
+    """A body with its strong ETag (RFC 9110); 304 without it if the client has the same."""
+    tag = f'"{hashlib.sha256(body).hexdigest()}"'
+    known = {one.strip().removeprefix("W/") for one in request.headers.get("if-none-match", "").split(",")}
+    kept = {**(headers or {}), "ETag": tag}
+    if tag in known or "*" in known:
+        return Response(status_code=304, headers=kept)
+    return Response(body, media_type=media_type, headers=kept)
+
+
+def listing(request: Request, page: SweepPage | DesignPage | JobPage | UploadPage) -> Response:
+    """A page of a list as JSON or CSV, with a link to the next one in its header too (RFC 8288)."""
+    kind = chosen(request.headers.get("accept"), LIST_MEDIA)
+    headers = {"Vary": "Accept"}
+    if page.next is not None:
+        headers["Link"] = f'<{page.next}>; rel="next"'
+    if kind == JSON:
+        return Response(page.model_dump_json(), media_type=kind, headers=headers)
+    return Response(csv_of_items(page.model_dump(mode="json")["items"]), media_type=kind, headers=headers)
+
+
+async def wait_for_end(service: Service, job_id: str, seconds: float, caller: Caller = KEYLESS) -> JobRow:
+    """The job when it has ended, the time is over or the service stops; holds no thread meanwhile."""
+    loop = asyncio.get_running_loop()
+    changed = asyncio.Event()
+
+    def listen(event: Event) -> None:
+        if event.ended:
+            loop.call_soon_threadsafe(changed.set)
+
+    end = loop.time() + seconds
+    with service.waiters.listening(job_id, listen):
+        while True:
+            row = await run_in_threadpool(service.job, job_id, caller)
+            left = end - loop.time()
+            if row.state.finished or service.stopping.is_set() or left <= 0.0:
+                return row
+            try:
+                await asyncio.wait_for(changed.wait(), min(left, _LOOK_AGAIN_SECONDS))
+            except TimeoutError:
+                continue
+            changed.clear()
+
+
+class HostCheck:
+    """Refuses requests for host names that are not this service's.
+
+    Without it, a web page could reach a service on loopback under a name that its owner points there.
+    """
+
+    def __init__(self, app: ASGIApp, hosts: tuple[str, ...]) -> None:
+        self._app = app
+        self._hosts = frozenset(host.lower() for host in hosts)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on, or answer it with a problem."""
+        if scope["type"] == "http" and "*" not in self._hosts:
+            request = Request(scope, receive)
+            host = re.sub(r":\d+$", "", request.headers.get("host", "").lower())
+            if host not in self._hosts:
+                error = HostRefusedError(f"the host {host!r} is not one of {', '.join(sorted(self._hosts))}")
+                await service_problem(request, error)(scope, receive, send)
+                return
+        await self._app(scope, receive, send)

@@ -1,0 +1,110 @@
+"""What a monitor reads at ``/metrics``: requests as they come, jobs and workers as they are when asked."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+
+from prometheus_client import CollectorRegistry, Counter, Histogram, generate_latest
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.queue.core import SOLVER_VERSION, Service
+
+CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
+_SECONDS = (0.001, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0)
+
+
+class Metrics:
+    """The numbers of one service."""
+
+    def __init__(self, service: Service) -> None:
+        self._registry = CollectorRegistry()
+        self._registry.register(_State(service))
+        self.requests = Counter(
+            "stickslip_http_requests", "Requests answered.", ("method", "route", "status"),
+            registry=self._registry,
+        )  # fmt: skip
+        self.seconds = Histogram(
+            "stickslip_http_request_seconds", "Time from a request to the end of its answer.",
+            ("method", "route"), buckets=_SECONDS, registry=self._registry,
+        )  # fmt: skip
+
+    def text(self) -> bytes:
+        """Return everything in Prometheus' text format."""
+        return generate_latest(self._registry)
+
+
+class _State(Collector):
+    """Jobs by state and workers, looked up when a monitor asks."""
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+
+    def collect(self) -> Iterable[Metric]:
+        """Yield the gauges; those of a database that does not answer are left out, and `up` says so."""
+        about = GaugeMetricFamily("stickslip_info", "Version of the service.", labels=("version",))
+        about.add_metric((SOLVER_VERSION,), 1.0)
+        yield about
+        jobs = GaugeMetricFamily("stickslip_jobs", "Jobs in the database by state.", labels=("state",))
+        try:
+            for state, count in self._service.jobs.count().items():
+                jobs.add_metric((state.value,), float(count))
+            answers = 1.0
+        except SQLAlchemyError:
+            answers = 0.0
+        yield jobs
+        yield GaugeMetricFamily("stickslip_database_up", "Whether the database answers.", answers)
+        queue = self._service.queue
+        yield GaugeMetricFamily("stickslip_queue_up", "Whether the queue takes jobs.", float(queue.alive))
+        status = queue.status()
+        workers = GaugeMetricFamily("stickslip_workers", "Worker processes by state.", labels=("state",))
+        for name, count in (("wanted", status.workers), ("ready", status.ready), ("busy", status.busy)):
+            workers.add_metric((name,), float(count))
+        yield workers
+        pruned = CounterMetricFamily(
+            "stickslip_pruned", "What retention deleted since the service began.", labels=("what",)
+        )
+        gone = self._service.retention.pruned
+        pruned.add_metric(("jobs",), float(gone.jobs))
+        pruned.add_metric(("sweeps",), float(gone.sweeps))
+        pruned.add_metric(("uploads",), float(gone.uploads))
+        yield pruned
+
+
+class Measured:
+    """Counts requests and times them, by the route they match and not by their path: ids are not names."""
+
+    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
+        self._app, self._metrics = app, metrics
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on and watch its answer."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        begun, status = time.perf_counter(), 500
+
+        async def watched(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+            await send(message)
+
+        try:
+            await self._app(scope, receive, watched)
+        finally:
+            route = _route(scope)
+            method = scope["method"] if scope["method"] in _METHODS else "other"
+            self._metrics.requests.labels(method, route, str(status)).inc()
+            self._metrics.seconds.labels(method, route).observe(time.perf_counter() - begun)
+
+
+_METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
+
+
+def _route(scope: Scope) -> str:
+    """Return the template of the route that answered, ``none`` for a request that matched none."""
+    return str(getattr(scope.get("route"), "path", "none"))

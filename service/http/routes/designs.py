@@ -1,0 +1,34 @@
+"""``/v1/designs``: what was designed, to be queried."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+
+from service.http.dependencies import CallerDependency, ServiceDependency, listing, tagged
+from service.http.routes.described import LISTED, UNCHANGED
+from service.schemas.answers import DesignDetail, DesignPage
+from service.schemas.design_queries import DesignQuery, design_detail, design_page
+
+router = APIRouter(prefix="/v1/designs", tags=["designs"])
+
+
+@router.get("", response_model=DesignPage, responses=LISTED)
+def list_designs(
+    request: Request,
+    service: ServiceDependency,
+    caller: CallerDependency,
+    query: Annotated[DesignQuery, Query()],
+) -> Response:
+    """Stored designs that meet every filter, newest first unless `sort` says otherwise."""
+    return listing(request, design_page(service.designs, query, service.settings, caller.sees))
+
+
+@router.get("/{design_id}", response_model=DesignDetail, responses=UNCHANGED)
+def get_design(
+    design_id: str, request: Request, service: ServiceDependency, caller: CallerDependency
+) -> Response:
+    """A stored design with the whole result of its job; its id is that of the job. Has a strong ETag."""
+    answer = design_detail(service.design(design_id, caller), service.designs)
+    return tagged(request, answer.model_dump_json().encode())

@@ -1,0 +1,54 @@
+"""``/v1/plan``: which effects a scene calls for, before anything is computed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter
+from pydantic import ConfigDict
+
+import solver
+from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
+from service.jobs.kinds.scenes import HarmonicRequest, resolve_scene
+from service.jobs.validation import validated
+from service.schemas.answers import Answer
+
+_EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "set": {"shroud.N0": 150}}
+
+router = APIRouter(prefix="/v1/plan", tags=["scenes"])
+
+
+class PlanRequest(HarmonicRequest):
+    """A scene to be looked at."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"scene": "bladed-disk", "set": {"shroud.N0": 150}}]}
+    )
+
+
+class EffectAnswer(Answer):
+    """An effect that a scene calls for or does not."""
+
+    name: str
+    used: bool
+    reason: str
+
+
+class PlanAnswer(Answer):
+    """The effects of a scene; sizes and cost."""
+
+    scene: str
+    effects: list[EffectAnswer]
+    unknowns: int
+    linear_dofs: int
+    contacts: int
+    n_harmonics: int
+    estimated_seconds_a_point: float
+
+
+@router.post("")
+def plan(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> PlanAnswer:
+    """The effects this scene calls for and those left out, each with the reason; sizes and cost."""
+    request = validated(PlanRequest, body)
+    scene = resolve_scene(request, service.scenes.of(caller))
+    return PlanAnswer.model_validate(solver.plan(scene, harmonics=request.harmonics).to_json())

@@ -1,0 +1,82 @@
+"""``/v1/scenes/read`` and ``/v1/scenes/text``: scenes from and to the text of a file."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Response
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.concurrency import run_in_threadpool
+
+from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
+from service.http.routes.described import TEXT, media
+from service.jobs.kinds.scenes import SceneRequest, resolve_scene
+from service.jobs.registry import SceneSource
+from service.jobs.validation import validated
+from service.schemas.scene_text import issues_of_scene, read_text
+from solver.scene.toml import toml_text
+
+router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
+
+_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "set": {"damper.N0": 80}, "comments": ["as set"]}
+MOST_CHARACTERS = 4_000_000
+
+
+class ReadRequest(BaseModel):
+    """The text of a scene file."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True,
+        json_schema_extra={"examples": [{"text": 'name = "half a scene"', "form": "toml"}]},
+    )  # fmt: skip
+
+    text: str = Field(max_length=MOST_CHARACTERS)
+    form: Literal["toml", "json"] = "toml"
+
+
+class TextRequest(SceneRequest):
+    """A scene with its values set, and what to say above it."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"scene": "two-dof", "set": {"damper.N0": 80}, "comments": ["as set"]}]
+        }
+    )
+
+    comments: list[Annotated[str, Field(max_length=2000)]] = Field(default=[], max_length=50)
+
+
+class SceneIssue(BaseModel):
+    """Something wrong: an RFC 6901 pointer into the scene, and a sentence."""
+
+    pointer: str
+    detail: str
+
+
+class SceneRead(BaseModel):
+    """The tables of a scene file and everything wrong with them."""
+
+    scene: dict[str, Any]
+    issues: list[SceneIssue]
+
+
+@router.post("/read")
+async def read(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> SceneRead:
+    """Read the text of a scene file and list everything that is wrong with it; nothing is stored."""
+    request = validated(ReadRequest, body)
+    return await run_in_threadpool(_read, request, service.scenes.of(caller))
+
+
+@router.post("/text", response_class=Response, responses={200: media({"application/toml": TEXT})})
+async def text(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> Response:
+    """The TOML of a scene with its values set: the file that reproduces what was computed."""
+    request = validated(TextRequest, body)
+    scene = await run_in_threadpool(resolve_scene, request, service.scenes.of(caller))
+    return Response(toml_text(scene.to_dict(), tuple(request.comments)), media_type="application/toml")
+
+
+def _read(request: ReadRequest, source: SceneSource) -> SceneRead:
+    raw = read_text(request.text, request.form)
+    found = issues_of_scene(raw, source)
+    issues = [SceneIssue(pointer=issue.pointer, detail=issue.message) for issue in found]
+    return SceneRead(scene=raw, issues=issues)

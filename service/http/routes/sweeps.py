@@ -1,0 +1,96 @@
+"""``/v1/sweeps``: what was computed, to be queried."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Query, Request, Response
+
+from service.db.repositories import SweepRow
+from service.http.dependencies import CallerDependency, ServiceDependency, listing, tagged
+from service.http.routes.described import BINARY, LISTED, TEXT, UNCHANGED, media
+from service.rendering.representations import (
+    BY_FORMAT,
+    JSON,
+    SUFFIXES,
+    SWEEP_MEDIA,
+    chosen,
+    sweep_body,
+    sweep_picture,
+)
+from service.schemas.answers import SweepDetail, SweepPage
+from service.schemas.sweep_queries import SweepQuery, sweep_page
+
+router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
+
+_PICTURE_TYPES = {"svg": "image/svg+xml", "png": "image/png"}
+_FORMS: dict[int | str, dict[str, Any]] = {
+    200: media({form: TEXT if form.startswith("text/") else BINARY for form in SWEEP_MEDIA if form != JSON}),
+    **UNCHANGED,
+}
+
+
+@router.get("", response_model=SweepPage, responses=LISTED)
+def list_sweeps(
+    request: Request,
+    service: ServiceDependency,
+    caller: CallerDependency,
+    query: Annotated[SweepQuery, Query()],
+) -> Response:
+    """Stored sweeps that meet every filter, newest first unless `sort` says otherwise."""
+    return listing(request, sweep_page(service.sweeps, query, service.settings, caller.sees))
+
+
+@router.get("/{sweep_id}", response_model=SweepDetail, responses=_FORMS)
+def get_sweep(
+    sweep_id: str,
+    request: Request,
+    service: ServiceDependency,
+    caller: CallerDependency,
+    form: Annotated[
+        Literal["json", "csv", "npz", "parquet"] | None,
+        Query(alias="format", description="In place of `Accept`, for links."),
+    ] = None,
+) -> Response:
+    """A stored sweep with its arrays, in the form that `Accept` prefers.
+
+    `text/csv` has a row for each point and a column for each array of one number a point. All arrays are in
+    `application/x-npz` (also as `application/zip`), which `numpy.load` reads, and in
+    `application/vnd.apache.parquet`.
+    """
+    accept = request.headers.get("accept") if form is None else BY_FORMAT[form]
+    kind = chosen(accept, SWEEP_MEDIA)
+    headers = {"Vary": "Accept"}
+    if kind in SUFFIXES:
+        headers["Content-Disposition"] = f'attachment; filename="sweep-{sweep_id}.{SUFFIXES[kind]}"'
+    sweep = service.sweep(sweep_id, caller)
+    scene = None if kind == "application/json" else service.jobs.spec(sweep.job_id).get("scene")
+    return tagged(request, sweep_body(sweep, kind, service.sweeps, scene), kind, headers)
+
+
+@router.get(
+    "/{sweep_id}/plot.svg",
+    response_class=Response,
+    responses={200: media({"image/svg+xml": TEXT}), **UNCHANGED},
+)
+def plot_svg(
+    sweep_id: str, request: Request, service: ServiceDependency, caller: CallerDependency
+) -> Response:
+    """The curve of a stored sweep, its peak marked, its band shaded."""
+    return _picture(service.sweep(sweep_id, caller), "svg", request, service)
+
+
+@router.get(
+    "/{sweep_id}/plot.png",
+    response_class=Response,
+    responses={200: media({"image/png": BINARY}), **UNCHANGED},
+)
+def plot_png(
+    sweep_id: str, request: Request, service: ServiceDependency, caller: CallerDependency
+) -> Response:
+    """The curve of a stored sweep, its peak marked, its band shaded."""
+    return _picture(service.sweep(sweep_id, caller), "png", request, service)
+
+
+def _picture(sweep: SweepRow, suffix: str, request: Request, service: ServiceDependency) -> Response:
+    return tagged(request, sweep_picture(sweep, suffix, service.sweeps), _PICTURE_TYPES[suffix])

@@ -1,0 +1,105 @@
+"""``/v1/uploads``: files of matrices and modes that scenes refer to."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.concurrency import run_in_threadpool
+
+from service.http.bodies import saved
+from service.http.dependencies import CallerDependency, ServiceDependency, listing
+from service.http.routes.described import LISTED
+from service.queue import cursors
+from service.schemas.upload_answers import NewUpload, UploadAnswer, UploadedArray, UploadPage
+from service.uploads.uploads import MEDIA, Arrived, UploadFormat, file_name, format_of
+
+router = APIRouter(prefix="/v1/uploads", tags=["uploads"])
+
+FileName = Annotated[
+    str,
+    Query(
+        max_length=200,
+        pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.\- ]*$",
+        description="Name to show, whose suffix may tell the format; never a path.",
+    ),
+]
+
+
+class UploadQuery(BaseModel):
+    """Which uploads to list."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    limit: int = Field(default=100, ge=1, le=10_000)
+    cursor: str | None = Field(default=None, max_length=500)
+
+
+@router.post(
+    "",
+    status_code=201,
+    response_model=NewUpload,
+    responses={200: {"model": NewUpload, "description": "The same file was uploaded before."}},
+)
+async def upload(
+    request: Request,
+    service: ServiceDependency,
+    caller: CallerDependency,
+    name: FileName = "matrices",
+    form: Annotated[
+        UploadFormat | None, Query(alias="format", description="In place of the suffix of `name`.")
+    ] = None,
+) -> Response:
+    """Store a file of a matrix, several matrices or modes: the body is the file.
+
+    It is read at once, within limits, and refused if it holds nothing usable. In a scene, `upload:ID` stands
+    where `M`, `K`, `C` or `modes` of a structure of kind `matrices` would name a file.
+    """
+    media = request.headers.get("content-type", "").split(";")[0].strip().lower()
+    known = format_of(form, name, media)
+    settings = service.settings
+    with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
+        path = Path(folder) / file_name(name, known)
+        with path.open("wb") as file:
+            size, sha256 = await saved(request, file, settings.max_upload_bytes, settings.upload_seconds)
+        arrived = Arrived(path=path, name=name, format=known, size=size, sha256=sha256)
+        row, found, added = await run_in_threadpool(service.uploads.add, arrived, caller)
+    answer = NewUpload(**UploadAnswer.of(row).model_dump(), contents=[UploadedArray(**one) for one in found])
+    headers = {"Location": f"/v1/uploads/{row.id}"}
+    return JSONResponse(answer.model_dump(mode="json"), 201 if added else 200, headers)
+
+
+@router.get("", response_model=UploadPage, responses=LISTED)
+def list_uploads(
+    request: Request,
+    service: ServiceDependency,
+    caller: CallerDependency,
+    query: Annotated[UploadQuery, Query()],
+) -> Response:
+    """Uploads, newest first."""
+    size = min(query.limit, service.settings.page_limit)
+    before = None if query.cursor is None else cursors.decode(query.cursor)[1]
+    rows = service.uploads.repository.page(size + 1, before, caller.sees)
+    following = None
+    if len(rows) > size:
+        following = cursors.next_link("/v1/uploads", query, None, rows[size - 1].id)
+    return listing(request, UploadPage(items=[UploadAnswer.of(row) for row in rows[:size]], next=following))
+
+
+@router.get("/{upload_id}")
+def get_upload(upload_id: str, service: ServiceDependency, caller: CallerDependency) -> UploadAnswer:
+    """An upload, without its bytes."""
+    return UploadAnswer.of(service.uploads.get(upload_id, caller))
+
+
+@router.delete("/{upload_id}", status_code=204)
+def delete_upload(upload_id: str, service: ServiceDependency, caller: CallerDependency) -> None:
+    """Forget an upload. Scenes and jobs that were made with it keep what it held."""
+    service.uploads.delete(upload_id, caller)
+
+
+UPLOAD_MEDIA = (*MEDIA, "application/octet-stream")

@@ -1,0 +1,1 @@
+"""Jobs: what a kind is, its checkpoints, its parts."""

@@ -1,0 +1,28 @@
+"""The kinds of job that come with the service; a further one is one module and one entry here."""
+
+from __future__ import annotations
+
+import optim
+import solver
+from service.jobs.kinds.accuracy import ACCURACY
+from service.jobs.kinds.campbell import CAMPBELL
+from service.jobs.kinds.design import DESIGN
+from service.jobs.kinds.map import MAP
+from service.jobs.kinds.march import MARCH
+from service.jobs.kinds.mistuning import MISTUNING
+from service.jobs.kinds.pareto import PARETO
+from service.jobs.kinds.peaks import PEAKS
+from service.jobs.kinds.solve import SOLVE
+from service.jobs.kinds.sweep import SWEEP
+from service.jobs.registry import Registry
+
+
+def warm_up() -> None:
+    """Load the numerical packages and the compiled loops, so that the first job does not wait for them."""
+    scene = solver.load_scene("two-dof")
+    solver.solve(scene, frequency_hz=scene.observe.band[0], harmonics=3)
+    solver.sweep(scene, harmonics=3)
+    optim.design(scene, harmonics=3)
+
+
+SHIPPED = Registry([SWEEP, MAP, PEAKS, DESIGN, PARETO, SOLVE, MARCH, ACCURACY, CAMPBELL, MISTUNING], warm_up)

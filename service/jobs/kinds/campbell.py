@@ -1,0 +1,129 @@
+"""The kind `campbell`: where orders of a running speed meet the resonances of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field
+
+import optim
+from optim.errors import DesignError
+from service.jobs.kinds.problem import Pair, Ranges
+from service.jobs.kinds.records import sweep_records
+from service.jobs.kinds.scenes import (
+    HarmonicRequest,
+    PositiveNumber,
+    refusal,
+    require,
+    resolve_scene,
+    resolved,
+)
+from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from service.jobs.strict_json import pointer
+from solver.errors import Issue
+from solver.scene.scene import Scene
+
+_EXAMPLE: dict[str, Any] = {
+    "scene": "bladed-disk",
+    "speeds_rpm": [[40000, 50000]],
+    "orders": [1, 2, 3],
+    "limit": 8e-5,
+}
+_MOST_ORDERS = 100
+_MOST_RPM = 6e10  # a revolution at the highest frequency that is accepted anywhere
+_Order = Annotated[int, Field(strict=True, ge=1, le=10_000)]
+
+
+class CampbellRequest(HarmonicRequest):
+    """A Campbell diagram, in the words of the command.
+
+    Attributes
+    ----------
+    speeds_rpm : list
+        Ranges [low, high] of the running speed [1/min].
+    orders : list or None
+        Excitations a revolution.
+    limit : float or None
+        Amplitude [m] that counts as resonance.
+    band_hz : list or None
+        Frequencies [low, high] looked at [Hz].
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+
+    speeds_rpm: Ranges = Field(description="Ranges [low, high] of the running speed [1/min].")
+    orders: Annotated[list[_Order], Field(min_length=1, max_length=_MOST_ORDERS)] | None = Field(
+        default=None,
+        description="Excitations a revolution; in a cyclic scene the engine order. The scene's own, or 1.",
+    )
+    limit: PositiveNumber | None = Field(
+        default=None, description="Amplitude [m] that counts as resonance; half power of each order's peak."
+    )
+    band_hz: Pair | None = Field(
+        default=None,
+        description="Frequencies looked at [Hz]; the scene's band and those of the running speeds.",
+    )
+
+
+def resolve(request: CampbellRequest, source: SceneSource) -> Resolved:
+    """Look up the scene, check speeds, orders and band."""
+    scene = resolve_scene(request, source)
+    sweeps = len(request.orders or [1]) * POINTS_OF_A_SWEEP
+    require(_speed_issues(request) + balance_issues("/orders", scene, request.harmonics, sweeps))
+    return resolved(
+        scene,
+        speeds_rpm=request.speeds_rpm,
+        orders=request.orders,
+        limit=request.limit,
+        band_hz=request.band_hz,
+        harmonics=request.harmonics,
+    )
+
+
+def _speed_issues(request: CampbellRequest) -> list[Issue]:
+    """What is wrong with the ranges of speed and frequency."""
+    issues: list[Issue] = []
+    for i, pair in enumerate(request.speeds_rpm):
+        where = pointer("speeds_rpm", i)
+        try:
+            optim.forbidden_hz([pair], 1)
+        except DesignError as error:
+            issues.append(refusal(where, str(error).replace("speeds_rpm[0]", f"speeds_rpm[{i}]", 1)))
+        else:
+            if pair[1] > _MOST_RPM:
+                issues.append(refusal(where, f"`speeds_rpm[{i}]` must be at most {_MOST_RPM:g}, got {pair}"))
+    if request.band_hz is not None and not 0.0 < request.band_hz[0] < request.band_hz[1]:
+        issues.append(
+            refusal("/band_hz", f"`band_hz` must have 0 < low < high [Hz], got {request.band_hz!r}")
+        )
+    return issues
+
+
+def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
+    """Follow the response of every order; all are stored."""
+    diagram = optim.campbell_diagram(
+        Scene.from_dict(spec["scene"]),
+        speeds_rpm=spec["speeds_rpm"],
+        orders=spec["orders"],
+        limit=spec["limit"],
+        band_hz=spec["band_hz"],
+        harmonics=spec["harmonics"],
+        on_progress=progress,
+        should_stop=should_stop,
+    )
+    return JobOutput(
+        result=diagram.to_json(),
+        sweeps=sweep_records(one.branch for one in diagram.orders),
+        shortfall=None if diagram.completed else diagram.status.value,
+    )
+
+
+CAMPBELL = JobKind(
+    name="campbell",
+    summary="Where orders of a running speed meet the resonances of a scene.",
+    request=CampbellRequest,
+    resolve=resolve,
+    run=run,
+)

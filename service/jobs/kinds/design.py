@@ -1,0 +1,160 @@
+"""The kind `design`: the best damper of a scene, of what is known or in spite of what is not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field
+
+import optim
+from service.jobs.kinds.problem import ProblemRequest, Weight, arguments, default_variables, problem_of
+from service.jobs.kinds.problem_check import problem_issues, uncertainty_issues
+from service.jobs.kinds.records import design_record, robust_record, sweep_record
+from service.jobs.kinds.scenes import FrequencyHz, refusal, require, resolve_scene, resolved
+from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.kinds.uncertain import Uncertain
+from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from service.jobs.strict_json import pointer
+from solver.errors import Issue
+from solver.scene.scene import Scene
+
+UNCERTAIN = "uncertain"
+_NOT_ROBUST = ("basins",)
+ROBUST = (UNCERTAIN, "aim", "quantile", "samples", "seed")
+
+
+_EXAMPLE: dict[str, Any] = {
+    "scene": "bladed-disk",
+    "variables": {"shroud.N0": [20, 3000], "root.kt": [1e6, 1e8]},
+    "cases": [{"name": "first bending"}, {"name": "twice the force", "set": {"excitation.amplitude": 100}}],
+    "limit": 8e-5,
+    "max_band_hz": 60,
+    "forbidden_hz": [[520, 560]],
+    "contact_states": {"shroud": "never-separates"},
+    "method": "auto",
+}
+
+
+class DesignRequest(ProblemRequest):
+    """A design problem, in the words of `optim.design`, or with `uncertain` of `optim.robust_design`.
+
+    Attributes
+    ----------
+    weights : dict or None
+        Of ``peak`` [1/m] and ``band`` [1/Hz] in what is minimised.
+    max_band_hz : float or None
+        Largest width of the resonance band allowed [Hz].
+    basins : int or None
+        How many local optima are looked for.
+    uncertain : dict, list or None
+        What is not known.
+    aim : str or None
+        What is minimised over it: ``worst-case``, ``mean`` or ``quantile``.
+    quantile : float or None
+        The share of the samples, for the aim of that name.
+    samples, seed : int or None
+        How many scenarios are drawn, and the seed of the random numbers.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+
+    weights: dict[Literal["peak", "band"], Weight] | None = Field(
+        default=None,
+        description="What is minimised: peak [1/m] and band [1/Hz], each times its weight; the peak alone.",
+        examples=[{"peak": 1, "band": 1e-6}],
+    )
+    max_band_hz: FrequencyHz | None = Field(
+        default=None, description="Largest width of the resonance band allowed [Hz]."
+    )
+    basins: Annotated[int, Field(strict=True, ge=1, le=20)] | None = Field(
+        default=None, description="How many local optima are looked for; 2."
+    )
+    uncertain: Uncertain | None = Field(
+        default=None,
+        description="What is not known: a table of intervals, a table of an ellipsoid, or a list of samples.",
+        examples=[{"damper.mu": [0.2, 0.4], "damper.kt": {"deviation": 0.1}}],
+    )
+    aim: Literal["worst-case", "mean", "quantile"] | None = Field(
+        default=None, description="What is minimised over the uncertainty; worst-case."
+    )
+    quantile: Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] | None = Field(
+        default=None, description="Share of the samples that the aim `quantile` minimises; 0.95."
+    )
+    samples: Annotated[int, Field(strict=True, ge=2, le=10_000)] | None = Field(
+        default=None, description="Scenarios drawn; 32 of a worst case, else 64."
+    )
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] | None = Field(
+        default=None, description="Of the random numbers; 0."
+    )
+
+
+def resolve(request: DesignRequest, source: SceneSource) -> Resolved:
+    """Look up the scene, check the problem, fill in the variables."""
+    scene = resolve_scene(request, source)
+    given = arguments(request)
+    cases = len(request.cases or [1])
+    times = cases if request.samples is None or UNCERTAIN not in given else cases * request.samples
+    points = POINTS_OF_A_SWEEP * times
+    where = "/samples" if times > cases else "/cases"
+    require(
+        design_issues(scene, given)
+        or balance_issues(where, scene, request.harmonics, points, "points of one design's responses")
+    )
+    return resolved(scene, **given, **default_variables(scene, given))
+
+
+def design_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
+    """Everything wrong with the arguments of a design, robust or not."""
+    known = {key: value for key, value in given.items() if key not in ROBUST}
+    issues = problem_issues(scene, known)
+    if UNCERTAIN in given:
+        issues += [
+            refusal(
+                pointer(key), f"`{key}` is for a design without `uncertain` parameters, got {given[key]!r}"
+            )
+            for key in _NOT_ROBUST
+            if key in given
+        ]
+        return issues + uncertainty_issues(scene, known, given[UNCERTAIN])
+    alone = [key for key in ROBUST if key in given]
+    return issues + [
+        refusal(pointer(key), f"`{key}` is for a design with `uncertain` parameters, got {given[key]!r}")
+        for key in alone
+    ]
+
+
+def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
+    """Search."""
+    scene, given = Scene.from_dict(spec["scene"]), problem_of(spec)
+    if UNCERTAIN in given:
+        return _run_robust(scene, given, progress, should_stop)
+    found = optim.design(scene, **given, on_progress=progress, should_stop=should_stop)
+    return JobOutput(
+        result=found.to_json(),
+        sweeps=tuple(sweep_record(branch) for branch in found.sweeps if len(branch.values)),
+        design=design_record(found),
+        shortfall=None if found.reached else found.status.value,
+    )
+
+
+def _run_robust(
+    scene: Scene, given: Mapping[str, Any], progress: Progress, should_stop: ShouldStop
+) -> JobOutput:
+    """Search over the uncertainty; the stored sweeps are those of the search without it."""
+    found = optim.robust_design(scene, **given, on_progress=progress, should_stop=should_stop)
+    return JobOutput(
+        result=found.to_json(),
+        sweeps=tuple(sweep_record(branch) for branch in found.design.sweeps if len(branch.values)),
+        design=robust_record(found),
+        shortfall=None if found.reached else found.status.value,
+    )
+
+
+DESIGN = JobKind(
+    name="design",
+    summary="The best damper of a scene.",
+    request=DesignRequest,
+    resolve=resolve,
+    run=run,
+)

@@ -1,0 +1,175 @@
+"""The kind `map`: the response over frequency and a parameter, with the ridge of its peaks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import ConfigDict, Field
+
+import solver
+from service.jobs import strict_json
+from service.jobs.arrays import decode, encode
+from service.jobs.kinds.ranges import RangeRequest, law_issues, range_issues
+from service.jobs.kinds.records import packed, sweep_records, unpacked
+from service.jobs.kinds.scenes import refusal, require, resolve_scene, resolved
+from service.jobs.kinds.sizes import MOST_POINTS, balance_issues
+from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
+from service.jobs.registry import JobKind, JobOutput, OnProgress, Resolved, SceneSource, ShouldStop
+from solver.errors import Issue
+from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.studies.response_map import MapGrid
+
+_EXAMPLE: dict[str, Any] = {
+    "scene": "bladed-disk",
+    "parameter": "shroud.N0",
+    "from": 20,
+    "to": 3000,
+    "steps": 60,
+    "frequencies": 400,
+}
+_Count = Annotated[int, Field(strict=True, ge=2, le=MOST_POINTS // 2)]
+
+
+class MapRequest(RangeRequest):
+    """A map, in the words of the command.
+
+    Attributes
+    ----------
+    steps : int
+        Values of the parameter.
+    frequencies : int
+        Frequencies over the band.
+    ridge : bool
+        Whether the peaks are tracked too.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+
+    steps: _Count = Field(default=60, description="Values of the parameter.")
+    frequencies: _Count = Field(default=400, description="Frequencies over the scene's band.")
+    ridge: bool = Field(
+        default=True, strict=True,
+        description="Track the peaks too; false is faster, and for contacts of every law.",
+    )  # fmt: skip
+
+
+def resolve(request: MapRequest, source: SceneSource) -> Resolved:
+    """Look up the scene, check the range, the size and, with a ridge, the laws of the contacts."""
+    scene = resolve_scene(request, source)
+    require(
+        range_issues(request, scene)
+        + _size_issues(request, scene)
+        + (law_issues("/ridge", scene) if request.ridge else [])
+    )
+    return resolved(
+        scene,
+        parameter=request.parameter,
+        start=request.from_,
+        stop=request.to,
+        steps=request.steps,
+        frequencies=request.frequencies,
+        ridge=request.ridge,
+        harmonics=request.harmonics,
+    )
+
+
+def _size_issues(request: MapRequest, scene: Scene) -> list[Issue]:
+    points = request.steps * request.frequencies
+    if points > MOST_POINTS:
+        return [refusal("/steps", f"`steps` × `frequencies` must be at most {MOST_POINTS}, got {points}")]
+    words = "`steps` × `frequencies`"
+    return balance_issues("/steps", scene, request.harmonics, points, words)
+
+
+def split(spec: Mapping[str, Any]) -> list[Part]:
+    """The ridge, which takes longest, and strips of rows."""
+    grid, ridge = _grid(spec), spec["ridge"]
+    from solver.studies.response_map import OF_THE_GRID
+
+    weight = (OF_THE_GRID if ridge else 1.0) / grid.steps
+    tracked = [Part(spec={"ridge": True}, weight=1.0 - OF_THE_GRID)] if ridge else []
+    return tracked + [
+        Part(spec={"rows": [first, last]}, weight=weight * (last - first)) for first, last in grid.strips
+    ]
+
+
+def run_part(
+    spec: Mapping[str, Any], part: Mapping[str, Any], progress: OnProgress, should_stop: ShouldStop
+) -> PartOutput:
+    """Track the peaks, or solve some rows."""
+    if part.get("ridge"):
+        return _ridge(spec, progress, should_stop)
+    strip = _grid(spec).solve(*part["rows"], on_progress=progress, should_stop=should_stop)
+    if strip.stopped:
+        raise PartStoppedError
+    return PartOutput(
+        result={
+            "first": strip.first, "newton_iterations": strip.newton_iterations, "seconds": strip.seconds
+        },
+        arrays={"values": encode(strip.values)},
+        points=strip.values.shape[0] * strip.values.shape[1],
+    )  # fmt: skip
+
+
+def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutput:
+    """The map from its strips; the stored sweeps are those that look for peaks."""
+    from solver.studies.response_map import Strip
+
+    parts = list(outputs.values())
+    ridge = parts.pop(0) if spec["ridge"] else None
+    found = _grid(spec).joined([Strip(**part.result, values=decode(part.arrays["values"])) for part in parts])
+    result = found.to_json()
+    if ridge is not None:
+        result["ridge"] = ridge.result["ridge"]
+        result["seconds"] = found.seconds + ridge.result["ridge"]["seconds"]
+    return JobOutput(
+        result=result,
+        sweeps=() if ridge is None else unpacked(ridge.result["sweeps"], ridge.arrays),
+        shortfall=None if found.completed else found.status.value,
+    )
+
+
+def _grid(spec: Mapping[str, Any]) -> MapGrid:
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from solver.studies.response_map import map_grid
+
+    return map_grid(
+        Scene.from_dict(spec["scene"]),
+        spec["parameter"],
+        spec["start"],
+        spec["stop"],
+        steps=spec["steps"],
+        frequencies=spec["frequencies"],
+        ridge=spec["ridge"],
+        harmonics=spec["harmonics"],
+    )
+
+
+def _ridge(spec: Mapping[str, Any], progress: OnProgress, should_stop: ShouldStop) -> PartOutput:
+    track = solver.track_peak(
+        Scene.from_dict(spec["scene"]),
+        spec["parameter"],
+        spec["start"],
+        spec["stop"],
+        harmonics=spec["harmonics"],
+        on_progress=lambda share, _sweeps: progress(share, 0),
+        should_stop=should_stop,
+    )
+    if track.status is solver.TrackStatus.STOPPED:
+        raise PartStoppedError
+    sweeps, arrays = packed(sweep_records(track.branches))
+    return PartOutput(result={"ridge": strict_json.finite(track.to_json()), "sweeps": sweeps}, arrays=arrays)
+
+
+_PARTS = Parts(split=split, run_part=run_part, join=join)
+MAP = JobKind(
+    name="map",
+    summary="The response over frequency and a parameter, with the ridge of its peaks.",
+    request=MapRequest,
+    resolve=resolve,
+    run=_PARTS.run,
+    parts=_PARTS,
+)

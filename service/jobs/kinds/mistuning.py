@@ -1,0 +1,265 @@
+"""The kind `mistuning`: the blades of many disks that are not quite equal, against the tuned disk."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
+
+import solver
+from service.jobs.arrays import decode, encode
+from service.jobs.kinds.problem import Name
+from service.jobs.kinds.records import packed, sweep_records, unpacked
+from service.jobs.kinds.scenes import FrequencyHz, HarmonicRequest, refusal, require, resolve_scene, resolved
+from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, annulus_issues, size_issues, whole_disk_dofs
+from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
+from service.jobs.registry import JobKind, JobOutput, OnProgress, Resolved, SceneSource, ShouldStop
+from service.jobs.strict_json import pointer
+from solver.errors import Issue, SceneError, SettingError
+from solver.scene.scene import CyclicStructure, Scene
+
+if TYPE_CHECKING:
+    from solver import BladePeaks
+
+_EXAMPLE: dict[str, Any] = {
+    "scene": "bladed-disk",
+    "of": ["tip_middle", "tip"],
+    "spread": 0.02,
+    "samples": 100,
+    "seed": 1,
+    "harmonics": 5,
+}
+_MOST_SAMPLES = 10_000
+_MOST_NAMES = 100
+_WORK_OF_A_PART = 4  # sectors × harmonics: 0.1 s, measured on bladed-disk
+_MOST_DIVIDED = 256
+_OF_THE_PEAKS = ("value", "at_hz")
+
+
+def _listed(value: object) -> object:
+    """A part alone is a list of one."""
+    return [value] if isinstance(value, str) else value
+
+
+_PartName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,100}$")]
+PartNames = Annotated[
+    list[_PartName],
+    Field(min_length=1, max_length=_MOST_NAMES),
+    BeforeValidator(_listed),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "string"},
+                {"type": "array", "items": {"type": "string"}, "minItems": 1, "maxItems": _MOST_NAMES},
+            ]
+        }
+    ),
+]
+
+
+class MistuningRequest(HarmonicRequest):
+    """A study of mistuned disks, in the words of the command.
+
+    Attributes
+    ----------
+    of : str or list
+        The parts that have factors: springs, dashpots and masses by name, or DOFs.
+    spread : float
+        Standard deviation of the factors.
+    samples : int
+        How many disks.
+    seed : int
+        Of the first disk; those of the others follow.
+    dof : str or None
+        DOF of one sector whose amplitude counts.
+    from_, to : float or None
+        Frequencies [Hz] (`from` in the body).
+    """
+
+    model_config = ConfigDict(validate_by_alias=True, json_schema_extra={"examples": [_EXAMPLE]})
+
+    of: PartNames = Field(description="Springs (k), dashpots (c) and masses by name, or DOFs (their mass).")
+    spread: Annotated[float, Field(strict=True, ge=0.0, le=1.0)] = Field(
+        default=0.02, description="Standard deviation of the factors 1 + spread z, z normal."
+    )
+    samples: Annotated[int, Field(strict=True, ge=1, le=_MOST_SAMPLES)] = Field(
+        default=100, description="How many disks."
+    )
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**53)] = Field(
+        default=1, description="Of the first disk; disk k has the seed of the first plus k."
+    )
+    dof: Name | None = Field(
+        default=None, description="DOF of one sector whose amplitude counts; the observed one."
+    )
+    from_: FrequencyHz | None = Field(
+        default=None, alias="from", description="Lowest frequency [Hz]; the scene's band."
+    )
+    to: FrequencyHz | None = Field(default=None, description="Highest frequency [Hz]; the scene's band.")
+
+
+def resolve(request: MistuningRequest, source: SceneSource) -> Resolved:
+    """Look up the scene, fill in the range, draw all factors to see that they can be had."""
+    scene = resolve_scene(request, source)
+    start = scene.observe.band[0] if request.from_ is None else request.from_
+    stop = scene.observe.band[1] if request.to is None else request.to
+    require(_issues(request, scene, start, stop))
+    return resolved(
+        scene,
+        of=request.of,
+        spread=request.spread,
+        samples=request.samples,
+        seed=request.seed,
+        dof=request.dof,
+        start=start,
+        stop=stop,
+        harmonics=request.harmonics,
+    )
+
+
+def _issues(request: MistuningRequest, scene: Scene, start: float, stop: float) -> list[Issue]:
+    """Everything wrong with the study for the scene."""
+    structure = scene.structure
+    if not isinstance(structure, CyclicStructure):
+        message = f"`scene` {scene.name!r} must have a cyclic structure to be mistuned"
+        return [refusal("/scene", message)]
+    sweeps = POINTS_OF_A_SWEEP * request.samples * structure.sectors
+    words = "points of all sweeps"
+    issues = annulus_issues(scene, request.harmonics)
+    issues += size_issues("/samples", words, sweeps, request.harmonics, whole_disk_dofs(scene))
+    # Drawn only if there are not too many.
+    issues = issues or _factor_issues(request, scene)
+    if request.dof is not None and request.dof not in structure.dofs:
+        known = ", ".join(structure.dofs)
+        issues.append(
+            refusal("/dof", f"`dof` must be a DOF of every sector, one of {known}, got {request.dof!r}")
+        )
+    if start >= stop:
+        issues.append(refusal("/to", f"`to` must be above `from` = {start!r} Hz, got {stop!r}"))
+    return issues
+
+
+def _factor_issues(request: MistuningRequest, scene: Scene) -> list[Issue]:
+    """Refuse parts that are not there, and factors that are not above 0."""
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from solver.studies.mistuning import disk_factors
+
+    try:
+        disk_factors(scene, request.of, request.spread, request.samples, request.seed)
+    except SceneError as error:
+        prefix = "/structure/mistuning/of"
+        within = [issue for issue in error.issues if issue.pointer.startswith(prefix)]
+        known = [refusal("/of" + issue.pointer.removeprefix(prefix), issue.message) for issue in within]
+        return known or [refusal("/of", issue.message) for issue in error.issues]
+    except SettingError as error:
+        return [refusal(pointer(error.name), str(error))]
+    return []
+
+
+def split(spec: Mapping[str, Any]) -> list[Part]:
+    """The tuned disk, and then some of the others at a time."""
+    structure = Scene.from_dict(spec["scene"]).structure
+    sectors = structure.sectors if isinstance(structure, CyclicStructure) else 1
+    a_disk, samples = sectors * max(spec["harmonics"], 1), spec["samples"]
+    size = max(math.ceil(_WORK_OF_A_PART / a_disk), math.ceil(samples / _MOST_DIVIDED))
+    return [Part(spec={"tuned": True})] + [
+        Part(spec={"first": first, "last": min(first + size, samples)}, weight=min(size, samples - first))
+        for first in range(0, samples, size)
+    ]
+
+
+def run_part(
+    spec: Mapping[str, Any], part: Mapping[str, Any], progress: OnProgress, should_stop: ShouldStop
+) -> PartOutput:
+    """Find the peaks of all blades of the tuned disk, or of some others."""
+    from solver.studies.mistuning import without_mistuning, worst_branch
+
+    scene, begun = Scene.from_dict(spec["scene"]), time.perf_counter()
+    tuned = bool(part.get("tuned"))
+    disks = range(1) if tuned else range(part["first"], part["last"])
+    found: list[BladePeaks] = []
+    worst: BladePeaks | None = None
+    for done, k in enumerate(disks):
+
+        def each(share: float, _blades: int, done: int = done) -> None:
+            progress((done + share) / len(disks), done)
+
+        peaks = solver.blade_peaks(
+            without_mistuning(scene)
+            if tuned
+            else solver.mistuned(scene, of=spec["of"], spread=spec["spread"], seed=spec["seed"] + k),
+            spec["start"],
+            spec["stop"],
+            dof=spec["dof"],
+            harmonics=spec["harmonics"],
+            on_progress=each,
+            should_stop=should_stop,
+        )
+        if should_stop():
+            raise PartStoppedError
+        found.append(replace(peaks, branches=()))
+        if peaks.largest > (0.0 if worst is None else worst.largest):
+            worst = peaks
+    sweeps, arrays = packed(sweep_records(() if worst is None else worst_branch(worst)))
+    arrays |= {key: encode(np.array([getattr(peaks, key) for peaks in found])) for key in _OF_THE_PEAKS}
+    status = [[each.name for each in peaks.status] for peaks in found]
+    return PartOutput(
+        result={
+            "dof": found[0].dof, "status": status, "sweeps": sweeps,
+            "largest": 0.0 if worst is None else worst.largest, "seconds": time.perf_counter() - begun,
+        },
+        arrays=arrays, points=0 if tuned else len(found), final=tuned and worst is None,
+    )  # fmt: skip
+
+
+def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutput:
+    """The study of all disks; the stored sweeps are those of the tuned disk and of the worst blade of all."""
+    from solver.studies.mistuning import joined_study
+
+    parts = list(outputs.values())
+    [tuned], others = _peaks(parts[0]), parts[1:]
+    study = joined_study(
+        Scene.from_dict(spec["scene"]),
+        of=spec["of"],
+        spread=spec["spread"],
+        seed=spec["seed"],
+        harmonics=spec["harmonics"],
+        tuned=tuned,
+        disks=[peaks for part in others for peaks in _peaks(part)],
+        seconds=sum(part.result["seconds"] for part in parts),
+    )
+    # The first of those that are equally high.
+    highest = max(others, key=lambda part: part.result["largest"], default=None)
+    sweeps = [part for part in (parts[0], highest) if part is not None]
+    return JobOutput(
+        result=study.to_json(),
+        sweeps=tuple(record for part in sweeps for record in unpacked(part.result["sweeps"], part.arrays)),
+        shortfall=None if study.completed else study.status.value,
+    )
+
+
+def _peaks(part: PartOutput) -> list[BladePeaks]:
+    """The peaks that a part found, a disk each."""
+    value, at_hz = (decode(part.arrays[key]) for key in _OF_THE_PEAKS)
+    return [
+        solver.BladePeaks(
+            dof=part.result["dof"], value=value[i], at_hz=at_hz[i], branches=(),
+            status=tuple(solver.BranchStatus[name] for name in names),
+        )
+        for i, names in enumerate(part.result["status"])
+    ]  # fmt: skip
+
+
+_PARTS = Parts(split=split, run_part=run_part, join=join)
+MISTUNING = JobKind(
+    name="mistuning",
+    summary="The blades of many mistuned disks against the tuned one.",
+    request=MistuningRequest,
+    resolve=resolve,
+    run=_PARTS.run,
+    parts=_PARTS,
+)

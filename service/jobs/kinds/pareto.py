@@ -1,0 +1,76 @@
+"""The kind `pareto`: the front of peak against resonance band."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field
+
+import optim
+from service.jobs.kinds.problem import ProblemRequest, arguments, default_variables, problem_of
+from service.jobs.kinds.problem_check import problem_issues
+from service.jobs.kinds.records import sweep_record
+from service.jobs.kinds.scenes import require, resolve_scene, resolved
+from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from solver.errors import Issue
+from solver.scene.scene import Scene
+
+_EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "variables": {"shroud.N0": [20, 3000]}, "limit": 8e-5}
+
+
+class ParetoRequest(ProblemRequest):
+    """A design problem without a limit on the band and weights: those are the front's own.
+
+    Attributes
+    ----------
+    points : int or None
+        How many points of the front are looked for, both ends included.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+
+    points: Annotated[int, Field(strict=True, ge=3, le=200)] | None = Field(
+        default=None, description="Points of the front looked for, both ends included; 9."
+    )
+
+
+def pareto_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
+    """Everything wrong with the arguments of a front."""
+    return problem_issues(scene, {key: value for key, value in given.items() if key != "points"})
+
+
+def resolve(request: ParetoRequest, source: SceneSource) -> Resolved:
+    """Look up the scene, check the problem, fill in the variables."""
+    scene = resolve_scene(request, source)
+    given = arguments(request)
+    points = POINTS_OF_A_SWEEP * len(request.cases or [1]) * (request.points or 1)
+    words = "points of the responses of a front"
+    require(pareto_issues(scene, given) or balance_issues("/points", scene, request.harmonics, points, words))
+    return resolved(scene, **given, **default_variables(scene, given))
+
+
+def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
+    """Follow the front; the stored sweeps are those of its points."""
+    found = optim.pareto_front(
+        Scene.from_dict(spec["scene"]), **problem_of(spec), on_progress=progress, should_stop=should_stop
+    )
+    evaluations = [point.design.evaluation for point in found.points]
+    branches = [
+        r.branch for evaluation in evaluations if evaluation is not None for r in evaluation.responses
+    ]
+    return JobOutput(
+        result=found.to_json(),
+        sweeps=tuple(sweep_record(branch) for branch in branches if len(branch.values)),
+        shortfall=None if found.reached else found.status.value,
+    )
+
+
+PARETO = JobKind(
+    name="pareto",
+    summary="The front of peak against resonance band.",
+    request=ParetoRequest,
+    resolve=resolve,
+    run=run,
+)

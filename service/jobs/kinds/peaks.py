@@ -1,0 +1,81 @@
+"""The kind `peaks`: the highest peak of the frequency response over a parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field
+
+import solver
+from service.jobs.kinds.ranges import RangeRequest, law_issues, range_issues
+from service.jobs.kinds.records import sweep_records
+from service.jobs.kinds.scenes import require, resolve_scene, resolved
+from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from solver.scene.scene import Scene
+
+_EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "parameter": "shroud.N0", "from": 20, "to": 3000}
+
+
+class PeaksRequest(RangeRequest):
+    """Tracked peaks, in the words of the command.
+
+    Attributes
+    ----------
+    checks : int
+        Sweeps between the ends that look for peaks nothing has followed.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+
+    checks: Annotated[int, Field(strict=True, ge=0, le=200)] = Field(
+        default=3, description="Sweeps between the ends that look for peaks nothing has followed."
+    )
+
+
+def resolve(request: PeaksRequest, source: SceneSource) -> Resolved:
+    """Look up the scene, check the range, the laws of the contacts and the size."""
+    scene = resolve_scene(request, source)
+    points = POINTS_OF_A_SWEEP * (request.checks + 2)
+    require(
+        range_issues(request, scene)
+        + law_issues("/scene", scene)
+        + balance_issues("/checks", scene, request.harmonics, points)
+    )
+    return resolved(
+        scene,
+        parameter=request.parameter,
+        start=request.from_,
+        stop=request.to,
+        checks=request.checks,
+        harmonics=request.harmonics,
+    )
+
+
+def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
+    """Track; the stored sweeps are those that look for peaks."""
+    track = solver.track_peak(
+        Scene.from_dict(spec["scene"]),
+        spec["parameter"],
+        spec["start"],
+        spec["stop"],
+        harmonics=spec["harmonics"],
+        checks=spec["checks"],
+        on_progress=progress,
+        should_stop=should_stop,
+    )
+    return JobOutput(
+        result=track.to_json(),
+        sweeps=sweep_records(track.branches),
+        shortfall=None if track.completed else track.status.value,
+    )
+
+
+PEAKS = JobKind(
+    name="peaks",
+    summary="The highest peak over a parameter, and where it is least.",
+    request=PeaksRequest,
+    resolve=resolve,
+    run=run,
+)

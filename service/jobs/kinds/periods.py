@@ -1,0 +1,114 @@
+"""One period of a solution or a march in numbers: time history, loops of the contacts, what they do when."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.scene.scene import AnyContact, FrictionContact, GapSpring
+
+if TYPE_CHECKING:
+    from solver.marching.result import MarchResult
+    from solver.response.contact_response import ContactResponse
+    from solver.response.solve import Solution
+
+STICK, SLIP, SEPARATION = 0, 1, 2
+FloatArray = NDArray[np.float64]
+CodeArray = NDArray[np.int64]
+
+
+def period_of(solution: Solution, samples: int) -> dict[str, Any]:
+    """One period of a converged balance.
+
+    Parameters
+    ----------
+    samples : of the period; the first is repeated at its end.
+
+    Returns
+    -------
+    ``time`` [s], ``displacement`` of the observed DOF [m], and for each contact its name, state, ``slip``
+    [m], ``force`` [N], ``load`` [N], ``motion`` (0 stick, 1 slip, 2 separation; null where the law has no
+    such) and ``shares`` of the period.
+    """
+    from solver.jit import fourier
+
+    tau = np.linspace(0.0, 2.0 * math.pi, samples + 1)
+    displacement = fourier.basis(tau, solution.highest_harmonic) @ solution.observed
+    pairs = zip(solution.scene.contacts, solution.contacts, strict=True)
+    return {
+        "time": (tau / (2.0 * math.pi * solution.frequency_hz)).tolist(),
+        "displacement": displacement.tolist(),
+        "contacts": [_contact(given, found, tau) for given, found in pairs],
+    }
+
+
+def history_of(march: MarchResult, samples: int) -> dict[str, Any]:
+    """The last period of a march, thinned out to about `samples`; of an annulus its first sector."""
+    step = max(1, len(march.time) // samples)
+    first = [i for i, name in enumerate(march.contacts) if name.partition("@")[2] in ("", "0")]
+    return {
+        "time": [*march.time[::step].tolist(), 1.0 / march.frequency_hz],
+        "displacement": _closed(march.displacement[::step]),
+        "contacts": [
+            {
+                "name": march.contacts[i].partition("@")[0],
+                "slip": _closed(march.slip[i, ::step]),
+                "force": _closed(march.contact_force[i, ::step]),
+                "load": _closed(march.normal_load[i, ::step]),
+            }
+            for i in first
+        ],
+    }
+
+
+def _contact(given: AnyContact, found: ContactResponse, tau: FloatArray) -> dict[str, Any]:
+    from solver.jit import fourier
+    from solver.response.force_history import force_at
+
+    slip = fourier.basis(tau, (found.slip.size - 1) // 2) @ found.slip
+    load = fourier.basis(tau, (found.load.size - 1) // 2) @ found.load
+    force = force_at(given, found, tau[:-1])
+    motion = _motion(given, found, tau[:-1], force)
+    shares = None
+    if motion is not None:
+        shares = {
+            name: float(np.mean(motion == code))
+            for name, code in (("stick", STICK), ("slip", SLIP), ("separation", SEPARATION))
+        }
+    return {
+        "name": found.name,
+        "state": found.state.value,
+        "slip": slip.tolist(),
+        "force": _closed(force),
+        "load": np.maximum(load, 0.0).tolist(),
+        "motion": None if motion is None else motion.tolist(),
+        "shares": shares,
+    }
+
+
+def _motion(
+    given: AnyContact, found: ContactResponse, tau: FloatArray, force: FloatArray
+) -> CodeArray | None:
+    """What a contact does at every angle; None where its law knows no stick and slip."""
+    from solver.contacts.kernels.stick_slip_events import BEGIN, END, MOTION
+    from solver.contacts.kernels.stick_slip_events import SLIP as SLIDES
+    from solver.contacts.segments import segments_of
+
+    if isinstance(given, GapSpring):
+        return np.where(force == 0.0, SEPARATION, STICK)
+    if not isinstance(given, FrictionContact) or found.second_motion is not None:
+        return None
+    motion = np.full(tau.size, SEPARATION)
+    for row in segments_of(found.slip, found.load, given.kt, given.mu).rows:
+        inside = (tau - row[BEGIN]) % (2.0 * math.pi) <= row[END] - row[BEGIN]
+        motion[inside] = SLIP if row[MOTION] == SLIDES else STICK
+    return motion
+
+
+def _closed(samples: FloatArray) -> list[float]:
+    """Samples of a period with the first repeated at its end."""
+    closed: list[float] = np.append(samples, samples[:1]).tolist()
+    return closed

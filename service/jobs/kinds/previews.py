@@ -1,0 +1,243 @@
+"""Previews: small responses answered at once and never stored, for people who move sliders.
+
+A preview is a kind like those of jobs, with limits that keep it within a blink.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field
+
+import solver
+from service.jobs.kinds.scenes import (
+    FrequencyHz,
+    HarmonicRequest,
+    PositiveNumber,
+    refusal,
+    require,
+    resolve_scene,
+    resolved,
+)
+from service.jobs.kinds.sizes import (
+    POINTS_OF_A_SWEEP,
+    balance_issues,
+    coefficients,
+    contact_motions,
+    dofs_solved,
+)
+from service.jobs.linear_limits import linear_limit
+from service.jobs.registry import (
+    JobKind,
+    JobOutput,
+    Point,
+    Progress,
+    Registry,
+    Resolved,
+    SceneSource,
+    ShouldStop,
+)
+from solver.errors import Issue
+from solver.scene.scene import Scene
+
+MOST_POINTS = 2000
+MOST_HARMONICS = 41
+MOST_UNKNOWNS = 50_000
+LIVE_UNKNOWNS = 130
+"""Of the balance of a response that is followed live: one of more takes longer than a second or two."""
+POINT_UNKNOWNS = 500
+"""Of the balance at one point."""
+FEW_MOTIONS = 8
+"""Of contacts: so few are quick with all harmonics."""
+SAMPLES = 400
+_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "set": {"damper.N0": 80}, "client": "a1b2"}
+
+
+class PreviewRequest(HarmonicRequest):
+    """What every preview takes; `client` names who asks: of its previews only the newest is computed."""
+
+    client: str = Field(
+        default="", max_length=64, description="Who asks: of its previews only the newest is computed."
+    )
+
+
+class SweepPreviewRequest(PreviewRequest):
+    """The frequency response over the scene's band; `limit` is the amplitude [m] its band is measured at."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+
+    limit: PositiveNumber | None = Field(
+        default=None, description="Amplitude [m] above which the resonance band is measured."
+    )
+
+
+class LimitsPreviewRequest(PreviewRequest):
+    """The linear responses between which friction works; `contact` is first removed, then stuck."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+
+    contact: Annotated[str, Field(max_length=105)] | None = Field(
+        default=None, description="The contact that is removed, the others stuck; all if left out."
+    )
+
+
+class PointPreviewRequest(PreviewRequest):
+    """One period at `frequency_hz`: time history, loops and states of the contacts, harmonics."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{**_EXAMPLE, "frequency_hz": 1.05}]})
+
+    frequency_hz: FrequencyHz = Field(description="Excitation frequency [Hz].")
+
+
+def _scene(request: PreviewRequest, source: SceneSource, points: int, harmonics: int) -> Scene:
+    """The scene, if it is small enough for so many points."""
+    scene = resolve_scene(request, source)
+    issues: list[Issue] = []
+    if request.harmonics > MOST_HARMONICS:
+        message = f"`harmonics` of a preview must be at most {MOST_HARMONICS}, got {request.harmonics}"
+        issues.append(refusal("/harmonics", message))
+    unknowns = dofs_solved(scene) * (2 * request.harmonics + 1)
+    if unknowns > MOST_UNKNOWNS:
+        words = "DOFs × coefficients of a preview"
+        message = f"{words} must be at most {MOST_UNKNOWNS}, got {unknowns}: submit a job"
+        issues.append(refusal("/scene", message))
+    require(issues or balance_issues("/harmonics", scene, harmonics, points))
+    return scene
+
+
+def harmonics_in_time(scene: Scene, asked: int, unknowns: int) -> int:
+    """The harmonics asked for; with many contacts those whose balance has at most so many unknowns.
+
+    A disk that is solved whole has the contacts of all its sectors: too many to be followed live with all
+    harmonics.
+    """
+    motions = contact_motions(scene)
+    if motions <= FEW_MOTIONS:
+        return asked
+    return next((h for h in range(asked, 1, -1) if motions * coefficients(scene, h) <= unknowns), 1)
+
+
+def resolve_sweep(request: SweepPreviewRequest, source: SceneSource) -> Resolved:
+    """Look up the scene, check its size, and choose the harmonics that can be kept in time."""
+    scene = _scene(request, source, POINTS_OF_A_SWEEP, request.harmonics)
+    kept = harmonics_in_time(scene, request.harmonics, LIVE_UNKNOWNS)
+    return resolved(scene, harmonics=kept, limit=request.limit)
+
+
+def resolve_limits(request: LimitsPreviewRequest, source: SceneSource) -> Resolved:
+    """Look up the scene and the contact."""
+    scene = _scene(request, source, 2 * POINTS_OF_A_SWEEP, 1)
+    names = [contact.name for contact in scene.contacts]
+    if request.contact is not None and request.contact not in names:
+        message = f"`contact` must be one of {', '.join(names)}, got {request.contact!r}"
+        require([refusal("/contact", message)])
+    return resolved(scene, harmonics=request.harmonics, contact=request.contact)
+
+
+def resolve_point(request: PointPreviewRequest, source: SceneSource) -> Resolved:
+    """Look up the scene, check its size, and choose the harmonics that can be kept in time."""
+    scene = _scene(request, source, 1, request.harmonics)
+    kept = harmonics_in_time(scene, request.harmonics, POINT_UNKNOWNS)
+    return resolved(scene, harmonics=kept, frequency_hz=request.frequency_hz)
+
+
+def run_sweep(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldStop) -> JobOutput:
+    """Follow the response over the band; with the state of every contact at the highest peak."""
+    scene = Scene.from_dict(spec["scene"])
+    branch = _response(scene, spec["harmonics"], spec["limit"], should_stop)
+    found = branch.to_json()
+    kept = (
+        "parameter", "amplitude", "peak", "peaks", "band_hz", "band_limit", "band_intervals_hz", "points",
+        "peak_certificate", "band_known", "error_estimate", "mean_undetermined", "flags",
+        "seconds", "completed", "status",
+    )  # fmt: skip
+    result = {key: found[key] for key in kept}
+    result |= {"n_harmonics": spec["harmonics"], "states": {}}
+    if len(branch.values):
+        at = int(branch.amplitude.argmax())
+        # Those of all sectors where one does not stand for them.
+        names = [contact.name for contact in branch.balance.scene.contacts]
+        result["states"] = _states(names, branch.states[at].tolist())
+    return JobOutput(result=result, shortfall=None if branch.completed else branch.status.value)
+
+
+def run_limits(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldStop) -> JobOutput:
+    """Follow the response with the contact removed, and with it stuck."""
+    scene = Scene.from_dict(spec["scene"])
+    result: dict[str, Any] = {}
+    one = spec["contact"]
+    freed = [contact.name for contact in scene.contacts] if one is None else [one]
+    kept = ("parameter", "amplitude", "peak", "peaks", "peak_certificate", "completed")
+    for name, removed in (("free", freed), ("stuck", [])):
+        found = _response(linear_limit(scene, removed), 1, None, should_stop).to_json()
+        result[name] = {key: found[key] for key in kept}
+    return JobOutput(result=result)
+
+
+def run_point(spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    """Solve the balance, and look at one period of it."""
+    from service.jobs.kinds.periods import period_of
+
+    solution = solver.solve(
+        Scene.from_dict(spec["scene"]), frequency_hz=spec["frequency_hz"], harmonics=spec["harmonics"]
+    )
+    result = solution.to_json()
+    if solution.converged:
+        result["period"] = period_of(solution, SAMPLES)
+    return JobOutput(result=result, shortfall=None if solution.converged else solution.status.value)
+
+
+def _response(scene: Scene, harmonics: int, limit: float | None, should_stop: ShouldStop) -> solver.Branch:
+    low, high = scene.observe.band
+    return solver.sweep(
+        scene, start=low, stop=high, harmonics=harmonics, limit=limit, should_stop=should_stop,
+        settings=solver.ContinuationSettings(most_points=MOST_POINTS),
+    )  # fmt: skip
+
+
+def _states(names: list[str], codes: list[int]) -> dict[str, str]:
+    from solver.response.contact_response import state_of
+
+    return {name: state_of(code).value for name, code in zip(names, codes, strict=True)}
+
+
+class _Silent:
+    """Progress that nobody watches."""
+
+    def __call__(self, fraction: float, points: int) -> None:
+        """Say nothing."""
+
+    def found(self, points: Sequence[Point]) -> None:
+        """Say nothing."""
+
+
+def warm_up() -> None:
+    """Load and compile what previews need."""
+    scene = solver.load_scene("two-dof")
+
+    def nothing(*_: object) -> bool:
+        return False
+
+    spec = {"scene": scene.to_dict(), "harmonics": 3, "limit": None, "contact": None, "frequency_hz": 1.05}
+    for run in (run_sweep, run_limits, run_point):
+        run(spec, _Silent(), nothing)
+
+
+PREVIEWS = Registry(
+    [
+        JobKind(
+            name="sweep", summary="The frequency response over the scene's band.",
+            request=SweepPreviewRequest, resolve=resolve_sweep, run=run_sweep,
+        ),
+        JobKind(
+            name="limits", summary="The linear responses with a contact removed and stuck.",
+            request=LimitsPreviewRequest, resolve=resolve_limits, run=run_limits,
+        ),
+        JobKind(
+            name="point", summary="One period at a frequency, with loops and states of the contacts.",
+            request=PointPreviewRequest, resolve=resolve_point, run=run_point,
+        ),
+    ],
+    warm_up,
+)  # fmt: skip

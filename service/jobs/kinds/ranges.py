@@ -1,0 +1,57 @@
+"""What the kinds share that look at the frequency response over the range of a parameter."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from pydantic import ConfigDict, Field
+
+from service.jobs.kinds.scenes import HarmonicRequest, Number, ParameterPath, check, refusal
+from solver.errors import Issue
+from solver.scene.scene import Scene
+
+FREQUENCY = "frequency"
+
+
+class RangeRequest(HarmonicRequest):
+    """A range of a parameter; the frequency is looked at over the scene's band.
+
+    Attributes
+    ----------
+    parameter : str
+        Path of what changes.
+    from_, to : float
+        Its range (`from` in the body).
+    """
+
+    model_config = ConfigDict(validate_by_alias=True)
+
+    parameter: ParameterPath = Field(description="Path of what changes, for example shroud.N0.")
+    from_: Number = Field(alias="from", description="Start of the range.")
+    to: Number = Field(description="End of the range.")
+
+
+def range_issues(request: RangeRequest, scene: Scene) -> list[Issue]:
+    """Everything wrong with the range for the scene."""
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from solver.continuation.parameter_scale import scale_of
+
+    path = request.parameter
+    unknown = check("/parameter", partial(scene.check_path, path))
+    if unknown:
+        return unknown
+    if path == FREQUENCY:
+        return [refusal("/parameter", "`parameter` cannot be the frequency: all of the band is looked at")]
+    issues: list[Issue] = []
+    for where, value in (("/from", request.from_), ("/to", request.to)):
+        issues += check(where, partial(scene.with_values, {path: value}))
+    if request.from_ == request.to:
+        issues.append(refusal("/to", f"`to` must differ from `from`, got {request.to!r} for both"))
+    return issues or check("/parameter", partial(scale_of, scene, path, request.from_, request.to))
+
+
+def law_issues(where: str, scene: Scene) -> list[Issue]:
+    """Refuse contacts whose peaks cannot be tracked, at the pointer `where`."""
+    from solver.peaks.tracker import check_laws
+
+    return check(where, partial(check_laws, scene))

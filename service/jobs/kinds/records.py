@@ -1,0 +1,192 @@
+"""From a branch of the solver and a design to a sweep and a design as they are stored."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from service.jobs.arrays import encode
+from service.jobs.registry import ContactValues, DesignRecord, StoredArray, SweepRecord, VariableValues
+from service.jobs.strict_json import digest
+from solver.scene.scene import AnyContact, FrictionContact, Scene
+
+if TYPE_CHECKING:
+    from optim.results.design import DesignResult
+    from optim.robust.result import RobustResult
+    from solver import Branch
+
+_ARRAYS = ("amplitude", "half_peak_to_peak", "mean", "coefficients", "observed")
+
+
+def sweep_record(branch: Branch, frequency_hz: float | None = None) -> SweepRecord:
+    """The branch with the columns people filter by; the scene's values are those that stayed fixed.
+
+    Parameters
+    ----------
+    branch : Branch
+        With at least one point.
+    frequency_hz : float or None
+        Excitation frequency [Hz], if another parameter was swept.
+    """
+    scene, parameter = branch.balance.scene, branch.parameter
+    peak = branch.peak
+    band = branch.band if parameter == "frequency" else None
+    amplitude = "excitation.amplitude"
+    return SweepRecord(
+        scene_name=scene.name,
+        scene_hash=digest(scene.to_dict()),
+        parameter=parameter,
+        from_value=branch.start,
+        to_value=branch.stop,
+        frequency_hz=frequency_hz,
+        excitation_amplitude=None if parameter == amplitude else scene.value(amplitude),
+        harmonics=branch.balance.n_harmonics,
+        points=len(branch.values),
+        peak=None if peak is None else peak.value,
+        peak_at=None if peak is None else peak.at,
+        limit=None if band is None else band.limit,
+        band_hz=None if band is None else band.width,
+        newton_iterations=branch.newton_iterations,
+        rejected_steps=branch.rejected_steps,
+        seconds=branch.seconds,
+        completed=branch.completed,
+        status=branch.status.value,
+        error_estimate=_finite(branch.error_estimate),
+        peaks_known=branch.peak_certificate.known,
+        contacts=contact_values(scene, parameter),
+        arrays={
+            "parameter": encode(branch.values),
+            "residual": encode(branch.residuals),
+            "states": encode(branch.states.astype(np.int8)),
+        }
+        | {name: encode(getattr(branch, name)) for name in _ARRAYS},
+    )
+
+
+def sweep_records(branches: Iterable[Branch]) -> tuple[SweepRecord, ...]:
+    """The frequency responses that have points, each once."""
+    once = {id(branch): branch for branch in branches if len(branch.values)}
+    return tuple(sweep_record(branch) for branch in once.values())
+
+
+def packed(records: Iterable[SweepRecord]) -> tuple[list[dict[str, Any]], dict[str, StoredArray]]:
+    """Records as the parts of a job give them back: JSON, and their arrays by names of their own."""
+    tables: list[dict[str, Any]] = []
+    arrays: dict[str, StoredArray] = {}
+    for index, record in enumerate(records):
+        tables.append({each.name: getattr(record, each.name) for each in fields(record)})
+        tables[-1]["contacts"] = [asdict(contact) for contact in record.contacts]
+        tables[-1]["arrays"] = {name: f"sweep-{index}-{name}" for name in record.arrays}
+        arrays |= {f"sweep-{index}-{name}": array for name, array in record.arrays.items()}
+    return tables, arrays
+
+
+def unpacked(
+    tables: Iterable[Mapping[str, Any]], arrays: Mapping[str, StoredArray]
+) -> tuple[SweepRecord, ...]:
+    """The records of `packed`."""
+    return tuple(
+        SweepRecord(
+            **{
+                **table,
+                "contacts": tuple(ContactValues(**contact) for contact in table["contacts"]),
+                "arrays": {name: arrays[key] for name, key in table["arrays"].items()},
+            }
+        )
+        for table in tables
+    )
+
+
+def design_record(result: DesignResult) -> DesignRecord:
+    """The design with the columns people filter by."""
+    problem, evaluation, peak = result.problem, result.evaluation, result.peak
+    feasible = False
+    if evaluation is not None and evaluation.good:
+        # Loaded here: a service that only lists does not need it.
+        from optim.criteria.evaluation import natural_scales
+        from optim.methods.kkt import KEPT
+
+        feasible = evaluation.violation(natural_scales(problem)) <= KEPT
+    return DesignRecord(
+        scene_name=result.scene,
+        scene_hash=digest(problem.scene.to_dict()),
+        method=result.method.value,
+        robust=False,
+        reached=result.reached,
+        feasible=feasible,
+        status=result.status.value,
+        objective=None if evaluation is None else _finite(evaluation.objective),
+        peak=None if peak is None else peak.value,
+        peak_at=None if peak is None else peak.at,
+        limit=result.limit,
+        band_hz=result.band_hz,
+        harmonics=problem.harmonics,
+        evaluations=result.evaluations,
+        work=_finite(result.work),
+        seconds=result.seconds,
+        variables=tuple(
+            VariableValues(name=v.name, value=result.optimum.get(v.name), low=v.low, high=v.high)
+            for v in problem.variables
+        ),
+    )
+
+
+def robust_record(result: RobustResult) -> DesignRecord:
+    """The robust design with the columns people filter by; its peak is the worst over the uncertainty."""
+    problem, side = result.problem, result.robust
+    worst = None if side is None or side.worst is None else side.worst
+    rows = () if worst is None else worst.rows
+    peak = max((r for r in rows if r.quantity.value == "peak"), key=lambda row: row.value, default=None)
+    bands = [row.value for row in rows if row.quantity.value == "band"]
+    return DesignRecord(
+        scene_name=problem.scene.name,
+        scene_hash=digest(problem.scene.to_dict()),
+        method=result.aim.value,
+        robust=True,
+        reached=result.reached,
+        feasible=side is not None and side.feasible,
+        status=result.status.value,
+        objective=_finite(result.objective),
+        peak=None if peak is None else peak.value,
+        peak_at=None if peak is None else _finite(peak.at_hz),
+        limit=problem.limit,
+        band_hz=max(bands, default=None),
+        harmonics=problem.harmonics,
+        evaluations=result.designs,
+        work=float(result.responses),
+        seconds=result.seconds,
+        variables=tuple(
+            VariableValues(name=v.name, value=result.optimum.get(v.name), low=v.low, high=v.high)
+            for v in problem.variables
+        ),
+    )
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def contact_values(scene: Scene, parameter: str) -> tuple[ContactValues, ...]:
+    """The values of every contact; None for what changes while `parameter` does."""
+    owner, _, key = parameter.rpartition(".")
+    return tuple(
+        _values(contact, key if owner in (contact.name, contact.group) else "") for contact in scene.contacts
+    )
+
+
+def _values(contact: AnyContact, swept: str) -> ContactValues:
+    if not isinstance(contact, FrictionContact):
+        return ContactValues(name=contact.name, kt=None, mu=None, N0=None, N1=None, N1_phase=None)
+    load_follows = swept in ("N1", "N1_ratio") or (swept == "N0" and contact.N1_ratio is not None)
+    return ContactValues(
+        name=contact.name,
+        kt=None if swept == "kt" else contact.kt,
+        mu=None if swept == "mu" else contact.mu,
+        N0=None if swept == "N0" else contact.N0,
+        N1=None if load_follows else contact.N1_value,
+        N1_phase=None if swept == "N1_phase" else contact.N1_phase,
+    )

@@ -1,0 +1,167 @@
+"""What every kind that works on a scene shares: the words of the request and their resolution."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, WithJsonSchema
+
+from service.errors import InvalidRequestError
+from service.jobs.registry import JobRequest, Resolved, SceneSource
+from service.jobs.strict_json import digest, pointer
+from solver.errors import Issue, SceneError, SettingError
+from solver.scene.scene import Scene, load_scene, shipped_scenes
+
+MAX_HARMONICS = 200
+LARGEST = 1e15
+UPLOAD = "upload:"
+"""What stands before the id of an upload where a scene file names a file."""
+
+_SCENE_NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
+_PATH_PATTERN = r"^[A-Za-z0-9_@-]+(\.[A-Za-z0-9_@-]+)?$"
+
+
+def _scene_reference(value: object) -> object:
+    """A name or an object; a path never: the service reads no files for its clients."""
+    if isinstance(value, dict) or (isinstance(value, str) and _SCENE_NAME.fullmatch(value)):
+        return value
+    raise ValueError("must be the name of a shipped or stored scene, or a scene as an object")
+
+
+SceneReference = Annotated[
+    Any,
+    BeforeValidator(_scene_reference),
+    WithJsonSchema({"anyOf": [{"type": "string", "pattern": _SCENE_NAME.pattern}, {"type": "object"}]}),
+]
+Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST)]
+PositiveNumber = Annotated[float, Field(strict=True, gt=0.0, le=LARGEST)]
+FrequencyHz = Annotated[float, Field(strict=True, gt=0.0, le=1e9)]
+Harmonics = Annotated[int, Field(strict=True, ge=1, le=MAX_HARMONICS)]
+ParameterPath = Annotated[str, Field(max_length=210, pattern=_PATH_PATTERN)]
+
+
+class SceneRequest(JobRequest):
+    """A request about a scene.
+
+    Attributes
+    ----------
+    scene : str or dict
+        Name of a shipped or stored scene, or the scene itself.
+    set : dict
+        Values put on parameter paths before anything is computed.
+    """
+
+    scene: SceneReference = Field(description="Name of a shipped or stored scene, or the scene as an object.")
+    set: dict[ParameterPath, Number] = Field(
+        default={}, max_length=1000, description='Values of parameters, {"damper.N0": 100}.'
+    )
+
+
+class HarmonicRequest(SceneRequest):
+    """A request answered by harmonic balance.
+
+    Attributes
+    ----------
+    harmonics : int
+        Highest harmonic of the balance.
+    """
+
+    harmonics: Harmonics = Field(default=11, description="Highest harmonic of the balance.")
+
+
+def resolve_scene(request: SceneRequest, source: SceneSource) -> Scene:
+    """The scene of a request with its values set.
+
+    Raises
+    ------
+    InvalidRequestError
+        With pointers below ``/scene`` and ``/set``.
+    """
+    scene = _read(request.scene, source)
+    issues: list[Issue] = []
+    for path, value in request.set.items():
+        try:
+            scene = scene.with_values({path: value})
+        except SettingError as error:
+            issues.append(Issue(pointer=pointer("set", path), message=str(error)))
+    if issues:
+        raise InvalidRequestError(issues)
+    return scene
+
+
+@lru_cache(maxsize=64)
+def shipped_scene(name: str) -> Scene | None:
+    """The scene of this name that comes with the package, read once; None for another one."""
+    return load_scene(name) if name in shipped_scenes() else None
+
+
+def _read(reference: object, source: SceneSource) -> Scene:
+    shipped = shipped_scene(reference) if isinstance(reference, str) else None
+    if shipped is not None:
+        return shipped
+    body = source.scene_body(reference) if isinstance(reference, str) else reference
+    if not isinstance(body, Mapping):
+        message = f"`scene` {reference!r} is neither a shipped scene nor a stored one"
+        raise InvalidRequestError([Issue(pointer=pointer("scene"), message=message)])
+    if body is reference and _refers_to_uploads(body):
+        try:
+            body = source.with_uploads(body)
+        except InvalidRequestError as error:
+            raise _below_scene(error.issues) from error
+    return read_scene(body, prefix=pointer("scene"))
+
+
+def _refers_to_uploads(body: Mapping[str, object]) -> bool:
+    structure = body.get("structure")
+    return isinstance(structure, Mapping) and any(
+        isinstance(item, str) and item.startswith(UPLOAD) for item in structure.values()
+    )
+
+
+def _below_scene(issues: Iterable[Issue]) -> InvalidRequestError:
+    found = [Issue(pointer=pointer("scene") + issue.pointer, message=issue.message) for issue in issues]
+    return InvalidRequestError(found)
+
+
+def read_scene(body: Mapping[str, object], prefix: str = "") -> Scene:
+    """A scene from a request body.
+
+    Raises
+    ------
+    InvalidRequestError
+        Lists everything that is wrong, with pointers below `prefix`.
+    """
+    try:
+        return Scene.from_dict(body)
+    except SceneError as error:
+        issues = [Issue(pointer=prefix + issue.pointer, message=issue.message) for issue in error.issues]
+        raise InvalidRequestError(issues) from error
+
+
+def check(where: str, attempt: Callable[[], object]) -> list[Issue]:
+    """Nothing if `attempt` goes through; its SettingError as an issue at the pointer `where` otherwise."""
+    try:
+        attempt()
+    except SettingError as error:
+        return [Issue(pointer=where, message=str(error))]
+    return []
+
+
+def refusal(where: str, message: str) -> Issue:
+    """Something wrong with the field at the pointer `where`."""
+    return Issue(pointer=where, message=message)
+
+
+def require(issues: list[Issue]) -> None:
+    """Raise InvalidRequestError if there are issues."""
+    if issues:
+        raise InvalidRequestError(issues)
+
+
+def resolved(scene: Scene, **settings: object) -> Resolved:
+    """The spec of a request about `scene`; the settings are JSON."""
+    body = scene.to_dict()
+    return Resolved(spec={"scene": body, **settings}, scene_name=scene.name, scene_hash=digest(body))

@@ -1,0 +1,143 @@
+"""How much one job may ask for; what is larger is several jobs, or a script of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+from service.jobs.kinds.scenes import refusal
+from solver.errors import Issue
+from solver.scene.scene import CyclicStructure, Scene
+
+MOST_POINTS = 500_000
+"""Of a map: its result is text, some 40 bytes a point."""
+MOST_WORK = 1_000_000_000
+"""Points × harmonics × DOFs: hours of one processor."""
+MOST_UNKNOWNS = 8_000
+"""Of the balance: its matrix, of which a worker holds some, is then 0.5 GB."""
+MOST_STEPS = 100_000_000_000
+"""Time steps × DOFs of a march: hours of one processor."""
+FEWEST_STEPS = 256
+"""Of a period, where the solver chooses them."""
+POINTS_OF_A_SWEEP = 20
+"""Fewer a frequency response seldom has."""
+
+_most_work: ContextVar[int] = ContextVar("most_work", default=MOST_WORK)
+
+
+@contextmanager
+def work_limited(most: int | None) -> Iterator[None]:
+    """Inside, jobs may ask for no more work than `most`, the limit of a key; None for no such limit."""
+    token = _most_work.set(MOST_WORK if most is None else min(most, MOST_WORK))
+    try:
+        yield
+    finally:
+        _most_work.reset(token)
+
+
+def size_issues(where: str, words: str, points: int, harmonics: int, dofs: int) -> list[Issue]:
+    """Refuse what would take longer than a job should, at the pointer `where`.
+
+    Parameters
+    ----------
+    where : of the field that makes it large.
+    words : what is counted, for people.
+    points : periodic responses to be solved.
+    harmonics : kept in each.
+    dofs : of the structure that is solved.
+    """
+    work = points * max(harmonics, 1) * dofs
+    most = _most_work.get()
+    if work <= most:
+        return []
+    return [refusal(where, f"{words} × harmonics × DOFs must be at most {most}, got {work}")]
+
+
+def balance_issues(
+    where: str, scene: Scene, harmonics: int, points: int = 1, words: str = "points"
+) -> list[Issue]:
+    """Refuse responses whose balance is too large, or too many of them, at the pointer `where`.
+
+    Parameters
+    ----------
+    where : of the field that makes it large, if it is not the scene itself.
+    harmonics : highest one kept.
+    points : periodic responses to be solved.
+    words : what is counted, for people.
+    """
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from solver.scene.annulus import sectors_needed
+
+    large = _unknown_issues(scene, harmonics, sectors_needed(scene).sectors)
+    return large or size_issues(where, words, points, harmonics, dofs_solved(scene))
+
+
+def annulus_issues(scene: Scene, harmonics: int) -> list[Issue]:
+    """Refuse a balance of all sectors that is too large."""
+    structure = scene.structure
+    sectors = structure.sectors if isinstance(structure, CyclicStructure) else 1
+    return _unknown_issues(scene, harmonics, sectors)
+
+
+def contact_motions(scene: Scene) -> int:
+    """Motions of the contacts, those of all sectors where one does not stand for them."""
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from solver.scene.annulus import sectors_needed
+
+    return _motions(scene, sectors_needed(scene).sectors)
+
+
+def coefficients(scene: Scene, harmonics: int) -> int:
+    """Coefficients of a motion, those that forces of higher harmonics call for included."""
+    from solver.scene.harmonics import kept_harmonics
+
+    return 2 * len(kept_harmonics(scene, (), harmonics, odd=False)) - 1
+
+
+def _motions(scene: Scene, sectors: int) -> int:
+    from solver.linear.contact_table import port_counts
+
+    return int(port_counts(scene).sum()) * sectors
+
+
+def _unknown_issues(scene: Scene, harmonics: int, sectors: int) -> list[Issue]:
+    motions = _motions(scene, sectors)
+    kept = coefficients(scene, harmonics)
+    unknowns = motions * kept
+    if unknowns <= MOST_UNKNOWNS:
+        return []
+    plain = kept == 2 * harmonics + 1
+    of_each = f"(2 × {harmonics} harmonics + 1)" if plain else f"{kept} coefficients"
+    fitting = (MOST_UNKNOWNS // motions - 1) // 2
+    got = f"got {motions} motions of contacts × {of_each} = {unknowns}"
+    if fitting >= 1:
+        words = f"`harmonics` must be at most {fitting} for this scene, {MOST_UNKNOWNS} unknowns"
+        return [refusal("/harmonics", f"{words}, {got}")]
+    words = f"`scene` must have contacts for at most {MOST_UNKNOWNS} unknowns"
+    return [refusal("/scene", f"{words}, {got}")]
+
+
+def march_issues(scene: Scene, steps_per_period: int | None, max_periods: int) -> list[Issue]:
+    """Refuse a march of more steps than one job should make."""
+    dofs = whole_disk_dofs(scene)
+    steps = (steps_per_period or FEWEST_STEPS) * max_periods * dofs
+    if steps <= MOST_STEPS:
+        return []
+    where = "max_periods" if steps_per_period is None else "steps_per_period"
+    words = "steps of a period × periods × DOFs"
+    return [refusal(f"/{where}", f"`{where}`: {words} must be at most {MOST_STEPS}, got {steps}")]
+
+
+def dofs_solved(scene: Scene) -> int:
+    """The DOFs of the structure as it is solved: of one sector, or of the whole disk."""
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from solver.scene.annulus import sectors_needed
+
+    return len(scene.structure.dofs) * sectors_needed(scene).sectors
+
+
+def whole_disk_dofs(scene: Scene) -> int:
+    """The DOFs of all sectors."""
+    structure = scene.structure
+    return len(structure.dofs) * (structure.sectors if isinstance(structure, CyclicStructure) else 1)

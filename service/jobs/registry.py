@@ -1,0 +1,369 @@
+"""What a kind of job is: a request model, a resolution of the request, a function that computes.
+
+A new kind is one module in `service.jobs.kinds` and one entry in its registry; queue, database, HTTP and
+command know kinds only through this contract. A kind whose work can be divided says so by a
+`service.jobs.parts.Parts`.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.errors import InvalidRequestError
+from service.jobs.strict_json import JsonText, pointer
+from solver.errors import Issue
+
+if TYPE_CHECKING:
+    from service.jobs.checkpoints import Checkpoints
+    from service.jobs.parts import Parts
+
+Point = tuple[float, float]
+"""Value of what is swept and amplitude [m]."""
+OnProgress = Callable[[float, int], None]
+ShouldStop = Callable[[], bool]
+
+
+class Progress(Protocol):
+    """What a run says on its way; both methods cost next to nothing and may be called at any rate."""
+
+    def __call__(self, fraction: float, points: int) -> None:
+        """So far it got: share of its path, points computed."""
+
+    def found(self, points: Sequence[Point]) -> None:
+        """The next points of the branch it follows; they go with the next report."""
+
+
+class JobRequest(BaseModel):
+    """What every kind of job takes; the models of the kinds derive from it.
+
+    Attributes
+    ----------
+    fresh : bool
+        Compute again even if the same thing was computed before.
+    priority : int
+        Jobs of a higher priority run first; equal ones in the order they came.
+    max_seconds : float or None
+        Longest time an attempt at it may take [s]; that of the service if left out.
+    """
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, validate_by_name=True)
+
+    fresh: bool = Field(
+        default=False, strict=True, description="Compute again even if a stored result exists."
+    )
+    priority: int = Field(default=0, strict=True, ge=-100, le=100, description="Higher ones run first.")
+    max_seconds: float | None = Field(
+        default=None,
+        strict=True,
+        ge=0.01,
+        le=1e7,
+        description="Longest time an attempt may take [s]; at most, and if left out, that of the service.",
+    )
+
+
+class SceneSource(Protocol):
+    """Where the scenes that requests name come from."""
+
+    def scene_body(self, name: str) -> Mapping[str, object] | None:
+        """Tables and lists of a shipped or stored scene, or None."""
+
+    def with_uploads(self, body: Mapping[str, object]) -> Mapping[str, object]:
+        """A scene with what its uploads hold in place of their ids."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resolved:
+    """A request with everything looked up: what a worker computes, from this alone.
+
+    Attributes
+    ----------
+    spec : dict
+        JSON; equal specs of one kind give equal results.
+    scene_name, scene_hash : str or None
+        Of the scene as computed, for lists and filters.
+    """
+
+    spec: dict[str, Any]
+    scene_name: str | None = None
+    scene_hash: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactValues:
+    """The values of a contact during a sweep; None where the value is swept or its law has none."""
+
+    name: str
+    kt: float | None
+    mu: float | None
+    N0: float | None
+    N1: float | None
+    N1_phase: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoredArray:
+    """An array as it is stored: npy bytes and their SHA-256 in hexadecimal."""
+
+    sha256: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Piece:
+    """A piece of what an unfinished job has computed, with the SHA-256 of its bytes in hexadecimal."""
+
+    part: int
+    sha256: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pace:
+    """How often a worker tells what, and how it logs.
+
+    Attributes
+    ----------
+    progress_seconds : float
+        Least time between two reports of an attempt [s].
+    checkpoint_seconds : float
+        Least time between two checkpoints of an attempt [s].
+    checkpoint_bytes : int
+        Most that a job keeps for later attempts.
+    log_level, log_format : str
+        As in `service.settings.logs.configure`.
+    """
+
+    progress_seconds: float
+    checkpoint_seconds: float
+    checkpoint_bytes: int
+    log_level: str = "INFO"
+    log_format: str = "text"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepRecord:
+    """One branch as it is stored; the fields are the columns people filter by."""
+
+    scene_name: str
+    scene_hash: str
+    parameter: str
+    from_value: float
+    to_value: float
+    frequency_hz: float | None
+    excitation_amplitude: float | None
+    harmonics: int
+    points: int
+    peak: float | None
+    peak_at: float | None
+    limit: float | None
+    band_hz: float | None
+    newton_iterations: int
+    rejected_steps: int
+    seconds: float
+    completed: bool
+    status: str
+    error_estimate: float | None = None
+    peaks_known: bool | None = None
+    contacts: tuple[ContactValues, ...] = ()
+    arrays: Mapping[str, StoredArray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VariableValues:
+    """A variable of a design: its best value (None if no design could be computed) and its bounds."""
+
+    name: str
+    value: float | None
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignRecord:
+    """A design as it is stored; the fields are the columns people filter by."""
+
+    scene_name: str
+    scene_hash: str
+    method: str
+    robust: bool
+    reached: bool
+    feasible: bool
+    status: str
+    objective: float | None
+    peak: float | None
+    peak_at: float | None
+    limit: float | None
+    band_hz: float | None
+    harmonics: int
+    evaluations: int
+    work: float | None
+    seconds: float
+    variables: tuple[VariableValues, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobOutput:
+    """What a run gives back.
+
+    Attributes
+    ----------
+    result : dict
+        JSON, with the keys of the command's ``--json``.
+    sweeps : tuple of SweepRecord
+        Every branch computed on the way.
+    design : DesignRecord or None
+        The design, if the job was to find one.
+    shortfall : str or None
+        If the computation did not reach its goal: the status, a sentence that says what to try. The job
+        then fails with it; result and sweeps are kept.
+    encoded : JsonText or None
+        The result as it is stored, if the worker has encoded it already; `result` is then empty.
+    """
+
+    result: dict[str, Any]
+    sweeps: tuple[SweepRecord, ...] = ()
+    encoded: JsonText | None = None
+    design: DesignRecord | None = None
+    shortfall: str | None = None
+
+
+class FailureKind(enum.StrEnum):
+    """Why a job failed."""
+
+    SCENE = "scene"
+    SETTING = "setting"
+    GOAL = "goal-not-reached"
+    WORKER_LOST = "worker-lost"
+    TIME_LIMIT = "time-limit"
+    INTERNAL = "internal"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobFailure:
+    """Why a job failed, as its row keeps it."""
+
+    kind: FailureKind
+    detail: str
+    issues: tuple[Issue, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """The error of a job, as JSON."""
+        body: dict[str, Any] = {"type": self.kind.value, "detail": self.detail}
+        if self.issues:
+            body["issues"] = [{"pointer": issue.pointer, "detail": issue.message} for issue in self.issues]
+        return body
+
+
+Run = Callable[[Mapping[str, Any], Progress, ShouldStop], JobOutput]
+RunOn = Callable[[Mapping[str, Any], Progress, ShouldStop, "Checkpoints"], JobOutput]
+WarmUp = Callable[[], None]
+Resolve = Callable[[Any, SceneSource], Resolved]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobKind:
+    """A kind of job. `run` is sent to workers by name: a function at the top level of a module.
+
+    Attributes
+    ----------
+    name : str
+        As in ``"kind": …`` of a request.
+    summary : str
+        One line for people.
+    request : type of JobRequest
+        Validates what was asked.
+    resolve : callable
+        From request to spec; raises InvalidRequestError. Runs in the service.
+    run : callable
+        From spec to output; raises SolverError for what is wrong for good. Runs in a worker.
+    parts : Parts or None
+        How the work is divided, if it can be; `run` is then ``parts.run``, which computes them one after the
+        other.
+    run_on : callable or None
+        `run` with a fourth argument, `service.jobs.checkpoints.Checkpoints`: keeps what it has, and goes on
+        from what an earlier attempt kept. Divided kinds need none: their parts are kept.
+    """
+
+    name: str
+    summary: str
+    request: type[JobRequest]
+    resolve: Resolve
+    run: Run
+    parts: Parts | None = None
+    run_on: RunOn | None = None
+
+
+def no_warm_up() -> None:
+    """For kinds that need none."""
+
+
+class Registry:
+    """The kinds of job a service knows, and what its workers do before they take the first one.
+
+    Parameters
+    ----------
+    kinds : iterable of JobKind
+        The kinds.
+    warm_up : callable
+        Loads and compiles what the kinds need; sent to workers by name, as their `run` is.
+    """
+
+    def __init__(self, kinds: Iterable[JobKind], warm_up: WarmUp = no_warm_up) -> None:
+        self._kinds = {kind.name: kind for kind in kinds}
+        self.warm_up = warm_up
+
+    def __getitem__(self, name: str) -> JobKind:
+        return self._kinds[name]
+
+    def __iter__(self) -> Iterator[JobKind]:
+        return iter(self._kinds.values())
+
+    def get(self, name: object) -> JobKind:
+        """The kind of this name.
+
+        Raises
+        ------
+        InvalidRequestError
+            If there is none, listing those there are.
+        """
+        if isinstance(name, str) and name in self._kinds:
+            return self._kinds[name]
+        message = f"`kind` must be one of {', '.join(self._kinds)}, got {name!r}"
+        raise InvalidRequestError([Issue(pointer=pointer("kind"), message=message)])
+
+    def extended(self, *kinds: JobKind) -> Registry:
+        """This registry with further kinds."""
+        return Registry([*self, *kinds], self.warm_up)
+
+    def runs(self) -> dict[str, RunOn]:
+        """The functions workers call, by kind; sent by name."""
+        return {kind.name: _run_on(kind) for kind in self}
+
+
+@dataclass(frozen=True, slots=True)
+class _FromTheStart:
+    """A run that keeps nothing."""
+
+    run: Run
+
+    def __call__(
+        self, spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, _checkpoints: Checkpoints
+    ) -> JobOutput:
+        """Compute."""
+        return self.run(spec, progress, should_stop)
+
+
+def _run_on(kind: JobKind) -> RunOn:
+    if kind.run_on is not None:
+        return kind.run_on
+    if kind.parts is None:
+        return _FromTheStart(kind.run)
+    # Imported here: what divided kinds are made of knows jobs.
+    from service.jobs.checkpoints import RunParts
+
+    return RunParts(kind.parts)

@@ -1,0 +1,65 @@
+"""From a request body to a checked request, with one sentence and one JSON pointer for each thing wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from service.errors import InvalidRequestError
+from service.jobs.strict_json import pointer
+from solver.errors import Issue
+
+ModelT = TypeVar("ModelT", bound=BaseModel)
+
+_MESSAGES = {
+    "extra_forbidden": "is not a known key",
+    "missing": "is missing",
+    "finite_number": "must be a finite number",
+    "bool_type": "must be true or false",
+    "int_type": "must be a whole number",
+    "float_type": "must be a number",
+    "string_type": "must be a string",
+}
+
+
+def validated(model: type[ModelT], body: object) -> ModelT:
+    """`body` as a checked `model`.
+
+    Raises
+    ------
+    InvalidRequestError
+        Lists everything that is wrong.
+    """
+    if not isinstance(body, Mapping):
+        message = f"the body must be a JSON object, got {type(body).__name__}"
+        raise InvalidRequestError([Issue(pointer="", message=message)])
+    try:
+        return model.model_validate(dict(body))
+    except ValidationError as error:
+        raise InvalidRequestError(issues_of(error.errors(include_url=False))) from error
+
+
+def issues_of(errors: Sequence[Any]) -> list[Issue]:
+    """Pydantic's errors as issues."""
+    return [_issue(error) for error in errors]
+
+
+def _issue(error: Mapping[str, Any]) -> Issue:
+    location = [part for part in error["loc"] if part != "[key]"]
+    kind = error["type"]
+    key = str(location[-1]) if location else "body"
+    message = _MESSAGES.get(kind) or str(error["msg"]).removeprefix("Value error, ")
+    if message.startswith("Input should be "):
+        message = "must be " + message.removeprefix("Input should be ")
+    if not message.startswith("`"):
+        message = f"`{key}` {message}"
+        if kind not in ("missing", "extra_forbidden"):
+            message += f", got {_short(error.get('input'))}"
+    return Issue(pointer=pointer(*location), message=message)
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else text[:77] + "..."

@@ -1,0 +1,1 @@
+"""The service itself: the queue of jobs, its callers, its stored results."""

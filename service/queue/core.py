@@ -1,0 +1,335 @@
+"""The service itself, without HTTP: what the routes, the embedded handle and the tests call."""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from service.auth.callers import KEYLESS, Caller, visible
+from service.db import revisions
+from service.db.clock import Clock
+from service.db.engine import Database
+from service.db.models import JobState
+from service.db.pg_notify import Notices
+from service.db.repositories import (
+    DesignRepository,
+    DesignRow,
+    JobRepository,
+    JobRow,
+    NewJob,
+    SceneRepository,
+    SweepRepository,
+    SweepRow,
+    UploadRepository,
+)
+from service.db.repositories.keys import KeyRepository
+from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
+from service.jobs.kinds import SHIPPED
+from service.jobs.kinds.sizes import work_limited
+from service.jobs.registry import JobRequest, OnProgress, Registry
+from service.jobs.strict_json import digest
+from service.jobs.validation import validated
+from service.queue.queue import JobQueue
+from service.queue.retention import Retention
+from service.queue.scene_store import SceneStore
+from service.queue.subscriptions import Event, Waiters
+from service.settings.settings import Settings
+from service.uploads.uploads import Uploads
+from service.workers import executor_of
+from service.workers.preview_workers import Previews
+from solver.errors import Issue
+
+log = logging.getLogger("stickslip.service")
+
+SOLVER_VERSION = version("stickslip")
+
+_LOOK_AGAIN_SECONDS = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Results:
+    """What a finished job left."""
+
+    job: JobRow
+    result: dict[str, Any]
+    sweeps: list[SweepRow]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WholeDesign:
+    """A stored design with the job that found it and the result of that job."""
+
+    row: DesignRow
+    job: JobRow
+    result: dict[str, Any]
+
+
+class Service:
+    """Database, queue and workers of one service.
+
+    Parameters
+    ----------
+    settings : Settings
+        Its settings.
+    registry : Registry
+        The kinds of job it runs.
+    now : callable, optional
+        Its clock (see `JobRepository`).
+    """
+
+    def __init__(self, settings: Settings, registry: Registry = SHIPPED, now: Clock | None = None) -> None:
+        self.settings = settings
+        self.registry = registry
+        self.database = Database(settings.database, settings.database_connections)
+        self.jobs = JobRepository(self.database, now)
+        self.sweeps = SweepRepository(self.database)
+        self.designs = DesignRepository(self.database)
+        self.keys = KeyRepository(self.database)
+        self.uploads = Uploads(UploadRepository(self.database), settings)
+        self.scenes = SceneStore(SceneRepository(self.database), self.uploads)
+        self.waiters = Waiters()
+        self.previews = Previews(settings.preview_seconds)
+        self.queue = JobQueue(self.jobs, executor_of(settings, registry), settings, self.waiters)
+        self.retention = Retention(self.database, settings, self.jobs.now)
+        self._notices = None if self.database.exclusive else self._make_notices()
+        self.stopping = threading.Event()
+        self._open = False
+
+    def _make_notices(self) -> Notices:
+        made = Notices(
+            self.database.own_connection,
+            accepted=self.queue.wake,
+            ended=self.waiters.ended_elsewhere,
+            cancel=self.queue.cancel_running,
+        )
+        self.waiters.relay = made.tell_ended
+        return made
+
+    def open(self) -> None:
+        """Lock SQLite's file and check or make the tables; nothing happens if that was done before.
+
+        Raises
+        ------
+        DatabaseInUseError
+            If another service has the file.
+        WrongRevisionError
+            If the tables are not this version's.
+        DatabaseError
+            If the database cannot be used.
+        """
+        if self._open:
+            return
+        self.database.acquire()
+        try:
+            revisions.prepare(self.settings.database)
+        except BaseException:
+            self.database.close()
+            raise
+        self._open = True
+
+    def start(self) -> None:
+        """Open the database, start queue and workers; `open` lists the errors."""
+        self.open()
+        try:
+            self.queue.start()
+        except BaseException:
+            self.database.close()
+            raise
+        self.retention.start()
+        if self._notices is not None:
+            self._notices.start()
+        log.info("database %s, %d workers", self.database.name, self.settings.workers)
+
+    def stop(self) -> None:
+        """End the workers, give running jobs back to the queue, close the database."""
+        self.stop_waiting()
+        self.previews.close()
+        self.retention.stop()
+        self.queue.stop()
+        if self._notices is not None:
+            self._notices.stop()
+        self.database.close()
+        self._open = False
+
+    def stop_waiting(self) -> None:
+        """Send everybody home who waits for a job."""
+        self.stopping.set()
+        self.waiters.wake_all()
+
+    def submit(
+        self, body: Mapping[str, Any], idempotency_key: str | None = None, caller: Caller = KEYLESS
+    ) -> tuple[JobRow, bool]:
+        """Accept a job of the caller's; whether it is new, and not made before under its idempotency key.
+
+        Raises
+        ------
+        InvalidRequestError
+            Lists everything that is wrong with the body.
+        IdempotencyError, QueueFullError, TooManyRequestsError
+            See `JobRepository.submit`.
+        """
+        if "kind" not in body:
+            raise InvalidRequestError([Issue(pointer="/kind", message="`kind` is missing")])
+        kind = self.registry.get(body["kind"])
+        request = validated(kind.request, {key: value for key, value in body.items() if key != "kind"})
+        seconds = self._seconds_limit(request, caller)
+        with work_limited(caller.limits.work):
+            resolved = kind.resolve(request, self.scenes.of(caller))
+        new = NewJob(
+            kind=kind.name,
+            request=dict(body),
+            spec=resolved.spec,
+            spec_hash=digest({"kind": kind.name, "spec": resolved.spec, "version": SOLVER_VERSION}),
+            request_hash=digest(body),
+            max_attempts=self.settings.max_attempts,
+            scene_name=resolved.scene_name,
+            scene_hash=resolved.scene_hash,
+            priority=request.priority,
+            fresh=request.fresh,
+            idempotency_key=idempotency_key,
+            owner=caller.owner,
+            seconds_limit=seconds,
+        )
+        row, inserted = self.jobs.submit(new, self.settings.queue_limit, caller.limits.waiting)
+        if row.state is JobState.ACCEPTED:
+            self.queue.wake()
+            if self._notices is not None:
+                self._notices.tell_accepted()
+        return row, inserted
+
+    def _seconds_limit(self, request: JobRequest, caller: Caller) -> float | None:
+        """The longest time an attempt may take, if the request or the key says so [s]."""
+        asked, of_key = request.max_seconds, caller.limits.seconds
+        most = min(self.settings.job_seconds, of_key or math.inf)
+        if asked is not None and asked > most:
+            whose = "the key's limit" if most == of_key else "the service's own limit"
+            message = f"`max_seconds` must be at most {most:g}, which is {whose}, got {asked!r}"
+            raise InvalidRequestError([Issue(pointer="/max_seconds", message=message)])
+        return asked if asked is not None else of_key
+
+    def job(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:
+        """The job.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of this id that the caller may see.
+        """
+        return visible(self.jobs.get(job_id), caller, f"there is no job {job_id!r}")
+
+    def sweep(self, sweep_id: str, caller: Caller = KEYLESS) -> SweepRow:
+        """A stored sweep.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of this id that the caller may see.
+        """
+        return visible(self.sweeps.get(sweep_id), caller, f"there is no sweep {sweep_id!r}")
+
+    def dismiss(self, job_id: str, caller: Caller = KEYLESS) -> JobRow:
+        """Cancel a job. A running one ends within the grace; the row given back may say `running` still.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of this id that the caller may see.
+        ConflictError
+            If it ended before.
+        """
+        self.job(job_id, caller)
+        row = visible(self.jobs.cancel(job_id), caller, f"there is no job {job_id!r}")
+        if row.state in (JobState.SUCCESSFUL, JobState.FAILED):
+            raise ConflictError(f"job {job_id} ended before ({row.state.value}), there is nothing to dismiss")
+        if row.state is JobState.RUNNING:
+            self.queue.cancel_running(job_id)
+            if self._notices is not None:
+                self._notices.tell_cancel(job_id)
+        else:
+            self.waiters.ended(job_id)
+        return row
+
+    def scene_of(self, job_id: str, caller: Caller = KEYLESS) -> dict[str, Any]:
+        """The scene of a job as it is computed: with its values set, and what its uploads held.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such job, or it has no scene.
+        """
+        scene: dict[str, Any] | None = self.jobs.spec(self.job(job_id, caller).id).get("scene")
+        if scene is None:
+            raise NotFoundError(f"job {job_id} has no scene")
+        return scene
+
+    def results(self, job_id: str, caller: Caller = KEYLESS) -> Results:
+        """What a job computed; of a failed one, what it computed all the same.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such job.
+        ConflictError
+            If it has not ended, or was dismissed.
+        JobFailedError
+            If it failed and computed nothing.
+        """
+        row = self.job(job_id, caller)
+        source = row.result_of or row.id
+        result = self.jobs.result(source)
+        if result is not None:
+            return Results(job=row, result=result, sweeps=self.sweeps.of_job(source))
+        if row.state is JobState.FAILED:
+            error = row.error or {}
+            raise JobFailedError(f"job {job_id} failed: {error.get('detail', 'for no known reason')}", error)
+        if row.state is JobState.DISMISSED:
+            raise ConflictError(f"job {job_id} was dismissed, it has no results")
+        raise ConflictError(f"job {job_id} is {row.state.value}, it has no results yet")
+
+    def design(self, design_id: str, caller: Caller = KEYLESS) -> WholeDesign:
+        """A stored design; the id of a later job that asked for the same names it too.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of this id that the caller may see.
+        """
+        missing = f"there is no design {design_id!r}"
+        asked = visible(self.jobs.get(design_id), caller, missing)
+        job = asked if asked.result_of is None else self.jobs.get(asked.result_of)
+        row = None if job is None else self.designs.get(job.id)
+        result = None if row is None else self.jobs.result(row.job_id)
+        if job is None or row is None or result is None:
+            raise NotFoundError(missing)
+        return WholeDesign(row=row, job=job, result=result)
+
+    def wait(
+        self,
+        job_id: str,
+        timeout: float | None = None,
+        on_progress: OnProgress | None = None,
+        caller: Caller = KEYLESS,
+    ) -> JobRow:
+        """Wait in this thread until a job has ended, the time [s] is over or the service stops."""
+        events: SimpleQueue[Event] = SimpleQueue()
+        end = math.inf if timeout is None else time.monotonic() + timeout
+        with self.waiters.listening(job_id, events.put):
+            row = self.job(job_id, caller)
+            while not (row.state.finished or self.stopping.is_set() or time.monotonic() >= end):
+                try:
+                    event = events.get(timeout=max(0.0, min(end - time.monotonic(), _LOOK_AGAIN_SECONDS)))
+                except Empty:
+                    row = self.job(job_id, caller)
+                    continue
+                if event.ended:
+                    row = self.job(job_id, caller)
+                elif on_progress is not None:
+                    on_progress(event.fraction, event.points)
+        return row

@@ -1,0 +1,394 @@
+"""The queue: takes waiting jobs from the database, has them run, writes what became of them.
+
+One thread decides (`_loop`); outcomes are written by the executor's threads. The database row is the
+truth: every write of a running job is guarded by its attempt, so that whoever lost a job cannot write it.
+"""
+
+from __future__ import annotations
+
+import enum
+import logging
+import math
+import os
+import secrets
+import socket
+import threading
+import time
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+
+from service.db.repositories import Attempt, JobRepository
+from service.jobs.registry import FailureKind, JobFailure, JobOutput, Piece, Point
+from service.queue.subscriptions import Waiters
+from service.settings import logs
+from service.settings.settings import Settings
+from service.workers.base import Executor, ExecutorStatus, Failed, Finished, Lost, Outcome, Stopped
+
+log = logging.getLogger("stickslip.queue")
+
+_TROUBLE_SECONDS = 1.0
+# Progress is told here as it comes. For other services and the time after a crash it is written: at most once
+# a second of each job, and ten times a second of all that run here.
+_WRITE_SECONDS, _WRITES_A_SECOND = 1.0, 10.0
+_MOST_POINTS = 50_000
+
+
+class _StopReason(enum.Enum):
+    """Why an attempt was told to stop."""
+
+    CANCEL = "its cancel was asked for"
+    TIME = "it ran too long"
+    LEASE = "the job is not ours any more"
+    SHUTDOWN = "the service stops"
+
+
+@dataclass(slots=True)
+class _Running:
+    """An attempt that an executor has."""
+
+    attempt: Attempt
+    started: float
+    written: float
+    fraction: float = 0.0
+    points: int = 0
+    stop: _StopReason | None = None
+    tag: str = field(default_factory=lambda: secrets.token_hex(4))
+    found: list[Point] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Live:
+    """How far an attempt is that runs here, newer than its row.
+
+    Attributes
+    ----------
+    tag : str
+        Of this run alone; another one has found other points.
+    attempt : int
+        Which attempt at the job it is.
+    fraction, points : float, int
+        Share of its path, points computed.
+    found : list of (value, amplitude)
+        The points of its branch so far, if its kind tells them; grows while it runs.
+    """
+
+    tag: str
+    attempt: int
+    fraction: float
+    points: int
+    found: Sequence[Point]
+
+
+def _about(attempt: Attempt, seconds: float | None = None) -> AbstractContextManager[None]:
+    """Put an attempt on the lines that are logged inside the block."""
+    return logs.about(
+        job=attempt.job_id,
+        kind=attempt.kind,
+        attempt=attempt.attempt,
+        owner=attempt.owner or None,
+        seconds=seconds,
+    )
+
+
+class JobQueue:
+    """The running queue of one service.
+
+    Parameters
+    ----------
+    jobs : JobRepository
+        Where the jobs are.
+    executor : Executor
+        What runs them.
+    settings : Settings
+        Lease, poll and time limit.
+    waiters : Waiters
+        Told of progress and of every job that ends.
+    """
+
+    def __init__(self, jobs: JobRepository, executor: Executor, settings: Settings, waiters: Waiters) -> None:
+        self.owner = f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(4)}"
+        self._jobs = jobs
+        self._executor = executor
+        self._settings = settings
+        self._waiters = waiters
+        self._running: dict[str, _Running] = {}
+        self._lock = threading.Lock()
+        self._claiming = threading.Lock()
+        self._wake = threading.Event()
+        self._stopping = False
+        self._next_upkeep = 0.0
+        self._thread = threading.Thread(target=self._loop, name="stickslip queue", daemon=True)
+
+    def start(self) -> None:
+        """Take back what a dead owner left running, start the workers and the queue."""
+        self._jobs.keep_time()
+        recovered = self._jobs.recover_abandoned(self.owner)
+        if recovered.total:
+            log.warning(
+                "an earlier service ended while jobs ran: %d wait again, %d failed, %d dismissed",
+                recovered.accepted,
+                recovered.failed,
+                recovered.dismissed,
+            )
+        self._executor.start(self)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop taking jobs, end those that run within the grace and give them back to the queue."""
+        self._stopping = True
+        self._wake.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+        with self._lock:
+            running = list(self._running.values())
+        for entry in running:
+            self._ask_to_stop(entry, _StopReason.SHUTDOWN)
+        self._executor.close()
+
+    def wake(self) -> None:
+        """A job was added, or something else happened that the queue should look at."""
+        self._wake.set()
+
+    def cancel_running(self, job_id: str) -> None:
+        """Stop the job if it runs here; its row says already that its cancel was asked for."""
+        with self._claiming, self._lock:
+            entry = self._running.get(job_id)
+        if entry is not None:
+            self._ask_to_stop(entry, _StopReason.CANCEL)
+
+    def live_progress(self, job_id: str) -> tuple[float, int] | None:
+        """Fraction and points of a job that runs here, newer than its row."""
+        with self._lock:
+            entry = self._running.get(job_id)
+        return None if entry is None else (entry.fraction, entry.points)
+
+    def live(self, job_id: str) -> Live | None:
+        """How far a job is that runs here."""
+        with self._lock:
+            entry = self._running.get(job_id)
+        if entry is None:
+            return None
+        return Live(
+            tag=entry.tag, attempt=entry.attempt.attempt, fraction=entry.fraction, points=entry.points,
+            found=entry.found,
+        )  # fmt: skip
+
+    def status(self) -> ExecutorStatus:
+        """How the workers are."""
+        return self._executor.status()
+
+    @property
+    def alive(self) -> bool:
+        """Whether the queue takes jobs."""
+        return self._thread.is_alive() and not self._stopping
+
+    def progress(self, attempt: Attempt, fraction: float, points: int) -> None:
+        """From the executor: remember and pass on how far an attempt got; write it now and then."""
+        entry = self._entry(attempt)
+        if entry is None or self._stopping:
+            return
+        entry.fraction, entry.points = fraction, points
+        now = time.monotonic()
+        pause = max(_WRITE_SECONDS, len(self._running) / _WRITES_A_SECOND)
+        if now - entry.written < min(pause, self._settings.lease_seconds / 3.0):
+            self._waiters.progress(attempt.job_id, fraction, points)
+            return
+        entry.written = now
+        try:
+            owned = self._jobs.report(attempt, fraction, points, self._lease_until())
+        except Exception:
+            log.exception("job %s: its progress could not be written", attempt.job_id)
+            return
+        if owned:
+            self._waiters.progress(attempt.job_id, fraction, points)
+        else:
+            self._ask_to_stop(entry, _StopReason.LEASE)
+
+    def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
+        """From the executor: keep the points of a branch for those who follow it."""
+        entry = self._entry(attempt)
+        if entry is not None:
+            entry.found.extend(points[: _MOST_POINTS - len(entry.found)])
+
+    def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:
+        """From the executor: store pieces for a later attempt, also while the service stops."""
+        entry = self._entry(attempt)
+        if entry is None:
+            return
+        fraction, points, until = entry.fraction, entry.points, self._lease_until()
+        try:
+            owned = self._jobs.keep(attempt, pieces, fraction, points, until, anew=anew)
+        except Exception:
+            log.exception("job %s: its checkpoint could not be written", attempt.job_id)
+            return
+        # The report that counts what is kept comes next, and is written as well.
+        entry.written = -math.inf
+        if not owned:
+            self._ask_to_stop(entry, _StopReason.LEASE)
+
+    def ended(self, attempt: Attempt, outcome: Outcome) -> None:
+        """From the executor: write what became of an attempt.
+
+        If that cannot be written, the lease is not renewed any more and the job is taken back when it
+        runs out.
+        """
+        entry = self._entry(attempt)
+        seconds = None if entry is None else round(time.monotonic() - entry.started, 3)
+        try:
+            with _about(attempt, seconds):
+                self._conclude(attempt, outcome, None if entry is None else entry.stop)
+        except Exception:
+            log.exception("job %s: its outcome could not be written, it will be tried again", attempt.job_id)
+        finally:
+            with self._lock:
+                # Given back, the job may run here again by now, as another attempt.
+                if entry is not None and self._running.get(attempt.job_id) is entry:
+                    del self._running[attempt.job_id]
+            self._waiters.ended(attempt.job_id)
+            self._wake.set()
+
+    def room(self) -> None:
+        """From the executor: an attempt may be taken."""
+        self._wake.set()
+
+    def _entry(self, attempt: Attempt) -> _Running | None:
+        with self._lock:
+            entry = self._running.get(attempt.job_id)
+        return entry if entry is not None and entry.attempt == attempt else None
+
+    def _lease_until(self) -> datetime:
+        return self._jobs.now() + timedelta(seconds=self._settings.lease_seconds)
+
+    def _ask_to_stop(self, entry: _Running, reason: _StopReason) -> None:
+        entry.stop = entry.stop or reason
+        with _about(entry.attempt):
+            log.info("job %s is told to stop: %s", entry.attempt.job_id, entry.stop.value)
+        self._executor.stop_attempt(entry.attempt)
+
+    def _conclude(self, attempt: Attempt, outcome: Outcome, stop: _StopReason | None) -> None:
+        """Write an outcome, seen in the light of why the attempt was told to stop, if it was."""
+        match outcome:
+            case Finished(output) if stop is not _StopReason.CANCEL:
+                self._conclude_finished(attempt, output)
+            case Failed(failure) if stop is not _StopReason.CANCEL:
+                self._note(attempt, "failed", written=self._jobs.fail(attempt, failure))
+            case Stopped() | Lost() | Finished() | Failed() if stop is not None:
+                self._conclude_stopped(attempt, stop)
+            case Lost(reason):
+                log.warning("job %s, attempt %d: %s", attempt.job_id, attempt.attempt, reason)
+                self._jobs.lose(attempt, reason)
+            case _:
+                self._note(attempt, "given back", written=self._jobs.release(attempt))
+
+    def _conclude_finished(self, attempt: Attempt, output: JobOutput) -> None:
+        if output.shortfall is not None:
+            failure = JobFailure(kind=FailureKind.GOAL, detail=output.shortfall)
+            self._note(attempt, "did not reach its goal", written=self._jobs.fail(attempt, failure, output))
+        elif self._jobs.succeed(attempt, output):
+            log.info("job %s, attempt %d: successful", attempt.job_id, attempt.attempt)
+        else:
+            self._note(attempt, "dismissed", written=self._jobs.dismiss(attempt))
+
+    def _conclude_stopped(self, attempt: Attempt, stop: _StopReason) -> None:
+        match stop:
+            case _StopReason.CANCEL:
+                self._note(attempt, "dismissed", written=self._jobs.dismiss(attempt))
+            case _StopReason.SHUTDOWN:
+                self._note(attempt, "given back", written=self._jobs.release(attempt))
+            case _StopReason.TIME:
+                limit = self._seconds_of(attempt)
+                failure = JobFailure(
+                    kind=FailureKind.TIME_LIMIT,
+                    detail=f"the computation took longer than the {limit:g} s one attempt may take",
+                )
+                self._note(attempt, "took too long", written=self._jobs.fail(attempt, failure))
+            case _StopReason.LEASE:
+                self._note(attempt, "stopped", written=False)
+
+    @staticmethod
+    def _note(attempt: Attempt, what: str, *, written: bool) -> None:
+        if written:
+            log.info("job %s, attempt %d: %s", attempt.job_id, attempt.attempt, what)
+        else:
+            log.warning(
+                "job %s, attempt %d lost its lease and wrote nothing", attempt.job_id, attempt.attempt
+            )
+
+    def _loop(self) -> None:
+        """Until stopped: hand out jobs while there is room, keep the leases, look at the time."""
+        while not self._stopping:
+            self._wake.clear()
+            try:
+                while not self._stopping and self._take_some():
+                    pass
+                self._upkeep()
+            except Exception:
+                log.exception("the queue met an error and goes on")
+                time.sleep(_TROUBLE_SECONDS)
+            self._wake.wait(self._patience())
+
+    def _take_some(self) -> bool:
+        """Claim as many jobs as the executor takes and have them run; whether there may be more."""
+        free = self._executor.free()
+        if free <= 0:
+            return False
+        with self._claiming:
+            attempts = self._jobs.claim_several(self.owner, self._lease_until(), free)
+            now = time.monotonic()
+            entries = [
+                _Running(attempt=one, started=now, written=now, fraction=one.progress, points=one.points)
+                for one in attempts
+            ]
+            with self._lock:
+                self._running.update((entry.attempt.job_id, entry) for entry in entries)
+        for entry in entries:
+            self._submit(entry)
+        return len(attempts) == free
+
+    def _submit(self, entry: _Running) -> None:
+        attempt = entry.attempt
+        with _about(attempt):
+            words = "job %s (%s), attempt %d of %d"
+            log.info(words, attempt.job_id, attempt.kind, attempt.attempt, attempt.max_attempts)
+        self._executor.submit(attempt)
+        if entry.stop is not None:
+            # Told to stop before the executor had it.
+            self._executor.stop_attempt(attempt)
+        self._waiters.progress(attempt.job_id, attempt.progress, attempt.points)
+
+    def _patience(self) -> float:
+        """Time until something must be looked at without being woken [s]."""
+        patience = min(self._settings.poll_seconds, self._settings.lease_seconds / 3.0)
+        with self._lock:
+            ends = [entry.started + self._seconds_of(entry.attempt) for entry in self._running.values()]
+        return min(patience, max(min(ends, default=math.inf) - time.monotonic(), 0.01))
+
+    def _seconds_of(self, attempt: Attempt) -> float:
+        """The longest time an attempt may take [s]: the job's limit, never more than the service's."""
+        own = attempt.seconds_limit
+        return self._settings.job_seconds if own is None else min(own, self._settings.job_seconds)
+
+    def _upkeep(self) -> None:
+        """Renew leases, take back expired ones, stop what runs too long."""
+        now = time.monotonic()
+        with self._lock:
+            running = list(self._running.values())
+        for entry in running:
+            if entry.stop is None and now - entry.started > self._seconds_of(entry.attempt):
+                self._ask_to_stop(entry, _StopReason.TIME)
+        if now < self._next_upkeep:
+            return
+        self._next_upkeep = now + min(self._settings.lease_seconds / 3.0, self._settings.poll_seconds)
+        self._jobs.keep_time()
+        by_attempt = {id(entry.attempt): entry for entry in running}
+        for lost in self._jobs.renew([entry.attempt for entry in running], self._lease_until()):
+            self._ask_to_stop(by_attempt[id(lost)], _StopReason.LEASE)
+        cancelled = self._jobs.cancelled(self.owner) if running else ()
+        for entry in running:
+            if entry.stop is None and entry.attempt.job_id in cancelled:
+                self._ask_to_stop(entry, _StopReason.CANCEL)
+        if self._jobs.recover_expired([entry.attempt.job_id for entry in running]).total:
+            log.warning("jobs whose lease ran out were taken back")
+            self._wake.set()

@@ -1,0 +1,181 @@
+"""Retention: old jobs, their sweeps and old uploads are deleted, a little at a time.
+
+Nothing may hold the database for long: SQLite has one writer. Every transaction is as large as it can be
+without taking longer than some thousandths of a second, and between two of them there is a pause as long as
+the work was.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from functools import partial
+
+from service.db.engine import Database
+from service.db.repositories.retention import Pruned, RetentionRepository
+from service.settings.settings import Settings
+
+log = logging.getLogger("stickslip.retention")
+
+_WANTED_SECONDS = 0.004
+_MOST = 64
+_JOBS = 64
+_JOBS_AT_ONCE = 4
+_ROUND_SECONDS = 600.0
+
+
+class _Paced:
+    """Does work in steps whose size is chosen by how long the last one took.
+
+    What a step changed is also moved from SQLite's log into its file here: else the request whose commit
+    finds the log long does that for all before it, up to 0.1 s.
+    """
+
+    def __init__(self, database: Database, pause: Callable[[float], bool]) -> None:
+        self._database = database
+        self._pause = pause
+        self._size = 4
+        self._last = 0.0
+        self.stopped = False
+
+    def all(self, step: Callable[[int], int]) -> int:
+        """Repeat `step`, which does up to a number of things and says how many, until nothing is left."""
+        total, size, done = 0, 0, 0
+        while done == size and not self.stopped:
+            size = self._size
+            done = self.once(partial(step, size))
+            total += done
+            if self._last > _WANTED_SECONDS:
+                self._size = max(1, size // 2)
+            elif self._last < 0.5 * _WANTED_SECONDS:
+                self._size = min(_MOST, 2 * size)
+        return total
+
+    def once(self, step: Callable[[], int]) -> int:
+        """Do one step, and pause."""
+        if self.stopped:
+            return 0
+        begun = time.monotonic()
+        done = step()
+        self._last = time.monotonic() - begun
+        self._database.settle()
+        self.stopped = self._pause(time.monotonic() - begun)
+        return done
+
+
+def prune(
+    database: Database,
+    before: datetime,
+    *,
+    keep_designs: bool,
+    pause: Callable[[float], bool] | None = None,
+    on_progress: Callable[[Pruned], None] | None = None,
+) -> Pruned:
+    """Delete the jobs that ended before a time, with their results and sweeps.
+
+    Parameters
+    ----------
+    keep_designs : of designs delete the sweeps alone.
+    pause : called between transactions with the time the last one took [s]; True ends the work.
+    on_progress : called with what was deleted in every round.
+    """
+    repository, paced = RetentionRepository(database), _Paced(database, pause or _sleep)
+    total = Pruned()
+    while not paced.stopped:
+        jobs = repository.take(before, _JOBS, keep_designs=keep_designs)
+        sweeps = paced.all(partial(repository.delete_sweeps, jobs, keep_designs=keep_designs))
+        deleted = 0
+        for index in range(0, len(jobs), _JOBS_AT_ONCE):
+            some = jobs[index : index + _JOBS_AT_ONCE]
+            deleted += paced.once(partial(repository.delete_jobs, some, keep_designs=keep_designs))
+        found = Pruned(jobs=deleted, sweeps=sweeps)
+        total += found
+        if on_progress is not None:
+            on_progress(found)
+        if found == Pruned():
+            return total
+    return total
+
+
+def prune_uploads(
+    database: Database, before: datetime, *, pause: Callable[[float], bool] | None = None
+) -> Pruned:
+    """Delete the uploads that came before a time and are not used, one by one; arguments as of `prune`."""
+    repository, paced = RetentionRepository(database), _Paced(database, pause or _sleep)
+    old = repository.old_uploads(before)
+    return Pruned(uploads=sum(paced.once(partial(repository.delete_upload, one, before)) for one in old))
+
+
+def _sleep(seconds: float) -> bool:
+    time.sleep(seconds)
+    return False
+
+
+class Retention:
+    """Deletes what is older than the settings say, beside the work of a service.
+
+    Parameters
+    ----------
+    database : Database
+        Where the jobs are.
+    settings : Settings
+        `retention_days`, `retention_keep_designs` and `retention_upload_days`; without days nothing is ever
+        deleted.
+    now : callable
+        The clock of the database.
+    """
+
+    def __init__(self, database: Database, settings: Settings, now: Callable[[], datetime]) -> None:
+        self._database = database
+        self._settings = settings
+        self._now = now
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._loop, name="stickslip retention", daemon=True)
+        self.pruned = Pruned()
+
+    def start(self) -> None:
+        """Begin, if the settings say so."""
+        if (self._settings.retention_days, self._settings.retention_upload_days) != (None, None):
+            self._thread.start()
+
+    def stop(self) -> None:
+        """End within the transaction that runs."""
+        self._stop.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def _loop(self) -> None:
+        while not self._stop.is_set():
+            try:
+                found = self.once()
+            except Exception:
+                log.exception("what is old could not be deleted, it is tried again later")
+            else:
+                if found != Pruned():
+                    words = "deleted %d old jobs, %d old sweeps and %d old uploads"
+                    log.info(words, found.jobs, found.sweeps, found.uploads)
+            self._stop.wait(_ROUND_SECONDS)
+
+    def once(self) -> Pruned:
+        """Delete what is too old now."""
+        found, now = Pruned(), self._now()
+        days, upload_days = self._settings.retention_days, self._settings.retention_upload_days
+        if days is not None:
+            found += prune(
+                self._database,
+                now - timedelta(days=days),
+                keep_designs=self._settings.retention_keep_designs,
+                pause=self._stop.wait,
+                on_progress=self._count,
+            )
+        if upload_days is not None and not self._stop.is_set():
+            uploads = prune_uploads(self._database, now - timedelta(days=upload_days), pause=self._stop.wait)
+            self._count(uploads)
+            found += uploads
+        return found
+
+    def _count(self, found: Pruned) -> None:
+        self.pruned += found

@@ -1,0 +1,127 @@
+"""The scenes a service knows: those that come with the package and those stored in its database."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from functools import cache
+
+from service.auth.callers import KEYLESS, Caller
+from service.db.models import NOBODY
+from service.db.repositories import SceneRepository, SceneRow
+from service.errors import ConflictError, NotFoundError
+from service.jobs.kinds.scenes import read_scene
+from service.jobs.strict_json import digest
+from service.uploads.uploads import Uploads
+from solver.scene.scene import load_scene, shipped_scenes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KnownScene:
+    """A scene by name.
+
+    Attributes
+    ----------
+    shipped : bool
+        Whether it comes with the package.
+    created : datetime or None
+        When it was stored; None for a shipped one.
+    owner : str
+        Whose it is; a shipped one is nobody's.
+    """
+
+    name: str
+    shipped: bool
+    scene_hash: str
+    body: Mapping[str, object]
+    created: datetime | None = None
+    owner: str = NOBODY
+
+
+@dataclass(frozen=True, slots=True)
+class SceneStore:
+    """Scenes by name, as one caller sees them; implements `service.jobs.registry.SceneSource`."""
+
+    repository: SceneRepository
+    uploads: Uploads
+    caller: Caller = KEYLESS
+
+    def of(self, caller: Caller) -> SceneStore:
+        """The same scenes as another caller sees them."""
+        return replace(self, caller=caller)
+
+    def with_uploads(self, body: Mapping[str, object]) -> Mapping[str, object]:
+        """A scene with what the caller's uploads hold in place of their ids."""
+        return self.uploads.resolved(body, self.caller)
+
+    def scene_body(self, name: str) -> Mapping[str, object] | None:
+        """Tables and lists of the scene, or None."""
+        try:
+            return self.get(name).body
+        except NotFoundError:
+            return None
+
+    def get(self, name: str) -> KnownScene:
+        """The shipped scene of this name, or the caller's own; only names are looked up, never paths.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none.
+        """
+        if name in shipped_scenes():
+            return _shipped(name)
+        row = self.repository.get(self.caller.owner, name)
+        if row is None:
+            known = ", ".join(shipped_scenes())
+            raise NotFoundError(f"there is no scene {name!r}: shipped are {known}, GET /v1/scenes lists all")
+        return _stored(row)
+
+    def all(self) -> list[KnownScene]:
+        """Shipped scenes, then the stored ones that the caller may see, each by name."""
+        stored = self.repository.all(self.caller.sees)
+        return [*map(_shipped, shipped_scenes()), *map(_stored, stored)]
+
+    def add(self, body: Mapping[str, object]) -> tuple[KnownScene, bool]:
+        """Store a scene under its own name; whether it is new.
+
+        Raises
+        ------
+        InvalidRequestError
+            If it is not a scene.
+        ConflictError
+            If another scene of the caller's has the name: a name means one scene for ever.
+        """
+        scene = read_scene(self.with_uploads(body))
+        tables = scene.to_dict()
+        scene_hash = digest(tables)
+        if scene.name in shipped_scenes():
+            known, added = _shipped(scene.name), False
+        else:
+            row, added = self.repository.add(self.caller.owner, scene.name, scene_hash, tables)
+            known = _stored(row)
+        if known.scene_hash != scene_hash:
+            kind = "shipped" if known.shipped else "stored"
+            raise ConflictError(
+                f"another scene is {kind} under the name {scene.name!r} and a name keeps its meaning: "
+                "give this one another `name`"
+            )
+        return known, added
+
+
+@cache
+def _shipped(name: str) -> KnownScene:
+    body = load_scene(name).to_dict()
+    return KnownScene(name=name, shipped=True, scene_hash=digest(body), body=body)
+
+
+def _stored(row: SceneRow) -> KnownScene:
+    return KnownScene(
+        name=row.name,
+        shipped=False,
+        scene_hash=row.scene_hash,
+        body=row.body,
+        created=row.created,
+        owner=row.owner,
+    )

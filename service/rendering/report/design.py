@@ -1,0 +1,125 @@
+"""The report of a design: what was given, what came out, what holds it, how to have it again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+from service.rendering.report.responses import Line, Sweeps, linear_lines
+from service.rendering.report.sections import (
+    Designed,
+    Json,
+    again_section,
+    bounds_of,
+    branch_table,
+    by_path,
+    motion_section,
+    plan_section,
+    response_section,
+    scene_section,
+)
+from service.rendering.tables.design import design_tables
+from solver.results import units
+from solver.views.plots import style
+from solver.views.plots.html import image, page, pairs, table
+
+
+def design_report(given: Designed) -> str:
+    """The report as a page of HTML.
+
+    Parameters
+    ----------
+    given : what was designed: the result of a design, or of a front.
+
+    Raises
+    ------
+    SettingError, SceneError
+        The optimum does not fit the scene.
+    """
+    chosen = _chosen(given.result)
+    optimum = by_path(chosen["optimum"])
+    sweeps = Sweeps(harmonics=given.harmonics, limit=given.problem.get("limit"))
+    case = sweeps.governing(given.scene, given.problem, optimum)
+    scene = case.scene
+    after = scene.with_values(optimum)
+    lines = [
+        *linear_lines(after, tuple(optimum)),
+        Line(name="as given", branch=sweeps.of(scene), color=style.BLUE),
+        Line(name="optimum", branch=sweeps.of(after), color=style.VERMILION, width=2.0),
+    ]
+    words = f"Amplitude of {scene.observe.dof} over frequency, as given and at the optimum{case.where}"
+    parts = [
+        f"<h1>Damper of {escape(given.scene.name)}</h1>",
+        f"<p>{escape(chosen['status'])}</p>",
+        _figures(given, chosen, lines, case.where),
+        response_section(scene, lines, words),
+        *_holds(given, chosen),
+        *_trade_off(given.result),
+        motion_section(lines[-1].branch),
+        scene_section(given.scene),
+        plan_section(after, given.harmonics),
+        again_section(given, "pareto" if _is_front(given.result) else "design"),
+    ]
+    return page(f"Damper of {given.scene.name}", "\n".join(parts))
+
+
+def _is_front(result: Json) -> bool:
+    return "points" in result
+
+
+def _chosen(result: Json) -> Json:
+    """The optimum; of a front its knee, else its least peak."""
+    if not _is_front(result):
+        return result
+    points = result["points"]
+    if not points:
+        return {"optimum": {}, "peak": None, "active": [], "status": result["status"]}
+    point = points[result["knee"] or 0]
+    peak = {"value": point["peak"], "at": point["at"]}
+    return {**point, "optimum": point["values"], "peak": peak, "status": result["status"]}
+
+
+def _figures(given: Designed, chosen: Json, lines: Sequence[Line], where: str) -> str:
+    """The optimum, and what it changes."""
+    rows: list[list[Any]] = []
+    for name, value in chosen["optimum"].items():
+        path = name.split(",")[0].strip()
+        before = units.parameter(path, given.scene.value(path))
+        rows.append([name, before, units.parameter(path, value), bounds_of(given, name)])
+    return (
+        f"<h2>Optimum</h2>{table(['variable', 'as given', 'optimum', 'bounds'], rows)}"
+        f"<h2>Before and after{escape(where)}</h2>{branch_table(lines)}"
+    )
+
+
+def _holds(given: Designed, chosen: Json) -> list[str]:
+    """What holds the optimum: limits, active rows with multipliers, local optima."""
+    if _is_front(given.result):
+        active = "; ".join(chosen["active"])
+        return [f"<h2>What holds it</h2><p>{escape(active)}</p>"] if active else []
+    found, tables = design_tables(given.result)
+    parts = ["<h2>What holds it</h2>", pairs(found)]
+    conditions = given.result.get("conditions")
+    if conditions is not None:
+        worst = max(conditions["violation"], 0.0)
+        violation = f"{worst:.1e}" if worst > 0.0 else "none"
+        parts.append(pairs([("largest relative violation of a limit", violation)]))
+    for one in tables:
+        parts += [f"<h3>{escape(one.heading)}</h3>", table(list(one.columns), [list(r) for r in one.rows])]
+    return parts
+
+
+def _trade_off(result: Json) -> list[str]:
+    """The front, of a job that computed one."""
+    if not _is_front(result) or not result["points"]:
+        return []
+    from optim.views.plots.pareto import pareto_figure
+
+    heads = [*result["points"][0]["values"], "peak", "band"]
+    rows = [
+        [*p["values"].values(), units.length(p["peak"]), f"{units.number(p['band_hz'])} Hz"]
+        for p in result["points"]
+    ]
+    words = "The front of peak against band, and the frequencies at risk"
+    return ["<h2>Trade-off</h2>", image(pareto_figure(result), words), table(heads, rows)]

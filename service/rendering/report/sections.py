@@ -1,0 +1,150 @@
+"""What every report has: the motion at the peak, the scene, the plan, and how to have it again."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import solver
+from service.rendering.report.responses import Line, comparison_figure
+from solver.continuation.branch import Branch
+from solver.results import units
+from solver.scene.scene import Scene
+from solver.scene.toml import toml_text
+from solver.views.notes import flag_words
+from solver.views.plots.html import image, pairs, table
+
+Json = Mapping[str, Any]
+_PACKAGES = ("stickslip", "numpy", "scipy", "numba", "casadi", "cvxpy", "clarabel")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Designed:
+    """What a report is of.
+
+    Attributes
+    ----------
+    scene : Scene
+        As it was given, with its values set.
+    problem : mapping
+        The arguments of the design layer.
+    result : mapping
+        The JSON of `optim.DesignResult`, of `optim.ParetoResult` or of `optim.RobustResult`.
+    """
+
+    scene: Scene
+    problem: Json
+    result: Json
+
+    @property
+    def harmonics(self) -> int:
+        """Highest harmonic kept."""
+        return int(self.problem.get("harmonics", 11))
+
+
+def by_path(values: Mapping[str, float]) -> dict[str, float]:
+    """The value of every parameter path; in a problem, paths that share one are separated by commas."""
+    return {path.strip(): value for paths, value in values.items() for path in paths.split(",")}
+
+
+def bounds_of(given: Designed, name: str) -> str:
+    """The bounds of a variable, with its unit; empty if they were not given."""
+    bounds = (given.problem.get("variables") or {}).get(name)
+    path = name.split(",")[0].strip()
+    return "" if bounds is None else f"{units.number(bounds[0], 6)} to {units.parameter(path, bounds[1])}"
+
+
+def branch_table(lines: Sequence[Line]) -> str:
+    """Peak, error, place and band of every response that is not a linear limit, and what is doubtful."""
+    rows: list[list[Any]] = []
+    doubts: list[str] = []
+    for line in lines:
+        branch = line.branch
+        if line.linear or branch is None or branch.peak is None:
+            continue
+        band = "" if branch.band is None else f"{units.number(branch.band.width)} Hz"
+        error, place = units.length(branch.error_estimate), f"{branch.peak.at:.6g} Hz"
+        certificate = branch.peak_certificate
+        rows.append(
+            [line.name, units.length(branch.peak.value), error, place, band,
+             "known" if certificate.known else "not known"]
+        )  # fmt: skip
+        if not certificate.known:
+            doubts.append(f"{line.name}: between its points there may be a higher peak. {certificate.reason}")
+        doubts += [f"{line.name}: {words}" for words in flag_words(branch.flags)]
+    heads = ["response", "highest peak", "estimated error", "at", "band", "peaks between points"]
+    said = "".join(f"<p>{escape(doubt)}</p>" for doubt in doubts)
+    return f"{table(heads, rows)}{said}"
+
+
+def motion_section(branch: Branch | None, where: str = "At the peak") -> str:
+    """One period at the highest peak of a response."""
+    if branch is None or branch.peak is None:
+        return ""
+    balance = branch.balance
+    solution = solver.solve(balance.scene, frequency_hz=branch.peak.at, harmonics=branch.balance.n_harmonics)
+    if not solution.converged:
+        return ""
+    words = "One period at the highest peak: motion, hysteresis loops, harmonics"
+    states = [(contact.name, contact.state.value) for contact in solution.contacts]
+    states += [("note", words) for words in flag_words(solution.flags)]
+    return f"<h2>{escape(where)}</h2>{image(solution.plot(), words, words + '.')}{pairs(states)}"
+
+
+def response_section(scene: Scene, lines: Sequence[Line], words: str) -> str:
+    """The responses in one picture, or that there are none; `words` end without a full stop."""
+    if all(line.branch is None for line in lines):
+        return "<p>No response could be computed over the band of the scene.</p>"
+    linear = ", between the linear limits" if any(line.linear for line in lines) else ""
+    return image(comparison_figure(scene, lines), words, f"{words}{linear}.")
+
+
+def scene_section(scene: Scene) -> str:
+    """The contacts, the force and what is observed; the rest is in the TOML."""
+    contacts: list[list[Any]] = []
+    for contact in scene.contacts:
+        values = [
+            f"{key} = {units.parameter(f'{contact.name}.{key}', value)}"
+            for key in contact.PARAMETERS
+            if (value := getattr(contact, key)) is not None
+        ]
+        contacts.append([contact.name, " – ".join(contact.between), ", ".join(values)])
+    low, high = scene.observe.band
+    about = [
+        ("structure", f"{scene.structure.kind}, {len(scene.structure.dofs)} DOFs"),
+        *(("force", f"{force.amplitude:g} N on {force.dof}") for force in scene.excitation),
+        ("observed", f"{scene.observe.dof}, {low:g} to {high:g} Hz"),
+    ]
+    return f"<h2>Scene</h2>{pairs(about)}{table(['contact', 'between', 'as given'], contacts)}"
+
+
+def plan_section(scene: Scene, harmonics: int) -> str:
+    """The effects in use and those left out."""
+    found = solver.plan(scene, harmonics=harmonics)
+    rows: list[list[Any]] = [[e.name, "in use" if e.used else "left out", e.reason] for e in found.effects]
+    words = "What was computed, and what was left out without loss."
+    return f"<h2>Plan</h2><p class=quiet>{words}</p>{table(['effect', '', 'why'], rows)}"
+
+
+def again_section(given: Designed, command: str) -> str:
+    """The files and the command that give the same, and the versions."""
+    problem = toml_text({"scene": "scene.toml", **given.problem})
+    packages = [("Python", platform.python_version()), *((name, _version(name)) for name in _PACKAGES)]
+    return (
+        "<h2>To have it again</h2>"
+        f"<pre>stickslip {command} --problem problem.toml</pre>"
+        f"<h3>problem.toml</h3><pre>{escape(problem)}</pre>"
+        f"<h3>scene.toml</h3><pre>{escape(toml_text(given.scene.to_dict()))}</pre>"
+        f"<h3>Versions</h3>{pairs(packages)}"
+    )
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"

@@ -1,0 +1,1 @@
+"""The tables that the command and the report share."""

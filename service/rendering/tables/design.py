@@ -1,0 +1,226 @@
+"""What people read of a design, given as the JSON object a program reads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from service.rendering.tables.text import print_pairs, print_table, say
+from solver.results import units
+
+Json = Mapping[str, Any]
+Pairs = list[tuple[str, str]]
+
+_PRICED = 0.02  # share of a size, rounded down to a power of ten
+_COUNTS = 1e-6  # multipliers below this hold nothing
+_ROUNDING = 1e-6  # relative excess over a limit up to which it is kept
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A table to print: heading, column heads, rows, and which columns are aligned right."""
+
+    heading: str
+    columns: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+    right: str
+
+
+def design(found: Json) -> None:
+    """The best design: what it reaches, what holds it, what it must keep, and the other optima."""
+    title = f"Best damper of {found['scene']}"
+    print_pairs(title if _kept(found) else f"{title}: not all limits can be kept", _pairs(found))
+    for table in design_tables(found)[1]:
+        say("")
+        print_table(table.heading, table.columns, table.rows, right=table.right)
+
+
+def design_tables(found: Json) -> tuple[Pairs, list[Table]]:
+    """What a design came to, and its tables: limits, what is active, local optima."""
+    tables = (_limits(found), _active(found), _basins(found), _checked(found))
+    return _pairs(found), [table for table in tables if table is not None]
+
+
+def _kept(found: Json) -> bool:
+    """Whether every limit is kept, to the accuracy of the search."""
+    conditions = found.get("conditions")
+    return not found.get("broken") or (conditions is not None and conditions["violation"] <= _ROUNDING)
+
+
+def front(found: Json) -> None:
+    """The points of a front of peak against band with what each costs in terms of the other."""
+    points: Sequence[Json] = found["points"]
+    names = tuple(points[0]["values"]) if points else ()
+    hertz = _price(max((point["band_hz"] for point in points), default=1.0))
+    metres = _price(min((point["peak"] for point in points), default=1.0))
+    rows: list[tuple[str, ...]] = [
+        (
+            *(units.parameter(name, point["values"][name]) for name in names),
+            units.length(point["peak"]),
+            f"{units.number(point['band_hz'])} Hz",
+            "" if point["slope"] is None else units.length(abs(point["slope"]) * hertz),
+            "" if point["hz_per_metre"] is None else f"{units.number(metres * point['hz_per_metre'])} Hz",
+            "knee" if index == found["knee"] else "",
+        )
+        for index, point in enumerate(points)
+    ]
+    costs = (f"peak for {hertz:g} Hz less band", f"band for {units.length(metres)} less peak")
+    columns = (*names, "peak", "band", *costs, "")
+    right = "".join(str(i) for i in range(min(len(columns) - 1, 10)))
+    print_table(f"Front of {found['scene']}: peak against band", columns, rows, right=right)
+    pairs = [("not found", f"band of {units.number(width)} Hz") for width in found["missed"]]
+    pairs += [("end", end["status"]) for end in found["ends"] if not end["reached"]]
+    effort = f"{found['evaluations']} designs in {units.duration(found['seconds'])}"
+    print_pairs("", [*pairs, ("effort", effort)])
+
+
+def _price(size: float) -> float:
+    """A round number, a hundredth of a size or so, in which a change of it is told."""
+    return 10.0 ** math.floor(math.log10(_PRICED * size)) if size > 0.0 else 1.0
+
+
+def values(optimum: Json) -> Pairs:
+    """The variables with their units."""
+    return [(path, units.parameter(path, value)) for path, value in optimum.items()]
+
+
+def amount(value: float, unit: str) -> str:
+    """A number of a row with its unit; lengths in the one that fits."""
+    return units.length(value) if unit == "m" else f"{units.number(value)} {unit}"
+
+
+def _pairs(found: Json) -> Pairs:
+    """What the design is and what it came to."""
+    pairs = [*values(found["optimum"]), *_plateau(found)]
+    peaks: Sequence[Json] = found.get("peaks") or ([found["peak"]] if found["peak"] else [])
+    several = len({peak.get("case") for peak in peaks}) > 1
+    if any(row["weight"] > 0.0 and row["quantity"] != "peak" for row in found.get("rows", ())):
+        pairs.append(("objective", units.number(found["objective"], 6)))
+    for index, peak in enumerate(peaks):
+        of = f" ({peak['case']})" if several else ""
+        name = "further peak" if index else "peak"
+        pairs.append((name, f"{units.length(peak['value'])} at {peak['at']:.6g} Hz{of}"))
+    pairs += _errors(found)
+    if found["band_hz"] is not None:
+        pairs.append(("band", f"{units.number(found['band_hz'])} Hz above {units.length(found['limit'])}"))
+    if found["active"]:
+        held = found.get("held_by")
+        case = f" (of {held['case']})" if held and several else ""
+        pairs.append(("held by", "; ".join(found["active"]) + case))
+    looked = len(found.get("looked_at", ()))
+    if looked:
+        ends = len(found.get("basins", ()))
+        pairs.append(("looked at", f"{looked} designs over the whole range; {ends} local optima"))
+    residual = found.get("optimality")
+    if residual is not None:
+        pairs.append(("KKT residual", f"{residual:.1e}"))
+    effort = f"{found['evaluations']} frequency responses in {units.duration(found['seconds'])}"
+    work = found.get("work")
+    if work is not None and abs(work - found["evaluations"]) >= 0.5:
+        effort += f", the work of {units.number(work, 3)}"
+    by = f", method {found['method']}" if "method" in found else ""
+    return [*pairs, ("effort", effort + by)]
+
+
+def _plateau(found: Json) -> Pairs:
+    """How far other values are as good, and what the design was chosen by among them."""
+    ends = [
+        (f"{path}, as good", f"{units.parameter(path, low)} to {units.parameter(path, high)}")
+        for path, (low, high) in found.get("plateau", {}).items()
+    ]
+    by = found.get("chosen_by")
+    return [*ends, ("chosen by", by)] if by else ends
+
+
+def _errors(found: Json) -> Pairs:
+    """The estimated error of the peak that holds the design, and what makes numbers doubtful."""
+    error = found.get("error_estimate")
+    pairs = [] if error is None else [("estimated error", units.length(error))]
+    return pairs + [("warning", words) for words in found.get("warnings", ())]
+
+
+def _checked(found: Json) -> Table | None:
+    """The local optima again with more harmonics, where the estimated error is large."""
+    checked: Sequence[Json] = found.get("checked", ())
+    if not checked:
+        return None
+    names = tuple(checked[0]["values"])
+    rows: list[tuple[str, ...]] = [
+        (
+            *(units.parameter(name, one["values"][name]) for name in names),
+            str(one["n_harmonics"]),
+            "unknown" if one["peak"] is None else units.length(one["peak"]),
+            "yes" if one["feasible"] else "no",
+        )
+        for one in checked
+    ]
+    columns = (*names, "harmonics", "peak", "keeps the limits")
+    right = "".join(str(i) for i in range(min(len(names) + 2, 10)))
+    return Table(heading="Again with more harmonics", columns=columns, rows=rows, right=right)
+
+
+def _limits(found: Json) -> Table | None:
+    """Every limit: what was asked, what is reached, and what is left or missing."""
+    worst: dict[tuple[str, str, str, float], Json] = {}
+    for row in found.get("rows", ()):
+        if row["bound"] is None:
+            continue
+        key = (row["quantity"], row["case"], row["what"].partition(" at ")[0], row["bound"])
+        if key not in worst or row["value"] > worst[key]["value"]:
+            worst[key] = row
+    if not worst:
+        return None
+    several, kept = len({row["case"] for row in worst.values()}) > 1, _kept(found)
+    rows: list[tuple[str, ...]] = []
+    for row in sorted(worst.values(), key=lambda row: row["bound"] - row["value"]):
+        left, unit = row["bound"] - row["value"], row["unit"]
+        left = max(left, 0.0) if kept else left
+        holds = f"{amount(left, unit)} left" if left >= 0.0 else f"broken by {amount(-left, unit)}"
+        what = f"{row['what']} ({row['case']})" if several else row["what"]
+        asked, reached = f"≤ {amount(row['bound'], unit)}", amount(row["value"], unit)
+        if row["quantity"] == "separation":  # a row is kept from above: the least load has its sign turned
+            what = what.removeprefix("-")
+            asked, reached = f"≥ {amount(0.0 - row['bound'], unit)}", amount(0.0 - row["value"], unit)
+        rows.append((what, asked, reached, holds))
+    return Table(heading="Limits", columns=("limit", "asked", "reached", ""), rows=rows, right="12")
+
+
+def _active(found: Json) -> Table | None:
+    """The rows and bounds that hold the optimum, with their multipliers."""
+    conditions = found.get("conditions")
+    if not conditions:
+        return None
+    several = len({row["case"] for row in conditions["rows"]}) > 1
+    held = [
+        (f"{row['what']} ({row['case']})" if several else row["what"], row["multiplier"])
+        for row in conditions["rows"]
+    ]
+    held += [
+        (f"{bound['side']} bound of {bound['variable']}", bound["multiplier"])
+        for bound in conditions["bounds"]
+    ]
+    rows: list[tuple[str, ...]] = [(what, units.number(x)) for what, x in held if abs(x) > _COUNTS]
+    return Table(heading="Active", columns=("row", "multiplier"), rows=rows, right="1") if rows else None
+
+
+def _basins(found: Json) -> Table | None:
+    """The local optima, if there are several."""
+    basins: Sequence[Json] = found.get("basins", ())
+    if len(basins) < 2:
+        return None
+    names = tuple(basins[0]["values"])
+    rows: list[tuple[str, ...]] = [
+        (
+            *(units.parameter(name, basin["values"][name]) for name in names),
+            units.length(basin["peak"]),
+            "yes" if basin["settled"] else "no",
+            "yes" if basin.get("proven", True) else "no",
+            "yes" if basin["feasible"] else "no",
+        )
+        for basin in basins
+    ]
+    columns = (*names, "peak", "settled", "proven", "keeps the limits")
+    right = "".join(str(i) for i in range(min(len(names) + 1, 10)))
+    return Table(heading="Local optima", columns=columns, rows=rows, right=right)

@@ -1,0 +1,190 @@
+"""What people read of a result, given as the JSON object a program reads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from service.cli.commands import mistuning as mistuning_command
+from service.rendering.tables import campbell as campbell_reports
+from service.rendering.tables import design as design_reports
+from service.rendering.tables import robust as robust_reports
+from service.rendering.tables import track as track_reports
+from service.rendering.tables.text import print_pairs, print_table, say
+from solver.results import units
+from solver.views.notes import BAND_OPEN, FLAGS, between_points, flag_words
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+Json = Mapping[str, Any]
+Pairs = list[tuple[str, str]]
+
+_ACCURACY_COLUMNS = ("", "harmonics", "contact forces", "max|x|", "error", "ms", "iterations")
+_EFFECT_COLUMNS = ("used", "effect", "reason")
+_SCENE_COLUMNS = ("name", "kind", "DOFs", "contacts", "observed", "band")
+
+
+def scenes(known: Sequence[Scene]) -> None:
+    """A table of scenes."""
+    rows = [
+        (
+            scene.name,
+            scene.structure.kind,
+            str(len(scene.structure.dofs)),
+            ", ".join(contact.name for contact in scene.contacts),
+            scene.observe.dof,
+            f"{scene.observe.band[0]:g} to {scene.observe.band[1]:g} Hz",
+        )
+        for scene in known
+    ]
+    print_table("Shipped scenes", _SCENE_COLUMNS, rows)
+
+
+def plan(found: Json) -> None:
+    """The effects in use and left out, the sizes and the cost."""
+    effects = [("yes" if e["used"] else "no", e["name"], e["reason"]) for e in found["effects"]]
+    print_table(f"Plan of {found['scene']}", _EFFECT_COLUMNS, effects)
+    print_pairs(
+        "",
+        [
+            (
+                "unknowns",
+                f"{found['unknowns']} ({found['contacts']} contacts, {found['n_harmonics']} harmonics)",
+            ),
+            ("linear DOFs", str(found["linear_dofs"])),
+            ("estimated cost", f"{units.duration(found['estimated_seconds_a_point'])} a point of a branch"),
+        ],
+    )
+
+
+def solution(found: Json) -> None:
+    """One response."""
+    title = f"{found['scene']} at {found['frequency_hz']:g} Hz, {found['n_harmonics']} harmonics"
+    if not found["converged"]:
+        print_pairs(title, [("converged", "no")])
+        return
+    pairs = _amplitudes(found)
+    if found["error_estimate"] is not None:
+        of = "half peak to peak" if "mean_undetermined" in found["flags"] else "max|x|"
+        pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of {of}"))
+    pairs.append(("harmonics 1 to 5", ", ".join(units.length(a) for a in found["harmonics"][1:6])))
+    pairs += [(f"contact {name}", state) for name, state in found["contacts"].items()]
+    pairs += [("note", words) for words in flag_words(found["flags"])]
+    low, high = found.get("mean_range", (None, None))
+    if low is not None and high is not None:
+        pairs.append(("mean, any history", f"{units.length(low)} to {units.length(high)}"))
+    pairs += [("residual", f"{found['residual']:.1e}"), ("time", units.duration(found["seconds"]))]
+    print_pairs(title, pairs)
+
+
+def branch(found: Json) -> None:
+    """A branch: its peaks and its band."""
+    path, values = found["parameter_path"], found["parameter"]
+    pairs = _peaks(found, path)
+    if found["error_estimate"] is not None:
+        pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of the highest"))
+    if found.get("mean_undetermined"):
+        pairs.append(("note", "at the highest peak " + FLAGS["mean_undetermined"]))
+    if found["band_hz"] is not None:
+        pairs.append(("band", _band(found)))
+    effort = f"{found['newton_iterations']} Newton iterations, {found['rejected_steps']} steps rejected"
+    pairs += sure_of(found)
+    pairs += [("note", words) for words in flag_words(found.get("flags", ()))]
+    pairs.append(("points", f"{found['points']} ({effort}, {found['folds']} folds)"))
+    pairs.append(("time", units.duration(found["seconds"])))
+    title = f"{found['scene']}, {path}"
+    if values:
+        title += f" from {units.parameter(path, values[0])} to {units.parameter(path, values[-1])}"
+    print_pairs(f"{title}, {found['n_harmonics']} harmonics", pairs)
+
+
+def sure_of(found: Json) -> Pairs:
+    """What a branch knows between its points; nothing of one that an earlier version computed."""
+    certificate = found.get("peak_certificate")
+    if certificate is None or found["peak"] is None:
+        return []
+    said = between_points(known=certificate["known"], reason=certificate["reason"])
+    pairs = [("between points", said)]
+    if certificate["known"] and found.get("band_known") is False:
+        pairs.append(("note", BAND_OPEN))
+    return pairs
+
+
+def accuracy(found: Json) -> None:
+    """Error against time, the rows nothing beats marked."""
+    size = found["reference"]
+    rows = [
+        (
+            "*" if row["pareto"] else "",
+            str(row["harmonics"]),
+            row["evaluator"] if row["samples"] == 0 else f"{row['samples']} samples",
+            units.length(row["max_abs"]),
+            f"{row['error'] / size:.1e}" if size > 0.0 else "",
+            f"{row['milliseconds']:.3g}",
+            str(row["iterations"]),
+        )
+        for row in found["rows"]
+    ]
+    title = f"{found['scene']} at {found['frequency_hz']:.6g} Hz: {units.length(size)}"
+    if found["reference_error"] is not None:
+        title += (
+            f" with {found['reference_harmonics']} harmonics, to {units.length(found['reference_error'])}"
+        )
+    print_table(title, _ACCURACY_COLUMNS, rows, right="13456")
+    say("* nothing else here is both as accurate and as fast")
+
+
+def march(found: Json) -> None:
+    """What a time march came to."""
+    pairs = _amplitudes(found)
+    if found["error_estimate"] is not None:
+        pairs.append(("estimated error", f"{found['error_estimate']:.1e} of max|x|"))
+    pairs.append(("periods", f"{found['periods']} of {found['steps_per_period']} steps"))
+    pairs.append(("time", units.duration(found["seconds"])))
+    print_pairs("Time march", pairs)
+
+
+def design(found: Json) -> None:
+    """A design, of what is known or in spite of what is not."""
+    if "nominal" in found:
+        robust_reports.robust(found)
+    else:
+        design_reports.design(found)
+
+
+BY_KIND: Mapping[str, Callable[[Json], None]] = {
+    "solve": solution,
+    "sweep": branch,
+    "design": design,
+    "pareto": design_reports.front,
+    "march": march,
+    "map": track_reports.response_map,
+    "peaks": track_reports.track,
+    "accuracy": accuracy,
+    "campbell": campbell_reports.diagram,
+    "mistuning": mistuning_command.report,
+}
+
+
+def _amplitudes(found: Json) -> Pairs:
+    names = {"max_abs": "max|x|", "half_peak_to_peak": "half peak to peak", "mean": "mean"}
+    known = {key: found[key] for key in names if found[key] is not None}
+    show = units.length_unit(max((abs(value) for value in known.values()), default=0.0)).show
+    return [(names[key], show(value)) for key, value in known.items()]
+
+
+def _peaks(found: Json, path: str) -> Pairs:
+    peak, interior = found["peak"], found["peaks"]
+    if peak is None:
+        return []
+    highest = "peak" if peak in interior else "highest, at an end"
+    others = [other for other in interior if other != peak]
+    named = [(highest, peak), *(("further peak", other) for other in others)]
+    return [(name, f"{units.length(p['value'])} at {units.parameter(path, p['at'])}") for name, p in named]
+
+
+def _band(found: Json) -> str:
+    above = f"{units.number(found['band_hz'])} Hz above {units.length(found['band_limit'])}"
+    intervals = [f"{low:.6g} to {high:.6g}" for low, high in found["band_intervals_hz"]]
+    return f"{above}: {', '.join(intervals)}" if intervals else above

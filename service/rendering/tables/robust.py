@@ -1,0 +1,98 @@
+"""What people read of a robust design, given as the JSON object a program reads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from service.rendering.tables.text import print_pairs, print_table, say
+from solver.results import units
+
+Json = Mapping[str, Any]
+
+_UNKNOWN = "not known"
+
+
+def robust(found: Json) -> None:
+    """The nominal and the robust optimum side by side, and the scenarios that make the difference."""
+    sides = [(name, found[name]) for name in ("nominal", "robust") if found[name] is not None]
+    rows: list[tuple[str, ...]] = []
+    if sides:
+        for path in sides[0][1]["values"]:
+            rows.append((path, *(units.parameter(path, side["values"][path]) for _, side in sides)))
+        rows += [(name, *(show(side) for _, side in sides)) for name, show in _LINES]
+    aim = found["aim"] if found["quantile"] is None else f"{100.0 * found['quantile']:g} % {found['aim']}"
+    title = f"Robust damper of {found['scene']}, {aim}"
+    columns = ("", *(f"{name} optimum" for name, _ in sides))
+    print_table(title, columns, rows, right="".join(str(i + 1) for i in range(len(sides))))
+    said = "; ".join(f"{name} {what}" for name, what in uncertain_rows(found["uncertain"]))
+    print_pairs("", [("uncertain", said), *effort_pairs(found)])
+    held = [cut for cut in found["cuts"] if abs(cut["multiplier"]) > 1e-6]
+    if held:
+        say("")
+        print_table(
+            "Scenarios that hold the robust optimum", ("scenario", "multiplier"),
+            [(cut["scenario"]["words"], units.number(cut["multiplier"])) for cut in held], right="1",
+        )  # fmt: skip
+
+
+def effort_pairs(found: Json) -> list[tuple[str, str]]:
+    """What was gained, how well the search closed, and what it took."""
+    pairs: list[tuple[str, str]] = []
+    if found["gain"] is not None:
+        pairs.append(
+            ("gain", f"the robust worst peak is {100.0 * found['gain']:.3g} % below the nominal one")
+        )
+    if found["gap"] is not None:
+        whole = ", after a look at the whole uncertainty" if found.get("inner_look") else ""
+        pairs.append(("gap of the cuts", f"{found['gap']:.1e}{whole}"))
+    if found["optimality"] is not None:
+        pairs.append(("KKT residual", f"{found['optimality']:.1e}"))
+    pairs += [("warning", words) for words in found.get("warnings", ())]
+    if found["unknown"] is not None:
+        pairs.append(("no response", found["unknown"]["words"]))
+    effort = f"{found['designs']} designs, {found['responses']} frequency responses"
+    return [*pairs, ("effort", f"{effort} in {units.duration(found['seconds'])}")]
+
+
+def uncertain_rows(found: Json) -> list[tuple[str, str]]:
+    """What is not known, each with how."""
+    said: list[tuple[str, str]] = []
+    for one in found.get("parameters", ()):
+        low, high, how = one["low"], one["high"], one["how"]
+        if how == "relative deviation":
+            said.append((one["path"], f"{100.0 * low:+.4g} to {100.0 * high:+.4g} %"))
+        elif how == "deviation":
+            said.append((one["path"], f"{low:+.4g} to {high:+.4g} from the design"))
+        else:
+            ends = [units.parameter(one["path"], end) for end in (low, high)]
+            said.append((one["path"], f"from {ends[0]} to {ends[1]}"))
+    if "samples" in found:
+        said.append(("samples", str(len(found["samples"]))))
+    if "disks" in found:
+        said.append(("mistuned disks", str(len(found["disks"]))))
+    return said
+
+
+def side_lines() -> tuple[tuple[str, Callable[[Json], str]], ...]:
+    """What is said of each optimum: a name, and how to say it."""
+    return _LINES
+
+
+def _length(value: float | None) -> str:
+    return _UNKNOWN if value is None else units.length(value)
+
+
+def _quantile(side: Json, share: float) -> str:
+    found = [q["peak"] for q in side["samples"]["quantiles"] if q["share"] == share]
+    return _length(found[0] if found else None)
+
+
+_LINES: tuple[tuple[str, Callable[[Json], str]], ...] = (
+    ("peak, nothing uncertain", lambda side: _length(side["peak"]["value"])),
+    ("worst peak", lambda side: _length(None if side["worst"] is None else side["worst"]["peak"])),
+    ("in the scenario", lambda side: "" if side["worst"] is None else side["worst"]["scenario"]["words"]),
+    ("mean of the samples", lambda side: _length(side["samples"]["mean"])),
+    ("95 % of the samples below", lambda side: _quantile(side, 0.95)),
+    ("keeps the limits", lambda side: "yes" if side["feasible"] else "no"),
+)

@@ -1,0 +1,83 @@
+"""What people read of tracked peaks and maps, given as the JSON object a program reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from service.rendering.tables.text import print_pairs
+from solver.results import units
+
+Json = Mapping[str, Any]
+Pairs = list[tuple[str, str]]
+ON_THE_GRID = "resonances narrower than the grid are not on it: the tracked peaks, or a sweep, have them"
+
+
+def track(found: Json) -> None:
+    """The highest peak over a parameter: both ends, the exchanges, the least."""
+    pairs = [*_ridge(found), *_plateau(found), *_sure(found)]
+    pairs.append(("points", f"{len(found['parameter'])}, {found['sweeps']} sweeps"))
+    pairs.append(("time", units.duration(found["seconds"])))
+    print_pairs(_title(found), pairs)
+
+
+def response_map(found: Json) -> None:
+    """The size of a map, its highest amplitude, and its ridge."""
+    path = found["parameter_path"]
+    known = [
+        (value, frequency, at)
+        for at, row in zip(found["parameter"], found["amplitude"], strict=True)
+        for frequency, value in zip(found["frequency"], row, strict=True)
+        if value is not None
+    ]
+    size = f"{len(found['parameter'])} × {len(found['frequency'])}"
+    pairs = [("points", f"{size}, {len(known)} solved, largest residual {found['largest_residual']:.1e}")]
+    if known:
+        value, frequency, at = max(known)
+        place = f"{frequency:.6g} Hz, {path} {units.parameter(path, at)}"
+        pairs.append(("highest of the grid", f"{units.length(value)} at {place}"))
+    if found["ridge"] is not None:
+        pairs += [*_ridge(found["ridge"]), *_plateau(found["ridge"]), *_sure(found["ridge"])]
+    else:
+        pairs.append(("note", ON_THE_GRID))
+    pairs.append(("time", units.duration(found["seconds"])))
+    print_pairs(_title(found), pairs)
+
+
+def _title(found: Json) -> str:
+    path, values = found["parameter_path"], found["parameter"]
+    title = f"{found['scene']}, {path}"
+    if values:
+        title += f" from {units.parameter(path, values[0])} to {units.parameter(path, values[-1])}"
+    return f"{title}, {found['n_harmonics']} harmonics"
+
+
+def _ridge(found: Json) -> Pairs:
+    path, best = found["parameter_path"], found["optimum"]
+    pairs: Pairs = []
+    for name, at in (("first peak", 0), ("last peak", -1)):
+        if found["peak"]:
+            value, frequency = found["peak"][at], found["frequency"][at]
+            pairs.append((name, f"{units.length(value)} at {frequency:.6g} Hz"))
+    for exchange in found["exchanges"]:
+        height = units.length(exchange["peak"])
+        pairs.append(("exchange", f"at {units.parameter(path, exchange['at'])}, both {height}"))
+    if best["at"] is not None:
+        held = ", ".join(f"{peak['frequency']:.6g} Hz" for peak in best["active"])
+        height = units.length(best["peak"])
+        pairs.append(("least peak", f"{height} at {path} = {units.parameter(path, best['at'])} ({held})"))
+    return pairs
+
+
+def _plateau(found: Json) -> Pairs:
+    """How far other values of the parameter are as good."""
+    path, best = found["parameter_path"], found["optimum"]
+    if best.get("plateau") is None:
+        return []
+    low, high = (units.parameter(path, end) for end in best["plateau"])
+    return [("as good", f"{low} to {high}"), ("chosen by", best["chosen_by"])]
+
+
+def _sure(found: Json) -> Pairs:
+    """Why it is not known of a response behind the result that no higher peak hides between its points."""
+    return [("warning", f"a response may have a higher peak. {why}") for why in found.get("peaks_open", ())]

@@ -1,0 +1,397 @@
+"""What the service answers, over HTTP and embedded alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from datetime import datetime
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.db.models import JobState
+from service.db.repositories import DesignRepository, DesignRow, JobRow, SweepRepository, SweepRow
+from service.jobs.arrays import decode
+from service.jobs.registry import ContactValues, VariableValues
+from service.queue.scene_store import KnownScene
+
+if TYPE_CHECKING:
+    from service.queue.core import Results
+
+_SAME = (
+    *(
+        "id",
+        "owner",
+        "scene_hash",
+        "parameter",
+        "frequency_hz",
+        "excitation_amplitude",
+        "harmonics",
+        "points",
+    ),
+    *(
+        "limit",
+        "band_hz",
+        "error_estimate",
+        "peaks_known",
+        "newton_iterations",
+        "rejected_steps",
+        "seconds",
+        "completed",
+        "status",
+        "created",
+    ),
+)
+_SAME_OF_DESIGNS = (
+    *(
+        "owner",
+        "scene_hash",
+        "method",
+        "robust",
+        "reached",
+        "feasible",
+        "status",
+        "objective",
+        "limit",
+        "band_hz",
+    ),
+    *("harmonics", "evaluations", "work", "seconds", "created"),
+)
+
+
+class Answer(BaseModel):
+    """Root of the answers."""
+
+    model_config = ConfigDict(frozen=True)
+
+
+class JobAnswer(Answer):
+    """A job."""
+
+    id: str
+    owner: str = Field(description="Whom it belongs to; empty if it was made without a key.")
+    kind: str
+    status: JobState
+    progress: float = Field(description="Fraction of the path, 0 to 1.")
+    points: int = Field(description="Points computed so far.")
+    scene: str | None
+    priority: int
+    attempt: int
+    max_attempts: int
+    cancel_requested: bool
+    created: datetime
+    started: datetime | None
+    finished: datetime | None
+    result_of: str | None = Field(description="The earlier job whose stored result answers this one.")
+    error: dict[str, Any] | None = Field(description="Why it failed: type, detail, issues.")
+    request: dict[str, Any] | None = Field(description="What was asked; null in lists.")
+    links: dict[str, str]
+
+    @classmethod
+    def of(cls, row: JobRow, live: tuple[float, int] | None = None) -> Self:
+        """The answer for a row, with progress that is newer than the row if there is any."""
+        progress, points = (row.progress, row.points) if live is None else live
+        source = row.result_of or row.id
+        links = {
+            "self": f"/v1/jobs/{row.id}",
+            "results": f"/v1/jobs/{row.id}/results",
+            "scene": f"/v1/jobs/{row.id}/scene",
+            "sweeps": f"/v1/sweeps?job={source}",
+        }
+        if row.kind == "design":
+            links["design"] = f"/v1/designs/{source}"
+        return cls(
+            id=row.id,
+            owner=row.owner,
+            kind=row.kind,
+            status=row.state,
+            progress=progress,
+            points=points,
+            scene=row.scene_name,
+            priority=row.priority,
+            attempt=row.attempt,
+            max_attempts=row.max_attempts,
+            cancel_requested=row.cancel_requested,
+            created=row.created,
+            started=row.started,
+            finished=row.finished,
+            result_of=row.result_of,
+            error=row.error,
+            request=row.request,
+            links=links,
+        )
+
+
+class JobPage(Answer):
+    """A page of jobs, newest first."""
+
+    items: list[JobAnswer]
+    next: str | None = Field(description="Link to the next page; null on the last one.")
+
+
+class Peak(Answer):
+    """The largest amplitude of a branch and where it is."""
+
+    value: float
+    at: float
+
+
+class ContactAnswer(Answer):
+    """Values of a contact during a sweep; null where the value was swept."""
+
+    kt: float | None
+    mu: float | None
+    N0: float | None
+    N1: float | None
+    N1_phase: float | None
+
+
+class SweepAnswer(Answer):
+    """A stored sweep."""
+
+    model_config = ConfigDict(frozen=True, validate_by_name=True, serialize_by_alias=True)
+
+    id: str
+    owner: str
+    job: str
+    scene: str
+    scene_hash: str
+    parameter: str
+    from_: float = Field(alias="from")
+    to: float
+    frequency_hz: float | None
+    excitation_amplitude: float | None
+    harmonics: int
+    points: int
+    peak: Peak | None
+    limit: float | None
+    band_hz: float | None
+    error_estimate: float | None = Field(
+        default=None, description="Of the highest peak [m]; null if it was stored by an earlier version."
+    )
+    peaks_known: bool | None = Field(
+        default=None,
+        description="Whether it is known that no higher peak hides between two points; null if it was stored "
+        "by an earlier version.",
+    )
+    newton_iterations: int
+    rejected_steps: int
+    seconds: float
+    completed: bool
+    status: str
+    created: datetime
+    contacts: dict[str, ContactAnswer]
+    links: dict[str, str]
+
+    @classmethod
+    def values(cls, row: SweepRow, contacts: Sequence[ContactValues]) -> dict[str, Any]:
+        """The fields of the answer for a row."""
+        peak = None
+        if row.peak is not None and row.peak_at is not None:
+            peak = Peak(value=row.peak, at=row.peak_at)
+        return {
+            **{name: getattr(row, name) for name in _SAME},
+            "job": row.job_id,
+            "scene": row.scene_name,
+            "from_": row.from_value,
+            "to": row.to_value,
+            "peak": peak,
+            "contacts": {contact.name: _contact(contact) for contact in contacts},
+            "links": {"self": f"/v1/sweeps/{row.id}", "job": f"/v1/jobs/{row.job_id}"},
+        }
+
+    @classmethod
+    def of_rows(cls, rows: Sequence[SweepRow], repository: SweepRepository) -> list[Self]:
+        """The answers for several rows."""
+        contacts = repository.contacts([row.id for row in rows])
+        return [cls(**cls.values(row, contacts[row.id])) for row in rows]
+
+
+class SweepDetail(SweepAnswer):
+    """A stored sweep with its arrays, as nested lists."""
+
+    arrays: dict[str, list[Any]]
+
+    @classmethod
+    def load(cls, row: SweepRow, repository: SweepRepository) -> Self:
+        """The sweep of a row."""
+        stored = repository.arrays(row.id)
+        return cls(
+            **cls.values(row, repository.contacts([row.id])[row.id]),
+            arrays={name: _listed(decode(array)) for name, array in stored.items()},
+        )
+
+
+class SweepPage(Answer):
+    """A page of sweeps."""
+
+    items: list[SweepAnswer]
+    next: str | None = Field(description="Link to the next page; null on the last one.")
+
+
+class JobScene(Answer):
+    """The scene of a job, as it is computed."""
+
+    job: str
+    scene: dict[str, Any]
+
+
+class ResultsAnswer(Answer):
+    """What a job computed."""
+
+    job: str
+    status: JobState
+    result: dict[str, Any]
+    sweeps: list[SweepAnswer]
+
+    @classmethod
+    def of(cls, results: Results, repository: SweepRepository) -> Self:
+        """The answer for the results of a job."""
+        return cls(
+            job=results.job.id,
+            status=results.job.state,
+            result=results.result,
+            sweeps=SweepAnswer.of_rows(results.sweeps, repository),
+        )
+
+
+class VariableAnswer(Answer):
+    """A variable of a design: its best value, null if no design could be computed, and its bounds."""
+
+    value: float | None
+    low: float
+    high: float
+
+
+class DesignAnswer(Answer):
+    """A stored design; its id is that of its job."""
+
+    id: str
+    owner: str
+    scene: str
+    scene_hash: str
+    method: str
+    robust: bool = Field(description="Whether it is the best in the worst case of uncertain parameters.")
+    reached: bool = Field(description="Whether the goal was reached.")
+    feasible: bool = Field(description="Whether it keeps every limit.")
+    status: str
+    objective: float | None
+    peak: Peak | None
+    limit: float | None
+    band_hz: float | None
+    harmonics: int
+    evaluations: int
+    work: float | None = Field(description="What the search cost, in frequency responses.")
+    seconds: float
+    created: datetime
+    variables: dict[str, VariableAnswer]
+    links: dict[str, str]
+
+    @classmethod
+    def values(cls, row: DesignRow, variables: Sequence[VariableValues]) -> dict[str, Any]:
+        """The fields of the answer for a row."""
+        peak = None
+        if row.peak is not None and row.peak_at is not None:
+            peak = Peak(value=row.peak, at=row.peak_at)
+        return {
+            **{name: getattr(row, name) for name in _SAME_OF_DESIGNS},
+            "id": row.job_id,
+            "scene": row.scene_name,
+            "peak": peak,
+            "variables": {v.name: VariableAnswer(value=v.value, low=v.low, high=v.high) for v in variables},
+            "links": {
+                "self": f"/v1/designs/{row.job_id}",
+                "job": f"/v1/jobs/{row.job_id}",
+                "sweeps": f"/v1/sweeps?job={row.job_id}",
+            },
+        }
+
+    @classmethod
+    def of_rows(cls, rows: Sequence[DesignRow], repository: DesignRepository) -> list[Self]:
+        """The answers for several rows."""
+        variables = repository.variables([row.job_id for row in rows])
+        return [cls(**cls.values(row, variables[row.job_id])) for row in rows]
+
+
+class DesignDetail(DesignAnswer):
+    """A stored design with its problem and the whole result of its job."""
+
+    problem: dict[str, Any] = Field(description="What was asked: the body of the request.")
+    result: dict[str, Any]
+
+
+class DesignPage(Answer):
+    """A page of designs."""
+
+    items: list[DesignAnswer]
+    next: str | None = Field(description="Link to the next page; null on the last one.")
+
+
+class FinishedJob(JobAnswer):
+    """A finished job with what it computed, as answered to those who waited for it."""
+
+    result: dict[str, Any] | None
+    sweeps: list[SweepAnswer]
+
+
+class SceneAnswer(Answer):
+    """A scene in a list."""
+
+    owner: str = Field(description="Whose it is; a shipped scene is everybody's.")
+    name: str
+    shipped: bool
+    scene_hash: str
+    created: datetime | None
+    links: dict[str, str]
+
+    @classmethod
+    def of(cls, scene: KnownScene) -> Self:
+        """The answer for a scene."""
+        return cls(**cls.values(scene))
+
+    @classmethod
+    def values(cls, scene: KnownScene) -> dict[str, Any]:
+        """The fields of the answer for a scene."""
+        return {
+            "owner": scene.owner,
+            "name": scene.name,
+            "shipped": scene.shipped,
+            "scene_hash": scene.scene_hash,
+            "created": scene.created,
+            "links": {"self": f"/v1/scenes/{scene.name}"},
+        }
+
+
+class SceneDetail(SceneAnswer):
+    """A scene with its tables."""
+
+    scene: dict[str, Any]
+
+    @classmethod
+    def of(cls, scene: KnownScene) -> Self:
+        """The answer for a scene."""
+        return cls(**cls.values(scene), scene=dict(scene.body))
+
+
+class SceneList(Answer):
+    """All scenes."""
+
+    items: list[SceneAnswer]
+
+
+def _listed(array: NDArray[Any]) -> list[Any]:
+    """Nested lists; null where a number is not finite."""
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        finite = np.isfinite(array)
+        array = array.astype(object)
+        array[~finite] = None
+    listed: list[Any] = array.tolist()
+    return listed
+
+
+def _contact(contact: ContactValues) -> ContactAnswer:
+    values = asdict(contact)
+    del values["name"]
+    return ContactAnswer(**values)

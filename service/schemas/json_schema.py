@@ -1,0 +1,57 @@
+"""JSON Schemas (2020-12) of the files people write: scenes, design problems, jobs."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Any
+
+from solver.scene.json_schema import DIALECT, plain, scene_schema
+
+
+class Described(Enum):
+    """What there is a schema of; the value is the word users write."""
+
+    SCENE = "scene"
+    PROBLEM = "problem"
+    JOB = "job"
+
+
+def schema_of(what: Described) -> dict[str, Any]:
+    """The schema of one kind of file."""
+    if what is Described.SCENE:
+        return scene_schema()
+    return _problem() if what is Described.PROBLEM else _job()
+
+
+def _problem() -> dict[str, Any]:
+    """Of ``--problem FILE``: a design, with the key that only fronts have."""
+    from service.jobs.kinds.design import DesignRequest
+    from service.jobs.kinds.pareto import ParetoRequest
+
+    found = plain(DesignRequest.model_json_schema())
+    front = plain(ParetoRequest.model_json_schema())
+    found["$defs"] = {**front.get("$defs", {}), **found.get("$defs", {})}
+    found["properties"] = {**front["properties"], **found["properties"]}
+    # The scene may be the command's argument instead.
+    found["required"] = [key for key in found.get("required", []) if key != "scene"]
+    found["properties"]["scene"] = _scene_of_a_file(found["properties"]["scene"])
+    return {"$schema": DIALECT, "title": "stickslip design problem", **found}
+
+
+def _scene_of_a_file(scene: dict[str, Any]) -> dict[str, Any]:
+    """Beside names and objects, the name of a scene file."""
+    return {"anyOf": [{"type": "string"}, {"type": "object"}], "description": scene.get("description", "")}
+
+
+def _job() -> dict[str, Any]:
+    """Of the body of ``POST /v1/jobs``."""
+    from service.jobs.kinds import SHIPPED
+
+    kinds, definitions = [], {}
+    for kind in SHIPPED:
+        schema = plain(kind.request.model_json_schema())
+        definitions.update(schema.pop("$defs", {}))
+        properties = {"kind": {"const": kind.name, "description": "Kind of the job."}, **schema["properties"]}
+        required = ["kind", *schema.get("required", [])]
+        kinds.append({**schema, "title": kind.name, "properties": properties, "required": required})
+    return {"$schema": DIALECT, "title": "stickslip job", "oneOf": kinds, "$defs": definitions}

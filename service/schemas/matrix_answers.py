@@ -1,0 +1,61 @@
+"""What `POST /v1/matrices` answers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from service.schemas.answers import Answer
+
+
+class MatrixAnswer(Answer):
+    """A matrix that was read."""
+
+    name: str
+    rows: int
+    entries: int
+
+
+class LabelsAnswer(Answer):
+    """What the files call their rows."""
+
+    first: list[str] = Field(description="Of the first rows, 400 at most.")
+    components: list[str]
+    nodes: tuple[int, int] = Field(description="The lowest and the highest.")
+
+
+class MassAnswer(Answer):
+    """The mass that moves in one direction."""
+
+    direction: str
+    kg: float
+
+
+class KeptAnswer(Answer):
+    """What a reduction kept, and what it is good for."""
+
+    modes: int
+    highest_hz: float
+    good_to_hz: float = Field(description="Frequencies up to here are estimated exact to 0.1 %.")
+    held_hz: list[float]
+    static_residual: float
+    mass_carried: dict[str, float]
+
+
+class MatricesAnswer(Answer):
+    """What was read, what should be known of it, and the scene."""
+
+    structure: dict[str, Any] = Field(description="Which upload is what.")
+    rows: int
+    modes: int | None = None
+    matrices: list[MatrixAnswer]
+    held: int = Field(default=0, description="Rows left out because a boundary condition holds them.")
+    labels: LabelsAnswer | None = None
+    mass: MassAnswer | None = None
+    frequencies_hz: list[float] | None = Field(
+        description="The lowest, null before a large model is reduced."
+    )
+    notes: list[str] = Field(description="What looks wrong, and what to do.")
+    reduction: KeptAnswer | None = None
+    scene: dict[str, Any] | None = Field(default=None, description="Null until DOFs are named.")

@@ -1,0 +1,50 @@
+"""What the service answers about uploads."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from pydantic import Field
+
+from service.db.repositories.uploads import UploadRow
+from service.schemas.answers import Answer
+
+
+class UploadAnswer(Answer):
+    """An uploaded file."""
+
+    id: str
+    name: str
+    format: str
+    size: int = Field(description="Bytes.")
+    sha256: str
+    created: datetime
+    links: dict[str, str]
+
+    @classmethod
+    def of(cls, row: UploadRow) -> UploadAnswer:
+        """The answer for a row."""
+        values = {name: getattr(row, name) for name in ("id", "name", "format", "size", "sha256", "created")}
+        return UploadAnswer(**values, links={"self": f"/v1/uploads/{row.id}"})
+
+
+class UploadedArray(Answer):
+    """A matrix or the modes in a file."""
+
+    name: str | None = Field(description="Its name in the file, null for a file of one matrix.")
+    rows: int
+    columns: int
+    entries: int | None = Field(description="Entries stored of a matrix.")
+
+
+class NewUpload(UploadAnswer):
+    """An uploaded file with what it holds."""
+
+    contents: list[UploadedArray]
+
+
+class UploadPage(Answer):
+    """A page of uploads, newest first."""
+
+    items: list[UploadAnswer]
+    next: str | None = Field(description="Link to the next page; null on the last one.")

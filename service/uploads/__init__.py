@@ -1,0 +1,1 @@
+"""Uploaded files of matrices, read in a process with limits."""

@@ -1,0 +1,203 @@
+"""Files from strangers are read in a process of their own, with limits of memory and time.
+
+What a reader does with a hostile file (allocate what its header promises, inflate without end, loop) then
+ends that process and not the service. It gets a folder and answers with JSON; nothing is ever unpickled.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import multiprocessing as mp
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from service.errors import InvalidRequestError, QueueFullError, UnreadableUploadError
+from service.workers.worker import THREAD_LIMITS
+from solver.errors import Issue
+
+MEMORY_BYTES = 2 * 1024**3
+_AT_ONCE = threading.BoundedSemaphore(2)
+_PATIENCE_SECONDS = 5.0
+_DESCRIBE, _RESOLVE, _LOOK = "describe", "resolve", "look"
+
+
+def contents(file: Path, seconds: float) -> list[dict[str, Any]]:
+    """The matrices or modes in a file: name, rows, columns and entries of each.
+
+    Raises
+    ------
+    UnreadableUploadError
+        If there are none, the file is damaged, or reading it takes too much.
+    QueueFullError
+        If too many are being read.
+    """
+    found: list[dict[str, Any]] = _ask(_DESCRIBE, file.parent, file.name, seconds, 1024**2)
+    return found
+
+
+def resolved_structure(
+    structure: Mapping[str, Any], folder: Path, seconds: float, most_bytes: int
+) -> dict[str, Any]:
+    """The tables of a structure with the files it names, in `folder`, replaced by what they hold.
+
+    Raises
+    ------
+    InvalidRequestError
+        With pointers into the scene.
+    UnreadableUploadError
+        If reading takes too much.
+    """
+    found: dict[str, Any] = _ask(_RESOLVE, folder, dict(structure), seconds, most_bytes)
+    return found
+
+
+def look_at(asked: Mapping[str, Any], folder: Path, seconds: float, most_bytes: int) -> dict[str, Any]:
+    """What files in `folder` hold and are good for, as `service.uploads.matrix_summary.look` says.
+
+    Raises
+    ------
+    InvalidRequestError
+        With pointers into the scene that is asked for.
+    UnreadableUploadError
+        If a file cannot be read, or it takes too much.
+    """
+    found: dict[str, Any] = _ask(_LOOK, folder, dict(asked), seconds, most_bytes)
+    return found
+
+
+def _ask(task: str, folder: Path, argument: Any, seconds: float, most_bytes: int) -> Any:
+    context = mp.get_context("spawn")
+    ours, theirs = context.Pipe(duplex=False)
+    with _turn(), ours:
+        process = context.Process(
+            target=_main, args=(theirs, task, str(folder), argument, seconds), name="reader", daemon=True
+        )
+        process.start()
+        theirs.close()
+        try:
+            if not ours.poll(seconds):
+                raise UnreadableUploadError(f"reading it takes longer than {seconds:g} s")
+            answer = json.loads(ours.recv_bytes(most_bytes))
+        except EOFError as error:
+            process.join(1.0)
+            raise UnreadableUploadError(_end(process.exitcode)) from error
+        except OSError as error:
+            message = f"what it holds takes more than {most_bytes} bytes as text"
+            raise UnreadableUploadError(message) from error
+        finally:
+            process.kill()
+            process.join()
+            process.close()
+    if "issues" in answer:
+        raise InvalidRequestError([Issue(pointer=where, message=text) for where, text in answer["issues"]])
+    if "error" in answer:
+        raise UnreadableUploadError(answer["error"])
+    return answer["found"]
+
+
+def _end(code: int | None) -> str:
+    """What is said of a file whose reader ended without an answer."""
+    if code is not None and -code in (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE):
+        return "it is damaged: its reader ended at it"
+    return "reading it takes more memory or time than there is for it"
+
+
+@contextlib.contextmanager
+def _turn() -> Iterator[None]:
+    """One of few processes at a time.
+
+    Raises
+    ------
+    QueueFullError
+        If others take too long.
+    """
+    if not _AT_ONCE.acquire(timeout=_PATIENCE_SECONDS):
+        raise QueueFullError("other files are being read: try again later", retry_after=5)
+    try:
+        yield
+    finally:
+        _AT_ONCE.release()
+
+
+def _main(connection: Connection, task: str, folder: str, argument: Any, seconds: float) -> None:
+    """The life of the process."""
+    os.environ.update(THREAD_LIMITS)
+    _limit(seconds)
+    os.chdir(folder)
+    # The other end may have lost its patience.
+    with contextlib.suppress(BrokenPipeError):
+        connection.send_bytes(json.dumps(_answer(task, argument), allow_nan=False).encode())
+
+
+def _limit(seconds: float) -> None:
+    import resource
+
+    for what, value in (
+        (resource.RLIMIT_AS, MEMORY_BYTES),
+        (resource.RLIMIT_CPU, round(seconds) + 1),
+        (resource.RLIMIT_CORE, 0),
+        (resource.RLIMIT_FSIZE, 0),
+    ):
+        hard = resource.getrlimit(what)[1]
+        limit = value if hard == resource.RLIM_INFINITY else min(value, hard)
+        resource.setrlimit(what, (limit, limit))
+
+
+def _answer(task: str, argument: Any) -> dict[str, Any]:
+    from solver.errors import SceneError
+    from solver.matrices.files import MatrixFileError
+
+    tasks: dict[str, Callable[[Any], Any]] = {_DESCRIBE: _describe, _RESOLVE: _resolve, _LOOK: _look}
+    try:
+        return {"found": tasks[task](argument)}
+    except SceneError as error:
+        return {"issues": [[issue.pointer, issue.message] for issue in error.issues]}
+    except MatrixFileError as error:
+        return {"error": str(error)}
+    except MemoryError:
+        return {"error": "reading it takes more memory than there is for it"}
+    except Exception as error:  # noqa: BLE001 - whatever a hostile file brings about is said of the file
+        return {"error": f"it cannot be read: {type(error).__name__}: {str(error)[:300]}"}
+
+
+def _describe(name: str) -> list[dict[str, Any]]:
+    from solver.matrices.files import array_names, read_matrix, read_modes
+    from solver.matrices.labels import LABEL_SUFFIXES
+    from solver.matrices.load_set import labels_of
+
+    file = Path(name)
+    if file.suffix.lower() in LABEL_SUFFIXES:
+        return [{"name": "mapping", "rows": len(labels_of(file)), "columns": 1, "entries": None}]
+    names = array_names(file)
+    if "modes" in names:
+        modes = read_modes(file)
+        return [{"name": "modes", "rows": modes.size, "columns": int(modes.omega2.size), "entries": None}]
+    matrices: list[str | None] = [key for key in ("M", "K", "C") if key in names]
+    found = []
+    for key in matrices or [None]:
+        matrix = read_matrix(file, key or "M")
+        rows, columns = (int(count) for count in matrix.shape)
+        found.append({"name": key, "rows": rows, "columns": columns, "entries": int(matrix.nnz)})
+    return found
+
+
+def _resolve(structure: dict[str, Any]) -> dict[str, Any]:
+    from solver.matrices.scene_files import with_files
+    from solver.matrices.values import as_json
+
+    tables = with_files({"structure": structure}, Path())["structure"]
+    if not isinstance(tables, dict):
+        raise TypeError(f"the structure is {type(tables).__name__}")
+    return as_json(tables)
+
+
+def _look(asked: dict[str, Any]) -> dict[str, Any]:
+    from service.uploads.matrix_summary import look
+
+    return look(asked)

@@ -1,0 +1,199 @@
+"""What is in matrices that were uploaded, what is wrong with them, and a scene that begins with them.
+
+All of it runs in the reader's process (`service.uploads.inspection`): files, factorisations and modes are a
+stranger's.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from solver.errors import Issue, SceneError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from solver.matrices.load_set import MatrixSet
+    from solver.matrices.reduction.craig_bampton import Reduced
+    from solver.scene.scene import Scene
+
+MOST_LABELS = 400
+MOST_SOUGHT = 20_000
+"""Rows of a model whose lowest frequencies are looked for before it is reduced."""
+_SHOWN = 10
+_OPTION = re.compile(r" \(--[^)]*\)")
+
+
+def look(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """What the files of a structure hold; with its DOFs also the scene, and what its structure resolves to.
+
+    Parameters
+    ----------
+    asked : `files` or `structure` (whose keys name files of the working directory), and for a scene `name`,
+        `contacts`, `excitation` and `observe`.
+
+    Raises
+    ------
+    SceneError
+        With pointers into the scene that is asked for.
+    """
+    from solver.matrices.files import read_modes
+    from solver.matrices.load_set import MatrixSet
+
+    structure = dict(asked["structure"] or _sorted(asked["files"]))
+    report: dict[str, Any] = {"structure": structure, "notes": []}
+    given = MatrixSet(matrices={})
+    tables = {"kind": "matrices", **structure}
+    if "modes" in structure:
+        modes = read_modes(Path(structure["modes"]))
+        report |= {"rows": modes.size, "modes": int(modes.omega2.size), "matrices": []}
+        omega2: NDArray[Any] | None = modes.omega2
+    else:
+        given = _read(tables)
+        size = int(given.matrices["K"].shape[0])
+        report |= {"rows": size, "matrices": _entries(given), "held": given.held, **_named(given)}
+        omega2 = None if structure.get("dofs") else _lowest(given, report["notes"])
+    if structure.get("dofs"):
+        return report | _scene(asked, structure, tables, given, report["notes"])
+    return report | _frequencies(given, omega2, report["notes"])
+
+
+def _sorted(files: list[str]) -> dict[str, Any]:
+    from solver.matrices.file_roles import sorted_files
+
+    return {role: path.name for role, path in sorted_files([Path(name) for name in files]).items()}
+
+
+def _read(tables: dict[str, Any]) -> MatrixSet:
+    """The matrices, refused if they are no structure."""
+    from solver.matrices.diagnostics import refuse
+    from solver.matrices.scene_files import read_matrices
+
+    missing = [key for key in "MK" if key not in tables]
+    if missing:
+        words = {"M": "mass", "K": "stiffness"}
+        raise SceneError([_issue(key, f"`{key}`, the {words[key]} matrix, is missing") for key in missing])
+    given = read_matrices(tables, Path())
+    try:
+        refuse(given, reduced=True)
+    except ValueError as error:
+        raise SceneError([_about(str(error))]) from error
+    return given
+
+
+def _about(message: str) -> Issue:
+    """An issue beside the matrix that it names first."""
+    found = re.match(r"`([MKC])`", message)
+    return _issue(found[1] if found else "", _OPTION.sub("", message))
+
+
+def _issue(key: str, message: str) -> Issue:
+    return Issue(pointer=f"/structure/{key}".rstrip("/"), message=message)
+
+
+def _entries(given: MatrixSet) -> list[dict[str, Any]]:
+    return [
+        {"name": key, "rows": int(matrix.shape[0]), "entries": int(matrix.nnz)}
+        for key, matrix in given.matrices.items()
+    ]
+
+
+def _named(given: MatrixSet) -> dict[str, Any]:
+    """The labels of the rows, and the mass they tell."""
+    from solver.matrices.diagnostics import total_mass
+
+    mass = total_mass(given)
+    found: dict[str, Any] = {"mass": mass and {"direction": mass[0], "kg": mass[1]}, "labels": None}
+    if given.labels is not None:
+        found["labels"] = {
+            "first": [str(label) for label in given.labels[:MOST_LABELS]],
+            "components": sorted({label.component for label in given.labels}),
+            "nodes": [min(label.node for label in given.labels), max(label.node for label in given.labels)],
+        }
+    return found
+
+
+def _lowest(given: MatrixSet, notes: list[str]) -> NDArray[Any] | None:
+    """The lowest ω² [rad²/s²]; None, with a note, if they are not known before the model is reduced."""
+    import numpy as np
+    from scipy.sparse import csc_array
+
+    from solver.matrices.diagnostics import refuse
+    from solver.matrices.reduction.fixed_interface_modes import held_modes, interior
+
+    matrices = given.matrices
+    size = matrices["K"].shape[0]
+    if size > MOST_SOUGHT:
+        return None
+    try:
+        refuse(given, reduced=False)
+        K, M = csc_array(matrices["K"]), csc_array(matrices["M"])
+        whole = interior(K, M, np.arange(size), np.arange(0))
+        return held_modes(whole, min(size, _SHOWN + 6), None)[0]
+    except ValueError as error:
+        notes.append(_OPTION.sub("", str(error)))
+        return None
+
+
+def _frequencies(given: MatrixSet, omega2: NDArray[Any] | None, notes: list[str]) -> dict[str, Any]:
+    from solver.matrices.diagnostics import notes as notes_of
+
+    if omega2 is None:
+        return {"frequencies_hz": None}
+    notes += [_OPTION.sub("", note) for note in notes_of(given, omega2)]
+    return {"frequencies_hz": [math.sqrt(max(float(v), 0.0)) / (2.0 * math.pi) for v in omega2[:_SHOWN]]}
+
+
+def _scene(
+    asked: Mapping[str, Any],
+    structure: dict[str, Any],
+    tables: dict[str, Any],
+    given: MatrixSet,
+    notes: list[str],
+) -> dict[str, Any]:
+    """The scene that is asked for, on the structure as it is kept."""
+    from service.uploads.scene_defaults import started
+    from solver.matrices.diagnostics import refuse
+    from solver.matrices.scene_files import as_kept, with_files
+    from solver.matrices.values import MOST_DOFS, as_json
+
+    reduced = None
+    if given.matrices:
+        size = int(given.matrices["K"].shape[0])
+        if size > MOST_DOFS and "keep_modes" not in tables:
+            raise SceneError([_issue("keep_modes", _TOO_LARGE.format(size=size, most=MOST_DOFS))])
+        try:
+            refuse(given, reduced="keep_modes" in tables)
+        except ValueError as error:
+            raise SceneError([_issue("keep_modes", _OPTION.sub("", str(error)))]) from error
+        kept, reduced = as_kept(tables, given.matrices)
+    else:
+        kept = with_files({"structure": tables}, Path())["structure"]  # type: ignore[assignment]
+    scene, omega2 = started(asked, kept)
+    body = scene.to_dict()
+    return {
+        "scene": {**body, "structure": {"kind": "matrices", **structure}},
+        "resolved": as_json(kept),
+        "reduction": None if reduced is None else _kept(reduced, scene),
+        **_frequencies(given, omega2, notes),
+    }
+
+
+_TOO_LARGE = (
+    "the model has {size} rows, {most} are the most as they stand: reduce it onto the DOFs named and some "
+    "modes of the rest, say 20"
+)
+
+
+def _kept(reduced: Reduced, scene: Scene) -> dict[str, Any]:
+    """What a reduction kept, and what it is good for."""
+    quality = reduced.quality
+    return {
+        "modes": reduced.modes, "highest_hz": reduced.highest_hz, "good_to_hz": quality.good_to_hz,
+        "held_hz": quality.held_hz.tolist(), "static_residual": quality.static_residual,
+        "mass_carried": dict(zip(scene.structure.dofs, quality.mass_carried.tolist(), strict=True)),
+    }  # fmt: skip

@@ -1,0 +1,287 @@
+"""Uploaded files of matrices and modes, and scenes that refer to them."""
+
+from __future__ import annotations
+
+import enum
+import tempfile
+import threading
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from service.auth.callers import KEYLESS, Caller, visible
+from service.db.repositories.uploads import UploadRepository, UploadRow
+from service.errors import InvalidRequestError, NotFoundError, UnreadableUploadError
+from service.jobs.kinds.scenes import UPLOAD
+from service.jobs.strict_json import digest, pointer
+from service.settings.settings import Settings
+from service.uploads.inspection import contents, look_at, resolved_structure
+from solver.errors import Issue
+
+_KEYS = ("M", "K", "C", "modes", "mapping")
+_KEPT = 4
+_LARGEST_STRUCTURE = 16 * 1024 * 1024
+
+
+class UploadFormat(enum.StrEnum):
+    """The formats that can be uploaded; the value is a suffix of such files."""
+
+    NPZ = "npz"
+    NPY = "npy"
+    MAT = "mat"
+    MTX = "mtx"
+    OUTPUT4 = "op4"
+    DMIG = "pch"
+    CALCULIX = "sti"
+    ANSYS_LABELS = "mapping"
+    CALCULIX_LABELS = "dof"
+    HARWELL_BOEING = "hb"
+
+
+MEDIA = {
+    "application/x-npz": UploadFormat.NPZ,
+    "application/x-npy": UploadFormat.NPY,
+    "application/x-matlab-data": UploadFormat.MAT,
+    "text/x-matrix-market": UploadFormat.MTX,
+    "application/x-matrix-market": UploadFormat.MTX,
+    "application/x-harwell-boeing": UploadFormat.HARWELL_BOEING,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arrived:
+    """A file that came in and was not looked at yet."""
+
+    path: Path
+    name: str
+    format: UploadFormat
+    size: int
+    sha256: str
+
+
+def format_of(asked: UploadFormat | None, name: str, content_type: str) -> UploadFormat:
+    """The format that was asked for, that of the suffix of the name, or of the content type.
+
+    Raises
+    ------
+    InvalidRequestError
+        If none of them says it.
+    """
+    from solver.matrices.files import HARWELL_BOEING
+    from solver.matrices.readers.calculix import CALCULIX
+    from solver.matrices.readers.dmig import DMIG
+
+    if asked is not None:
+        return asked
+    suffix = Path(name).suffix.lower()
+    if suffix in HARWELL_BOEING:
+        return UploadFormat.HARWELL_BOEING
+    if suffix in DMIG:
+        return UploadFormat.DMIG
+    if suffix in CALCULIX:
+        return UploadFormat.CALCULIX
+    by_suffix = {f".{known.value}": known for known in UploadFormat}
+    found = by_suffix.get(suffix) or MEDIA.get(content_type)
+    if found is not None:
+        return found
+    known = ", ".join(UploadFormat)
+    message = f"`format` must be one of {known}: neither the name {name!r} nor the content type says it"
+    raise InvalidRequestError([Issue(pointer="/format", message=message)], source="query")
+
+
+class Uploads:
+    """The uploaded files of one service."""
+
+    def __init__(self, repository: UploadRepository, settings: Settings) -> None:
+        self.repository = repository
+        self._seconds = settings.inspection_seconds
+        self._lock = threading.Lock()
+        self._resolved: OrderedDict[str, dict[str, Any]] = OrderedDict()
+
+    def add(self, arrived: Arrived, caller: Caller = KEYLESS) -> tuple[UploadRow, list[dict[str, Any]], bool]:
+        """Look at a file and store it; what it holds, and whether it is new to its owner.
+
+        Raises
+        ------
+        UnreadableUploadError
+            If it holds no usable matrix or modes.
+        """
+        found = contents(arrived.path, self._seconds)
+        row, added = self.repository.add(
+            owner=caller.owner, name=arrived.name, format=arrived.format.value, size=arrived.size,
+            sha256=arrived.sha256, data=arrived.path.read_bytes(),
+        )  # fmt: skip
+        return row, found, added
+
+    def get(self, upload_id: str, caller: Caller = KEYLESS) -> UploadRow:
+        """An upload.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of this id that the caller may see.
+        """
+        return visible(self.repository.get(upload_id), caller, f"there is no upload {upload_id!r}")
+
+    def delete(self, upload_id: str, caller: Caller = KEYLESS) -> None:
+        """Forget an upload; scenes and jobs that were made with it keep what it held.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of this id.
+        """
+        self.get(upload_id, caller)
+        self.repository.delete(upload_id)
+
+    def resolved(self, body: Mapping[str, object], caller: Caller = KEYLESS) -> Mapping[str, object]:
+        """A scene with what its uploads hold in place of their ids; one without uploads as it is.
+
+        Raises
+        ------
+        InvalidRequestError
+            With pointers into the scene: an upload that is not there, or that does not fit.
+        """
+        structure = body.get("structure")
+        if not isinstance(structure, Mapping) or structure.get("kind") != "matrices":
+            return body
+        if not any(_is_reference(structure.get(key)) for key in _KEYS):
+            return body
+        return {**body, "structure": self._with(structure, self._rows(structure, caller))}
+
+    def looked_at(self, asked: Mapping[str, Any], caller: Caller = KEYLESS) -> dict[str, Any]:
+        """What uploaded matrices hold, and the scene that is asked for, as
+        `service.uploads.matrix_summary.look` says.
+
+        What a scene's structure resolves to is kept in mind: the scene is about to be used.
+
+        Raises
+        ------
+        InvalidRequestError
+            With pointers into the scene, or to the upload: one that is not there, or that does not fit.
+        """
+        structure = asked["structure"]
+        if structure is None:
+            rows = {f"{at}": self._row("uploads", at, id, caller) for at, id in enumerate(asked["uploads"])}
+        else:
+            rows = self._rows(structure, caller)
+        names = file_names(rows)
+        uploaded = {names[key]: f"{UPLOAD}{row.id}" for key, row in rows.items()}
+        placed = None if structure is None else {**structure, **names}
+        with self._placed(rows, names) as folder:
+            try:
+                files = list(names.values())
+                found = look_at(
+                    {**asked, "structure": placed, "files": files}, folder, self._seconds, _LARGEST_STRUCTURE
+                )
+            except UnreadableUploadError as error:
+                where = "/uploads" if structure is None else pointer("structure")
+                raise InvalidRequestError([Issue(pointer=where, message=error.detail)]) from error
+        resolved = found.pop("resolved", None)
+        if resolved is not None:
+            self._remember(_digest(structure, rows), resolved)
+        for tables in (found, found.get("scene") or {}):
+            if "structure" in tables:
+                tables["structure"] = {
+                    key: uploaded.get(item, item) if key in _KEYS else item
+                    for key, item in tables["structure"].items()
+                }
+        return found
+
+    def _row(self, key: str, at: int, upload_id: str, caller: Caller) -> UploadRow:
+        try:
+            return self.get(upload_id, caller)
+        except NotFoundError as error:
+            raise InvalidRequestError([Issue(pointer=pointer(key, at), message=error.detail)]) from error
+
+    def _rows(self, structure: Mapping[str, Any], caller: Caller) -> dict[str, UploadRow]:
+        """The uploads a structure names, by its keys.
+
+        Raises
+        ------
+        InvalidRequestError
+            One that is not there; a file that is named in another way.
+        """
+        rows, issues = {}, []
+        for key in _KEYS:
+            given = structure.get(key)
+            if not isinstance(given, str):
+                continue
+            if not _is_reference(given):
+                message = f"`{key}` must be inline or an upload, `{UPLOAD}ID`: files are not read here"
+                issues.append(_issue(key, message))
+                continue
+            try:
+                rows[key] = self.get(given.removeprefix(UPLOAD), caller)
+            except NotFoundError as error:
+                issues.append(_issue(key, f"`{key}`: {error.detail}"))
+        if issues:
+            raise InvalidRequestError(issues)
+        return rows
+
+    def _with(self, structure: Mapping[str, Any], rows: Mapping[str, UploadRow]) -> dict[str, Any]:
+        known = _digest(structure, rows)
+        with self._lock:
+            if known in self._resolved:
+                self._resolved.move_to_end(known)
+                return self._resolved[known]
+        names = file_names(rows)
+        with self._placed(rows, names) as folder:
+            try:
+                found = resolved_structure({**structure, **names}, folder, self._seconds, _LARGEST_STRUCTURE)
+            except UnreadableUploadError as error:
+                raise InvalidRequestError([_issue(next(iter(rows)), error.detail)]) from error
+        self._remember(known, found)
+        return found
+
+    @contextmanager
+    def _placed(self, rows: Mapping[str, UploadRow], names: Mapping[str, str]) -> Iterator[Path]:
+        """A folder that holds the files of uploads under their names."""
+        with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
+            for key, row in rows.items():
+                (Path(folder) / names[key]).write_bytes(self.repository.data(row.id))
+            yield Path(folder)
+
+    def _remember(self, known: str, found: dict[str, Any]) -> None:
+        with self._lock:
+            self._resolved[known] = found
+            while len(self._resolved) > _KEPT:
+                self._resolved.popitem(last=False)
+
+
+def file_names(rows: Mapping[str, UploadRow]) -> dict[str, str]:
+    """Names of files for uploads by their keys: those they came with, each upload its own."""
+    owners: dict[str, str] = {}
+    names = {}
+    for key, row in rows.items():
+        name = file_name(row.name, UploadFormat(row.format))
+        if owners.setdefault(name, row.id) != row.id:
+            name = f"{key}-{name}"
+        names[key] = name
+    return names
+
+
+def file_name(name: str, form: UploadFormat) -> str:
+    """The name an upload came with, with a suffix of its format."""
+    try:
+        fits = format_of(None, name, "") is form
+    except InvalidRequestError:
+        fits = False
+    return name if fits else f"{name}.{form.value}"
+
+
+def _digest(structure: Mapping[str, Any], rows: Mapping[str, UploadRow]) -> str:
+    """What a structure resolves to depends on: its tables, and what the files hold under which names."""
+    names = file_names(rows)
+    return digest({**structure, **{key: [row.sha256, names[key]] for key, row in rows.items()}})
+
+
+def _is_reference(value: object) -> bool:
+    return isinstance(value, str) and value.startswith(UPLOAD)
+
+
+def _issue(key: str, message: str) -> Issue:
+    return Issue(pointer=pointer("structure", key), message=message)

@@ -1,0 +1,331 @@
+"""Workers of a Dask cluster: one order an attempt, or one a part where the kind can be divided.
+
+The row in the database stays the truth: orders carry everything a worker needs, what comes back is written
+here, and an order that was lost costs the attempt (a part is computed once more). The cluster's own second
+tries are not wanted: an order that begins a second time is a worker that died.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from importlib.metadata import version
+from queue import SimpleQueue
+from typing import Any
+
+from distributed import Future, KilledWorker, Security
+
+from service.db.repositories import Attempt
+from service.jobs.registry import JobKind, Pace, Registry
+from service.workers.base import ExecutorStatus, Failed, Lost, Outcome, Sink, Stopped
+from service.workers.cluster import Cluster, answer_of
+from service.workers.tasks import Answer, Order
+from service.workers.work import Flight, Work
+from service.workers.worker import Task, failure_of
+
+log = logging.getLogger("stickslip.executor")
+
+_WRITERS = 4
+
+_tokens = itertools.count(1)
+
+
+class DaskExecutor:
+    """The workers of a Dask cluster.
+
+    Parameters
+    ----------
+    registry : Registry
+        The kinds; their functions are sent by name, so workers have this package.
+    address : str
+        Of the scheduler.
+    security : Security or None
+        Certificates, for a tls:// address.
+    grace_seconds : float
+        Time between asking an attempt to stop and ending its worker by force [s], if that has one thread and
+        a nanny.
+    pace : Pace
+        How often workers tell what, and how much of a divided job is kept for later attempts.
+    """
+
+    def __init__(
+        self,
+        registry: Registry,
+        address: str,
+        *,
+        security: Security | None = None,
+        grace_seconds: float,
+        pace: Pace,
+    ) -> None:
+        self._registry = registry
+        self._grace_seconds = grace_seconds
+        self._pace = pace
+        self._runs = registry.runs()
+        self._version = version("stickslip")
+        self._cluster = Cluster(address, security, self._heard, self._looked, self._lost)
+        self._lock = threading.RLock()
+        self._work: list[Work] = []
+        self._flights: dict[str, Flight] = {}
+        self._leaving: dict[str, Flight] = {}
+        self._notes: SimpleQueue[dict[str, Any] | None] = SimpleQueue()
+        self._listener = threading.Thread(target=self._listen, name="stickslip notes", daemon=True)
+        self._pool = ThreadPoolExecutor(_WRITERS, thread_name_prefix="stickslip outcomes")
+        self._closing = False
+        self._sink: Sink
+
+    def start(self, sink: Sink) -> None:
+        """Begin to connect; returns at once."""
+        self._sink = sink
+        self._listener.start()
+        self._cluster.start()
+
+    def free(self) -> int:
+        """How many attempts could start now; one that is divided leaves threads to the others."""
+        with self._lock:
+            return max(self._cluster.threads - len(self._work), 0) if self._cluster.connected else 0
+
+    def submit(self, attempt: Attempt) -> None:
+        """Send an attempt, in parts if its kind can be divided."""
+        work = Work(attempt)
+        with self._lock:
+            self._work.append(work)
+        self._later(self._begin, work)
+
+    def stop_attempt(self, attempt: Attempt) -> None:
+        """Let an attempt go; its workers see that it is not wanted any more."""
+        with self._lock:
+            work = next((work for work in self._work if work.attempt is attempt), None)
+        if work is not None:
+            self._later(self._end, work, Stopped())
+
+    def close(self) -> None:
+        """Let everything go and close the connection."""
+        with self._lock:
+            self._closing = True
+            running = list(self._work)
+        for work in running:
+            self._end(work, Stopped())
+        self._pool.shutdown()
+        self._cluster.close()
+        self._notes.put(None)
+        if self._listener.ident is not None:
+            self._listener.join()
+
+    def status(self) -> ExecutorStatus:
+        """How the cluster is."""
+        threads = self._cluster.threads if self._cluster.connected else 0
+        with self._lock:
+            busy = len(self._flights) + len(self._leaving)
+        trouble = self._cluster.trouble
+        if not threads and trouble is None:
+            trouble = f"there is no connection to the Dask scheduler at {self._cluster.address} yet"
+        return ExecutorStatus(workers=threads, ready=threads, busy=busy, trouble=trouble)
+
+    def _later(self, call: Callable[..., None], *arguments: object) -> None:
+        """Call in another thread: it may write to the database."""
+        with self._lock:
+            if not self._closing:
+                self._pool.submit(self._logged, call, *arguments)
+
+    @staticmethod
+    def _logged(call: Callable[..., None], *arguments: object) -> None:
+        try:
+            call(*arguments)
+        except Exception:
+            log.exception("an outcome could not be dealt with")
+
+    def _begin(self, work: Work) -> None:
+        """Divide an attempt and send what there is room for."""
+        attempt = work.attempt
+        try:
+            work.divide(self._registry[attempt.kind].parts, self._sink, self._pace)
+        except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
+            self._end(work, Failed(failure_of(_task(attempt), error)))
+            return
+        self._finish_if_whole(work)
+        self._fill()
+
+    def _fill(self) -> None:
+        """Send orders while there are threads without one; attempts with the fewest go first."""
+        with self._lock:
+            while len(self._flights) + len(self._leaving) < self._cluster.threads:
+                waiting = [work for work in self._work if work.pending]
+                if not waiting:
+                    return
+                work = min(waiting, key=lambda work: work.flying)
+                index = work.pending.popleft()
+                order = self._order(work, index)
+                try:
+                    future = self._cluster.send(order, 0)
+                except (OSError, RuntimeError, TypeError) as error:
+                    self._later(self._end, work, Lost(f"it could not be sent: {error}"))
+                    return
+                work.flying += 1
+                self._flights[order.token] = Flight(work=work, index=index, future=future)
+                future.add_done_callback(lambda _, token=order.token: self._later(self._landed, token))
+
+    def _order(self, work: Work, index: int | None) -> Order:
+        attempt = work.attempt
+        kind: JobKind = self._registry[attempt.kind]
+        return Order(
+            token=f"{attempt.lease_owner}-{next(_tokens)}",
+            job_id=attempt.job_id,
+            kind=attempt.kind,
+            spec=attempt.spec,
+            run=self._runs[attempt.kind] if index is None else None,
+            run_part=None if index is None or kind.parts is None else kind.parts.run_part,
+            part=None if index is None else work.parts[index].spec,
+            saved=work.saved if index is None else (),
+            told=work.told,
+            warm_up=self._registry.warm_up,
+            version=self._version,
+            pace=self._pace,
+        )
+
+    def _landed(self, token: str) -> None:
+        """Deal with an order that came back, in whatever way."""
+        with self._lock:
+            flight = self._flights.get(token)
+        if flight is None:
+            return
+        try:
+            answer = answer_of(flight.future)
+        except Exception as error:  # noqa: BLE001 - all that may become of a future
+            answer = Answer(retry=self._loss(flight.future, error))
+        with self._lock:
+            if self._flights.pop(token, None) is None:
+                return
+            flight.work.flying -= 1
+        flight.future.release()
+        self._deal(flight, answer)
+        self._fill()
+        self._sink.room()
+
+    def _loss(self, future: Future, error: Exception) -> str:
+        if isinstance(error, KilledWorker):
+            return f"Dask worker {error.last_worker.address} died"
+        if future.status in ("cancelled", "lost"):
+            self._cluster.look()
+            return f"the connection to the Dask scheduler at {self._cluster.address} was lost"
+        return f"a Dask worker could not do it: {type(error).__name__}: {error}"
+
+    def _deal(self, flight: Flight, answer: Answer) -> None:
+        """Draw the consequences of an answer."""
+        work, index = flight.work, flight.index
+        if answer.failure is not None:
+            self._end(work, Failed(answer.failure))
+        elif answer.retry is not None:
+            self._again(work, index, answer.retry)
+        elif answer.output is None:
+            # It kept something, or its worker leaves the cluster in good order; nothing was lost.
+            for kept in answer.kept:
+                self._sink.kept(work.attempt, kept.pieces, anew=kept.anew)
+            with self._lock:
+                work.go_on(index, answer.kept)
+        else:
+            work.keep(index, answer.output)
+            self._finish_if_whole(work)
+
+    def _again(self, work: Work, index: int | None, reason: str) -> None:
+        """Compute a lost part once more, if the connection is there; else the attempt is lost."""
+        with self._lock:
+            if self._cluster.connected and work.may_lose(index):
+                log.warning("job %s, part %s: %s", work.attempt.job_id, index, reason)
+                work.pending.appendleft(index)
+                return
+        self._end(work, Lost(reason))
+
+    def _finish_if_whole(self, work: Work) -> None:
+        try:
+            outcome = work.outcome()
+        except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
+            outcome = Failed(failure_of(_task(work.attempt), error))
+        if outcome is not None:
+            self._end(work, outcome)
+
+    def _end(self, work: Work, outcome: Outcome) -> None:
+        """Report an attempt and let go what is still computed for it; nothing the second time."""
+        with self._lock:
+            if work not in self._work:
+                return
+            self._work.remove(work)
+            mine = {token: flight for token, flight in self._flights.items() if flight.work is work}
+            for token, flight in mine.items():
+                del self._flights[token]
+                if flight.begun:
+                    self._leaving[token] = flight.leaving(time.monotonic() + self._grace_seconds)
+        for flight in mine.values():
+            flight.future.release()
+        work.flush()
+        self._sink.ended(work.attempt, outcome)
+        self._fill()
+        self._sink.room()
+
+    def _heard(self, note: dict[str, Any]) -> None:
+        self._notes.put(note)
+
+    def _listen(self) -> None:
+        """What workers say, in the order they said it."""
+        while (note := self._notes.get()) is not None:
+            self._logged(self._take, note)
+
+    def _take(self, note: dict[str, Any]) -> None:
+        token = str(note.get("token"))
+        found = [(float(value), float(amplitude)) for value, amplitude in note.get("found", ())]
+        with self._lock:
+            flight = self._flights.get(token)
+            if flight is not None:
+                flight.work.told += len(found)
+            if note.get("over") and self._leaving.pop(token, None) is not None:
+                self._later(self._fill)
+        if flight is None:
+            return
+        if "begun" in note:
+            if flight.begun and flight.begun != note["begun"]:
+                self._begun_again(flight)
+            flight.begun, flight.worker = note["begun"], str(note["worker"])
+            flight.threads = int(note["threads"])
+        elif "share" in note:
+            if found:
+                self._sink.found(flight.work.attempt, found)
+            flight.work.progress(flight.index, float(note["share"]), int(note["points"]))
+
+    def _begun_again(self, flight: Flight) -> None:
+        """Its worker died, and the scheduler gave the order to another one by itself."""
+        reason = f"Dask worker {flight.worker} died"
+        if not flight.work.may_lose(flight.index):
+            self._later(self._end, flight.work, Lost(reason))
+        else:
+            log.warning("job %s, part %s: %s", flight.work.attempt.job_id, flight.index, reason)
+
+    def _looked(self, changed: bool) -> None:
+        """The connection is there: end workers that did not heed in time, use new ones."""
+        now = time.monotonic()
+        with self._lock:
+            late = {token: flight for token, flight in self._leaving.items() if now > flight.deadline}
+            for token in late:
+                del self._leaving[token]
+        for flight in late.values():
+            if flight.threads == 1:
+                log.warning("Dask worker %s did not heed a stop in time and is ended", flight.worker)
+                self._later(self._cluster.restart, flight.worker)
+        if changed or late:
+            self._later(self._fill)
+            self._sink.room()
+
+    def _lost(self, reason: str) -> None:
+        """There is no connection: what ran is lost."""
+        with self._lock:
+            running = list(self._work)
+            self._leaving.clear()
+        for work in running:
+            self._later(self._end, work, Lost(reason))
+
+
+def _task(attempt: Attempt) -> Task:
+    """An attempt as messages about it name it."""
+    return Task(0, attempt.job_id, attempt.kind, attempt.spec)

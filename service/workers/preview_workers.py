@@ -1,0 +1,209 @@
+"""Previews: computed at once by a worker process of their own, never stored.
+
+The process starts with the first preview, or when the page is opened. Of the previews of one client only the
+newest is computed; those of several clients wait for each other, a few at most.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import threading
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from service.db.repositories import Attempt
+from service.errors import ConflictError, InvalidRequestError, JobFailedError, PreviewError, QueueFullError
+from service.jobs.ids import new_id
+from service.jobs.kinds.previews import PREVIEWS
+from service.jobs.registry import FailureKind, Pace, Piece, Point, Registry
+from service.workers.base import Failed, Finished, Lost, Outcome
+from service.workers.local import LocalExecutor
+from solver.errors import Issue
+
+log = logging.getLogger("stickslip.previews")
+
+MOST_WAITING = 16
+_RETRY_SECONDS = 1
+_GRACE_SECONDS = 0.5
+_LONGEST_WAIT_SECONDS = 120.0
+_SILENT = Pace(progress_seconds=3600.0, checkpoint_seconds=3600.0, checkpoint_bytes=0)
+_SUPERSEDED = "a newer preview of the same client took its place"
+
+
+@dataclass(eq=False, slots=True)
+class _Asked:
+    """A preview somebody waits for."""
+
+    attempt: Attempt
+    client: str
+    loop: asyncio.AbstractEventLoop
+    answer: asyncio.Future[bytes]
+    stopped: Exception | None = field(default=None)
+
+    def settle(self, outcome: bytes | Exception) -> None:
+        """Answer, from any thread; once the client's loop has closed nobody listens."""
+        if not self.loop.is_closed():
+            self.loop.call_soon_threadsafe(self._settle, outcome)
+
+    def _settle(self, outcome: bytes | Exception) -> None:
+        if self.answer.done():
+            return
+        if isinstance(outcome, Exception):
+            self.answer.set_exception(outcome)
+        else:
+            self.answer.set_result(outcome)
+
+
+class Previews:
+    """Computes previews; a `Sink` of its executor.
+
+    Parameters
+    ----------
+    seconds : float
+        Longest time one may take [s].
+    registry : Registry
+        The kinds of preview.
+    """
+
+    def __init__(self, seconds: float, registry: Registry = PREVIEWS) -> None:
+        self.registry = registry
+        self._seconds = seconds
+        self._lock = threading.RLock()
+        self._waiting: deque[_Asked] = deque()
+        self._running: _Asked | None = None
+        self._executor: LocalExecutor | None = None
+        self._closed = False
+
+    async def compute(self, kind: str, spec: dict[str, Any], client: str = "") -> bytes:
+        """The answer to a preview, as JSON.
+
+        Raises
+        ------
+        QueueFullError
+            If too many wait.
+        ConflictError
+            If a newer one of the same client took its place.
+        PreviewError
+            If it took too long, or its worker died.
+        InvalidRequestError, JobFailedError
+            If it cannot be computed.
+        """
+        loop = asyncio.get_running_loop()
+        attempt = Attempt(
+            job_id=new_id(), kind=kind, spec=spec, attempt=1, max_attempts=1, lease_owner="preview"
+        )
+        asked = _Asked(attempt, client, loop, loop.create_future())
+        self._add(asked)
+        try:
+            return await asyncio.wait_for(asked.answer, _LONGEST_WAIT_SECONDS)
+        except TimeoutError as error:
+            raise PreviewError(f"no worker was free for it within {_LONGEST_WAIT_SECONDS:g} s") from error
+        finally:
+            self._drop(asked)
+
+    def begin(self) -> None:
+        """Start the worker if it does not run: for those who will want a preview in a moment."""
+        with self._lock:
+            if self._closed or self._executor is not None:
+                return
+            self._executor = LocalExecutor(
+                self.registry.runs(),
+                self.registry.warm_up,
+                workers=1,
+                grace_seconds=_GRACE_SECONDS,
+                pace=_SILENT,
+            )
+            self._executor.start(self)
+
+    def close(self) -> None:
+        """End the worker; whoever waits is told."""
+        with self._lock:
+            self._closed = True
+            waiting, self._waiting = list(self._waiting), deque()
+            executor, self._executor = self._executor, None
+        for asked in waiting:
+            asked.settle(PreviewError("the service stops"))
+        if executor is not None:
+            executor.close()
+
+    def progress(self, attempt: Attempt, fraction: float, points: int) -> None:
+        """Nobody watches a preview."""
+
+    def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
+        """Nobody watches a preview."""
+
+    def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:
+        """A preview has no later attempt."""
+
+    def ended(self, attempt: Attempt, outcome: Outcome) -> None:
+        """Answer the one who waits for it."""
+        with self._lock:
+            asked, self._running = self._running, None
+        if asked is not None and asked.attempt is attempt:
+            asked.settle(asked.stopped or _answer(outcome))
+        self.room()
+
+    def room(self) -> None:
+        """Compute the next one."""
+        with self._lock:
+            if self._closed or self._executor is None or self._running is not None:
+                return
+            if not self._waiting or not self._executor.free():
+                return
+            self._running = asked = self._waiting.popleft()
+            asked.loop.call_soon_threadsafe(asked.loop.call_later, self._seconds, self._overtime, asked)
+            self._executor.submit(asked.attempt)
+
+    def _add(self, asked: _Asked) -> None:
+        with self._lock:
+            if self._closed:
+                raise PreviewError("the service stops")
+            if asked.client:
+                self._supersede(asked.client)
+            if len(self._waiting) >= MOST_WAITING:
+                raise QueueFullError(f"{MOST_WAITING} previews wait already", _RETRY_SECONDS)
+            self._waiting.append(asked)
+        self.begin()
+        self.room()
+
+    def _supersede(self, client: str) -> None:
+        for other in [each for each in self._waiting if each.client == client]:
+            self._waiting.remove(other)
+            other.settle(ConflictError(_SUPERSEDED))
+        if self._running is not None and self._running.client == client:
+            self._stop(self._running, ConflictError(_SUPERSEDED))
+
+    def _overtime(self, asked: _Asked) -> None:
+        detail = f"the preview took longer than {self._seconds:g} s: submit it as a job"
+        with self._lock:
+            self._stop(asked, PreviewError(detail))
+
+    def _drop(self, asked: _Asked) -> None:
+        """Nobody waits for it any more."""
+        with self._lock:
+            if asked in self._waiting:
+                self._waiting.remove(asked)
+            self._stop(asked, PreviewError("nobody waits for it"))
+
+    def _stop(self, asked: _Asked, reason: Exception) -> None:
+        if self._running is asked and asked.stopped is None and self._executor is not None:
+            asked.stopped = reason
+            self._executor.stop_attempt(asked.attempt)
+
+
+def _answer(outcome: Outcome) -> bytes | Exception:
+    if isinstance(outcome, Finished):
+        return (outcome.output.encoded or "{}").encode()
+    if isinstance(outcome, Lost):
+        log.warning("a preview was lost: %s", outcome.reason)
+        return PreviewError(outcome.reason)
+    if isinstance(outcome, Failed):
+        failure = outcome.failure
+        if failure.kind in (FailureKind.SCENE, FailureKind.SETTING):
+            issues = failure.issues or (Issue(pointer="", message=failure.detail),)
+            return InvalidRequestError(issues)
+        return JobFailedError(failure.detail, failure.to_json())
+    return PreviewError("the preview was stopped")

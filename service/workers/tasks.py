@@ -1,0 +1,185 @@
+"""What a worker of a Dask cluster does: computes one order, and says how far it is.
+
+It never opens the database. That a task is not wanted any more, because its job was cancelled or because the
+service or the scheduler is gone, shows in the worker's own state of the task: asking it costs no message and
+cannot hang when the scheduler does.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any
+
+from distributed import Status, Worker, get_worker
+
+from service.jobs.checkpoints import Checkpoints, Kept
+from service.jobs.parts import PartOutput, RunPart
+from service.jobs.registry import JobFailure, JobOutput, Pace, Piece, RunOn, WarmUp
+from service.workers.worker import THREAD_LIMITS, Report, Task, Throttle, checked, failure_of
+
+TOPIC = "stickslip"
+
+_GONE = (Status.closing, Status.closing_gracefully, Status.closed, Status.failed)
+
+_warming = threading.Lock()
+_warmed: set[WarmUp] = set()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Order:
+    """To a worker: compute this job, or this part of it.
+
+    Attributes
+    ----------
+    token : str
+        Names the order in what the worker says about it.
+    run, run_part : callable or None
+        One of them: for a whole job, or for the part whose spec is `part`.
+    saved : tuple of Piece
+        What earlier orders of a whole job kept.
+    told : int
+        How many points of its branch the service knows; they are not said again.
+    version : str
+        Of the service; a worker with another one might compute other numbers.
+    pace : Pace
+        How often the worker tells what, and when a whole job keeps what it has.
+    """
+
+    token: str
+    job_id: str
+    kind: str
+    spec: Mapping[str, Any]
+    run: RunOn | None
+    run_part: RunPart | None
+    part: Mapping[str, Any] | None
+    saved: tuple[Piece, ...]
+    told: int
+    warm_up: WarmUp
+    version: str
+    pace: Pace
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """From a worker: an output, a failure, a reason to try again, or none of them if it stopped on its way.
+
+    What it `kept` then is for the next order.
+    """
+
+    kept: tuple[Kept, ...] = ()
+    output: JobOutput | PartOutput | None = None
+    failure: JobFailure | None = None
+    retry: str | None = None
+
+
+class _Unwanted:
+    """`should_stop` of one order: whether the cluster still wants its task; remembers that it does not."""
+
+    def __init__(self, worker: Worker, key: object) -> None:
+        self._worker = worker
+        self._tasks: Mapping[object, Any] = worker.state.tasks
+        self._key = key
+        self.obeyed = False
+
+    def __call__(self) -> bool:
+        task = self._tasks.get(self._key)
+        if task is None or task.state in ("cancelled", "resumed") or self._worker.status in _GONE:
+            self.obeyed = True
+        return self.obeyed
+
+
+class _Stop:
+    """`should_stop` of one order, and the place where its run keeps what it has.
+
+    A run that has kept something stops there: its pieces are the answer, and the next order goes on behind
+    them. They so take the way of the results, are stored before a worker can take them along, and are not
+    in the scheduler's log of events, which forgets little.
+    """
+
+    def __init__(self, unwanted: _Unwanted) -> None:
+        self._unwanted = unwanted
+        self.kept: list[Kept] = []
+        self.obeyed = False
+
+    def __call__(self) -> bool:
+        if self.kept or self._unwanted():
+            self.obeyed = True
+        return self.obeyed
+
+
+def compute(order: Order) -> bytes:
+    """Compute an order; every error becomes an answer.
+
+    The answer is pickled here: what cannot be sent is an error of the job, as it is from a local worker.
+    """
+    answer = _answer(order)
+    try:
+        return pickle.dumps(answer)
+    except (pickle.PicklingError, TypeError, AttributeError) as error:
+        return pickle.dumps(Answer(failure=failure_of(_task(order), error)))
+
+
+def _answer(order: Order) -> Answer:
+    worker = get_worker()
+    here = f"{worker.address} (process {os.getpid()})"
+    if (mine := version("stickslip")) != order.version:
+        return Answer(retry=f"worker {here} has stickslip {mine}, the service {order.version}")
+
+    def say(**note: Any) -> None:
+        worker.log_event(TOPIC, {"token": order.token, "worker": worker.address, **note})
+
+    known = order.told
+
+    def send(report: Report) -> None:
+        nonlocal known
+        found = [list(point) for point in report.found[known:]]
+        known = max(known - len(report.found), 0)
+        say(share=report.fraction, points=report.points, found=found)
+
+    # The time tells a second start of an order from the first one, even in the same process.
+    say(begun=time.time_ns(), threads=worker.state.nthreads)
+    stop = _Stop(_Unwanted(worker, worker.get_current_task()))
+    try:
+        return _computed(order, Throttle(send, order.pace.progress_seconds), stop)
+    finally:
+        say(over=True)
+
+
+def _computed(order: Order, progress: Throttle, stop: _Stop) -> Answer:
+    kept = Checkpoints(order.job_id, order.saved, stop.kept.append, order.pace)
+    try:
+        _warm(order.warm_up)
+        output: JobOutput | PartOutput
+        if order.run_part is not None and order.part is not None:
+            output = order.run_part(order.spec, order.part, progress, stop)
+        elif order.run is not None:
+            output = checked(order.run(order.spec, progress, stop, kept))
+    except MemoryError as error:
+        return Answer(retry=f"the worker ran out of memory ({error})")
+    except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
+        if not stop.obeyed:
+            return Answer(failure=failure_of(_task(order), error))
+    if not stop.obeyed:
+        return Answer(output=output)
+    kept.flush()
+    return Answer(kept=tuple(stop.kept))
+
+
+def _task(order: Order) -> Task:
+    """An order as messages about it name it."""
+    return Task(0, order.job_id, order.kind, order.spec)
+
+
+def _warm(warm_up: WarmUp) -> None:
+    """Load and compile what the kinds need, once in this process and one thread at a time."""
+    with _warming:
+        if warm_up not in _warmed:
+            os.environ.update(THREAD_LIMITS)
+            warm_up()
+            _warmed.add(warm_up)

@@ -1,0 +1,246 @@
+"""A worker process: gets attempts through a pipe, computes, sends progress and results back.
+
+It never opens the database, ignores the terminal's Ctrl-C (the service decides when to stop) and ends
+itself when its parent dies. This module imports nothing heavy: the numerical packages are loaded by
+`main`, after the environment that limits their threads is in place.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import multiprocessing as mp
+import os
+import pickle
+import signal
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from ctypes import Array
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from types import FrameType
+from typing import Any
+
+from optim.errors import DesignError
+from service.jobs import strict_json
+from service.jobs.checkpoints import Checkpoints, Kept
+from service.jobs.registry import FailureKind, JobFailure, JobOutput, Pace, Piece, Point, RunOn, WarmUp
+from service.settings import logs
+from solver.errors import SceneError, SettingError, SolverError
+
+THREAD_LIMITS = dict.fromkeys(
+    (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "BLIS_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+        "NUMEXPR_NUM_THREADS",
+        "NUMBA_NUM_THREADS",
+    ),
+    "1",
+)
+
+_PARENT_DIED = 70
+_TERMINATION_SECONDS = 3.0
+
+log = logging.getLogger("stickslip.worker")
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """To a worker: compute this, from what earlier attempts kept. `token` is larger than any before."""
+
+    token: int
+    job_id: str
+    kind: str
+    spec: Mapping[str, Any]
+    saved: tuple[Piece, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """From a worker: everything is loaded."""
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """From a worker: how far it got, with the points found since the last report."""
+
+    fraction: float
+    points: int
+    found: tuple[Point, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """From a worker: the output, the failure, or neither if it was told to stop."""
+
+    output: JobOutput | None = None
+    failure: JobFailure | None = None
+    retry: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """From a worker: something about the task with this token."""
+
+    token: int
+    about: Report | Kept | Done
+
+
+class Orders:
+    """Shared memory in which the parent writes which tasks are to stop.
+
+    Plain numbers: reading them costs nothing, and a process killed while it looks cannot hold a lock.
+    """
+
+    SIZE = 3
+
+    def __init__(self, numbers: Array[ctypes.c_longlong]) -> None:
+        self._numbers = numbers
+
+    def stop(self, token: int) -> None:
+        """Have the task with this token stop; later ones are not meant."""
+        self._numbers[0] = token
+
+    def withdraw(self, first: int, last: int) -> None:
+        """Have the tasks with these tokens and those between not begin, or stop."""
+        # The range is empty in between: tokens grow, and those withdrawn before were answered by now.
+        self._numbers[1] = first
+        self._numbers[2] = last
+
+    def stopped(self, token: int) -> bool:
+        """Whether this task is to stop."""
+        return self._numbers[0] == token or self.withdrawn(token)
+
+    def withdrawn(self, token: int) -> bool:
+        """Whether this task is not to begin."""
+        return self._numbers[1] <= token <= self._numbers[2]
+
+
+class _Stop:
+    """`should_stop` of one task; remembers that it answered yes."""
+
+    def __init__(self, orders: Orders, token: int) -> None:
+        self._orders = orders
+        self._token = token
+        self.obeyed = False
+
+    def __call__(self) -> bool:
+        if self._orders.stopped(self._token):
+            self.obeyed = True
+        return self.obeyed
+
+
+class Throttle:
+    """`on_progress` of one task; sends at most one report every `interval` seconds, none of a shorter one."""
+
+    def __init__(self, send: Callable[[Report], None], interval: float) -> None:
+        self._send = send
+        self._interval = interval
+        self._next = time.monotonic() + interval
+        self._found: list[Point] = []
+
+    def __call__(self, fraction: float, points: int) -> None:
+        """Send it if the last report is long enough ago."""
+        now = time.monotonic()
+        if now >= self._next:
+            self._next = now + self._interval
+            self._send(Report(min(max(float(fraction), 0.0), 1.0), int(points), tuple(self._found)))
+            self._found.clear()
+
+    def found(self, points: Sequence[Point]) -> None:
+        """Keep points for the next report."""
+        self._found.extend(points)
+
+
+def main(
+    connection: Connection,
+    numbers: Array[ctypes.c_longlong],
+    runs: Mapping[str, RunOn],
+    warm_up: WarmUp,
+    pace: Pace,
+) -> None:
+    """The life of a worker process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _leave_soon)
+    threading.Thread(target=_die_with_parent, name="parent watch", daemon=True).start()
+    logs.configure(pace.log_level, pace.log_format)
+    warm_up()
+    orders = Orders(numbers)
+    connection.send(Ready())
+    while True:
+        try:
+            task = connection.recv()
+        except (EOFError, OSError):
+            return
+        if task is None:
+            return
+        if orders.withdrawn(task.token):
+            connection.send(Reply(task.token, Done()))
+            continue
+        stop, reply = _Stop(orders, task.token), _replying(connection, task)
+        kept = Checkpoints(task.job_id, task.saved, reply, pace)
+        with logs.about(job=task.job_id, kind=task.kind):
+            done = _compute(runs, task, Throttle(reply, pace.progress_seconds), stop, kept)
+        try:
+            connection.send(Reply(task.token, done))
+        except (pickle.PicklingError, TypeError, AttributeError) as error:
+            connection.send(Reply(task.token, Done(failure=failure_of(task, error))))
+
+
+def _replying(connection: Connection, task: Task) -> Callable[[Report | Kept], None]:
+    return lambda about: connection.send(Reply(task.token, about))
+
+
+def _leave_soon(_signal: int, _frame: FrameType | None) -> None:
+    """On SIGTERM: leave the service, which got it too, the time to give the job back to its queue."""
+    timer = threading.Timer(_TERMINATION_SECONDS, os._exit, (0,))
+    timer.daemon = True
+    timer.start()
+
+
+def _die_with_parent() -> None:
+    parent = mp.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(_PARENT_DIED)
+
+
+def _compute(
+    runs: Mapping[str, RunOn], task: Task, progress: Throttle, stop: _Stop, kept: Checkpoints
+) -> Done:
+    """Run one task; every error becomes an answer, the process lives on."""
+    try:
+        output = checked(runs[task.kind](task.spec, progress, stop, kept))
+    except MemoryError as error:
+        return Done(retry=f"the worker ran out of memory ({error})")
+    except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
+        return _stopped(kept) if stop.obeyed else Done(failure=failure_of(task, error))
+    return _stopped(kept) if stop.obeyed else Done(output=output)
+
+
+def _stopped(kept: Checkpoints) -> Done:
+    """The answer of a run that was told to stop; what it has goes before, for the next attempt."""
+    kept.flush()
+    return Done()
+
+
+def checked(output: JobOutput) -> JobOutput:
+    """The output with its result encoded, so that the service does not have to; TypeError if it cannot be."""
+    return replace(output, result={}, encoded=strict_json.encoded(output.result))
+
+
+def failure_of(task: Task, error: Exception) -> JobFailure:
+    """A deterministic error, as the job keeps it."""
+    if isinstance(error, SceneError):
+        return JobFailure(kind=FailureKind.SCENE, detail=str(error), issues=error.issues)
+    if isinstance(error, SettingError | DesignError):
+        return JobFailure(kind=FailureKind.SETTING, detail=str(error))
+    if isinstance(error, SolverError):
+        return JobFailure(kind=FailureKind.GOAL, detail=str(error))
+    log.error("job %s (%s) met an unexpected error", task.job_id, task.kind, exc_info=error)
+    detail = f"unexpected {type(error).__name__}: {error}"
+    return JobFailure(kind=FailureKind.INTERNAL, detail=f"{detail}; the service's log has the details")

@@ -1,0 +1,1 @@
+"""The multi-harmonic balance of a scene for one parameter."""

@@ -1,0 +1,228 @@
+"""The balance of a scene: its `System` for the compiled loops, for any parameter that may be continued in."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.balance.parameter import Kind, Parameter, resolve
+from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.contacts.kernels.system import System
+from solver.errors import SettingError
+from solver.jit.fourier import Integer
+from solver.jit.trig_polynomial import grid_size, grid_tables
+from solver.linear.assembly import linear_model, structure_derivative
+from solver.linear.condensation import reduce_model
+from solver.linear.contact_table import (
+    contact_table,
+    enough_samples,
+    law_numbers,
+    port_counts,
+    port_stiffnesses,
+)
+from solver.scene.annulus import check_in_annulus, written_out
+from solver.scene.harmonics import MOST_HARMONICS, forced_harmonics, kept_harmonics
+from solver.scene.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Balance:
+    """A scene with its harmonics and the parameter λ of a run.
+
+    Attributes
+    ----------
+    scene : Scene
+        What is solved.
+    parameter : Parameter
+        What λ is; its unit inside is that of `Parameter.inside`.
+    system : System
+        The arrays the compiled loops work on.
+    n_harmonics : int
+        Highest harmonic asked for. The system keeps `system.ks`: these, or the odd ones of them, and those
+        that forces and loads call for whatever was asked, see `solver.scene.harmonics.kept_harmonics`.
+    effects : Effects
+        What is paid for though the scene does not call for it.
+    """
+
+    scene: Scene
+    parameter: Parameter
+    system: System
+    n_harmonics: int
+    effects: Effects
+
+    @property
+    def highest_harmonic(self) -> int:
+        """Highest harmonic of full coefficients: the one asked for, or that of a force above it."""
+        return max(self.n_harmonics, int(self.system.ks[-1]))
+
+    @property
+    def n_ports(self) -> int:
+        """Relative motions of all contacts."""
+        return int(self.system.owner.size)
+
+    @property
+    def n_coefficients(self) -> int:
+        """Real coefficients kept of each motion."""
+        return int(2 * self.system.ks.size - (self.system.ks[0] == 0))
+
+    @property
+    def n_unknowns(self) -> int:
+        """Unknowns of the condensed balance."""
+        return self.n_ports * self.n_coefficients
+
+
+def check_harmonics(harmonics: int) -> int:
+    """Return `harmonics` if it is a usable highest harmonic.
+
+    Raises
+    ------
+    SettingError
+        Not an integer from 0 to `MOST_HARMONICS`.
+    """
+    if isinstance(harmonics, bool) or not isinstance(harmonics, (int, np.integer)):
+        raise SettingError("harmonics", harmonics, "must be a whole number")
+    if not 0 <= harmonics <= MOST_HARMONICS:
+        raise SettingError("harmonics", harmonics, f"must be from 0 to {MOST_HARMONICS}")
+    return harmonics
+
+
+def check_frequency(name: str, frequency_hz: float) -> float:
+    """Return `frequency_hz` as a float if it is a usable frequency.
+
+    Raises
+    ------
+    SettingError
+        Not a finite number above 0.
+    """
+    good = isinstance(frequency_hz, (int, float, np.number)) and not isinstance(frequency_hz, bool)
+    if not good or not math.isfinite(frequency_hz) or frequency_hz <= 0.0:
+        raise SettingError(name, frequency_hz, "must be a frequency > 0 Hz")
+    return float(frequency_hz)
+
+
+def build(
+    scene: Scene, path: str = "frequency", *, harmonics: int = 11, frequency_hz: float | None = None,
+    effects: Effects | None = None,
+) -> Balance:  # fmt: skip
+    """Set up the balance of a scene for continuation in `path`.
+
+    Parameters
+    ----------
+    scene : the scene, with the values that stay fixed.
+    path : the parameter that λ is.
+    harmonics : highest harmonic asked for; all from 0 on are kept, or the odd ones where the others are zero,
+        and those that forces and loads call for, see `solver.scene.harmonics.kept_harmonics`.
+    frequency_hz : the excitation frequency [Hz], needed unless λ is the frequency.
+    effects : what is paid for though the scene does not call for it.
+
+    Raises
+    ------
+    SettingError
+        Unknown path, a missing or bad frequency, or a bad number of harmonics.
+    """
+    effects = effects or Effects()
+    whole = written_out(scene, every_sector=effects.every_sector)
+    if whole is not scene:
+        check_in_annulus(scene, path)
+    scene = whole
+    parameter = resolve(scene, path)
+    ks = _harmonics(scene, path, check_harmonics(harmonics), effects)
+    omega = 0.0
+    if parameter.kind is not Kind.FREQUENCY:
+        if frequency_hz is None:
+            raise SettingError("frequency_hz", None, f"is needed when the parameter is `{path}`")
+        omega = 2.0 * math.pi * check_frequency("frequency_hz", frequency_hz)
+    if parameter.kind is Kind.LEVEL and scene.value("excitation.amplitude") == 0.0:
+        scene = scene.with_values({"excitation.amplitude": 1.0})
+    system = _system(scene, parameter, ks, omega, effects)
+    return Balance(scene=scene, parameter=parameter, system=system, n_harmonics=harmonics, effects=effects)
+
+
+def _harmonics(scene: Scene, path: str, highest: int, effects: Effects) -> Integer:
+    """Return the harmonics kept: all of them, or the odd ones where a symmetry makes the others zero."""
+    odd = not effects.even_harmonics and even_harmonics_reason(scene, (path,)) is None
+    return kept_harmonics(scene, (path,), highest, odd=odd)
+
+
+def for_parameter(balance: Balance, path: str, frequency_hz: float) -> Balance:
+    """Return the same balance with another λ, at a fixed frequency.
+
+    Raises
+    ------
+    SettingError
+        Even harmonics were left out, but λ calls for them: build the first balance with them.
+    """
+    parameter = resolve(balance.scene, path)
+    omega = 2.0 * math.pi * frequency_hz
+    reason = even_harmonics_reason(balance.scene, (path,))
+    if reason is not None and balance.system.ks[0] != 0:
+        raise SettingError("parameter", path, f"needs a balance with even harmonics: {reason}")
+    if parameter.kind is Kind.STRUCTURE or balance.parameter.kind is Kind.STRUCTURE:
+        system = _system(balance.scene, parameter, balance.system.ks, omega, balance.effects)
+    else:
+        system = balance.system._replace(
+            kind=int(parameter.kind), active=parameter.active, omega=omega,
+            level_reference=_level(balance.scene), phase_reference=balance.scene.value("excitation.phase"),
+        )  # fmt: skip
+    return replace(balance, parameter=parameter, system=system)
+
+
+def fewer_harmonics(balance: Balance, count: int) -> Balance:
+    """Return the same balance with `count` of its harmonics (the mean counts as one).
+
+    The lowest are kept, and before all others the mean and those of the forces and loads.
+    """
+    ks = balance.system.ks
+    needed = np.isin(ks, [0, *forced_harmonics(balance.scene, (balance.parameter.path,))])
+    rank = np.argsort(~needed, kind="stable")
+    return with_harmonics(balance, ks[np.sort(rank[: max(count, int(needed.sum()))])])
+
+
+def with_harmonics(balance: Balance, ks: Integer) -> Balance:
+    """Return the same balance with the harmonics `ks`, some of its own."""
+    system = balance.system
+    at = np.searchsorted(system.ks, ks)
+    highest = max(int(ks[-1]), 1)
+    cos_table, sin_table = grid_tables(grid_size(highest), highest)
+    rows = {name: getattr(system, name) for name in ("modal_forces", "forces")}
+    rows = {name: np.ascontiguousarray(row[at]) if row.shape[0] else row for name, row in rows.items()}
+    smaller = system._replace(ks=ks, which=system.which[at], cos_table=cos_table, sin_table=sin_table, **rows)
+    return replace(balance, system=smaller, n_harmonics=min(balance.n_harmonics, int(ks[-1])))
+
+
+def _level(scene: Scene) -> float:
+    """Return the excitation amplitude the unit excitation stands for (1 where it is zero: nothing scales)."""
+    return scene.value("excitation.amplitude") or 1.0
+
+
+def _system(
+    scene: Scene, parameter: Parameter, ks: Integer, omega: float, effects: Effects
+) -> System:  # fmt: skip
+    """Put the arrays of the compiled loops together."""
+    model = linear_model(scene)
+    derivative = structure_derivative(scene, parameter.name) if parameter.kind is Kind.STRUCTURE else None
+    contacts = enough_samples(contact_table(scene), law_numbers(scene), int(ks[-1]))
+    reduced = reduce_model(
+        model, ks, port_stiffnesses(scene, model), derivative, whole_matrices=effects.whole_matrices
+    )  # fmt: skip
+    highest = max(int(ks[-1]), 1)
+    cos_table, sin_table = grid_tables(grid_size(highest), highest)
+    ports = port_counts(scene)
+    return System(
+        ks=ks, load_ks=np.arange(2, dtype=np.int64), which=reduced.which, cos_table=cos_table,
+        sin_table=sin_table, laws=law_numbers(scene), first_port=np.append(0, np.cumsum(ports)),
+        first_block=np.append(0, np.cumsum(ports**2)), owner=np.repeat(np.arange(ports.size), ports),
+        contacts=contacts, samples=0, condense=0 if effects.every_contact else 1,
+        least_size=reduced.least_size,
+        active=parameter.active, shift=reduced.shift, loose=reduced.loose, hold=0,
+        kind=int(parameter.kind), omega=omega,
+        level_reference=_level(scene), phase_reference=scene.value("excitation.phase"),
+        parameter_reference=scene.value(parameter.path) if derivative is not None else 0.0,
+        form=reduced.form, eigenvalues=reduced.eigenvalues, dampings=reduced.dampings,
+        contact_modes=reduced.contact_modes, contact_duals=reduced.contact_duals,
+        observe_modes=reduced.observe_modes, modal_forces=reduced.modal_forces, K=reduced.K, C=reduced.C,
+        M=reduced.M, dK=reduced.dK, dC=reduced.dC, dM=reduced.dM, L=reduced.L, observe=reduced.observe,
+        forces=reduced.forces,
+    )  # fmt: skip

@@ -1,0 +1,133 @@
+"""The whole linear part at one frequency, in modes or as matrices, with its derivatives by ω and structure.
+
+Of the motion x = Z⁻¹ φ of every kept harmonic, φ = f − Lᴴ F the forces. In modes Z⁻¹ = R D⁻¹ Sᵀ, D diagonal
+and alone dependent on ω: the same formulas hold with D for Z and Rᵀ, Sᵀ taken into L, Lᴴ, f and the observed
+DOF, so one class serves both. Only a structural parameter needs the matrices themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.balance.parameter_derivatives import Matrices
+from solver.contacts.kernels.system import DENSE, MODES, System
+from solver.jit.fourier import Complex, Real
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WholeMotion:
+    """Z and what stands around it for each of nk harmonics; N modes or coordinates.
+
+    A matrix is kept as its diagonal (nk, N) in modes, else whole (nk, N, N).
+
+    Attributes
+    ----------
+    inverse : Z⁻¹.
+    by_omega, by_omega_twice : ∂Z/∂ω, ∂²Z/∂ω².
+    by_structure : (∂Z/∂q, ∂²Z/∂q∂ω) of each structural path by its number; ∂²Z/∂q² = 0.
+    contact : (nk, nc, N) u = L x; back : (nk, nc, N) the rows of (Lᴴ)ᵀ.
+    observe, forces : (nk, N).
+    """
+
+    inverse: Complex
+    by_omega: Complex
+    by_omega_twice: Complex
+    by_structure: dict[int, tuple[Complex, Complex]]
+    contact: Complex
+    back: Complex
+    observe: Complex
+    forces: Complex
+
+    def solve(self, phi: Complex) -> Complex:
+        """Return Z⁻¹ φ, (..., nk, N)."""
+        return times(self.inverse, phi)
+
+    def solve_transposed(self, eta: Complex) -> Complex:
+        """Return Z⁻ᵀ η, (..., nk, N)."""
+        return times_transposed(self.inverse, eta)
+
+    def pushed(self, forces: Complex) -> Complex:
+        """Return Lᴴ F, (..., nk, N), of amplitudes (..., nc, nk)."""
+        return np.asarray(np.einsum("kcn,...ck->...kn", self.back, forces))
+
+    def relative(self, x: Complex) -> Complex:
+        """Return the relative motions L x, (..., nc, nk)."""
+        return np.asarray(np.einsum("kcn,...kn->...ck", self.contact, x))
+
+    def seen(self, turn: Complex, pulls: Complex) -> Complex:
+        """Return the weights η = turn·observe − Lᵀ pull, (nk, N), of turns (nk,) and pulls (nc, nk)."""
+        return np.asarray(turn[:, None] * self.observe - np.einsum("kcn,ck->kn", self.contact, pulls))
+
+
+def times(matrix: Complex, x: Complex) -> Complex:
+    """Return matrix @ x for each harmonic, of a diagonal or whole matrix and x (..., nk, N)."""
+    if matrix.ndim == 2:
+        return np.asarray(matrix * x)
+    return np.asarray(np.einsum("kab,...kb->...ka", matrix, x))
+
+
+def times_transposed(matrix: Complex, x: Complex) -> Complex:
+    """Return matrixᵀ @ x for each harmonic, as `times`."""
+    if matrix.ndim == 2:
+        return np.asarray(matrix * x)
+    return np.asarray(np.einsum("kab,...ka->...kb", matrix, x))
+
+
+def whole_motion(
+    system: System, matrices: Matrices | None, dampings: dict[int, Complex], omega: float
+) -> WholeMotion:
+    """Return the linear part at ω [rad/s].
+
+    Parameters
+    ----------
+    system : of a frequency response.
+    matrices : where a path needs them; else the modes of `system` serve, or its matrices if it has none.
+    dampings : ∂C/∂q in the modes, (nk, nm), of each path that is a proportional damping, by its number.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        Z is singular.
+    """
+    ks = system.ks.astype(np.float64)
+    if matrices is None and system.form == DENSE:
+        which = system.which
+        matrices = Matrices(
+            K=system.K[which], C=system.C[which], M=system.M[which], L=system.L[which],
+            observe=system.observe, forces=system.forces, by={},
+        )  # fmt: skip
+    if matrices is not None:
+        return _of_matrices(matrices, ks[:, None, None], omega)
+    values, which, k = system.eigenvalues[system.which], system.which, ks[:, None]
+    if system.form == MODES:
+        c = system.dampings[which]
+        d = values.real - (k * omega) ** 2 + 1j * k * omega * c
+        slope, bend = -2.0 * k**2 * omega + 1j * k * c, -2.0 * k**2 + 0.0j * c
+    else:
+        d = 1j * k * omega - values
+        slope, bend = 1j * k + 0.0 * values, 0.0 * values
+    by = {i: (1j * k * omega * dC, 1j * k * dC) for i, dC in dampings.items()}
+    if np.any(d == 0.0):
+        raise np.linalg.LinAlgError("Z is singular")
+    return WholeMotion(
+        inverse=np.asarray(1.0 / d, np.complex128), by_omega=slope, by_omega_twice=bend, by_structure=by,
+        contact=system.contact_modes[which], back=system.contact_duals[which],
+        observe=system.observe_modes[which], forces=system.modal_forces,
+    )  # fmt: skip
+
+
+def _of_matrices(matrices: Matrices, k: Real, omega: float) -> WholeMotion:
+    """Return the linear part of matrices; `k` (nk, 1, 1)."""
+    C, M, speed = matrices.C, matrices.M, k * omega
+    by = {
+        i: (dK + 1j * speed * dC - speed**2 * dM, 1j * k * dC - 2.0 * k * speed * dM)
+        for i, (dK, dC, dM) in matrices.by.items()
+    }
+    return WholeMotion(
+        inverse=np.asarray(np.linalg.inv(matrices.K + 1j * speed * C - speed**2 * M), np.complex128),
+        by_omega=1j * k * C - 2.0 * k * speed * M, by_omega_twice=-2.0 * k**2 * M + 0.0j, by_structure=by,
+        contact=matrices.L, back=matrices.L.conj(),
+        observe=np.broadcast_to(matrices.observe, matrices.forces.shape), forces=matrices.forces,
+    )  # fmt: skip

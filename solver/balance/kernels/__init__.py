@@ -1,0 +1,1 @@
+"""Compiled residual, Jacobian and Newton's method of the balance."""

@@ -1,0 +1,242 @@
+"""The balance at one (u, λ): residual and derivative by λ from the contact forces and their derivatives."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.balance.kernels.gauge import find_gauge, let_hold
+from solver.contacts.kernels.aft import sampled_force
+from solver.contacts.kernels.columns import COLUMNS, COULOMB, OWN, OWN_KIND
+from solver.contacts.kernels.coulomb import contact_force
+from solver.contacts.kernels.laws import law_force
+from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED, piece_of
+from solver.contacts.kernels.system import (
+    FRICTION,
+    KT,
+    LEVEL,
+    LOAD_AMPLITUDE,
+    LOAD_COEFFICIENTS,
+    LOAD_PHASE,
+    LOAD_RATIO,
+    MU,
+    N0,
+    N1,
+    NORMAL_LOAD,
+    PHASE,
+    RATIO,
+    STIFFNESS,
+    Evaluation,
+    Receptance,
+    System,
+)
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Real, coefficient_count, cosine_position
+from solver.jit.lapack import copy_block
+from solver.jit.separate import apart
+
+_CANCELLED, _LOST = 1e-3, 1e-5  # shares of |A| |F| and |A| |dF/dU| |u| a residual is relative to at least
+
+
+@apart
+def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, Real, Real]:
+    """Return the elements at λ = p: table, load coefficients (ne, 3), and the derivatives of both by λ.
+
+    `added` [N] is put on every mean load (the start-up ladder presses the contacts into full stick).
+    """
+    nc = system.laws.size
+    table, slope = np.empty((nc, COLUMNS)), np.zeros((nc, COLUMNS))
+    copy_block(table, system.contacts)
+    for c in range(nc):
+        row, d = table[c], slope[c]
+        tied = not math.isnan(row[RATIO])
+        if system.active[c] > 0.0:
+            if system.kind == NORMAL_LOAD:
+                row[N0], d[N0] = p, 1.0
+            elif system.kind == LOAD_AMPLITUDE:
+                row[N1], d[N1], tied = p, 1.0, False
+            elif system.kind == LOAD_RATIO:
+                row[RATIO], d[RATIO], tied = p, 1.0, True
+            elif system.kind == LOAD_PHASE:
+                row[PHASE], d[PHASE] = p, 1.0
+            elif system.kind == STIFFNESS:
+                row[KT], d[KT] = p, 1.0
+            elif system.kind == FRICTION:
+                row[MU], d[MU] = p, 1.0
+            elif system.kind >= OWN_KIND:
+                column = OWN + system.kind - OWN_KIND
+                row[column], d[column] = p, 1.0
+        if tied:
+            row[N1] = row[RATIO] * row[N0]
+            d[N1] = row[RATIO] * d[N0] + d[RATIO] * row[N0]
+    load, dload = np.empty((nc, LOAD_COEFFICIENTS)), np.empty((nc, LOAD_COEFFICIENTS))
+    for c in range(nc):
+        cosine, sine = math.cos(table[c, PHASE]), math.sin(table[c, PHASE])
+        amplitude, turn = table[c, N1], slope[c, PHASE]
+        load[c, 0], dload[c, 0] = table[c, N0] + added, slope[c, N0]
+        load[c, 1], load[c, 2] = amplitude * cosine, -amplitude * sine
+        dload[c, 1] = slope[c, N1] * cosine - amplitude * sine * turn
+        dload[c, 2] = -slope[c, N1] * sine - amplitude * cosine * turn
+    return table, load, slope, dload
+
+
+@apart
+def evaluate(system: System, linear: Receptance, u: Real, p: float, added: float, out: Evaluation) -> float:
+    """Evaluate the balance at (u, λ = p) for a receptance already filled at p.
+
+    Returns
+    -------
+    The relative residual, see `_residual` (NaN if a contact failed, or Z is singular).
+    """
+    for i in range(system.ks.size):
+        if not math.isfinite(linear.x_linear[0, i].real):
+            return np.nan
+    table, load, slope, dload = contact_values(system, p, added)
+    for e in range(system.laws.size):
+        if system.laws[e] == COULOMB:
+            good = _coulomb(system, e, u, table[e], load[e], slope[e], dload[e], out)
+        else:
+            good = _any_law(system, e, u, table[e], load[e], slope[e], dload[e], out)
+        if not good:
+            return np.nan
+    return _residual(system, linear, u, least_size(system, p), out)
+
+
+@apart
+def _coulomb(
+    system: System, e: int, u: Real, table: Real, load: Real, slope: Real, dload: Real, out: Evaluation
+) -> bool:
+    """Evaluate an elastic Coulomb contact with a given load; False if its march failed."""
+    n = coefficient_count(system.ks)
+    c, block = system.first_port[e], system.first_block[e]
+    if system.samples > 0:
+        state, count = sampled_force(
+            u[c * n : (c + 1) * n], system.ks, load, system.load_ks, table[KT], table[MU], system.samples,
+            out.segments, out.dF_dU[block], out.dF_dkt, out.dF_dmu, out.dF_dN, out.F[c],
+        )  # fmt: skip
+    else:
+        state, count = contact_force(
+            u[c * n : (c + 1) * n], system.ks, load, system.load_ks, table[KT], table[MU], system.cos_table,
+            system.sin_table, out.segments, out.dF_dU[block], out.dF_dkt, out.dF_dmu, out.dF_dN, out.F[c],
+        )  # fmt: skip
+    out.states[e], out.pieces[e] = state, piece_of(out.segments, count)
+    out.slopes[e] = np.nan
+    if state == FAILED:
+        return False
+    if state == SEPARATED:
+        out.slopes[e] = 0.0
+    elif state == STUCK and out.segments[0, BEGAN] == UNLOADED:
+        out.slopes[e] = table[KT]
+    for i in range(n):
+        total = slope[KT] * out.dF_dkt[i] + slope[MU] * out.dF_dmu[i]
+        for j in range(LOAD_COEFFICIENTS):
+            total += out.dF_dN[i, j] * dload[j]
+        out.dF_dp[c, i] = total
+    return True
+
+
+@apart
+def _any_law(
+    system: System, e: int, u: Real, table: Real, load: Real, slope: Real, dload: Real, out: Evaluation
+) -> bool:
+    """Evaluate an element of any law; False if it failed."""
+    n, c, block = coefficient_count(system.ks), system.first_port[e], system.first_block[e]
+    end, last = system.first_port[e + 1], system.first_block[e + 1]
+    U = u[c * n : end * n].reshape((end - c, n))
+    state, piece = law_force(
+        system.laws[e], U, system.ks, load, system.load_ks, table, slope, dload, system.cos_table,
+        system.sin_table, out.segments, out.F[c:end], out.dF_dU[block:last], out.dF_dp[c:end],
+    )  # fmt: skip
+    out.states[e], out.pieces[e], out.slopes[e] = state, piece, np.nan
+    return bool(state != FAILED)
+
+
+@compiled
+def least_size(system: System, p: float) -> float:
+    """Return the size of a motion below which only rounding is left of it [m], at the level λ = p."""
+    if system.kind == LEVEL:
+        return system.least_size * abs(p / system.level_reference)
+    return system.least_size
+
+
+@compiled
+def _sizes(system: System, u: Real, out: Evaluation) -> tuple[float, float]:
+    """Return the largest coefficient of the vibration, and the force that a residual of A F is relative to.
+
+    That is a share of the largest force, or a smaller one of the motion times the slope of a force: the
+    rounding of a motion, its mean included, reaches the force multiplied by it, which is what counts for
+    stiff contacts.
+    """
+    n, first = coefficient_count(system.ks), 1 if system.ks[0] == 0 else 0
+    motion, mean, force, steepest = 0.0, 0.0, 0.0, 0.0
+    for c in range(system.owner.size):
+        e = system.owner[c]
+        ports, port = system.first_port[e + 1] - system.first_port[e], c - system.first_port[e]
+        block = system.first_block[e] + port * ports + port
+        for j in range(first, n):
+            motion = max(motion, abs(u[c * n + j]))
+            force = max(force, abs(out.F[c, j] - system.shift[c] * u[c * n + j]))
+            steepest = max(steepest, abs(out.dF_dU[block, j, j]))
+        if first == 1:
+            mean = max(mean, abs(u[c * n]))
+    return motion, max(_CANCELLED * force, _LOST * steepest * max(motion, mean))
+
+
+@apart
+def _residual(system: System, linear: Receptance, u: Real, least: float, out: Evaluation) -> float:
+    """Put r and dr/dλ together from the contact forces and the receptance.
+
+    Each harmonic's residual is taken relative to the largest of its own ū and A F and of all motions: near an
+    undamped resonance ū and A F of one harmonic are huge and cancel, and must not hide what is left of the
+    others. Where A F is the difference of large forces only their rounding is left, see `_sizes`.
+    """
+    nc, n = system.owner.size, coefficient_count(system.ks)
+    r, dr = out.residual, out.dr_dp
+    motion, force_scale = _sizes(system, u, out)
+    if system.loose.shape[0] > 0:
+        find_gauge(system, out)
+    worst, check = 0.0, 0.0
+    for i in range(system.ks.size):
+        here = cosine_position(system.ks, i)
+        has_sine = system.ks[i] > 0
+        scale, residual = max(least, motion), 0.0
+        for c in range(nc):
+            row = c * n + here
+            response, dresponse, reach = complex(0.0), complex(0.0), 0.0
+            for d in range(nc):
+                at = d * n + here
+                stiffness = system.shift[d]
+                fc = out.F[d, here] - stiffness * u[at]
+                fs, dfs = 0.0, 0.0
+                if has_sine:
+                    fs = out.F[d, here + 1] - stiffness * u[at + 1]
+                    dfs = out.dF_dp[d, here + 1]
+                a, da = linear.A[0, i, c, d], linear.A[1, i, c, d]
+                force, dforce = complex(fc, -fs), complex(out.dF_dp[d, here], -dfs)
+                response += a * force
+                dresponse += a * dforce + da * force
+                reach = max(reach, abs(a.real) + abs(a.imag))
+            free, dfree = linear.u_linear[0, i, c], linear.u_linear[1, i, c]
+            scale = max(scale, abs(free), reach * force_scale)
+            if has_sine:
+                # The mean of a part that nothing holds may drift without bound: it must not hide a residual.
+                scale = max(scale, abs(response))
+            r[row] = u[row] - free.real + response.real
+            dr[row] = -dfree.real + dresponse.real
+            residual = max(residual, abs(r[row]))
+            check += r[row]
+            if has_sine:
+                r[row + 1] = u[row + 1] + free.imag - response.imag
+                dr[row + 1] = dfree.imag - dresponse.imag
+                residual = max(residual, abs(r[row + 1]))
+                check += r[row + 1]
+        if system.ks[i] == 0 and system.hold == 1 and system.loose.shape[0] > 0:
+            let_hold(system, r, out)
+            residual = 0.0
+            for c in range(nc):
+                residual = max(residual, abs(r[c * n]))
+        if residual > 0.0:
+            worst = max(worst, residual / scale if scale > 0.0 else residual)
+    # `max` passes over NaN, a sum does not.
+    return worst if math.isfinite(check) else np.nan

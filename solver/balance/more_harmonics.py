@@ -1,0 +1,106 @@
+"""The same balance with more harmonics, made without reducing the structure anew."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from solver.balance.balance import Balance, build, with_harmonics
+from solver.contacts.kernels.system import System
+from solver.jit.fourier import Complex, Integer, Real
+from solver.jit.trig_polynomial import grid_size, grid_tables
+from solver.linear.assembly import linear_model
+from solver.linear.contact_table import enough_samples
+from solver.scene.harmonics import MULTIPLES, kept_harmonics, spread
+
+
+def more_harmonics(balance: Balance, top: int, *, multiples: int = MULTIPLES) -> Balance:
+    """Return the same balance with the harmonics kept for `top`; one of odd harmonics stays one.
+
+    The modes do not depend on the harmonics kept, only the tables of the event search are made anew. A cyclic
+    structure is reduced again where a further harmonic meets a nodal diameter that is not there yet.
+    """
+    ks = further_harmonics(balance, top, multiples)
+    system = _extended(balance, ks)
+    if system is None:
+        return _rebuilt(balance, top)
+    cos_table, sin_table = _tables(max(int(ks[-1]), 1))
+    contacts = enough_samples(system.contacts, system.laws, int(ks[-1]))
+    system = system._replace(cos_table=cos_table, sin_table=sin_table, contacts=contacts)
+    return replace(balance, system=system, n_harmonics=top)
+
+
+def less_harmonics(balance: Balance, top: int) -> Balance:
+    """Return the same balance with those of its harmonics that are kept if only `top` are asked for."""
+    ks = kept_harmonics(balance.scene, (balance.parameter.path,), top, odd=False)
+    return replace(with_harmonics(balance, np.intersect1d(balance.system.ks, ks)), n_harmonics=top)
+
+
+def linear_part(balance: Balance, top: int) -> System:
+    """Return the linear part alone with the harmonics up to `top`: a `System` for receptances, no forces."""
+    system = _extended(balance, further_harmonics(balance, top))
+    return _rebuilt(balance, top).system if system is None else system
+
+
+def further_harmonics(balance: Balance, top: int, multiples: int = MULTIPLES) -> Integer:
+    """Return the harmonics of a balance and those that are kept if `top` are asked for."""
+    ks = balance.system.ks
+    odd = bool(np.all(ks % 2 == 1))
+    path = balance.parameter.path
+    wider = kept_harmonics(balance.scene, (path,), top, odd=odd, multiples=multiples)
+    return np.union1d(ks, wider)
+
+
+def pad(coefficients: Real, balance: Balance, wider: Balance) -> Real:
+    """Return coefficients (of one motion or of all unknowns) of `balance` filled up for `wider`."""
+    kept = coefficients.reshape(-1, balance.n_coefficients)
+    return spread(kept, balance.system.ks, wider.system.ks).reshape(-1)
+
+
+def _rebuilt(balance: Balance, top: int) -> Balance:
+    """Return the balance of the same scene with the harmonics up to `top`, everything made anew."""
+    frequency_hz = balance.system.omega / (2.0 * math.pi) or None
+    return build(
+        balance.scene,
+        balance.parameter.path,
+        harmonics=top,
+        frequency_hz=frequency_hz,
+        effects=balance.effects,
+    )
+
+
+def _extended(balance: Balance, ks: Integer) -> System | None:
+    """Return the system with the harmonics `ks` but the old tables; None if the balance lacks what they need.
+
+    That is a nodal diameter not met so far, or a force with one of the further harmonics.
+    """
+    model, system = linear_model(balance.scene), balance.system
+    if any(force.harmonic in ks and force.harmonic not in system.ks for force in model.forces):
+        return None
+    known, wanted = ((each * model.engine_order) % model.sectors for each in (system.ks, ks))
+    structures = {int(d): int(s) for d, s in zip(known, system.which, strict=True)}
+    if any(int(d) not in structures for d in wanted):
+        return None
+    at = np.searchsorted(ks, system.ks).astype(np.int64)
+    return system._replace(
+        ks=ks, which=np.array([structures[int(d)] for d in wanted], dtype=np.int64),
+        modal_forces=_padded_rows(system.modal_forces, at, ks.size),
+        forces=_padded_rows(system.forces, at, ks.size),
+    )  # fmt: skip
+
+
+def _padded_rows(rows: Complex, at: Integer, count: int) -> Complex:
+    """Return (nk, m) unit forces put at `at` of `count` rows, the rest zero; without rows they stay so."""
+    if rows.shape[0] == 0:
+        return rows
+    padded = np.zeros((count, rows.shape[1]), np.complex128)
+    padded[at] = rows
+    return padded
+
+
+@lru_cache(maxsize=16)
+def _tables(highest: int) -> tuple[Real, Real]:
+    return grid_tables(grid_size(highest), highest)

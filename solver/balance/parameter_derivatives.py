@@ -1,0 +1,141 @@
+"""What a unit of each parameter path changes: the numbers of the contacts and their loads, the structure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.balance.balance import Balance
+from solver.balance.parameter import Kind, Parameter, resolve
+from solver.balance.simplifications import even_harmonics_reason
+from solver.contacts.kernels.columns import COLUMNS, OWN, OWN_KIND
+from solver.contacts.kernels.system import KT, LOAD_COEFFICIENTS, MODES, MU, N0, N1, PHASE, RATIO
+from solver.errors import SettingError
+from solver.jit.fourier import Complex, Real
+from solver.linear.assembly import linear_model, structure_derivative
+from solver.linear.condensation import reduce_model
+from solver.linear.contact_table import port_stiffnesses
+from solver.scene.parameter_paths import PROPORTIONAL
+from solver.scene.scene import MatricesStructure
+
+_COLUMNS = {
+    Kind.NORMAL_LOAD: N0, Kind.LOAD_AMPLITUDE: N1, Kind.LOAD_RATIO: RATIO, Kind.LOAD_PHASE: PHASE,
+    Kind.STIFFNESS: KT, Kind.FRICTION: MU,
+}  # fmt: skip
+
+
+def resolved(balance: Balance, paths: Sequence[str]) -> tuple[Parameter, ...]:
+    """Return what the paths mean in the scene of a balance.
+
+    Raises
+    ------
+    SettingError
+        An unknown path, the frequency, or one that calls for even harmonics the balance left out.
+    """
+    scene, found = balance.scene, []
+    for path in paths:
+        parameter = resolve(scene, path)
+        if parameter.kind is Kind.FREQUENCY:
+            raise SettingError("paths", path, "must be a value of the scene; the frequency is not")
+        reason = even_harmonics_reason(scene, (path,)) if balance.system.ks[0] != 0 else None
+        if reason is not None:
+            raise SettingError("paths", path, f"needs a balance with even harmonics: {reason}")
+        found.append(parameter)
+    return tuple(found)
+
+
+def contact_slopes(balance: Balance, parameters: Sequence[Parameter]) -> tuple[Real, Real]:
+    """Return the derivatives of the contacts' numbers and loads by each parameter.
+
+    Returns
+    -------
+    (n_paths, n_contacts, COLUMNS) of the rows of the contact table, and (n_paths, n_contacts, 3) of the load
+    N0, N1 cos(phase), −N1 sin(phase). A path of N1 unties it from N0, one of N1_ratio ties it.
+    """
+    rows = balance.system.contacts
+    slopes = np.zeros((len(parameters), rows.shape[0], COLUMNS))
+    loads = np.zeros((len(parameters), rows.shape[0], LOAD_COEFFICIENTS))
+    for slope, load, parameter in zip(slopes, loads, parameters, strict=True):
+        acts = parameter.active > 0.0
+        kind = parameter.kind
+        if not acts.any():
+            continue
+        column = _COLUMNS[kind] if kind < OWN_KIND else OWN + kind - OWN_KIND
+        slope[acts, column] = 1.0
+        if kind is Kind.NORMAL_LOAD:
+            slope[:, N1] = np.nan_to_num(rows[:, RATIO]) * slope[:, N0]
+        elif kind is Kind.LOAD_RATIO:
+            slope[:, N1] = rows[:, N0] * slope[:, RATIO]
+        cosine, sine = np.cos(rows[:, PHASE]), np.sin(rows[:, PHASE])
+        load[:, 0] = slope[:, N0]
+        load[:, 1] = slope[:, N1] * cosine - rows[:, N1] * sine * slope[:, PHASE]
+        load[:, 2] = -slope[:, N1] * sine - rows[:, N1] * cosine * slope[:, PHASE]
+    return slopes, loads
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Matrices:
+    """The linear part as matrices, for each kept harmonic, with its derivatives by structural parameters.
+
+    Attributes
+    ----------
+    K, C, M : (nk, n, n) array
+        Stiffness, damping and mass; contacts that alone hold a part in place are in K.
+    L : (nk, nc, n) array
+        Relative motions u = L x.
+    observe : (n,) array
+        Selects the observed DOF.
+    forces : (nk, n) array
+        Complex force amplitudes [N].
+    by : mapping
+        (dK, dC, dM) of each structural path by its number, (nk, n, n) each.
+    """
+
+    K: Complex
+    C: Complex
+    M: Complex
+    L: Complex
+    observe: Complex
+    forces: Complex
+    by: dict[int, tuple[Complex, Complex, Complex]]
+
+
+def modal_dampings(balance: Balance, parameters: Sequence[Parameter]) -> dict[int, Complex]:
+    """Return ∂C/∂q in the modes, (nk, nm), by the number of each path of a proportional damping.
+
+    Empty where the modes do not carry it: a lumped or cyclic structure, damping that couples the modes, or a
+    part that contacts alone hold. Of mass-normalised modes M is 1 and K the squared frequency.
+    """
+    system, structure = balance.system, balance.scene.structure
+    if not isinstance(structure, MatricesStructure) or system.form != MODES or system.shift.any():
+        return {}
+    stiffness, mass = PROPORTIONAL
+    values = {stiffness: system.eigenvalues, mass: np.ones_like(system.eigenvalues)}
+    return {i: values[p.name][system.which] for i, p in enumerate(parameters) if p.kind is Kind.STRUCTURE}
+
+
+def matrices_of_paths(balance: Balance, parameters: Sequence[Parameter]) -> Matrices | None:
+    """Return the linear part as matrices where a parameter needs them, one of the structure, else None."""
+    structural = {i: p.name for i, p in enumerate(parameters) if p.kind is Kind.STRUCTURE}
+    if not structural or modal_dampings(balance, parameters):
+        return None
+    scene, ks = balance.scene, balance.system.ks
+    model = linear_model(scene)
+    dense = reduce_model(model, ks, port_stiffnesses(scene, model), whole_matrices=True)
+    diameters = (ks * model.engine_order) % model.sectors
+    turn = np.exp(2j * np.pi * diameters / model.sectors)[:, None, None]
+    by = {}
+    for i, name in structural.items():
+        d = structure_derivative(scene, name)
+        by[i] = (
+            d.dK0 + d.dKp * turn + d.dKp.T * turn.conj(),
+            d.dC0 + d.dCp * turn + d.dCp.T * turn.conj(),
+            d.dM + 0.0 * turn,
+        )
+    which = dense.which
+    return Matrices(
+        K=dense.K[which], C=dense.C[which], M=dense.M[which], L=dense.L[which], observe=dense.observe,
+        forces=dense.forces, by=by,
+    )  # fmt: skip

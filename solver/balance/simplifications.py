@@ -1,0 +1,137 @@
+"""Which effects a run pays for: what may be left out without changing the answer, and the override.
+
+Every saving but one is exact. A scene whose loads are constant and whose forces have odd harmonics only
+responds with x(τ + π) = −x(τ) if no stiffness changes with the motion: even harmonics and mean are zero. A
+contact that sticks all the time is its spring, and one that never touches is nothing: both are eliminated
+from the Newton step. A tuned disk under a travelling wave repeats itself from sector to sector; where the
+laws of its contacts allow other motions too that is an assumption, and said. Modes carry the linear part at
+the cost of modes instead of matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+
+from solver.errors import SettingError
+from solver.scene.scene import (
+    AnyContact,
+    ElasticNormalContact,
+    FrictionContact,
+    GapSpring,
+    PolynomialSpring,
+    Scene,
+)
+
+_POWERS = tuple(f"a{power}" for power in range(1, 10))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effects:
+    """Effects to pay for whether the scene calls for them or not; the rest is decided by the plan.
+
+    Attributes
+    ----------
+    even_harmonics : bool
+        Even harmonics and the mean, even where the response is half-wave symmetric.
+    every_contact : bool
+        Every contact stays in the Newton step, even one that cannot slip or never touches.
+    every_sector : bool
+        The whole annulus, even of a tuned disk under a travelling wave.
+    whole_matrices : bool
+        The matrices of the linear part at every frequency, even where modes carry it.
+    """
+
+    even_harmonics: bool = False
+    every_contact: bool = False
+    every_sector: bool = False
+    whole_matrices: bool = False
+
+    @classmethod
+    def everything(cls) -> Effects:
+        """Return the settings that leave nothing out."""
+        return cls(**dict.fromkeys((field.name for field in fields(cls)), True))
+
+    @classmethod
+    def read(cls, text: str) -> Effects:
+        """Read ``auto``, ``all``, or names such as ``even-harmonics,every-sector``.
+
+        Raises
+        ------
+        SettingError
+            A name that is none of these.
+        """
+        if text == "auto":
+            return cls()
+        if text == "all":
+            return cls.everything()
+        known = [field.name.replace("_", "-") for field in fields(cls)]
+        chosen = [name.strip() for name in text.split(",")]
+        for name in chosen:
+            if name not in known:
+                raise SettingError("effects", name, f"must be `auto`, `all`, or of {', '.join(known)}")
+        return cls(**{name.replace("-", "_"): True for name in chosen})
+
+
+def even_harmonics_reason(scene: Scene, paths: Iterable[str] = ()) -> str | None:
+    """Return why even harmonics and the mean are needed, or None if the response has odd harmonics only.
+
+    Parameters
+    ----------
+    scene : what vibrates.
+    paths : parameters that will be changed or differentiated by; a load amplitude breaks the symmetry.
+    """
+    for contact in scene.contacts:
+        reason = _breaks_symmetry(contact) or _not_the_only_one(contact)
+        if reason is not None:
+            return reason
+    for force in scene.excitation:
+        if force.harmonic % 2 == 0:
+            kind = "static" if force.harmonic == 0 else f"of harmonic {force.harmonic}"
+            return f"the force on {force.dof} is {kind}"
+    for path in paths:
+        if path.endswith((".N1", ".N1_ratio")):
+            return f"{path} changes the variation of a normal load"
+        if path.rpartition(".")[2] in _POWERS:
+            return f"{path} changes a power of the motion"
+    return None
+
+
+def breaks_symmetry(scene: Scene, paths: Iterable[str] = ()) -> bool:
+    """Return whether a motion and its negative half a period later are not answered alike.
+
+    Without that a half-wave symmetric response is always one of the responses, if perhaps not the only one.
+    """
+    if any(_breaks_symmetry(contact) is not None for contact in scene.contacts):
+        return True
+    if any(force.harmonic % 2 == 0 for force in scene.excitation):
+        return True
+    return any(path.endswith((".N1", ".N1_ratio", ".a2", ".a4", ".a6", ".a8")) for path in paths)
+
+
+def _not_the_only_one(contact: AnyContact) -> str | None:
+    """Return why a half-wave symmetric response need not be the only one, or None.
+
+    Friction and springs of a constant stiffness never let two responses move apart. A spring that stiffens
+    or softens does, with the inertia, though its force is odd: m = k = a3 = 1, c = 0.2, F = 15 has at
+    ω = 1.6 rad/s a symmetric response that is not stable, and two with a mean that are.
+    """
+    if not isinstance(contact, PolynomialSpring):
+        return None
+    first, *others = contact.coefficients
+    if any(others):
+        return f"the stiffness of {contact.name} changes with its motion, so other responses are possible"
+    return f"the stiffness of {contact.name} is negative" if first < 0.0 else None
+
+
+def _breaks_symmetry(contact: AnyContact) -> str | None:
+    """Return why a contact answers a motion and its negative differently, or None."""
+    if isinstance(contact, ElasticNormalContact):
+        return f"the normal load of {contact.name} moves with the parts"
+    if isinstance(contact, FrictionContact) and contact.N1_value != 0.0:
+        return f"the normal load of {contact.name} varies by {abs(contact.N1_value):g} N"
+    if isinstance(contact, GapSpring):
+        return f"{contact.name} pushes on one side only"
+    if isinstance(contact, PolynomialSpring) and any(contact.coefficients[1::2]):
+        return f"{contact.name} has an even power of the motion"
+    return None

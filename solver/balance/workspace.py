@@ -1,0 +1,279 @@
+"""The arrays one run works in, and the operations on a single point that everything else is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.balance.balance import Balance, fewer_harmonics
+from solver.balance.kernels.jacobian import fill_jacobian
+from solver.balance.kernels.locate import slope_by_parameter
+from solver.balance.kernels.newton import from_stuck, ladder, newton
+from solver.balance.kernels.output import MEASURES
+from solver.balance.kernels.residual import evaluate
+from solver.contacts.kernels.columns import ELASTIC_NORMAL, GAP_SPRING
+from solver.contacts.kernels.system import (
+    UNHELD,
+    Evaluation,
+    Receptance,
+    System,
+    by_reference,
+    evaluation_by_value,
+    new_evaluation,
+    new_receptance,
+    receptance_by_value,
+)
+from solver.jit.fourier import Integer, Real
+from solver.linear.kernels.receptance import receptance
+from solver.scene.harmonics import spread
+
+FEWEST_HARMONICS = (
+    2  # the mean and the first: with these Newton's method from full stick nearly always ends well
+)
+
+
+BALANCED = 1e-6  # of the forces on a part that contacts alone hold: a mean force that drives it is larger
+ROUNDING = 1e-15
+_LEAST_RISE = 1e-3  # share of the excitation below which it is raised no further
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointSolution:
+    """One attempt to solve the balance at one value of λ.
+
+    Attributes
+    ----------
+    converged : bool
+        Whether `u` satisfies the balance.
+    u : (n_unknowns,) array
+        Slip motions [m], contact after contact.
+    iterations : int
+        Newton iterations spent, the start-up ladder included.
+    residual : float
+        Relative residual at `u`.
+    ratchets : bool
+        There is no periodic motion: a part that contacts alone hold drifts a little further every period.
+    """
+
+    converged: bool
+    u: Real
+    iterations: int
+    residual: float
+    ratchets: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """The mean force on what contacts alone hold.
+
+    Attributes
+    ----------
+    relative : float
+        Relative to the forces of the contacts along the same motion.
+    unheld : bool
+        Whether nothing holds a part there against it: each of its contacts slips both ways, is open, or
+        carries all it can.
+    """
+
+    relative: float
+    unheld: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointMeasures:
+    """What is observed at a solution, with slopes by λ (inside unit).
+
+    Attributes
+    ----------
+    observed : (n,) array
+        Coefficients of the observed DOF [m].
+    values : (MEASURES,) array
+        Indexed by the column names of `solver.balance.kernels.output`.
+    """
+
+    observed: Real
+    values: Real
+
+
+@dataclass(frozen=True, slots=True)
+class Workspace:
+    """A balance with the scratch arrays of the compiled loops; not for two threads at once."""
+
+    balance: Balance
+    system: System
+    linear: Receptance
+    point: Evaluation
+
+    @classmethod
+    def of(cls, balance: Balance) -> Workspace:
+        """Return a fresh workspace for a balance."""
+        system = by_reference(balance.system)
+        return cls(balance, system, new_receptance(system), new_evaluation(system))
+
+    def solve(self, p: float, guess: Real | None = None) -> PointSolution:
+        """Solve at λ = `p` (inside unit): from `guess` if given, else from nothing.
+
+        From nothing, Newton starts at the fully stuck response; if that fails, the harmonics are added
+        little by little, beginning with the first alone; if that fails too, the load is walked down rung by
+        rung from full stick, and at last the excitation is raised from nothing. Where contacts alone hold a
+        part, and none does, it is looked whether a force drives the part away.
+        """
+        found = self._plain(p, guess)
+        if not len(self.balance.system.loose) or (found.converged and self._balanced(found.u, p)):
+            return found
+        return self._held_in_place(p, found.iterations)
+
+    def _plain(self, p: float, guess: Real | None = None) -> PointSolution:
+        """Solve the balance as it stands, as `solve`."""
+        system, linear, point = self.system, self.linear, self.point
+        u, spent = np.zeros(self.balance.n_unknowns), 0
+        if guess is not None:
+            good, spent, norm = self._newton(guess, u, p)
+            if good:
+                return PointSolution(converged=True, u=u, iterations=spent, residual=norm)
+        good, more, norm = from_stuck(system, linear, u, p, point)
+        spent += more
+        if not good:
+            ks, coarse = self._with_fewer_harmonics(p)
+            spent += coarse.iterations
+            if coarse.converged:
+                good, more, norm = self._newton(self._padded(coarse.u, ks), u, p)
+                spent += more
+        if not good:
+            good, more, norm = ladder(system, linear, u, p, point)
+            spent += more
+        if not good:
+            good, more, norm = self._by_level(u, p)
+            spent += more
+        return PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
+
+    def solve_from(self, p: float, guess: Real) -> PointSolution:
+        """Solve at λ = `p` (inside unit) by Newton's method from `guess` alone."""
+        u = np.zeros(self.balance.n_unknowns)
+        good, spent, norm = self._newton(guess, u, p)
+        if good and len(self.balance.system.loose) and not self._balanced(u, p):
+            good = False
+        return PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
+
+    def _balanced(self, u: Real, p: float) -> bool:
+        """Return whether the mean forces on what contacts alone hold balance, relative to these forces.
+
+        The residual is one of displacements, which are large where a part is far away.
+        """
+        return self.drive(u, p).relative <= BALANCED
+
+    def drive(self, u: Real, p: float) -> Drive:
+        """Return the mean force left on what contacts alone hold, where (u, p) solves the rest."""
+        system, n = self.balance.system, self.balance.n_coefficients
+        _, point = self.evaluate(u, p)
+        # Of the parts' rigid-body motions l, Σ_c l_c kt_c r_c is the sum of all mean forces along them.
+        forces = system.loose @ (system.shift * point.residual[::n])
+        carried = np.abs(system.loose) @ np.abs(point.F).max(axis=1)
+        applied = np.abs(system.loose @ (system.shift * self.receptance(p).u_linear[0, 0].real))
+        size = max(float(carried.max()), float(applied.max()), float(np.abs(forces).max()))
+        # Of a part far away the forces are the rounding of its place.
+        lost = ROUNDING * (np.abs(system.loose) @ (system.shift * np.abs(u[::n]))).max()
+        relative = float(np.abs(forces).max() + lost) / size if size > 0.0 else 0.0
+        # A contact that sticks with all the mean force it can carry, and was pulled beyond, holds the part
+        # the other way.
+        full = point.elastic > 0.0
+        beyond = point.elastic * u[::n] - point.F[:, 0]
+        away = bool(np.all((forces @ system.loose)[full] * beyond[full] <= 0.0))
+        # A contact that opens and closes with the parts may hold the part elsewhere.
+        touches = np.isin(system.laws, (ELASTIC_NORMAL, GAP_SPRING))[system.owner]
+        away &= not np.any(system.loose[:, touches])
+        return Drive(relative=relative, unheld=away and bool(full.any() or point.counts[UNHELD]))
+
+    def _held_in_place(self, p: float, spent: int) -> PointSolution:
+        """Solve where a constant force holds what no contact does: is the force 0, nothing drives the part.
+
+        Under given loads the friction forces of two motions never work on their difference, so the motion of
+        a part that needs such a force is no periodic one without it.
+        """
+        held = self.balance.system._replace(hold=1)
+        other = Workspace.of(replace(self.balance, system=held))
+        found = other._plain(p)
+        u, spent = found.u, spent + found.iterations
+        if found.converged:
+            drive = self.drive(u, p)
+            if drive.relative <= BALANCED:
+                norm, _ = self.evaluate(u, p)
+                return PointSolution(converged=True, u=u, iterations=spent, residual=norm)
+            if drive.unheld:
+                return PointSolution(converged=False, u=u, iterations=spent, residual=np.inf, ratchets=True)
+        return PointSolution(converged=False, u=u, iterations=spent, residual=np.inf)
+
+    def _by_level(self, u: Real, p: float) -> tuple[bool, int, float]:
+        """Raise the excitation from nothing, the result in `u`; as `newton`."""
+        reached, step, spent, norm = 0.0, 0.1, 0, np.inf
+        kept = np.zeros(u.size)
+        while reached < 1.0 and step > _LEAST_RISE:
+            level = min(1.0, reached + step)
+            u[:] = kept * (level / reached) if reached > 0.0 else kept
+            receptance(self.system, p, self.linear)
+            linear = receptance_by_value(self.linear)
+            linear.u_linear[...] *= level
+            linear.x_linear[...] *= level
+            good, more, norm = newton(self.system, self.linear, u, p, 0.0, self.point)
+            spent += more
+            if good:
+                kept, reached, step = u.copy(), level, 1.5 * step
+            else:
+                step *= 0.5
+        receptance(self.system, p, self.linear)
+        return reached == 1.0, spent, norm
+
+    def _with_fewer_harmonics(self, p: float) -> tuple[Integer, PointSolution]:
+        """Solve with about two thirds of the harmonics, found in the same way from still fewer.
+
+        Returns them and the solution.
+        """
+        count = self.balance.system.ks.size
+        less = fewer_harmonics(self.balance, max(2 * count // 3, FEWEST_HARMONICS))
+        if less.system.ks.size >= count:
+            nothing = np.zeros(self.balance.n_unknowns)
+            failed = PointSolution(converged=False, u=nothing, iterations=0, residual=np.inf)
+            return self.balance.system.ks, failed
+        smaller = Workspace.of(less)
+        ks, coarse = smaller._with_fewer_harmonics(p)
+        u, good, norm, spent = np.zeros(smaller.balance.n_unknowns), False, np.inf, coarse.iterations
+        if coarse.converged:
+            good, more, norm = smaller._newton(smaller._padded(coarse.u, ks), u, p)
+            spent += more
+        if not good:
+            good, more, norm = from_stuck(smaller.system, smaller.linear, u, p, smaller.point)
+            spent += more
+        found = PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
+        return less.system.ks, found
+
+    def _newton(self, guess: Real, u: Real, p: float) -> tuple[bool, int, float]:
+        """Run Newton's method from `guess`, the result in `u`."""
+        u[:] = guess
+        receptance(self.system, p, self.linear)
+        return newton(self.system, self.linear, u, p, 0.0, self.point)
+
+    def _padded(self, u: Real, ks: Integer) -> Real:
+        """Return a solution with the fewer harmonics `ks`, filled up with zeros."""
+        kept = u.reshape(self.balance.n_ports, -1)
+        return spread(kept, ks, self.balance.system.ks).reshape(-1)
+
+    def evaluate(self, u: Real, p: float) -> tuple[float, Evaluation]:
+        """Return the relative residual at (u, p) and everything evaluated there (views of scratch arrays)."""
+        receptance(self.system, p, self.linear)
+        norm = evaluate(self.system, self.linear, u, p, 0.0, self.point)
+        fill_jacobian(self.system, self.linear, self.point)
+        return float(norm), evaluation_by_value(self.point)
+
+    def receptance(self, p: float) -> Receptance:
+        """Return the condensed linear part at λ = `p` (views of scratch arrays)."""
+        receptance(self.system, p, self.linear)
+        return receptance_by_value(self.linear)
+
+    def measure(self, u: Real, p: float) -> PointMeasures | None:
+        """Return what is observed at the solution (u, p) with slopes by λ; None where dr/du is singular."""
+        receptance(self.system, p, self.linear)
+        evaluate(self.system, self.linear, u, p, 0.0, self.point)
+        observed, values = np.zeros(self.balance.n_coefficients), np.zeros(MEASURES)
+        good = slope_by_parameter(self.system, self.linear, u, self.point, observed, values)
+        return PointMeasures(observed=observed, values=values) if good else None

@@ -1,0 +1,1 @@
+"""`sweep` and its ways: walked, point by point, with as many harmonics as accuracy takes."""

@@ -1,0 +1,235 @@
+"""The condensed multi-harmonic balance r(u, λ) = u − ū + A F(u): its data and its evaluation.
+
+With Z_k = K − (kω)²M + ikωC of every kept harmonic k, the linear degrees of freedom are eliminated,
+A_k = L Z_k⁻¹ Lᴴ, ū_k = L Z_k⁻¹ f̂_k, so the unknowns are the slip motions of the contacts alone. Z⁻¹ is kept
+in one of three forms: undamped modes (classical damping), poles and residues (any damping whose eigenvectors
+span the state space), both at the cost of modes × contacts² a frequency, and dense (the rest, and whenever λ
+is a parameter of the structure itself).
+
+A stiffness `shift` of each port may be moved into the structure and taken out of the force again,
+r = u − ū + A (F − shift u): the same equation, but Z_0 stays regular when only contacts hold a part in place.
+
+An element (a contact, of whatever law) has one or more ports: relative motions with n coefficients each, the
+force of each depending on all of them. The unknowns are the motions of all ports, port after port.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numba.experimental import structref
+
+from solver.contacts.kernels.stick_slip_events import SEGMENT_COLUMNS, segment_capacity
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Complex, Index, Integer, Real, coefficient_count
+from solver.jit.reference import Reference
+
+# What λ is.
+FREQUENCY, LEVEL, FORCE_PHASE, STRUCTURE = 0, 1, 2, 3
+NORMAL_LOAD, LOAD_AMPLITUDE, LOAD_RATIO, LOAD_PHASE, STIFFNESS, FRICTION = 4, 5, 6, 7, 8, 9
+# How Z⁻¹ is kept.
+MODES, POLES, DENSE = 0, 1, 2
+# Columns of the contact table.
+KT, MU, N0, N1, RATIO, PHASE = 0, 1, 2, 3, 4, 5
+LOAD_COEFFICIENTS = 3
+# Numbers in `Evaluation.counts`.
+FREE, HELD, SIZE, AT_BRANCH_POINT, UNHELD = 0, 1, 2, 3, 4
+
+
+class System(NamedTuple):
+    """Everything the compiled loops need; arrays only.
+
+    nk harmonics, ne elements with nc ports in all, ns distinct structures (nodal diameters), nm modes or n
+    DOFs of each.
+    """
+
+    ks: Integer  # (nk,) harmonics kept, ascending
+    load_ks: Integer  # harmonics of the normal load
+    which: Integer  # (nk,) structure of each harmonic
+    cos_table: Real
+    sin_table: Real
+    laws: Integer  # (ne,) COULOMB, … of `solver.contacts.kernels.columns`
+    first_port: Integer  # (ne + 1,) where the ports of each element begin
+    first_block: Integer  # (ne + 1,) where its blocks of dF_dU begin: ports² of them, row after row
+    owner: Integer  # (nc,) element of each port
+    contacts: Real  # (ne, COLUMNS) kt, mu, N0, N1, N1_ratio (NaN: not tied), N1_phase, and a law's own
+    active: Real  # (ne,) 1.0 where λ acts
+    shift: Real  # (nc,) stiffness moved into the structure [N/m]
+    loose: Real  # (nr, nc) ports' part in the rigid-body motions of what contacts alone hold, see `loose`
+    hold: int  # 1: where no contact holds such a part, a constant force does
+    samples: int  # in a period, for contact forces by samples in time; 0: in closed form
+    condense: int  # 1: contacts that are linear where they are leave the Newton step, 0: none does
+    kind: int  # what λ is
+    omega: float  # rad/s, when λ is not the frequency
+    level_reference: float  # N, the excitation amplitude at level 1
+    phase_reference: float  # rad
+    parameter_reference: float  # the value of a structural parameter at which K, M, C stand
+    least_size: float  # m, motions of the contacts far below it are rounding of what cancels in ū
+    form: int
+    eigenvalues: Complex  # (ns, nm) undamped ω² [rad²/s²], or poles [rad/s]
+    dampings: Real  # (ns, nm) modal damping [1/s] of undamped modes
+    contact_modes: Complex  # (ns, nc, nm) L x_m
+    contact_duals: Complex  # (ns, nc, nm) y_mᴴ Lᴴ, normalised
+    observe_modes: Complex  # (ns, nm)
+    modal_forces: Complex  # (nk, nm) y_mᴴ f̂_k at level 1, normalised
+    K: Complex  # (ns, n, n), likewise below; empty unless dense
+    C: Complex
+    M: Complex
+    dK: Complex  # derivative by the structural parameter
+    dC: Complex
+    dM: Complex
+    L: Complex  # (ns, nc, n)
+    observe: Complex  # (n,)
+    forces: Complex  # (nk, n) f̂_k at level 1
+
+
+class Receptance(NamedTuple):
+    """Condensed linear part at one λ, and its derivative by λ (first index 0: value, 1: derivative)."""
+
+    A: Complex  # (2, nk, nc, nc)
+    u_linear: Complex  # (2, nk, nc)
+    B: Complex  # (2, nk, nc) from the contact forces to the observed DOF
+    x_linear: Complex  # (2, nk)
+
+
+class Evaluation(NamedTuple):
+    """The balance at one (u, λ): residual, derivative by λ, and the contact forces behind them.
+
+    From `jacobian` on, filled by `solver.balance.kernels.jacobian`: what belongs to the last Jacobian looked
+    at.
+    """
+
+    residual: Real  # (nt,)
+    dr_dp: Real  # (nt,) dr/dλ
+    F: Real  # (nc, n)
+    dF_dU: Real  # (blocks, n, n)
+    dF_dp: Real  # (nc, n) partial derivative of the force by λ
+    dF_dkt: Real  # (n,) scratch, as the two below
+    dF_dmu: Real  # (n,)
+    dF_dN: Real  # (n, 3)
+    states: Integer  # (ne,)
+    pieces: Integer  # (ne,) which smooth piece of its law a contact is on, see `events.piece_of`
+    slopes: Real  # (ne,) F = slope · u where the law is linear there (stuck or separated), else NaN
+    segments: Real  # scratch
+    jacobian: Real  # (nt, nt) dr/du
+    lu: Real  # (nt + 1, nt + 1) factors of the condensed, perhaps bordered, Jacobian in their leading block
+    pivots: Index  # (nt + 1,)
+    free: Integer  # (nc,) ports kept in it
+    held: Integer  # (nc,) ports eliminated
+    counts: Integer  # (5,) numbers of both, size of the factors, whether they belong to a branch point, and
+    # the number of directions in which nothing holds a part
+    G: Real  # (blocks, n, n) dF_dU less the shift, at the factors' point
+    inverse: Complex  # (nk, nc, nc) D⁻¹, likewise below; see `solver.balance.kernels.jacobian`
+    V: Complex  # (nk, nc, nc)
+    W: Complex  # (nk, nc, nc)
+    reduced: Complex  # (nk, nc, nc) A' of the ports kept
+    border: Real  # (nt,) the weighted tangent
+    held_slope: Real  # (nt,) D⁻¹ dr/dλ of the ports eliminated
+    work: Real  # (4, nt + 1) scratch
+    gauge: Real  # (nr, nc) motions of the ports that nothing holds, see `solver.balance.kernels.gauge`
+    unheld: Real  # (nr, nr) forces along them, over the rigid-body motions
+    elastic: Real  # (nc,) stiffness of contacts that carry all the mean force they can [N/m], else 0
+
+
+# Inside the compiled loops each record is one pointer: forty arrays passed by value at every call cost more
+# than the work itself, and minutes of compilation.
+
+
+@structref.register
+class _SystemType(Reference):
+    """Numba's type of a `System` by reference."""
+
+
+@structref.register
+class _ReceptanceType(Reference):
+    """Numba's type of a `Receptance` by reference."""
+
+
+@structref.register
+class _EvaluationType(Reference):
+    """Numba's type of an `Evaluation` by reference."""
+
+
+class _SystemReference(structref.StructRefProxy):
+    """A `System` by reference."""
+
+
+class _ReceptanceReference(structref.StructRefProxy):
+    """A `Receptance` by reference."""
+
+
+class _EvaluationReference(structref.StructRefProxy):
+    """An `Evaluation` by reference."""
+
+
+structref.define_proxy(_SystemReference, _SystemType, list(System._fields))
+structref.define_proxy(_ReceptanceReference, _ReceptanceType, list(Receptance._fields))
+structref.define_proxy(_EvaluationReference, _EvaluationType, list(Evaluation._fields))
+
+_new_system: Callable[..., System] = _SystemReference
+_receptance_of: Callable[..., Receptance] = _ReceptanceReference
+_evaluation_of: Callable[..., Evaluation] = _EvaluationReference
+
+
+@compiled
+def by_reference(system: System) -> System:
+    """Return the same system as the compiled loops take it: one pointer."""
+    return _new_system(*system)
+
+
+@compiled
+def evaluation_by_value(point: Evaluation) -> Evaluation:
+    """Return the arrays of an evaluation as a tuple that Python can read (views, not copies)."""
+    return Evaluation(
+        point.residual, point.dr_dp, point.F, point.dF_dU, point.dF_dp, point.dF_dkt, point.dF_dmu,
+        point.dF_dN, point.states, point.pieces, point.slopes, point.segments, point.jacobian, point.lu,
+        point.pivots, point.free, point.held, point.counts, point.G, point.inverse, point.V, point.W,
+        point.reduced, point.border, point.held_slope, point.work, point.gauge, point.unheld,
+        point.elastic,
+    )  # fmt: skip
+
+
+@compiled
+def receptance_over(A: Complex, u_linear: Complex, B: Complex, x_linear: Complex) -> Receptance:
+    """Return a receptance that reads arrays of others, whose first index begins with value, derivative."""
+    return _receptance_of(A, u_linear, B, x_linear)
+
+
+@compiled
+def receptance_by_value(linear: Receptance) -> Receptance:
+    """Return the arrays of a receptance as a tuple that Python can read (views, not copies)."""
+    return Receptance(linear.A, linear.u_linear, linear.B, linear.x_linear)
+
+
+@compiled
+def new_receptance(system: System) -> Receptance:
+    """Return an empty receptance for `system`."""
+    nk, nc = system.ks.size, system.owner.size
+    return _receptance_of(
+        np.zeros((2, nk, nc, nc), np.complex128),
+        np.zeros((2, nk, nc), np.complex128),
+        np.zeros((2, nk, nc), np.complex128),
+        np.zeros((2, nk), np.complex128),
+    )
+
+
+@compiled
+def new_evaluation(system: System) -> Evaluation:
+    """Return empty arrays for `evaluate`."""
+    ne, nc, n, nk = system.laws.size, system.owner.size, coefficient_count(system.ks), system.ks.size
+    blocks, nt = system.first_block[ne], nc * n
+    return _evaluation_of(
+        np.zeros(nt), np.zeros(nt), np.zeros((nc, n)), np.zeros((blocks, n, n)), np.zeros((nc, n)),
+        np.zeros(n), np.zeros(n), np.zeros((n, LOAD_COEFFICIENTS)), np.zeros(ne, np.int64),
+        np.zeros(ne, np.int64), np.zeros(ne),
+        np.zeros((segment_capacity(max(system.ks[-1], 1)), SEGMENT_COLUMNS)), np.zeros((nt, nt)),
+        np.zeros((nt + 1, nt + 1)), np.zeros(nt + 1, np.int32), np.zeros(nc, np.int64),
+        np.zeros(nc, np.int64), np.zeros(5, np.int64), np.zeros((blocks, n, n)),
+        np.zeros((nk, nc, nc), np.complex128), np.zeros((nk, nc, nc), np.complex128),
+        np.zeros((nk, nc, nc), np.complex128), np.zeros((nk, nc, nc), np.complex128), np.zeros(nt),
+        np.zeros(nt), np.zeros((4, nt + 1)),
+        np.zeros((system.loose.shape[0], nc)), np.zeros((system.loose.shape[0], system.loose.shape[0])),
+        np.zeros(nc),
+    )  # fmt: skip

@@ -1,0 +1,89 @@
+"""The segments of a contact over a period, and how much of it each motion takes."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.contacts.kernels.planar import periods_to_repeat, plane_step
+from solver.contacts.kernels.state_durations import find_segments
+from solver.contacts.kernels.stick_slip_events import (
+    BEGIN,
+    END,
+    MOTION,
+    SEGMENT_COLUMNS,
+    SLIP,
+    segment_capacity,
+)
+from solver.jit import fourier
+from solver.jit.fourier import Real
+from solver.jit.trig_polynomial import grid_size, grid_tables
+
+_TURN = 2.0 * math.pi
+
+
+class Segments(NamedTuple):
+    """What a contact does over a period, see `solver.contacts.kernels.stick_slip_events`."""
+
+    state: int
+    rows: Real  # (count, SEGMENT_COLUMNS)
+
+
+class Shares(NamedTuple):
+    """Shares of the period a contact spends in each motion; they add up to 1."""
+
+    stick: float
+    slip: float
+    separation: float
+
+
+def segments_of(slip: Real, load: Real, kt: float, mu: float) -> Segments:
+    """Return the segments for full coefficients of slip motion [m] and normal load [N]."""
+    ks, load_ks = (fourier.all_harmonics((q.size - 1) // 2) for q in (slip, load))
+    top = max(int(ks[-1]), int(load_ks[-1]), 1)
+    rows = np.zeros((segment_capacity(top), SEGMENT_COLUMNS))
+    tables = grid_tables(grid_size(top), top)
+    state, count = find_segments(slip, ks, load, load_ks, float(kt), float(mu), *tables, rows)
+    return Segments(state=int(state), rows=rows[:count].copy())
+
+
+def shares_of(*found: Segments) -> Shares:
+    """Return the shares of one slider, or of several under one load: they slip where any of them does."""
+    edges = {0.0, 1.0}
+    for each in found:
+        edges |= {float(share) for share in (each.rows[:, [BEGIN, END]] / _TURN % 1.0).ravel()}
+    ends = np.array(sorted(edges))
+    middles, lengths = 0.5 * (ends[1:] + ends[:-1]), np.diff(ends)
+    touching, slipping = np.zeros(middles.size, bool), np.zeros(middles.size, bool)
+    for each in found:
+        for row in each.rows:
+            inside = (middles - row[BEGIN] / _TURN) % 1.0 < (row[END] - row[BEGIN]) / _TURN
+            touching |= inside
+            slipping |= inside & (row[MOTION] == SLIP)
+    slip, contact = float(lengths[slipping].sum()), float(lengths[touching].sum())
+    return Shares(stick=contact - slip, slip=slip, separation=1.0 - contact)
+
+
+def sampled_shares(motions: Real, load: Real, kt: float, mu: float, samples: int) -> Shares:
+    """Return the shares under a circular limit, whose law is sampled: those of its intervals.
+
+    Parameters
+    ----------
+    motions : (2, 2H + 1) full coefficients [m]; load : full coefficients [N].
+    """
+    tau = np.linspace(0.0, _TURN, samples, endpoint=False)
+    u = np.ascontiguousarray((fourier.basis(tau, (motions.shape[1] - 1) // 2) @ motions.T).T)
+    limit = mu * (fourier.basis(tau, (load.size - 1) // 2) @ load)
+    T, seeds, nothing = np.zeros(2), np.empty((7, 0)), np.empty((2, 0))
+    plane_step(kt, u[0, 0], u[1, 0], limit[0], limit[0], T, seeds, nothing)
+    apart = slips = 0
+    for _ in range(periods_to_repeat(u, limit, kt)):
+        apart = slips = 0
+        for j in range(samples):
+            to = (j + 1) % samples
+            du, dw = u[0, to] - u[0, j], u[1, to] - u[1, j]
+            slips += bool(plane_step(kt, du, dw, limit[j], limit[to], T, seeds, nothing))
+            apart += bool(limit[to] <= 0.0)
+    return Shares(stick=(samples - slips - apart) / samples, slip=slips / samples, separation=apart / samples)

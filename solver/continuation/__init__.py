@@ -1,0 +1,1 @@
+"""Walking along a branch of periodic responses over one parameter."""

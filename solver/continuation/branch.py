@@ -1,0 +1,312 @@
+"""Branches: what continuation returns. Only converged points are in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from solver.balance.balance import Balance
+from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN, RESIDUAL, SLOPE
+from solver.continuation.certificate import PeakCertificate
+from solver.continuation.kernels.state import FINISHED, LEFT_RANGE, NO_START, STALLED
+from solver.jit.fourier import Integer, Real
+from solver.results.base import Piece, Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.results.dataset import Dataset
+    from solver.views.plots.style import Into
+
+
+class BranchStatus(Enum):
+    """How a continuation ended; the value is a sentence a user can act on."""
+
+    COMPLETED = "The branch reached the end of the range."
+    NO_START = "No first solution was found: start somewhere else, or use more harmonics."
+    STALLED = (
+        "The steps became too small to go on: use more harmonics, or start from the other end of the range."
+    )
+    TURNED_BACK = "The branch turned and left the range where it began; the end of the range was not reached."
+    ACCURACY_NOT_REACHED = (
+        "The branch reached the end of the range, but the accuracy asked for was not reached with the most "
+        "harmonics allowed: ask for less, or set the harmonics yourself."
+    )
+    STOPPED = "The continuation was stopped by the caller."
+    TOO_MANY_POINTS = "The largest number of points was used up: allow more points or a larger step."
+    TOO_STIFF = (
+        "A contact is so much stiffer than the structure that what it deforms is lost in the rounding of its "
+        "motion: lower kt. Above a million times the structure's stiffness the response no longer depends on "
+        "it."
+    )
+    RATCHETS = (
+        "Beyond the last point there is no periodic motion: a part that contacts alone hold ratchets, it "
+        "drifts a little further every period. Press it harder, take away what pulls it to one side, or hold "
+        "it by a spring."
+    )
+
+
+ENDINGS = {
+    FINISHED: BranchStatus.COMPLETED,
+    NO_START: BranchStatus.NO_START,
+    STALLED: BranchStatus.STALLED,
+    LEFT_RANGE: BranchStatus.TURNED_BACK,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Peak(Piece):
+    """A local maximum of the amplitude along a branch, polished to the stationary point.
+
+    Attributes
+    ----------
+    value : float
+        max|x| of the observed DOF [m].
+    at : float
+        Parameter value there, in user units (Hz for a frequency).
+    solution : (n_unknowns,) array
+        Slip motions of the contacts there [m].
+    interior : bool
+        A true maximum, not an end of the branch.
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"value": "m"}
+
+    value: float
+    at: float
+    solution: Real
+    interior: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Edge:
+    """An end of an interval in which the amplitude exceeds a limit: where it equals the limit, or a fold.
+
+    Attributes
+    ----------
+    at : float
+        Parameter value, in user units.
+    solution : (n_unknowns,) array
+        Slip motions of the contacts there [m].
+    opens : bool
+        The interval begins here; otherwise it ends here.
+    fold : bool
+        The branch turns back here, above the limit.
+    corner : bool
+        It does so where a contact changes its state: the end has no derivative.
+    """
+
+    at: float
+    solution: Real
+    opens: bool
+    fold: bool = False
+    corner: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Band(Piece):
+    """Where the amplitude exceeds a limit.
+
+    Attributes
+    ----------
+    limit : float
+        The limit [m].
+    width : float
+        Measure of {parameter : amplitude > limit}, in user units (Hz for a frequency).
+    intervals : tuple of (low, high)
+        Its intervals, ascending.
+    edges : tuple of Edge
+        The interval ends inside the branch (an end of the range itself is not one).
+    known : bool
+        Wherever the amplitude may cross the limit between two points, that was settled by solutions; see
+        also `Branch.peak_certificate`.
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"limit": "m"}
+
+    limit: float
+    width: float
+    intervals: tuple[tuple[float, float], ...]
+    edges: tuple[Edge, ...]
+    known: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Branch(Shown):
+    """A branch of periodic responses over one parameter, P points in their order along it.
+
+    They are the steps of the continuation and what was solved for between them: narrow resonances and peaks.
+
+    Attributes
+    ----------
+    balance : Balance
+        What was continued; its scene holds the values that stayed fixed.
+    status : BranchStatus
+        How it ended.
+    values : (P,) array
+        Parameter values in user units.
+    solutions, tangents : (P, n_unknowns + 1) array
+        Slip motions [m] with λ (inside unit) last, and tangents that point onward along the branch.
+    observed : (P, 2H + 1) array
+        Full coefficients of the observed DOF [m], zero where a harmonic is not kept.
+    measures : (P, MEASURES) array
+        Columns named in `solver.balance.kernels.output`; slopes are along the tangents.
+    states : (P, n_contacts) array
+        State of every contact, as in `solver.response.contact_response.ContactState`.
+    peaks : tuple of Peak
+        All local maxima, highest first; the ends of the branch are in it too.
+    band : Band or None
+        Where the amplitude exceeds the limit asked for (peak/√2 if none was); None without a peak.
+    error_estimate : float
+        Estimated error of the highest peak's value, by the harmonics left out and the residual [m], with
+        peaks that stand elsewhere if more are kept (`solver.extrema.branch_error`); NaN without a peak.
+        `solver.branch_errors` gives that of every point.
+    peak_certificate : PeakCertificate
+        Why no higher peak hides between two points, or why that is not known.
+    flags : tuple of str
+        ``symmetric_unstable`` if a half-wave symmetric point of it is not the motion that is seen,
+        ``travelling_wave_assumed`` where one sector stands for all though the laws allow other motions.
+    """
+
+    balance: Balance
+    status: BranchStatus
+    start: float
+    stop: float
+    values: Real
+    solutions: Real
+    tangents: Real
+    observed: Real
+    measures: Real
+    states: Integer
+    peaks: tuple[Peak, ...]
+    band: Band | None
+    error_estimate: float
+    newton_iterations: int
+    rejected_steps: int
+    stepped_over: int
+    seconds: float
+    peak_certificate: PeakCertificate
+    flags: tuple[str, ...] = ()
+
+    @property
+    def parameter(self) -> str:
+        """Path of the parameter that was continued in."""
+        return self.balance.parameter.path
+
+    @property
+    def completed(self) -> bool:
+        """Whether the branch reached the end of the range."""
+        return self.status is BranchStatus.COMPLETED
+
+    @property
+    def amplitude(self) -> Real:
+        """max|x| of the observed DOF at each point [m]."""
+        return self.measures[:, MAX_ABS]
+
+    @property
+    def half_peak_to_peak(self) -> Real:
+        """(max x − min x)/2 of the observed DOF at each point [m]."""
+        return self.measures[:, HALF_RANGE]
+
+    @property
+    def mean(self) -> Real:
+        """Mean of the observed DOF at each point [m]."""
+        return self.measures[:, MEAN]
+
+    @property
+    def residuals(self) -> Real:
+        """Relative residual at each point."""
+        return self.measures[:, RESIDUAL]
+
+    @property
+    def slopes(self) -> Real:
+        """Change of max|x| along the unit tangent at each point."""
+        return self.measures[:, SLOPE]
+
+    @property
+    def coefficients(self) -> Real:
+        """Slip motion of every contact at each point, (P, n_contacts, n) [m]."""
+        n = self.balance.n_coefficients
+        return self.solutions[:, :-1].reshape(len(self.values), -1, n)
+
+    @property
+    def peak(self) -> Peak | None:
+        """The highest peak, or None if the branch has no point."""
+        return self.peaks[0] if self.peaks else None
+
+    @property
+    def mean_undetermined(self) -> bool | None:
+        """Whether the mean, and with it the height, of the highest peak depends on the history; None without.
+
+        It is found when it is asked for, as `solve` does.
+        """
+        from solver.response.history_dependence import peak_flags
+
+        return None if self.peak is None else "mean_undetermined" in peak_flags(self)
+
+    @property
+    def folds(self) -> int:
+        """How often the branch turned back in its parameter."""
+        return int(np.count_nonzero(np.diff(np.sign(np.diff(self.values)))))
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.views.summary import of_branch
+
+        return of_branch(self)
+
+    def to_dataset(self) -> Dataset:
+        """A point a row, with harmonics and contact states; SI units."""
+        from solver.views.to_dataset import branch_dataset
+
+        return branch_dataset(self)
+
+    def plot(self, ax: Into = None, *, limit: float | None = None) -> Figure:
+        """Draw the response, its peak and its band.
+
+        Parameters
+        ----------
+        ax : axes to draw into, else a new figure.
+        limit : amplitude [m] drawn as a line.
+        """
+        from solver.views.plots.curves import Response
+        from solver.views.plots.responses import Demands, response_figure
+
+        return response_figure(Response.of_branch(self), asked=Demands(limit=limit), ax=ax)
+
+    def to_json(self) -> dict[str, object]:
+        """Return the branch as one JSON object."""
+        peak, band = self.peak, self.band
+        return {
+            "scene": self.balance.scene.name,
+            "parameter": self.values.tolist(),
+            "parameter_path": self.parameter,
+            "unit": self.balance.parameter.unit,
+            "amplitude": self.amplitude.tolist(),
+            "half_peak_to_peak": self.half_peak_to_peak.tolist(),
+            "mean": self.mean.tolist(),
+            "peak": None if peak is None else {"value": peak.value, "at": peak.at},
+            "peaks": [{"value": peak.value, "at": peak.at} for peak in self.peaks if peak.interior],
+            "band_hz": None if band is None else band.width,
+            "band_limit": None if band is None else band.limit,
+            "band_intervals_hz": None if band is None else [list(interval) for interval in band.intervals],
+            "band_known": None if band is None else band.known and self.peak_certificate.known,
+            "peak_certificate": self.peak_certificate.to_json(),
+            "points": len(self.values),
+            "n_harmonics": self.balance.n_harmonics,
+            "error_estimate": float(self.error_estimate) if math.isfinite(self.error_estimate) else None,
+            "newton_iterations": self.newton_iterations,
+            "rejected_steps": self.rejected_steps,
+            "folds": self.folds,
+            "mean_undetermined": self.mean_undetermined,
+            "largest_residual": float(self.residuals.max()) if len(self.values) else None,
+            "seconds": self.seconds,
+            "flags": list(self.flags),
+            "completed": self.completed,
+            "status": self.status.value,
+        }

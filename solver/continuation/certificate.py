@@ -1,0 +1,69 @@
+"""Why no higher peak hides between two points of a branch, or that it is not known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from solver.results.base import Piece
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class PeakCertificate(Piece):
+    """What is known of the amplitude between the points of a branch.
+
+    It is about the branch as it was computed, with its harmonics: what the harmonics left out may change is
+    the error estimate, and another branch of a law that allows several is not on this one.
+
+    Attributes
+    ----------
+    known : bool
+        No peak of the branch is higher than `bound`, and every peak above 1 % of the highest is listed.
+    reason : str
+        Why, or why it is not known.
+    bound : float
+        What the amplitude does not exceed between points [m]: of the cubics through them, which near the top
+        are checked by solutions between, and of the motion predicted at every resonance of the structure with
+        its contacts that is narrower than the points are apart. NaN if not known.
+    widest_gap : float
+        Largest distance between neighbouring points, in units of the parameter (Hz for a frequency).
+    resonances : int
+        Narrow resonances between points that were solved for.
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"bound": "m"}
+
+    known: bool
+    reason: str
+    bound: float
+    widest_gap: float
+    resonances: int
+
+    def to_json(self) -> dict[str, object]:
+        """Return the certificate as one JSON object."""
+        return {
+            "known": self.known,
+            "reason": self.reason,
+            "bound": self.bound if math.isfinite(self.bound) else None,
+            "widest_gap": self.widest_gap if math.isfinite(self.widest_gap) else None,
+            "resonances": self.resonances,
+        }
+
+
+def certified(*, bound: float, gap: float, resonances: int) -> PeakCertificate:
+    """Return the certificate of a branch on which everything was settled."""
+    solved = "" if resonances == 0 else f" {resonances} of them between points were solved for."
+    reason = (
+        "Every resonance of the structure with its contacts is as broad as the points are apart, or too "
+        f"weakly driven to matter, or solved for.{solved}"
+    )
+    return PeakCertificate(known=True, reason=reason, bound=bound, widest_gap=gap, resonances=resonances)
+
+
+def uncertain(why: str, gap: float = math.nan) -> PeakCertificate:
+    """Return the certificate of a branch of which something is not known."""
+    return PeakCertificate(
+        known=False, reason=f"Not known: {why}.", bound=math.nan, widest_gap=gap, resonances=0
+    )

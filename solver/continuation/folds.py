@@ -1,0 +1,94 @@
+"""Where a branch turns back: the parameter is stationary along the arc, dλ/ds = 0.
+
+An interval in which the amplitude exceeds a limit may end there. Such an end moves with the fold, not with
+the limit: with y the left null vector of dr/du at the fold,
+
+    dλ/dp = −(yᵀ ∂r/∂p) / (yᵀ ∂r/∂λ)
+
+(W. Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, 2000, chapter 3,
+doi:10.1137/1.9780898719543). The adjoint of any quantity that is not stationary there points along y,
+the more so the closer to the fold, so that dλ/dp is minus the ratio of its derivatives by p and by λ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol, TypeVar
+
+from solver.jit.fourier import Real
+
+_STATIONARY = 1e-11  # dλ/dshare of a fold, relative to that at the points it lies between
+_SMOOTH = 1e-6  # above: it jumps, the fold is a corner where a contact changes its state
+_MOST_SOLVES = 60
+
+
+class OnArc(Protocol):
+    """A point between two others of a branch, with its tangent by the share of the way between them."""
+
+    @property
+    def tangent(self) -> Real:
+        """Derivative by the share, λ last."""
+
+
+class OnBranch(Protocol):
+    """A point of a branch: solution and tangent, λ last."""
+
+    @property
+    def solution(self) -> Real:
+        """Motions [m], λ last."""
+
+    @property
+    def tangent(self) -> Real:
+        """Direction of the branch."""
+
+
+_Point = TypeVar("_Point", bound=OnArc)
+
+
+def motion_scales(left: OnBranch, right: OnBranch) -> tuple[float, float]:
+    """Return the factors that turn both tangents into derivatives by the share of the chord of the motion.
+
+    Around a fold λ goes there and back, so that the motion alone tells how far it is.
+    """
+    chord = right.solution[:-1] - left.solution[:-1]
+    length = float(chord @ chord)
+    at_left, at_right = float(chord @ left.tangent[:-1]), float(chord @ right.tangent[:-1])
+    return length / at_left if at_left != 0.0 else 0.0, length / at_right if at_right != 0.0 else 0.0
+
+
+def fold_between(
+    at_share: Callable[[float], _Point | None], before: float, after: float
+) -> tuple[_Point, bool] | None:
+    """Return the fold between two points of a branch, and whether it is smooth (no corner).
+
+    Parameters
+    ----------
+    at_share : the solution at a share of the way, None where there is none.
+    before, after : dλ/dshare at both points, of opposite signs; 0 where the motion is the same at both, which
+        then are one but for rounding, with no fold between them.
+    """
+    low, high, g_low, g_high = 0.0, 1.0, before, after
+    size = max(abs(before), abs(after))
+    if size == 0.0:
+        return None
+    best: _Point | None = None
+    least = float("inf")
+    for _ in range(_MOST_SOLVES):
+        width = high - low
+        steep = g_high != g_low
+        share = (low * g_high - high * g_low) / (g_high - g_low) if steep else 0.5 * (low + high)
+        share = min(max(share, low + 1e-3 * width), high - 1e-3 * width)
+        point = at_share(share)
+        if point is None:
+            break
+        g = float(point.tangent[-1])
+        if abs(g) <= least:
+            best, least = point, abs(g)
+        if abs(g) <= _STATIONARY * size or width <= 1e-13:
+            break
+        # Illinois: the end that stays counts half the next time.
+        if g * g_low > 0.0:
+            low, g_low, g_high = share, g, 0.5 * g_high
+        else:
+            high, g_high, g_low = share, g, 0.5 * g_low
+    return None if best is None else (best, least <= _SMOOTH * size)

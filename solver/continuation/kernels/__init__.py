@@ -1,0 +1,1 @@
+"""Compiled pseudo-arc-length continuation."""

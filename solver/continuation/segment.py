@@ -1,0 +1,154 @@
+"""Consecutive points of a branch with all that is needed to go on behind the last of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.balance.balance import Balance
+from solver.balance.kernels.jacobian import factorise
+from solver.balance.kernels.newton import ACCEPTED
+from solver.balance.kernels.output import MEASURES
+from solver.balance.kernels.residual import evaluate
+from solver.balance.workspace import Workspace
+from solver.contacts.kernels.system import AT_BRANCH_POINT, evaluation_by_value
+from solver.continuation.branch import BranchStatus
+from solver.continuation.kernels.pseudo_arclength import begin_walk
+from solver.continuation.kernels.state import COUNT, ITERATIONS, Control, P, Walk, walk_by_value, weights
+from solver.errors import SettingError
+from solver.jit.fourier import Integer, Real
+from solver.linear.kernels.receptance import receptance
+
+_ENDINGS = tuple(BranchStatus)
+_NUMBERS = 12
+_ROWS = ("solutions", "tangents", "states", "observed", "measures")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stretch:
+    """Some consecutive points of a branch; the arrays are those of `solver.continuation.branch.Branch`.
+
+    Attributes
+    ----------
+    status : BranchStatus or None
+        How the branch ended with this stretch; None if it goes on.
+    newton_iterations, rejected_steps, stepped_over : int
+        Since the branch began.
+    seconds : float
+        Since the branch began [s].
+    walk : (4 n_unknowns + 15,) array
+        The state of the continuation behind the last point; empty if the branch could not begin.
+    """
+
+    solutions: Real
+    tangents: Real
+    states: Integer
+    observed: Real
+    measures: Real
+    status: BranchStatus | None
+    newton_iterations: int
+    rejected_steps: int
+    stepped_over: int
+    seconds: float
+    walk: Real
+
+    def first(self, count: int) -> Stretch:
+        """Return the first points alone, without the state of a continuation, which is that of the last."""
+        return replace(
+            self, solutions=self.solutions[:count], tangents=self.tangents[:count],
+            states=self.states[:count], observed=self.observed[:count], measures=self.measures[:count],
+            status=None, walk=np.zeros(0),
+        )  # fmt: skip
+
+    def to_arrays(self) -> dict[str, Real | Integer]:
+        """Return everything as plain arrays, to be stored."""
+        ending = -1 if self.status is None else _ENDINGS.index(self.status)
+        counts = [ending, self.newton_iterations, self.rejected_steps, self.stepped_over]
+        arrays: dict[str, Real | Integer] = {name: getattr(self, name) for name in _ROWS}
+        return arrays | {
+            "counts": np.array(counts, np.int64), "seconds": np.array([self.seconds]), "walk": self.walk,
+        }  # fmt: skip
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, Real | Integer]) -> Stretch:
+        """Return the stretch of such arrays (KeyError, ValueError or IndexError if they are not that)."""
+        real = {name: np.ascontiguousarray(arrays[name], np.float64) for name in (*_ROWS, "walk")}
+        ending, iterations, rejected, over = (int(number) for number in arrays["counts"])
+        return cls(
+            solutions=real["solutions"], tangents=real["tangents"],
+            states=np.ascontiguousarray(arrays["states"], np.int64), observed=real["observed"],
+            measures=real["measures"], status=None if ending < 0 else _ENDINGS[ending],
+            newton_iterations=iterations, rejected_steps=rejected, stepped_over=over,
+            seconds=float(arrays["seconds"][0]), walk=real["walk"],
+        )  # fmt: skip
+
+
+def joined(stretches: Sequence[Stretch]) -> Stretch:
+    """Return consecutive stretches as one; at least one."""
+    last = stretches[-1]
+    return Stretch(
+        solutions=np.concatenate([stretch.solutions for stretch in stretches]),
+        tangents=np.concatenate([stretch.tangents for stretch in stretches]),
+        states=np.concatenate([stretch.states for stretch in stretches]),
+        observed=np.concatenate([stretch.observed for stretch in stretches]),
+        measures=np.concatenate([stretch.measures for stretch in stretches]),
+        status=last.status, newton_iterations=last.newton_iterations, rejected_steps=last.rejected_steps,
+        stepped_over=last.stepped_over, seconds=last.seconds, walk=last.walk,
+    )  # fmt: skip
+
+
+def rows_of(balance: Balance, count: int) -> tuple[Real, Real, Integer, Real, Real]:
+    """Return empty rows for `count` points: solutions, tangents, states, observed, measures."""
+    nt, n = balance.n_unknowns, balance.n_coefficients
+    return (
+        np.zeros((count, nt + 1)), np.zeros((count, nt + 1)),
+        np.zeros((count, len(balance.scene.contacts)), np.int64), np.zeros((count, n)),
+        np.zeros((count, MEASURES)),
+    )  # fmt: skip
+
+
+def state_of(walk: Walk) -> Real:
+    """Return the state of a continuation as one array."""
+    return np.concatenate(walk_by_value(walk))
+
+
+def go_on_from(workspace: Workspace, control: Control, stretch: Stretch) -> tuple[Walk, int]:
+    """Return the continuation behind the last point of `stretch`, and the iterations before it began.
+
+    The point is evaluated and its matrix factorised as they were when it was found, so that what follows is
+    what would have followed.
+
+    Raises
+    ------
+    SettingError
+        The stretch is not of this balance: other sizes, or its last point is no solution.
+    """
+    balance, system, linear = workspace.balance, workspace.system, workspace.linear
+    rows = rows_of(balance, 0)
+    fits = all(
+        getattr(stretch, name).shape[1:] == row.shape[1:] for name, row in zip(_ROWS, rows, strict=True)
+    )
+    nt = balance.n_unknowns
+    if not fits or stretch.walk.size != 4 * nt + 3 + _NUMBERS or not len(stretch.solutions):
+        raise _foreign(stretch)
+    _, state = begin_walk(system, linear, workspace.point, control, stretch.walk[:nt].copy())
+    places = walk_by_value(state)
+    ends = np.cumsum([place.size for place in places])[:-1]
+    for place, values in zip(places, np.split(stretch.walk, ends), strict=True):
+        place[:] = values
+    numbers = places.numbers
+    receptance(system, numbers[P], linear)
+    norm = evaluate(system, linear, places.u, numbers[P], 0.0, workspace.point)
+    if not norm <= ACCEPTED or numbers[COUNT] < 0:
+        raise _foreign(stretch)
+    weight_u, weight_p = weights(system, state, control)
+    if factorise(system, linear, workspace.point, places.before_tangent, weight_u, weight_p) != 0.0:
+        evaluation_by_value(workspace.point).counts[AT_BRANCH_POINT] = 1
+    return state, stretch.newton_iterations - int(numbers[ITERATIONS])
+
+
+def _foreign(stretch: Stretch) -> SettingError:
+    points = f"{len(stretch.solutions)} points"
+    return SettingError("resume", points, "must be the beginning of the same branch")

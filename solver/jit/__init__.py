@@ -1,0 +1,1 @@
+"""Compilation of the numerical kernels: decorators, cache on disk, parallel compilation; shared numerics."""

@@ -1,0 +1,120 @@
+"""Where the machine code of the kernels is kept on disk, and how several processes share it.
+
+Numba looks only at the file a function stands in, so a caller would go on using the old machine code of a
+callee that changed in another file. The folder is therefore named by a hash of every kernel source: change
+one and all are compiled anew. Nothing else is asked of them, so that all copies of the same sources, wherever
+they lie and whenever they were written, share one folder.
+
+Numba writes its index without a lock: of two processes that save at once, one may lose its entry, or find the
+machine code of the other under its own. Here one saves at a time, and none reads meanwhile.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import stat
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numba
+from numba.core import caching
+
+try:
+    import fcntl
+except ImportError:  # Windows has no such lock
+    fcntl = None  # type: ignore[assignment]
+
+
+def _source_hash() -> str:
+    """Return a hash of the kernels' sources and of what compiles them."""
+    solver = Path(__file__).parent.parent
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in (*sorted(solver.glob("jit/*.py")), *sorted(solver.glob("*/kernels/*.py"))):
+        digest.update(f"{source.parent.parent.name}/{source.name}".encode() + source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _cache_folder() -> str:
+    """Return a writable folder for the machine code of exactly these sources."""
+    asked = os.environ.get("NUMBA_CACHE_DIR")
+    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    for root in [asked] if asked else [home, None]:
+        try:
+            folder = (Path(root) / "stickslip-kernels" if root else _temporary()) / _source_hash()
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            return str(folder)
+    return tempfile.mkdtemp(prefix="stickslip-kernels-")
+
+
+def _temporary() -> Path:
+    """Return this user's own temporary folder; OSError if somebody else could put machine code there."""
+    if not hasattr(os, "getuid"):  # on Windows each user has a folder for temporary files
+        return Path(tempfile.gettempdir()) / "stickslip-kernels"
+    folder = Path(tempfile.gettempdir()) / f"stickslip-kernels-{os.getuid()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o022:
+        raise PermissionError(f"{folder} is not this user's alone")
+    return folder
+
+
+CACHE_FOLDER = _cache_folder()
+
+
+@contextlib.contextmanager
+def _locked(*, alone: bool) -> Iterator[None]:
+    """Have the folder, alone or with others who only read, until the block ends."""
+    Path(CACHE_FOLDER).mkdir(parents=True, exist_ok=True)
+    with open(Path(CACHE_FOLDER) / "lock", "w") as file:
+        # Some network file systems have no locks; there it is as it would be without this.
+        if fcntl is not None:
+            with contextlib.suppress(OSError):
+                fcntl.flock(file, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
+        yield
+
+
+class _Locator(caching._CacheLocator):
+    """Tells Numba the folder, and that the machine code there is never out of date."""
+
+    def __init__(self, line: int) -> None:
+        self._line = line
+
+    @classmethod
+    def from_function(cls, function: Any, _file: str) -> _Locator:
+        return cls(function.__code__.co_firstlineno)
+
+    def get_cache_path(self) -> str:
+        return CACHE_FOLDER
+
+    def get_source_stamp(self) -> str:
+        return "named by its sources"
+
+    def get_disambiguator(self) -> str:
+        return str(self._line)
+
+
+class _Serialised(caching.CompileResultCacheImpl):
+    _locator_classes: ClassVar = [_Locator]
+
+
+class KernelCache(caching.Cache):
+    """The machine code of one kernel, for each types of its arguments."""
+
+    _impl_class = _Serialised
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what was saved for these types, or None."""
+        with _locked(alone=False):
+            return super().load_overload(sig, target_context)
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Save what was compiled for these types."""
+        with _locked(alone=True):
+            super().save_overload(sig, data)

@@ -1,0 +1,204 @@
+"""Dense linear algebra inside compiled loops: vectors, solves with the sign of the determinant, inverses.
+
+Written as plain loops: an array expression costs Numba a tenth of a second of compilation each time.
+
+Small systems use a loop of our own (a call to LAPACK costs more than the factorisation), larger ones LAPACK's
+``dgetrf`` through the entry Numba itself links, which stays cacheable on disk.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numba
+import numpy as np
+
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Complex, Index, Real
+from solver.jit.separate import apart
+
+OWN_UP_TO = 36  # measured crossing of our loop and LAPACK
+
+_int, _index, _doubles = numba.types.intc, numba.types.intp, numba.types.CPointer(numba.types.float64)
+_pivots = numba.types.CPointer(numba.types.int32)
+_getrf: Callable[..., int] = numba.core.types.ExternalFunction(
+    "numba_xxgetrf", _int(numba.types.char, _index, _index, _doubles, _index, _pivots)
+)
+_DOUBLE = np.int8(ord("d"))
+
+
+@compiled
+def copy_to(target: Real, source: Real) -> None:
+    """Copy a vector."""
+    for i in range(target.size):
+        target[i] = source[i]
+
+
+@compiled
+def set_to(target: Real, source: Real, factor: float, direction: Real) -> None:
+    """Set target = source + factor · direction."""
+    for i in range(target.size):
+        target[i] = source[i] + factor * direction[i]
+
+
+@compiled
+def copy_block(target: Real, source: Real) -> None:
+    """Copy a matrix into the upper left block of another."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[i, j] = source[i, j]
+
+
+@compiled
+def fill(target: Real, value: float) -> None:
+    """Set every entry of a vector."""
+    for i in range(target.size):
+        target[i] = value
+
+
+@compiled
+def fill_block(target: Real, value: float) -> None:
+    """Set every entry of a matrix."""
+    for i in range(target.shape[0]):
+        for j in range(target.shape[1]):
+            target[i, j] = value
+
+
+@compiled
+def largest_entry(vector: Real) -> float:
+    """Return max|v|."""
+    size = 0.0
+    for i in range(vector.size):
+        size = max(size, abs(vector[i]))
+    return size
+
+
+@apart
+def invert(matrix: Complex, inverse: Complex) -> bool:
+    """Invert a complex matrix by Gauss–Jordan elimination with partial pivoting; `matrix` is destroyed.
+
+    Returns False, with `inverse` meaningless, if the matrix is singular or not finite.
+    """
+    n = matrix.shape[0]
+    for i in range(n):
+        for j in range(n):
+            inverse[i, j] = 1.0 if i == j else 0.0
+    for k in range(n):
+        pivot, size = k, abs(matrix[k, k])
+        for i in range(k + 1, n):
+            here = abs(matrix[i, k])
+            if here > size:
+                pivot, size = i, here
+        if not size > 0.0:
+            return False
+        if pivot != k:
+            for j in range(n):
+                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+                inverse[k, j], inverse[pivot, j] = inverse[pivot, j], inverse[k, j]
+        factor = 1.0 / matrix[k, k]
+        for j in range(n):
+            matrix[k, j] *= factor
+            inverse[k, j] *= factor
+        for i in range(n):
+            factor = matrix[i, k]
+            if i == k or factor == 0.0:
+                continue
+            for j in range(n):
+                matrix[i, j] -= factor * matrix[k, j]
+                inverse[i, j] -= factor * inverse[k, j]
+    return True
+
+
+@apart
+def _own_factors(a: Real, n: int, pivots: Index) -> None:
+    """Factorise the leading block, columns exchanged for the largest pivot of a row; numbers as LAPACK's."""
+    for k in range(n):
+        pivot, size = k, abs(a[k, k])
+        for j in range(k + 1, n):
+            here = abs(a[k, j])
+            if here > size:
+                pivot, size = j, here
+        pivots[k] = pivot + 1
+        if pivot != k:
+            for i in range(n):
+                a[i, k], a[i, pivot] = a[i, pivot], a[i, k]
+        if not size > 0.0:
+            continue
+        inverse = 1.0 / a[k, k]
+        for j in range(k + 1, n):
+            a[k, j] *= inverse
+        for i in range(k + 1, n):
+            factor = a[i, k]
+            if factor != 0.0:
+                for j in range(k + 1, n):
+                    a[i, j] -= factor * a[k, j]
+
+
+@apart
+def factorise(a: Real, n: int, pivots: Index) -> float:
+    """Factorise the leading n × n block of a row-major matrix in place, as `back_substitute` needs it.
+
+    The rows of `a` are the columns of its transpose, which is what is factorised: LAPACK works on columns.
+
+    Returns
+    -------
+    The sign of the determinant, 0.0 if the matrix is singular or not finite.
+    """
+    for i in range(n):
+        for j in range(n):
+            if not math.isfinite(a[i, j]):
+                return 0.0
+    if n <= OWN_UP_TO:
+        _own_factors(a, n, pivots)
+    else:
+        _getrf(_DOUBLE, n, n, a.ctypes, a.shape[1], pivots.ctypes)
+    sign = 1.0
+    for k in range(n):
+        if a[k, k] == 0.0:
+            return 0.0
+        if pivots[k] != k + 1:
+            sign = -sign
+        if a[k, k] < 0.0:
+            sign = -sign
+    return sign
+
+
+@apart
+def back_substitute(a: Real, n: int, pivots: Index, x: Real) -> None:
+    """Solve matrix @ x = rhs with the factors of `factorise`; `x` (≥ n,) is the right-hand side, overwritten.
+
+    With Mᵀ = Pᵀ L U the solution is x = Pᵀ L⁻ᵀ U⁻ᵀ rhs: dot products along rows of `a`.
+    """
+    for i in range(n):
+        total = x[i]
+        for k in range(i):
+            total -= a[i, k] * x[k]
+        x[i] = total / a[i, i]
+    for i in range(n - 1, -1, -1):
+        total = x[i]
+        for k in range(i + 1, n):
+            total -= a[i, k] * x[k]
+        x[i] = total
+    for k in range(n - 1, -1, -1):
+        other = pivots[k] - 1
+        if other != k:
+            x[k], x[other] = x[other], x[k]
+
+
+@apart
+def back_substitute_transposed(a: Real, n: int, pivots: Index, x: Real) -> None:
+    """Solve matrixᵀ @ x = rhs with the factors of `factorise`, in place: x = U⁻¹ L⁻¹ P rhs."""
+    for k in range(n):
+        other = pivots[k] - 1
+        if other != k:
+            x[k], x[other] = x[other], x[k]
+    for k in range(n):
+        value = x[k]
+        for i in range(k + 1, n):
+            x[i] -= a[k, i] * value
+    for k in range(n - 1, -1, -1):
+        x[k] /= a[k, k]
+        value = x[k]
+        for i in range(k):
+            x[i] -= a[k, i] * value

@@ -1,0 +1,144 @@
+"""Compile kernels in several processes at once; they meet in the cache on disk.
+
+One process calls kernels as any program does. Of each that it compiles it learns which others are called
+there; those go to a pool of processes, which report what they find in turn. Before a kernel runs for the
+first time it is taken back from the pool, or waited for, and what waits in the meantime is compiled here.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+
+from solver.jit.separate import make, watched
+
+MOST_PROCESSES = 4  # each compiles the short kernels for itself, and takes 200 MB
+
+
+def cores() -> int:
+    """Return how many processes may run at once on this machine."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def compile_together(calls: Sequence[Callable[[], object]], *, processes: int | None = None) -> None:
+    """Make these calls, each in one process, and compile every kernel that lies under them.
+
+    Parameters
+    ----------
+    calls : functions of modules, so that another process finds them.
+    processes : how many; one for each core, up to `MOST_PROCESSES`, if left out.
+
+    Raises
+    ------
+    Exception
+        What a call or the compilation of a kernel raised, in whatever process.
+    """
+    count = min(cores(), MOST_PROCESSES) if processes is None else processes
+    spawning = multiprocessing.get_context("spawn")
+    with contextlib.ExitStack() as stack:
+        pool = None
+        if count > 1:
+            pool = stack.enter_context(ProcessPoolExecutor(count - 1, mp_context=spawning))
+            stack.callback(pool.shutdown, wait=False, cancel_futures=True)
+        team = _Team(pool)
+        with watched(team):
+            team.hand_out(calls[1:])
+            calls[0]()
+            team.finish()
+
+
+class _Noted:
+    """Keeps the names of the kernels called."""
+
+    def __init__(self) -> None:
+        self.names: list[bytes] = []
+
+    def called(self, name: bytes) -> None:
+        self.names.append(name)
+
+    def needed(self, name: bytes) -> None:
+        """Nobody else makes it."""
+
+
+def _elsewhere(task: Callable[[], object] | bytes) -> list[bytes]:
+    """Make a call or a kernel in a process of the pool; return the names of the kernels called there."""
+    noted = _Noted()
+    with watched(noted):
+        if isinstance(task, bytes):
+            make(task)
+        else:
+            task()
+    return noted.names
+
+
+class _Team:
+    """The tasks of all processes, from the view of the first."""
+
+    def __init__(self, pool: ProcessPoolExecutor | None) -> None:
+        self._pool = pool
+        self._lock = threading.Lock()
+        self._seen: set[bytes] = set()
+        self._open: dict[Callable[[], object] | bytes, Future[list[bytes]] | None] = {}
+
+    def hand_out(self, tasks: Sequence[Callable[[], object] | bytes]) -> None:
+        """Offer tasks to the pool."""
+        for task in tasks:
+            with self._lock:
+                if isinstance(task, bytes):
+                    if task in self._seen:
+                        continue
+                    self._seen.add(task)
+                future = None if self._pool is None else self._pool.submit(_elsewhere, task)
+                self._open[task] = future
+            if future is not None:
+                future.add_done_callback(self._more)
+
+    def _more(self, future: Future[list[bytes]]) -> None:
+        """Offer what a process found; what it raised is raised where its task is waited for."""
+        if not future.cancelled() and future.exception() is None:
+            self.hand_out(future.result())
+
+    def called(self, name: bytes) -> None:
+        """Offer the kernel to the pool."""
+        self.hand_out([name])
+
+    def needed(self, name: bytes) -> None:
+        """Wait until the kernel is compiled if another process is at it; compile others meanwhile."""
+        with self._lock:
+            future = self._open.pop(name, None)
+        if future is None or future.cancel():
+            return
+        while not future.done() and self._help():
+            pass
+        future.result()
+
+    def _help(self) -> bool:
+        """Do a task here that no process has begun; False if there is none."""
+        with self._lock:
+            mine = next(
+                (task for task, future in self._open.items() if future is None or future.cancel()), None
+            )
+            if mine is None:
+                return False
+            del self._open[mine]
+        if isinstance(mine, bytes):
+            make(mine)
+        else:
+            mine()
+        return True
+
+    def finish(self) -> None:
+        """Return when nothing is left to do."""
+        while True:
+            while self._help():
+                pass
+            with self._lock:
+                if not self._open:
+                    return
+                _, future = self._open.popitem()
+            if future is not None:
+                future.result()

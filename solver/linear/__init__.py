@@ -1,0 +1,1 @@
+"""The linear structure: assembly, modes, reduction to the contacts, receptances."""

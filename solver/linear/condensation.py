@@ -1,0 +1,204 @@
+"""The linear part as the compiled loops use it: modes, poles or matrices for each nodal diameter in play.
+
+Harmonic k of a travelling wave of engine order i has the interblade phase k·i·2π/sectors, so one sector with
+a Hermitian stiffness stands for the whole tuned annulus; any other structure is the case of one real
+structure for every harmonic. What does not depend on contacts and forces is found once for a structure and
+kept (`solver.linear.modal`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from solver.contacts.kernels.system import DENSE
+from solver.jit.fourier import Complex, Integer, Real
+from solver.linear.assembly import LinearModel, LinearModelDerivative, linear_model
+from solver.linear.contact_table import port_stiffnesses
+from solver.linear.modal import Decomposition, Held, decompose, held_alone, held_by, matrices_of
+from solver.linear.rigid_body_modes import loose_motions
+from solver.scene.scene import Scene
+
+CANCELLED = 1e-3  # a relative residual of 1e-11 of this share of what cancels in a motion is its rounding
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reduced:
+    """The linear part in the form the loops take; see `solver.contacts.kernels.system.System` for the
+    shapes."""
+
+    which: Integer
+    shift: Real
+    loose: Real
+    least_size: float
+    form: int
+    eigenvalues: Complex
+    dampings: Real
+    contact_modes: Complex
+    contact_duals: Complex
+    observe_modes: Complex
+    modal_forces: Complex
+    K: Complex
+    C: Complex
+    M: Complex
+    dK: Complex
+    dC: Complex
+    dM: Complex
+    L: Complex
+    observe: Complex
+    forces: Complex
+
+
+def reduce_model(
+    model: LinearModel,
+    ks: Integer,
+    kt: Real,
+    derivative: LinearModelDerivative | None = None,
+    *,
+    whole_matrices: bool = False,
+) -> Reduced:
+    """Bring a linear model into the form of the compiled loops.
+
+    Parameters
+    ----------
+    model : the matrices of one sector, or of the whole structure.
+    ks : (nk,) harmonics kept.
+    kt : (nc,) stiffness of every port of the contacts [N/m], used as the shift where contacts alone
+        hold a part in place.
+    derivative : by the structural parameter that is continued in; then the dense form is kept.
+    whole_matrices : keep the dense form whatever the damping is.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The mass matrix is not positive definite.
+    """
+    diameters, which = np.unique((ks * model.engine_order) % model.sectors, return_inverse=True)
+    theta = 2.0 * np.pi * diameters / model.sectors
+    forces = force_amplitudes(model, ks)
+    L = model.contact_here + model.contact_next * np.exp(1j * theta)[:, None, None]
+    held = matrices_of(model, theta)
+    shift, loose = np.zeros(kt.size), np.zeros((0, kt.size))
+    if 0 in ks:
+        loose = loose_motions(held.K[which[0]], L[which[0]], kt)
+        if len(loose) or not held_alone(held):
+            shift, held = kt.copy(), held_by(held, L, kt)
+    found = None if whole_matrices or derivative is not None else decompose(held)
+    if found is None and not whole_matrices and derivative is None and not held_alone(held):
+        # A free part has a double pole at 0, of which there are no two eigenvectors: held, it has not.
+        shift, held = kt.copy(), held_by(held, L, kt)
+        found = decompose(held)
+    if found is None:
+        modes: dict[str, Any] = _no_modes(theta.size, ks.size, kt.size)
+        dense: dict[str, Any] = _dense(held, theta, L, model, forces, derivative)
+    else:
+        modes = _projected(found, L, model.observe, forces, which)
+        dense = {name: np.zeros((0,) * axes, np.complex128) for name, axes in _DENSE_AXES.items()}
+    least = 0.0 if found is None else _least_size(found, L, forces, which)
+    return Reduced(which=which.astype(np.int64), shift=shift, loose=loose, least_size=least, **modes, **dense)
+
+
+def _least_size(found: Decomposition, L: Complex, forces: Complex, which: Integer) -> float:
+    """Return the size below which a motion of the contacts is rounding [m].
+
+    A share of Σ |L| |x_m| |y_mᴴ| |f| / |λ_m|, the static motion of a contact if neither parts nor
+    modes cancelled.
+    """
+    sizes = np.maximum(np.abs(found.eigenvalues), 1e-12 * np.abs(found.eigenvalues).max(initial=0.0))
+    largest = 0.0
+    for i, s in enumerate(which):
+        if not np.any(forces[i]) or not np.any(sizes[s]):
+            continue
+        driven = (np.abs(forces[i]) @ np.abs(found.left[s])) / np.where(sizes[s] > 0.0, sizes[s], np.inf)
+        moved = np.abs(L[s]) @ (np.abs(found.right[s]) @ driven)
+        largest = max(largest, float(moved.max(initial=0.0)))
+    return CANCELLED * largest
+
+
+def loose_ports(scene: Scene) -> tuple[Real, Real]:
+    """Return the rigid-body motions at the ports of what contacts alone hold, and the ports' stiffnesses.
+
+    See `solver.linear.rigid_body_modes.loose_motions`; also where the balance has no means.
+    """
+    model = linear_model(scene)
+    kt = port_stiffnesses(scene, model)
+    static = matrices_of(model, np.zeros(1))
+    return loose_motions(static.K[0], model.contact_here + model.contact_next, kt), kt
+
+
+def force_amplitudes(model: LinearModel, ks: Integer) -> Complex:
+    """Return the complex force amplitudes f̂_k, (nk, n), of cos(hωt + phase) terms: amplitude·e^{i phase}."""
+    amplitudes = np.zeros((ks.size, model.observe.size), dtype=np.complex128)
+    for term in model.forces:
+        rows = np.flatnonzero(ks == term.harmonic)
+        turn = np.exp(1j * term.phase) if term.harmonic else 1.0
+        amplitudes[rows] += term.amplitude * turn * term.vector
+    return amplitudes
+
+
+def _projected(
+    found: Decomposition, L: Complex, observe: Real, forces: Complex, which: Integer
+) -> dict[str, Any]:
+    """Return what the loops need of the modes: their share at contacts, forces and the observed DOF."""
+    contact_modes = L @ found.right
+    contact_duals = L.conj() @ found.left
+    observe_modes = observe @ found.right
+    modal_forces = np.zeros((which.size, found.eigenvalues.shape[1]), np.complex128)
+    for s in range(L.shape[0]):
+        rows = np.flatnonzero(which == s)
+        modal_forces[rows] = forces[rows] @ found.left[s]
+    # Exact zeros only: a mode that no contact, and not both force and observer, can see adds nothing.
+    touched = np.any(contact_modes != 0.0, axis=(0, 1)) | np.any(contact_duals != 0.0, axis=(0, 1))
+    seen = touched | (np.any(observe_modes != 0.0, axis=0) & np.any(modal_forces != 0.0, axis=0))
+    return {
+        "form": found.form,
+        "eigenvalues": np.ascontiguousarray(found.eigenvalues[:, seen]),
+        "dampings": np.ascontiguousarray(found.dampings[:, seen]),
+        "contact_modes": _contiguous(contact_modes[:, :, seen]),
+        "contact_duals": _contiguous(contact_duals[:, :, seen]),
+        "observe_modes": _contiguous(observe_modes[:, seen]),
+        "modal_forces": _contiguous(modal_forces[:, seen]),
+    }
+
+
+def _contiguous(array: Any) -> Complex:
+    return np.ascontiguousarray(array, dtype=np.complex128)
+
+
+def _no_modes(n_structures: int, n_harmonics: int, n_contacts: int) -> dict[str, Any]:
+    """Return empty modes for the dense form."""
+    return {
+        "form": DENSE,
+        "eigenvalues": np.zeros((n_structures, 0), np.complex128),
+        "dampings": np.zeros((n_structures, 0)),
+        "contact_modes": np.zeros((n_structures, n_contacts, 0), np.complex128),
+        "contact_duals": np.zeros((n_structures, n_contacts, 0), np.complex128),
+        "observe_modes": np.zeros((n_structures, 0), np.complex128),
+        "modal_forces": np.zeros((n_harmonics, 0), np.complex128),
+    }
+
+
+_DENSE_AXES = {"K": 3, "C": 3, "M": 3, "dK": 3, "dC": 3, "dM": 3, "L": 3, "observe": 1, "forces": 2}
+
+
+def _dense(
+    held: Held,
+    theta: Real,
+    L: Complex,
+    model: LinearModel,
+    forces: Complex,
+    derivative: LinearModelDerivative | None,
+) -> dict[str, Complex]:
+    """Return the matrices and their derivatives by the structural parameter (zero if there is none)."""
+    turn = np.exp(1j * theta)[:, None, None]
+    dK = dC = dM = np.zeros(held.K.shape, np.complex128)
+    if derivative is not None:
+        dK = dK + derivative.dK0 + derivative.dKp * turn + derivative.dKp.T * turn.conj()
+        dC = dC + derivative.dC0 + derivative.dCp * turn + derivative.dCp.T * turn.conj()
+        dM = dM + derivative.dM
+    return {
+        "K": _contiguous(held.K), "C": _contiguous(held.C), "M": _contiguous(held.M), "dK": dK, "dC": dC,
+        "dM": dM, "L": _contiguous(L), "observe": _contiguous(model.observe), "forces": forces,
+    }  # fmt: skip

@@ -1,0 +1,96 @@
+"""A structure of kind ``matrices`` as the equations of motion solved for the accelerations.
+
+This is for time marching, which needs the DOFs in use as coordinates, and shares nothing with the harmonic
+balance: the matrices are inverted here, not decomposed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from solver.errors import SettingError
+from solver.scene.parts import MatricesStructure
+
+FloatArray = NDArray[np.float64]
+_INDEPENDENT = 1e-9  # smallest singular value of the modes at the DOFs in use, relative to the largest
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Equations:
+    """x'' = W f − A x − B x', the DOFs in use among the coordinates x.
+
+    Attributes
+    ----------
+    A, B, W : (n, n) array
+        M⁻¹ K [1/s²], M⁻¹ C [1/s] and M⁻¹ [1/kg].
+    index : dict
+        Coordinate of each DOF in use.
+    """
+
+    A: FloatArray
+    B: FloatArray
+    W: FloatArray
+    index: dict[str, int]
+
+
+def equations(structure: MatricesStructure, used: Sequence[str]) -> Equations:
+    """The equations of motion with the DOFs `used` as coordinates.
+
+    Raises
+    ------
+    SettingError
+        The structure is given by too few modes to tell the motions of these DOFs apart.
+    """
+    rows = dict(zip(structure.dofs, structure.dofs.rows, strict=True))
+    if structure.modes is not None:
+        return _of_modes(structure, list(dict.fromkeys(used)), rows)
+    if structure.M is None or structure.K is None:
+        raise SettingError("structure", structure.kind, "must have M and K, or `modes`")
+    M, K = structure.M.array, structure.K.array
+    C = structure.stiffness_proportional_damping * K + structure.mass_proportional_damping * M
+    if structure.C is not None:
+        C = C + structure.C.array
+    if structure.damping_ratio:
+        # C = 2 ζ M sqrt(M⁻¹ K): the square root taken in the coordinates where M is 1.
+        factor = linalg.cholesky(M, lower=True)
+        scaled = linalg.solve_triangular(factor, linalg.solve_triangular(factor, K, lower=True).T, lower=True)
+        values, vectors = linalg.eigh(scaled)
+        root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+        C = C + 2.0 * structure.damping_ratio * (factor @ root @ factor.T)
+    W = linalg.inv(M)
+    return Equations(A=W @ K, B=W @ C, W=W, index={name: rows[name] for name in used})
+
+
+def _of_modes(structure: MatricesStructure, used: list[str], rows: dict[str, int]) -> Equations:
+    """Coordinates y = S q: the DOFs in use, and what of the modes q is orthogonal to them."""
+    modes = structure.modes
+    if modes is None:
+        raise SettingError("structure", structure.kind, "must have `modes`")
+    seen = modes.modes[[rows[name] for name in used]]
+    sizes = linalg.svdvals(seen)
+    if seen.shape[0] > seen.shape[1] or sizes[-1] <= _INDEPENDENT * sizes[0]:
+        raise SettingError(
+            "scene",
+            f"{modes.omega2.size} modes at the DOFs {', '.join(used)}",
+            "must have modes that tell its DOFs in use apart to be marched in time (or M and K)",
+        )
+    S = np.vstack([seen, linalg.null_space(seen).T])
+    inverse = linalg.inv(S)
+    omega = np.sqrt(modes.omega2)
+    ratio = structure.damping_ratio or 0.0 if modes.damping_ratio is None else modes.damping_ratio
+    damping = (
+        2.0 * ratio * omega
+        + structure.stiffness_proportional_damping * modes.omega2
+        + structure.mass_proportional_damping
+    )
+    return Equations(
+        A=(S * modes.omega2) @ inverse,
+        B=(S * damping) @ inverse,
+        W=S @ S.T,
+        index={name: i for i, name in enumerate(used)},
+    )

@@ -1,0 +1,1 @@
+"""Compiled receptances of the condensed structure."""

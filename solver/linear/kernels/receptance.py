@@ -1,0 +1,298 @@
+"""The condensed linear part A_k, ū_k at one λ, and the way to the observed DOF, with derivatives by λ."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.contacts.kernels.system import (
+    DENSE,
+    FORCE_PHASE,
+    FREQUENCY,
+    LEVEL,
+    MODES,
+    STRUCTURE,
+    Receptance,
+    System,
+)
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Complex, Real
+from solver.jit.lapack import invert
+from solver.jit.separate import apart
+
+BLOCK = 512  # modes summed at a time: their weights stay in the near cache
+
+
+@compiled
+def excitation(system: System, p: float) -> tuple[complex, complex]:
+    """Return the complex factor on the unit excitation at λ = p and its derivative by λ."""
+    if system.kind == LEVEL:
+        return complex(p / system.level_reference), complex(1.0 / system.level_reference)
+    if system.kind == FORCE_PHASE:
+        turn = p - system.phase_reference
+        value = complex(math.cos(turn), math.sin(turn))
+        return value, 1j * value
+    return complex(1.0), complex(0.0)
+
+
+@apart
+def receptance(system: System, p: float, out: Receptance) -> None:
+    """Fill `out` with the condensed linear part at λ = p and its derivative by λ."""
+    if system.form == DENSE:
+        _dense_receptance(system, p, out)
+    else:
+        _modal_receptance(system, p, out)
+    factor, slope = excitation(system, p)
+    for k in range(system.ks.size):
+        # A static load (harmonic 0) has no phase to turn; its level scales all the same.
+        f, df = factor, slope
+        if system.ks[k] == 0 and system.kind == FORCE_PHASE:
+            f, df = complex(1.0), complex(0.0)
+        out.x_linear[1, k] = f * out.x_linear[1, k] + df * out.x_linear[0, k]
+        out.x_linear[0, k] *= f
+        for c in range(out.B.shape[2]):
+            out.u_linear[1, k, c] = f * out.u_linear[1, k, c] + df * out.u_linear[0, k, c]
+            out.u_linear[0, k, c] *= f
+
+
+@compiled
+def _clear(out: Receptance) -> None:
+    """Set a receptance to zero."""
+    nk, nc = out.x_linear.shape[1], out.B.shape[2]
+    for order in range(2):
+        for i in range(nk):
+            out.x_linear[order, i] = 0.0
+            for c in range(nc):
+                out.u_linear[order, i, c] = 0.0
+                out.B[order, i, c] = 0.0
+                for d in range(nc):
+                    out.A[order, i, c, d] = 0.0
+
+
+@apart
+def _modal_receptance(system: System, p: float, out: Receptance) -> None:
+    """Sum the modes: Z⁻¹ = Σ x_m y_mᴴ / d_m with d_m = ω_m² − (kω)² + ikω c_m, or ikω − s_m for poles.
+
+    Block by block: the products of modes at pairs of contacts once for all harmonics of a structure, then one
+    real sum over the block for each of them, which the compiler vectorises.
+    """
+    omega = p if system.kind == FREQUENCY else system.omega
+    by_omega = 1.0 if system.kind == FREQUENCY else 0.0
+    nc, most = out.B.shape[2], min(BLOCK, system.eigenvalues.shape[1])
+    _clear(out)
+    weights, driven = np.empty((2 * (nc * nc + nc), most)), np.empty((2 * (nc + 1), most))
+    terms = np.empty((4, most))
+    for s in range(system.eigenvalues.shape[0]):
+        for first in range(0, system.eigenvalues.shape[1], BLOCK):
+            size = min(BLOCK, system.eigenvalues.shape[1] - first)
+            turns = _fill_weights(system, s, first, size, weights)
+            for i in range(system.ks.size):
+                if system.which[i] == s:
+                    _fill_terms(system, s, first, size, float(system.ks[i]), omega, by_omega, terms)
+                    _add_pairs(system, size, i, turns, weights, terms, out)
+                    if _fill_driven(system, s, first, size, i, driven):
+                        _add_driven(size, i, driven, terms, out)
+
+
+@compiled
+def _fill_weights(system: System, s: int, first: int, size: int, weights: Real) -> bool:
+    """Fill in real and imaginary rows of x_m y_mᴴ at pairs of contacts, then from contacts to the observer.
+
+    For modes, whose y is x, pairs with d ≤ c are enough. Returns whether any imaginary part is not zero.
+    """
+    nc, symmetric = system.contact_modes.shape[1], system.form == MODES
+    modes, duals, seen = system.contact_modes[s], system.contact_duals[s], system.observe_modes[s]
+    turns = 0.0
+    for c in range(nc):
+        for d in range(c + 1 if symmetric else nc):
+            row = 2 * (c * nc + d)
+            turns += _products(modes[c], duals[d], first, size, weights[row], weights[row + 1])
+        row = 2 * (nc * nc + c)
+        turns += _products(seen, duals[c], first, size, weights[row], weights[row + 1])
+    return turns > 0.0
+
+
+@compiled
+def _products(left: Complex, right: Complex, first: int, size: int, real: Real, imag: Real) -> float:
+    """Fill in real and imaginary parts of the products of a block; return the sum of |imaginary|."""
+    turns = 0.0
+    for m in range(size):
+        x, y = left[first + m], right[first + m]
+        real[m] = x.real * y.real - x.imag * y.imag
+        imag[m] = x.real * y.imag + x.imag * y.real
+        turns += abs(imag[m])
+    return turns
+
+
+@compiled
+def _fill_driven(system: System, s: int, first: int, size: int, i: int, driven: Real) -> bool:
+    """Fill in real and imaginary rows of x_m y_mᴴ f̂_k at contacts and observer; False without a force."""
+    nc, modes, seen = system.contact_modes.shape[1], system.contact_modes[s], system.observe_modes[s]
+    forces = system.modal_forces[i]
+    moved = 0.0
+    for m in range(first, first + size):
+        moved += abs(forces[m].real) + abs(forces[m].imag)
+    if moved == 0.0:
+        return False
+    for c in range(nc):
+        _products(modes[c], forces, first, size, driven[2 * c], driven[2 * c + 1])
+    _products(seen, forces, first, size, driven[2 * nc], driven[2 * nc + 1])
+    return True
+
+
+@compiled
+def _fill_terms(
+    system: System, s: int, first: int, size: int, k: float, omega: float, by_omega: float, terms: Real
+) -> None:
+    """Fill in 1/d_m and its derivative by λ: real, imaginary, real, imaginary; NaN where d_m is zero."""
+    speed, values = k * omega, system.eigenvalues[s]
+    for m in range(size):
+        terms[0, m] = values[first + m].real
+        terms[1, m] = values[first + m].imag
+    a, b, da, db = terms[0], terms[1], terms[2], terms[3]
+    if system.form == MODES:
+        dampings = system.dampings[s]
+        for m in range(size):
+            a[m] -= speed * speed
+            b[m] = speed * dampings[first + m]
+            da[m] = -2.0 * k * speed * by_omega
+            db[m] = k * dampings[first + m] * by_omega
+    else:
+        for m in range(size):
+            a[m] = -a[m]
+            b[m] = speed - b[m]
+            da[m] = 0.0
+            db[m] = k * by_omega
+    for m in range(size):
+        inverse = 1.0 / (a[m] * a[m] + b[m] * b[m])
+        re, im = a[m] * inverse, -b[m] * inverse
+        re2, im2 = re * re - im * im, 2.0 * re * im
+        a[m], b[m] = re, im
+        da[m], db[m] = im2 * db[m] - re2 * da[m], -re2 * db[m] - im2 * da[m]
+
+
+@compiled
+def _sums(weights: Real, terms: Real, size: int) -> tuple[complex, complex]:
+    """Return Σ w_m / d_m and its derivative for real weights."""
+    a, b, da, db = terms[0], terms[1], terms[2], terms[3]
+    re, im, dre, dim = 0.0, 0.0, 0.0, 0.0
+    for m in range(size):
+        w = weights[m]
+        re += w * a[m]
+        im += w * b[m]
+        dre += w * da[m]
+        dim += w * db[m]
+    return complex(re, im), complex(dre, dim)
+
+
+@compiled
+def _add_pairs(
+    system: System, size: int, i: int, turns: bool, weights: Real, terms: Real, out: Receptance
+) -> None:
+    """Add a block of modes to A and B of harmonic number i."""
+    nc = out.B.shape[2]
+    symmetric = system.form == MODES
+    turned, dturned = complex(0.0), complex(0.0)
+    for c in range(nc):
+        for d in range(c + 1 if symmetric else nc):
+            row = 2 * (c * nc + d)
+            value, dvalue = _sums(weights[row], terms, size)
+            if turns:
+                turned, dturned = _sums(weights[row + 1], terms, size)
+            out.A[0, i, c, d] += value + 1j * turned
+            out.A[1, i, c, d] += dvalue + 1j * dturned
+            if symmetric and c != d:
+                out.A[0, i, d, c] += value - 1j * turned
+                out.A[1, i, d, c] += dvalue - 1j * dturned
+        row = 2 * (nc * nc + c)
+        value, dvalue = _sums(weights[row], terms, size)
+        if turns:
+            turned, dturned = _sums(weights[row + 1], terms, size)
+        out.B[0, i, c] += value + 1j * turned
+        out.B[1, i, c] += dvalue + 1j * dturned
+
+
+@compiled
+def _add_driven(size: int, i: int, driven: Real, terms: Real, out: Receptance) -> None:
+    """Add a block of modes to ū and x̄ of harmonic number i."""
+    nc = out.B.shape[2]
+    for c in range(nc + 1):
+        value, dvalue = _sums(driven[2 * c], terms, size)
+        turned, dturned = _sums(driven[2 * c + 1], terms, size)
+        if c == nc:
+            out.x_linear[0, i] += value + 1j * turned
+            out.x_linear[1, i] += dvalue + 1j * dturned
+        else:
+            out.u_linear[0, i, c] += value + 1j * turned
+            out.u_linear[1, i, c] += dvalue + 1j * dturned
+
+
+@apart
+def _dense_receptance(system: System, p: float, out: Receptance) -> None:
+    """Invert Z_k itself; λ may be the frequency or a structural parameter: dZ⁻¹ = −Z⁻¹ dZ Z⁻¹."""
+    omega = p if system.kind == FREQUENCY else system.omega
+    moved = p - system.parameter_reference if system.kind == STRUCTURE else 0.0
+    n = system.observe.size
+    Z, dZ = np.empty((n, n), np.complex128), np.empty((n, n), np.complex128)
+    green = np.empty((2, n, n), np.complex128)
+    half = np.empty((n, n), np.complex128)
+    for i in range(system.ks.size):
+        k, s = system.ks[i], system.which[i]
+        speed = k * omega
+        damped, inertia = complex(0.0, speed), speed * speed
+        for a in range(n):
+            for b in range(n):
+                dK, dC, dM = system.dK[s, a, b], system.dC[s, a, b], system.dM[s, a, b]
+                C, M = system.C[s, a, b] + moved * dC, system.M[s, a, b] + moved * dM
+                Z[a, b] = system.K[s, a, b] + moved * dK + damped * C - inertia * M
+                dZ[a, b] = 0.0
+                if system.kind == STRUCTURE:
+                    dZ[a, b] = dK + damped * dC - inertia * dM
+                elif system.kind == FREQUENCY:
+                    dZ[a, b] = complex(0.0, float(k)) * C - 2.0 * k * speed * M
+        if not invert(Z, green[0]):
+            green[0, 0, 0] = np.nan
+        _product(dZ, green[0], half)
+        _product(green[0], half, green[1])
+        for order in range(2):
+            _project(system, s, i, 1.0 - 2.0 * order, green[order], order, out)
+
+
+@compiled
+def _product(left: Complex, right: Complex, out: Complex) -> None:
+    """Fill `out` with left @ right."""
+    n = left.shape[0]
+    for a in range(n):
+        for b in range(n):
+            out[a, b] = 0.0
+        for c in range(n):
+            factor = left[a, c]
+            if factor != 0.0:
+                for b in range(n):
+                    out[a, b] += factor * right[c, b]
+
+
+@compiled
+def _project(
+    system: System, s: int, i: int, sign: float, green: Complex, order: int, out: Receptance
+) -> None:
+    """Project Z⁻¹ (or its derivative) of harmonic number i on contacts, excitation and observed DOF."""
+    nc, n = out.B.shape[2], green.shape[0]
+    out.x_linear[order, i] = 0.0
+    for c in range(nc):
+        out.u_linear[order, i, c] = 0.0
+        out.B[order, i, c] = 0.0
+        for d in range(nc):
+            out.A[order, i, c, d] = 0.0
+    for a in range(n):
+        for b in range(n):
+            value = sign * green[a, b]
+            driven = value * system.forces[i, b]
+            out.x_linear[order, i] += system.observe[a] * driven
+            for c in range(nc):
+                out.u_linear[order, i, c] += system.L[s, c, a] * driven
+                back = value * system.L[s, c, b].conjugate()
+                out.B[order, i, c] += system.observe[a] * back
+                for d in range(nc):
+                    out.A[order, i, d, c] += system.L[s, d, a] * back

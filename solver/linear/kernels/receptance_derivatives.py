@@ -1,0 +1,238 @@
+"""The condensed linear part at a frequency ω and a parameter p with the derivatives by ω, ω², p and ωp.
+
+What `solver.linear.kernels.receptance` gives with one derivative, as the tracking of a peak needs it: there ω
+moves whatever the parameter is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numba.experimental import structref
+
+from solver.contacts.kernels.system import DENSE, FORCE_PHASE, MODES, STRUCTURE, System
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Complex
+from solver.jit.lapack import invert
+from solver.jit.reference import Reference
+from solver.jit.separate import apart
+from solver.linear.kernels.receptance import excitation
+
+# First index of every array.
+VALUE, BY_OMEGA, BY_OMEGA_TWICE, BY_P, BY_BOTH = 0, 1, 2, 3, 4
+ORDERS = 5
+
+
+class Jets(NamedTuple):
+    """The condensed linear part and its derivatives; nk harmonics, nc relative motions."""
+
+    A: Complex  # (ORDERS, nk, nc, nc)
+    u_linear: Complex  # (ORDERS, nk, nc)
+    B: Complex  # (ORDERS, nk, nc)
+    x_linear: Complex  # (ORDERS, nk)
+
+
+@structref.register
+class _JetsType(Reference):
+    """Numba's type of `Jets` by reference."""
+
+
+class _JetsReference(structref.StructRefProxy):
+    """`Jets` by reference."""
+
+
+structref.define_proxy(_JetsReference, _JetsType, list(Jets._fields))
+
+_new: Callable[..., Jets] = _JetsReference
+
+
+@compiled
+def new_jets(system: System) -> Jets:
+    """Return empty jets for `system`."""
+    nk, nc = system.ks.size, system.shift.size
+    return _new(
+        np.zeros((ORDERS, nk, nc, nc), np.complex128), np.zeros((ORDERS, nk, nc), np.complex128),
+        np.zeros((ORDERS, nk, nc), np.complex128), np.zeros((ORDERS, nk), np.complex128),
+    )  # fmt: skip
+
+
+@apart
+def fill_jets(system: System, omega: float, p: float, out: Jets) -> None:
+    """Fill `out` at the frequency `omega` [rad/s] and the parameter λ = p (which is not the frequency)."""
+    _clear(out)
+    if system.form == DENSE:
+        _dense(system, omega, p, out)
+    else:
+        _modal(system, omega, out)
+    factor, slope = excitation(system, p)
+    nc = out.u_linear.shape[2]
+    for i in range(system.ks.size):
+        # A static load (harmonic 0) has no phase to turn; its level scales all the same.
+        f, df = factor, slope
+        if system.ks[i] == 0 and system.kind == FORCE_PHASE:
+            f, df = complex(1.0), complex(0.0)
+        x = out.x_linear[:, i]
+        x[BY_BOTH] = f * x[BY_BOTH] + df * x[BY_OMEGA]
+        x[BY_P] = f * x[BY_P] + df * x[VALUE]
+        for order in range(BY_P):
+            x[order] *= f
+        for c in range(nc):
+            u = out.u_linear[:, i, c]
+            u[BY_BOTH] = f * u[BY_BOTH] + df * u[BY_OMEGA]
+            u[BY_P] = f * u[BY_P] + df * u[VALUE]
+            for order in range(BY_P):
+                u[order] *= f
+
+
+@compiled
+def _clear(out: Jets) -> None:
+    """Set everything to zero."""
+    nk, nc = out.u_linear.shape[1], out.u_linear.shape[2]
+    for order in range(ORDERS):
+        for i in range(nk):
+            out.x_linear[order, i] = 0.0
+            for c in range(nc):
+                out.u_linear[order, i, c] = 0.0
+                out.B[order, i, c] = 0.0
+                for d in range(nc):
+                    out.A[order, i, c, d] = 0.0
+
+
+@compiled
+def _modal(system: System, omega: float, out: Jets) -> None:
+    """Sum the modes: Z⁻¹ = Σ x_m y_mᴴ/d_m; (1/d)' = −d'/d², (1/d)'' = 2d'²/d³ − d''/d²."""
+    nc = out.u_linear.shape[2]
+    parts = np.empty(BY_P, np.complex128)
+    for i in range(system.ks.size):
+        k, s = system.ks[i], system.which[i]
+        speed = k * omega
+        for m in range(system.eigenvalues.shape[1]):
+            if system.form == MODES:
+                damping = system.dampings[s, m]
+                d = complex(system.eigenvalues[s, m].real - speed * speed, speed * damping)
+                slope, bend = complex(-2.0 * k * speed, k * damping), complex(-2.0 * k * k)
+            else:
+                d = complex(0.0, speed) - system.eigenvalues[s, m]
+                slope, bend = complex(0.0, float(k)), complex(0.0)
+            if d.real == 0.0 and d.imag == 0.0:
+                d = complex(np.nan, np.nan)
+            inverse = 1.0 / d
+            parts[VALUE] = inverse
+            parts[BY_OMEGA] = -slope * inverse * inverse
+            parts[BY_OMEGA_TWICE] = (2.0 * slope * slope * inverse - bend) * inverse * inverse
+            force, seen = system.modal_forces[i, m], system.observe_modes[s, m]
+            for order in range(BY_P):
+                part = parts[order]
+                out.x_linear[order, i] += seen * part * force
+                for c in range(nc):
+                    phi = system.contact_modes[s, c, m]
+                    dual = system.contact_duals[s, c, m]
+                    out.u_linear[order, i, c] += phi * part * force
+                    out.B[order, i, c] += seen * part * dual
+                    for other in range(nc):
+                        out.A[order, i, c, other] += phi * part * system.contact_duals[s, other, m]
+
+
+@compiled
+def _dense(system: System, omega: float, p: float, out: Jets) -> None:
+    """Invert Z itself, with G = Z⁻¹: G_x = −G Z_x G, G_xy = G Z_x G Z_y G + G Z_y G Z_x G − G Z_xy G."""
+    moved = p - system.parameter_reference if system.kind == STRUCTURE else 0.0
+    structural = system.kind == STRUCTURE
+    n = system.observe.size
+    Z = np.zeros((ORDERS, n, n), np.complex128)
+    G = np.zeros((ORDERS, n, n), np.complex128)
+    half, one, two = (
+        np.empty((n, n), np.complex128),
+        np.empty((n, n), np.complex128),
+        np.empty((n, n), np.complex128),
+    )
+    for i in range(system.ks.size):
+        k, s = system.ks[i], system.which[i]
+        speed = k * omega
+        ik = complex(0.0, float(k))
+        for a in range(n):
+            for b in range(n):
+                dK, dC, dM = system.dK[s, a, b], system.dC[s, a, b], system.dM[s, a, b]
+                C, M = system.C[s, a, b] + moved * dC, system.M[s, a, b] + moved * dM
+                Z[VALUE, a, b] = system.K[s, a, b] + moved * dK + ik * omega * C - speed * speed * M
+                Z[BY_OMEGA, a, b] = ik * C - 2.0 * k * speed * M
+                Z[BY_OMEGA_TWICE, a, b] = -2.0 * k * k * M
+                if structural:
+                    Z[BY_P, a, b] = dK + ik * omega * dC - speed * speed * dM
+                    Z[BY_BOTH, a, b] = ik * dC - 2.0 * k * speed * dM
+        green = G[VALUE]
+        if not invert(Z[VALUE], green):
+            green[0, 0] = np.nan
+        _sandwich(green, Z[BY_OMEGA], green, half, one)
+        _set(G[BY_OMEGA], -1.0, one)
+        _sandwich(green, Z[BY_OMEGA_TWICE], green, half, one)
+        _sandwich(G[BY_OMEGA], Z[BY_OMEGA], green, half, two)
+        _set(G[BY_OMEGA_TWICE], -1.0, one)
+        _more(G[BY_OMEGA_TWICE], -2.0, two)
+        if structural:
+            _sandwich(green, Z[BY_P], green, half, one)
+            _set(G[BY_P], -1.0, one)
+            _sandwich(green, Z[BY_BOTH], green, half, one)
+            _set(G[BY_BOTH], -1.0, one)
+            _sandwich(G[BY_OMEGA], Z[BY_P], green, half, two)
+            _more(G[BY_BOTH], -1.0, two)
+            _sandwich(green, Z[BY_P], G[BY_OMEGA], half, two)
+            _more(G[BY_BOTH], -1.0, two)
+        for order in range(ORDERS):
+            if structural or order < BY_P:
+                _project(system, s, i, G[order], order, out)
+
+
+@apart
+def _sandwich(left: Complex, middle: Complex, right: Complex, half: Complex, out: Complex) -> None:
+    """Fill `out` with left @ middle @ right."""
+    _product(left, middle, half)
+    _product(half, right, out)
+
+
+@compiled
+def _product(left: Complex, right: Complex, out: Complex) -> None:
+    """Fill `out` with left @ right."""
+    n = left.shape[0]
+    for a in range(n):
+        for b in range(n):
+            out[a, b] = 0.0
+        for c in range(n):
+            factor = left[a, c]
+            for b in range(n):
+                out[a, b] += factor * right[c, b]
+
+
+@compiled
+def _set(target: Complex, factor: float, source: Complex) -> None:
+    """Set target = factor · source."""
+    for a in range(target.shape[0]):
+        for b in range(target.shape[1]):
+            target[a, b] = factor * source[a, b]
+
+
+@compiled
+def _more(target: Complex, factor: float, source: Complex) -> None:
+    """Add factor · source."""
+    for a in range(target.shape[0]):
+        for b in range(target.shape[1]):
+            target[a, b] += factor * source[a, b]
+
+
+@apart
+def _project(system: System, s: int, i: int, green: Complex, order: int, out: Jets) -> None:
+    """Add Z⁻¹ (or a derivative) of harmonic number i, seen from contacts, excitation and observed DOF."""
+    nc, n = out.u_linear.shape[2], green.shape[0]
+    for a in range(n):
+        for b in range(n):
+            value = green[a, b]
+            driven = value * system.forces[i, b]
+            out.x_linear[order, i] += system.observe[a] * driven
+            for c in range(nc):
+                out.u_linear[order, i, c] += system.L[s, c, a] * driven
+                back = value * system.L[s, c, b].conjugate()
+                out.B[order, i, c] += system.observe[a] * back
+                for d in range(nc):
+                    out.A[order, i, d, c] += system.L[s, d, a] * back

@@ -1,0 +1,77 @@
+"""A structure of kind ``matrices`` in the coordinates it is computed in, with its damping put together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.matrices.normal_modes import undamped_modes
+from solver.scene.parts import MatricesStructure
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MatrixModel:
+    """M q'' + C q' + K q = shapesᵀ f, x = shapes q; all arrays read-only.
+
+    Attributes
+    ----------
+    M, C, K : (n, n) array
+        In physical coordinates, or in modal ones if the structure is given by its modes.
+    shapes : (n_dofs, n) array
+        The DOFs in use.
+    """
+
+    M: FloatArray
+    C: FloatArray
+    K: FloatArray
+    shapes: FloatArray
+
+
+@lru_cache(maxsize=16)
+def matrix_model(structure: MatricesStructure) -> MatrixModel:
+    """The matrices of a structure; the same arrays each time, so that what follows from them can be kept."""
+    M, K, own, shapes = _base(structure.model_copy(update=_NO_PROPORTIONAL))
+    C = own
+    if structure.stiffness_proportional_damping or structure.mass_proportional_damping:
+        C = own + structure.stiffness_proportional_damping * K + structure.mass_proportional_damping * M
+        C.setflags(write=False)
+    return MatrixModel(M=M, C=C, K=K, shapes=shapes)
+
+
+_NO_PROPORTIONAL = {"stiffness_proportional_damping": 0.0, "mass_proportional_damping": 0.0}
+
+
+@lru_cache(maxsize=16)
+def _base(structure: MatricesStructure) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """M, K, C and shapes without proportional damping."""
+    modes, rows = structure.modes, list(structure.dofs.rows)
+    ratio = structure.damping_ratio or 0.0
+    if modes is not None:
+        ratios = modes.damping_ratio if modes.damping_ratio is not None else np.full(modes.omega2.size, ratio)
+        M, K = np.eye(modes.omega2.size), np.diag(modes.omega2)
+        C, shapes = np.diag(2.0 * ratios * np.sqrt(modes.omega2)), modes.modes[rows]
+    elif structure.M is not None and structure.K is not None:
+        M, K = structure.M.array, structure.K.array
+        C = np.zeros_like(M) if structure.C is None else structure.C.array
+        if ratio:
+            C = C + _modal_damping(M, K, ratio)
+        shapes = np.zeros((len(rows), M.shape[0]))
+        shapes[np.arange(len(rows)), rows] = 1.0
+    else:
+        raise ValueError("a matrices structure needs M and K, or `modes`")
+    for array in (M, K, C, shapes):
+        array.setflags(write=False)
+    return M, K, C, shapes
+
+
+def _modal_damping(M: FloatArray, K: FloatArray, ratio: float) -> FloatArray:
+    """C with the damping ratio in every mode, Σ 2 ζ ω (Mφ)(Mφ)ᵀ; a rigid body has none."""
+    found = undamped_modes(K, M)
+    momenta = M @ found.phi
+    omega = np.sqrt(np.maximum(found.omega2, 0.0))
+    return np.asarray((momenta * (2.0 * ratio * omega)) @ momenta.T)

@@ -1,0 +1,215 @@
+"""Modes or poles of a structure, found once and kept.
+
+They depend on the matrices and the interblade phases alone. The matrices of a scene are the same arrays as
+long as its structure is the same (`solver.linear.assembly.linear_model`), so the identity of these read-only
+arrays is the key: changing contacts, forces or the observed DOF costs no decomposition.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from solver.contacts.kernels.system import MODES, POLES
+from solver.jit.fourier import Complex, Real
+from solver.linear.assembly import LinearModel
+from solver.matrices.normal_modes import UndampedModes, least_stiffness, undamped_modes
+
+CLASSICAL = 1e-11  # largest off-diagonal modal damping, relative to the diagonal, that counts as none
+ROUNDING = 4.0  # the same in units of what the modes lack in orthogonality
+SPAN_ERROR = 1e-11  # largest relative error of the pole form against the direct inverse
+SINGULAR = 1e-13  # smallest squared pivot of the scaled K that counts as held in place
+LEAST_POLE = 1e-25  # smallest |1/s| relative to the largest: below is rounding
+
+
+@dataclass(frozen=True, slots=True)
+class _Identity:
+    """A read-only array as a key: equal to itself alone, and kept alive by the key."""
+
+    array: NDArray[Any]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Identity) and self.array is other.array
+
+    def __hash__(self) -> int:
+        return id(self.array)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Held:
+    """Matrices at each interblade phase, (ns, n, n) each, real where all phases are 0.
+
+    Attributes
+    ----------
+    key : tuple
+        Tells equal ones apart from others.
+    """
+
+    K: NDArray[Any] = field(repr=False)
+    C: NDArray[Any] = field(repr=False)
+    M: NDArray[Any] = field(repr=False)
+    key: tuple[object, ...]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Held) and self.key == other.key
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decomposition:
+    """Z⁻¹ = Σ right_m left_m / d_m, with d_m as `solver.linear.kernels.receptance` has it for the form.
+
+    Attributes
+    ----------
+    eigenvalues, dampings : (ns, nm) array
+        Of every structure.
+    right, left : (ns, n, nm) array
+        Mass-normalised modes and their conjugates, or residues of the poles.
+    """
+
+    form: int
+    eigenvalues: Complex
+    dampings: Real
+    right: NDArray[Any]
+    left: NDArray[Any]
+
+
+def matrices_of(model: LinearModel, theta: Real) -> Held:
+    """Return the matrices at each interblade phase."""
+    parts = tuple(_Identity(a) for a in (model.K0, model.Kp, model.C0, model.Cp, model.M))
+    return _matrices(parts, tuple(theta.tolist()))
+
+
+@lru_cache(maxsize=32)
+def _matrices(parts: tuple[_Identity, ...], theta: tuple[float, ...]) -> Held:
+    K0, Kp, C0, Cp, M = (part.array for part in parts)
+    turn = np.exp(1j * np.array(theta))[:, None, None]
+
+    def at(zero: Real, plus: Real) -> NDArray[Any]:
+        if not np.any(plus):
+            return np.broadcast_to(zero, (len(theta), *zero.shape))
+        return np.asarray(zero + plus * turn + plus.T * turn.conj())
+
+    held = np.broadcast_to(M, (len(theta), *M.shape))
+    return Held(at(K0, Kp), at(C0, Cp), held, (parts, theta))
+
+
+@lru_cache(maxsize=32)
+def held_alone(held: Held) -> bool:
+    """Return whether the static stiffness alone holds every part in place."""
+    return held.K.shape[1] == 0 or least_stiffness(held.K[0]) > SINGULAR
+
+
+def held_by(held: Held, L: Complex, kt: Real) -> Held:
+    """Return the matrices with the stiffness of the contacts in them."""
+    extra = np.einsum("sci,c,scj->sij", L.conj(), kt, L)
+    if not np.iscomplexobj(held.K) and not np.any(extra.imag):
+        extra = extra.real
+    return Held(held.K + extra, held.C, held.M, (held.key, L.tobytes(), kt.tobytes()))
+
+
+@lru_cache(maxsize=32)
+def decompose(held: Held) -> Decomposition | None:
+    """Return modes if the damping is classical, else poles; None if neither gives Z⁻¹ to rounding."""
+    undamped = [undamped_modes(K, M) for K, M in zip(held.K, held.M, strict=True)]
+    damping = [u.psi.conj().T @ C @ u.psi for u, C in zip(undamped, held.C, strict=True)]
+    rounding = [_rounding(u, K, M) for u, K, M in zip(undamped, held.K, held.M, strict=True)]
+    if all(_classical(D, each) for D, each in zip(damping, rounding, strict=True)):
+        phi = np.array([u.phi for u in undamped])
+        return Decomposition(
+            form=MODES,
+            eigenvalues=np.array([u.omega2 for u in undamped], dtype=np.complex128),
+            dampings=np.array([np.diag(D).real / u.mu for u, D in zip(undamped, damping, strict=True)]),
+            right=phi,
+            left=phi.conj(),
+        )
+    poles = [
+        _poles(u, D) if u.sigma == 0.0 else _plain_poles(K, C, M)
+        for u, D, K, C, M in zip(undamped, damping, held.K, held.C, held.M, strict=True)
+    ]
+    found = [each for each in poles if each is not None]
+    if len(found) < len(poles):
+        return None
+    values = np.array([each[0] for each in found], dtype=np.complex128)
+    return Decomposition(
+        form=POLES,
+        eigenvalues=values,
+        dampings=np.zeros(values.shape),
+        right=np.array([each[1] for each in found]),
+        left=np.array([each[2] for each in found]),
+    )
+
+
+def _rounding(undamped: UndampedModes, K: NDArray[Any], M: NDArray[Any]) -> float:
+    """Return how far from orthogonal by K the modes are: of a fine mesh, more than the last digits."""
+    gram = undamped.psi.conj().T @ (K + undamped.sigma * M if undamped.sigma else K) @ undamped.psi
+    return _off_diagonal(gram)
+
+
+def _classical(damping: NDArray[Any], rounding: float) -> bool:
+    """Return whether modal damping is diagonal, as far as the modes themselves are orthogonal."""
+    largest = np.abs(np.diag(damping)).max(initial=0.0)
+    return bool(_off_diagonal(damping) <= max(CLASSICAL, ROUNDING * rounding) * largest)
+
+
+def _off_diagonal(matrix: NDArray[Any]) -> float:
+    return float(np.abs(matrix - np.diag(np.diag(matrix))).max(initial=0.0))
+
+
+def _poles(undamped: UndampedModes, D: NDArray[Any]) -> tuple[Complex, Complex, Complex] | None:
+    """Return poles s_m, residues (x_m, y_mᴴ) with Z⁻¹(s) = Σ x_m y_mᴴ / (s − s_m); None if not to rounding.
+
+    In the modes ψ with ψᴴ K ψ = 1 the motion z = (Ω p, p') has the inverse state matrix
+    [[−D, −Ω⁻¹], [Ω⁻¹, 0]] with eigenvalues 1/s, in which the slow poles are the large and accurate ones.
+    """
+    n = undamped.mu.size
+    slow = np.diag(np.sqrt(undamped.mu))
+    state = np.block([[-D, -slow], [slow, np.zeros((n, n))]])
+    values, w, v = linalg.eig(state, left=True, right=True)
+    norm = np.einsum("nm,nm->m", w.conj(), v)
+    if not np.all(np.abs(norm) > 0.0):
+        return None
+    size = np.abs(values).max()
+    values = np.where(np.abs(values) < LEAST_POLE * size, LEAST_POLE * size, values)
+    x, yh = v[:n], w[:n].conj() * (-1.0 / (values * norm))
+    fast = 1.0 / np.sqrt(undamped.mu)
+    for s in 1j * np.array([0.01 * fast[-1], 0.3 * fast[-1], 1.7 * fast[-1], 0.7 * fast[0], 3.1 * fast[0]]):
+        direct = np.linalg.inv(np.eye(n) + s * D + np.diag(s * s * undamped.mu))
+        summed = (x / (s - 1.0 / values)) @ yh.T
+        if np.abs(summed - direct).max() > SPAN_ERROR * np.abs(direct).max():
+            return None
+    return 1.0 / values, undamped.psi @ x, undamped.psi.conj() @ yh
+
+
+def _plain_poles(
+    K: NDArray[Any], C: NDArray[Any], M: NDArray[Any]
+) -> tuple[Complex, Complex, Complex] | None:
+    """Return the same as `_poles` where K is singular.
+
+    Z⁻¹(s) = Σ x_m y_mᴴ / (y_mᴴ (C + 2 s_m M) x_m (s − s_m)) for simple poles: Tisseur, Meerbergen, SIAM Rev.
+    43 (2001) 235, doi:10.1137/S0036144500381988.
+    """
+    n = K.shape[0]
+    inverse = np.linalg.inv(M)
+    state = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K, -inverse @ C]])
+    values, y, x = linalg.eig(state, left=True, right=True)
+    # Left eigenvectors of the first-order form carry those of the quadratic one in their lower half.
+    x, y = x[:n], inverse.conj().T @ y[n:]
+    norm = np.einsum("nm,nm->m", y.conj(), C @ x + 2.0 * (M @ x) * values)
+    if not np.all(np.abs(norm) > 0.0):
+        return None
+    yh = (y / norm.conj()).conj()
+    scale = np.sqrt(np.abs(np.linalg.eigvalsh(K)).max() / np.abs(np.linalg.eigvalsh(M)).max())
+    for s in (0.3j * scale, 1.7j * scale, 0.01j * scale):
+        direct = np.linalg.inv(K + s * C + s * s * M)
+        summed = (x / (s - values)) @ yh.T
+        if np.abs(summed - direct).max() > SPAN_ERROR * np.abs(direct).max():
+            return None
+    return values, x, yh

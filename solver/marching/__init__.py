@@ -1,0 +1,1 @@
+"""Time marching: the referee, which shares nothing with the balance."""

@@ -1,0 +1,1 @@
+"""Compiled Taylor steps with located events."""

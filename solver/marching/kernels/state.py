@@ -1,0 +1,202 @@
+"""What a time march works on: the equations, the state, the series of a step, and what it records."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numba.experimental import structref
+from numpy.typing import NDArray
+
+from solver.jit.decorators import compiled
+from solver.jit.reference import Reference
+
+Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+ORDER = 8  # of the Taylor series; stable on the imaginary axis for h |lambda| < 3.4
+# Laws of the contacts.
+COULOMB, ELASTIC_NORMAL, GAP, POLYNOMIAL = 0, 1, 2, 3
+# What a contact does; a slipping one has its direction, +1 or -1. A gap is closed (STICK) or open.
+STICK, SEPARATED = 0, 2
+# How a run of periods ended.
+RAN, SETTLED, CHATTER, NOT_FINITE = 0, 1, 2, 3
+
+
+class System(NamedTuple):
+    """The equations in tau: x'' = W (force - L^T F) - A x - B x', with A, B and W as compressed sparse rows.
+
+    W is the inverse of the mass matrix times omega^-2. `kt` is also the stiffness of a gap spring. Of the law
+    elastic-normal: the ends of the normal motion, its stiffness, and the part of the normal force that is in
+    equilibrium at rest. `powers` (n_contacts, degree) are the coefficients of polynomial springs.
+    """
+
+    A_start: Whole
+    A_column: Whole
+    A_value: Real
+    B_start: Whole
+    B_column: Whole
+    B_value: Real
+    W_start: Whole
+    W_column: Whole
+    W_value: Real
+    force_dof: Whole
+    force_amplitude: Real
+    force_phase: Real
+    force_harmonic: Whole
+    first: Whole
+    second: Whole
+    kt: Real
+    mu: Real
+    N0: Real
+    N1: Real
+    N1_phase: Real
+    law: Whole
+    normal_first: Whole
+    normal_second: Whole
+    kn: Real
+    rest: Real
+    gap: Real
+    powers: Real
+
+
+class State(NamedTuple):
+    """Motion and contacts at one instant; changed in place. `mode`: STICK, SEPARATED, +1 or -1."""
+
+    x: Real
+    v: Real
+    force: Real
+    mode: Whole
+
+
+class Series(NamedTuple):
+    """Taylor coefficients over a step, row k belongs to s^k, s = 0..1; of u^j at [contact, j - 1, k].
+
+    `pull` is scratch, a force a DOF.
+    """
+
+    x: Real
+    v: Real
+    force: Real
+    load: Real
+    pull: Real
+    normal: Real
+    power: Real
+
+
+class Record(NamedTuple):
+    """Samples of one period, evenly spaced; empty arrays record nothing."""
+
+    x: Real
+    v: Real
+    slip: Real
+    force: Real
+    load: Real
+
+
+# Inside the compiled loops each of them is one pointer, as in `solver.contacts.kernels.system`.
+
+
+@structref.register
+class _MarchSystemType(Reference):
+    """Numba's type of a `System` by reference."""
+
+
+class _SystemReference(structref.StructRefProxy):
+    """A `System` by reference."""
+
+
+@structref.register
+class _MarchStateType(Reference):
+    """Numba's type of a `State` by reference."""
+
+
+class _StateReference(structref.StructRefProxy):
+    """A `State` by reference."""
+
+
+@structref.register
+class _MarchSeriesType(Reference):
+    """Numba's type of a `Series` by reference."""
+
+
+class _SeriesReference(structref.StructRefProxy):
+    """A `Series` by reference."""
+
+
+@structref.register
+class _MarchRecordType(Reference):
+    """Numba's type of a `Record` by reference."""
+
+
+class _RecordReference(structref.StructRefProxy):
+    """A `Record` by reference."""
+
+
+structref.define_proxy(_SystemReference, _MarchSystemType, list(System._fields))
+structref.define_proxy(_StateReference, _MarchStateType, list(State._fields))
+structref.define_proxy(_SeriesReference, _MarchSeriesType, list(Series._fields))
+structref.define_proxy(_RecordReference, _MarchRecordType, list(Record._fields))
+
+new_system: Callable[..., System] = _SystemReference
+new_state: Callable[..., State] = _StateReference
+new_series: Callable[..., Series] = _SeriesReference
+new_record: Callable[..., Record] = _RecordReference
+
+
+@compiled
+def product(start: Whole, column: Whole, value: Real, x: Real, row: int) -> float:
+    """Return row `row` of a matrix in compressed sparse rows times x."""
+    total = 0.0
+    for j in range(start[row], start[row + 1]):
+        total += value[j] * x[column[j]]
+    return total
+
+
+@compiled
+def slip(system: System, x: Real, c: int) -> float:
+    """Return x(first end) - x(second end) of contact c; an end of -1 is the ground."""
+    first, second = system.first[c], system.second[c]
+    return (x[first] if first >= 0 else 0.0) - (x[second] if second >= 0 else 0.0)
+
+
+@compiled
+def wave(k: int, angle: float) -> float:
+    """Return the k-th derivative of the cosine."""
+    turn = k % 4
+    value = math.cos(angle) if turn % 2 == 0 else math.sin(angle)
+    return value if turn in (0, 3) else -value
+
+
+@compiled
+def normal_slip(system: System, x: Real, c: int) -> float:
+    """Return x(first) - x(second) of the normal pair of contact c."""
+    first, second = system.normal_first[c], system.normal_second[c]
+    return (x[first] if first >= 0 else 0.0) - (x[second] if second >= 0 else 0.0)
+
+
+@compiled
+def power_series(system: System, series: Series, c: int, k: int) -> float:
+    """Fill in coefficient k of every power of the motion of contact c; return that of its force."""
+    power = series.power[c]
+    power[0, k] = slip(system, series.x[k], c)
+    total = system.powers[c, 0] * power[0, k]
+    for j in range(1, power.shape[0]):
+        value = 0.0
+        for i in range(k + 1):
+            value += power[j - 1, i] * power[0, k - i]
+        power[j, k] = value
+        total += system.powers[c, j] * value
+    return total
+
+
+@compiled
+def motion_size(system: System, series: Series, c: int, normal: bool) -> float:
+    """Return a bound of a relative motion of contact c in the step."""
+    total = 0.0
+    for k in range(series.x.shape[0]):
+        x = series.x[k]
+        total += abs(normal_slip(system, x, c) if normal else slip(system, x, c))
+    return total

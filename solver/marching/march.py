@@ -1,0 +1,385 @@
+"""Time marching: the independent referee of the harmonic balance.
+
+It shares nothing with the balance but the scene: matrices are assembled here, the whole annulus is marched
+instead of one sector, and the friction law is followed in time. See `solver.marching.kernels.taylor` for the
+scheme.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from numbers import Integral, Real
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array
+
+from solver.errors import SettingError
+from solver.linear.first_order import equations
+from solver.marching.contacts import columns, rows
+from solver.marching.kernels import state as kernel
+from solver.marching.kernels import taylor as stepping
+from solver.marching.result import MarchResult, MarchStatus, describe
+from solver.scene.annulus import annulus
+from solver.scene.scene import CyclicStructure, End, Excitation, LumpedStructure, MatricesStructure, Scene
+from solver.scene.validation import listing
+
+FloatArray = NDArray[np.float64]
+LEAST_STEPS = 64
+MOST_STEPS = 1_000_000
+SAMPLES_PER_PERIOD = 2048
+REPEATS = 1e-7  # relative change of velocities, forces and of the drift at which a part is said to drift
+BALANCING = 30  # products with full matrices, of mixed units, in the bound of the fastest motion
+MOST_PERIODS, WORK = 50, 2e6  # between two looks at progress and stop: periods, and their rough work
+_STATUS = {
+    kernel.SETTLED: MarchStatus.CONVERGED,
+    kernel.CHATTER: MarchStatus.CHATTER,
+    kernel.NOT_FINITE: MarchStatus.NOT_FINITE,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Plan:
+    """What stays the same during a march."""
+
+    system: kernel.System
+    dof: int
+    tolerance: float
+    max_periods: int
+    on_progress: Callable[[float, int], None] | None
+    should_stop: Callable[[], bool] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Run:
+    """One march with one step size."""
+
+    state: kernel.State
+    record: kernel.Record
+    status: MarchStatus
+    steps: int
+    changes: FloatArray
+    drift: float
+
+    @property
+    def settled(self) -> bool:
+        """The motion repeats."""
+        return self.status is MarchStatus.CONVERGED
+
+
+def march(
+    scene: Scene,
+    *,
+    frequency_hz: float,
+    steps_per_period: int | None = None,
+    tolerance: float = 1e-10,
+    max_periods: int = 20_000,
+    tractions: Mapping[str, float] | None = None,
+    on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> MarchResult:
+    """March a scene in time from rest, contacts without force, until the motion repeats.
+
+    A cyclic scene is marched as its whole annulus. The march is made twice, the second time with half the
+    step and from where the first one ended; the difference gives the error estimate. A contact that sticks
+    all the time keeps a force that depends on the history: `mean` and `max_abs` are then those of this start.
+    Under given loads `half_peak_to_peak` is a property of the scene all the same; a load that moves, a gap or
+    a nonlinear spring makes it depend on the history too (`solver.response.history_dependence`).
+
+    Parameters
+    ----------
+    scene : Scene
+        What to march.
+    frequency_hz : float
+        Excitation frequency [Hz].
+    steps_per_period : int, optional
+        Steps of the finer run; chosen from the fastest motion of the structure when left out.
+    tolerance : float
+        Largest change of displacements, velocities and contact forces over a period, relative to their
+        largest values.
+    max_periods : int
+        Limit of the periods for each step size.
+    tractions : mapping, optional
+        Friction forces at the start by the names in `MarchResult.contacts` [N], what assembly may have left;
+        a force beyond the limit there is cut to it. None of a contact that is not named.
+    on_progress : callable, optional
+        Called with the fraction done (0 to 1, on the scale of the logarithm of the change) and the periods.
+    should_stop : callable, optional
+        Asked now and then; True ends the march with the status STOPPED.
+
+    Raises
+    ------
+    SettingError
+        An argument is out of its range, a traction of an unknown contact or of one without friction, or the
+        scene has a contact with a circular limit.
+    """
+    begin = time.perf_counter()
+    _check(frequency_hz, tolerance, max_periods)
+    whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
+    omega = 2.0 * math.pi * frequency_hz
+    system, dof = _system(whole, omega)
+    steps = _steps(system, scene.excitation, steps_per_period)
+    plan = _Plan(
+        system=system,
+        dof=dof,
+        tolerance=tolerance,
+        max_periods=max_periods,
+        on_progress=on_progress,
+        should_stop=should_stop,
+    )
+    names = tuple(row.name for row in rows(whole.contacts))
+    start = _with_tractions(plan.system, _at_rest(plan.system), names, tractions or {})
+    coarse = _run(plan, start, steps // 2, done=0)
+    fine = _run(plan, coarse.state, steps, done=coarse.changes.size) if coarse.settled else coarse
+    periods = coarse.changes.size + (fine.changes.size if coarse.settled else 0)
+    if on_progress is not None and fine.settled:
+        on_progress(1.0, periods)
+    return describe(
+        record=fine.record,
+        coarse=coarse.record,
+        order=kernel.ORDER,
+        transient=_left_to_decay(coarse.changes, fine.changes),
+        periods=periods,
+        contacts=names,
+        frequency_hz=frequency_hz,
+        steps_per_period=fine.steps,
+        status=fine.status,
+        drift=fine.drift,
+        seconds=time.perf_counter() - begin,
+    )
+
+
+def _check(frequency_hz: float, tolerance: float, max_periods: int) -> None:
+    if not (isinstance(frequency_hz, Real) and 0.0 < frequency_hz <= 1e9):
+        raise SettingError("frequency_hz", frequency_hz, "must be a number > 0 and <= 1e9 [Hz]")
+    if not (isinstance(tolerance, Real) and 1e-13 <= tolerance <= 1e-2):
+        raise SettingError("tolerance", tolerance, "must be a number from 1e-13 to 1e-2")
+    if not (isinstance(max_periods, Integral) and 1 <= max_periods <= 100_000_000):
+        raise SettingError("max_periods", max_periods, "must be a whole number from 1 to 1e8")
+
+
+def _steps(system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None) -> int:
+    """Steps of the finer run: the fastest motion turns less than 0.375 rad in one of them."""
+    full = system.W_value.size > system.W_start.size - 1
+    turns = 2.0 * math.pi * _fastest(system, BALANCING if full else 1)
+    least = max(LEAST_STEPS, 2 * math.ceil(turns / 1.5), 16 * max(force.harmonic for force in forces))
+    chosen = max(2 * LEAST_STEPS, 2 * least) if wanted is None else wanted
+    if isinstance(chosen, Integral) and chosen % 2 == 0 and least <= chosen <= MOST_STEPS:
+        return int(chosen)
+    needs = f"structure and forces need at least {least} steps per period at this frequency"
+    raise SettingError("steps_per_period", chosen, f"must be an even number up to {MOST_STEPS}; {needs}")
+
+
+def _fastest(system: kernel.System, products: int) -> float:
+    """Bound of the largest rate of the motion with every contact stuck, per omega: vibration or decay."""
+    n = system.A_start.size - 1
+    sizes = [
+        csr_array((np.abs(value), column, start), shape=(n, n))
+        for start, column, value in (
+            (system.A_start, system.A_column, system.A_value),
+            (system.B_start, system.B_column, system.B_value),
+            (system.W_start, system.W_column, system.W_value),
+        )
+    ]
+    stuck = np.zeros(n)
+    tangential, normal = (system.first, system.second), (system.normal_first, system.normal_second)
+    for k, pairs in ((system.kt, tangential), (system.kn, normal)):
+        for ends in pairs:
+            np.add.at(stuck, ends[ends >= 0], 2.0 * k[ends >= 0])
+    stiffness = _largest(sizes[0] + sizes[2] @ diags_array(stuck), products)
+    return float(max(math.sqrt(stiffness), _largest(sizes[1], products)))
+
+
+def _largest(matrix: csr_array, products: int) -> float:
+    """Bound of the spectral radius of a matrix that is not negative: its largest row sum, units balanced.
+
+    Collatz: min max (P d)_i / d_i over d > 0 is the radius (Math. Z. 48 (1942) 221); powers of P give d.
+    """
+    scale = np.ones(matrix.shape[0])
+    least = float("inf")
+    for _ in range(products):
+        grown = matrix @ scale
+        least = min(least, float(np.max(grown / scale, initial=0.0)))
+        if least == 0.0:
+            break
+        scale = grown / grown.max() + 1e-12 * scale
+    return least
+
+
+def _rows(dofs: tuple[str, ...], ends: Sequence[tuple[End, End]]) -> csr_array:
+    """Relative displacement x(first) - x(second) of each pair of ends as rows."""
+    index = {dof: i for i, dof in enumerate(dofs)}
+    signed = [
+        (row, index[end.dof], sign)
+        for row, pair in enumerate(ends)
+        for end, sign in zip(pair, (1.0, -1.0), strict=True)
+        if end.dof is not None
+    ]
+    row, column, sign = np.array(signed, dtype=float).reshape(-1, 3).T
+    places = (row.astype(np.int64), column.astype(np.int64))
+    return csr_array((sign, places), shape=(len(ends), len(index)))
+
+
+def _matrices(structure: LumpedStructure) -> tuple[FloatArray, csr_array, csr_array]:
+    """Masses [kg], damping and stiffness of a lumped structure."""
+    M = np.array([mass.m for mass in structure.masses])
+    k = np.array([spring.k for spring in structure.springs])
+    c = np.array([spring.c for spring in structure.springs]) + structure.stiffness_proportional_damping * k
+    dashpots = np.array([damper.c for damper in structure.dampers])
+    springs = _rows(structure.dofs, [spring.ends for spring in structure.springs])
+    dampers = _rows(structure.dofs, [damper.ends for damper in structure.dampers])
+    K = springs.T @ diags_array(k) @ springs
+    C = springs.T @ diags_array(c) @ springs + dampers.T @ diags_array(dashpots) @ dampers
+    return M, csr_array(C), csr_array(K)
+
+
+def _equations(scene: Scene) -> tuple[csr_array, csr_array, csr_array, dict[str, int]]:
+    """A = M⁻¹ K, B = M⁻¹ C, W = M⁻¹ and the coordinate of each DOF in use."""
+    structure = scene.structure
+    if isinstance(structure, MatricesStructure):
+        pairs = [pair for contact in scene.contacts for pair in contact.pair_ends]
+        ends = [end.dof for pair in pairs for end in pair if end.dof is not None]
+        used = [*ends, *(force.dof for force in scene.excitation), scene.observe.dof]
+        found = equations(structure, used)
+        return csr_array(found.A), csr_array(found.B), csr_array(found.W), found.index
+    if not isinstance(structure, LumpedStructure):
+        raise SettingError("scene", scene.name, "must be written out as its annulus to be marched")
+    M, C, K = _matrices(structure)
+    inverse = diags_array(1.0 / M)
+    index = {dof: i for i, dof in enumerate(structure.dofs)}
+    return csr_array(inverse @ K), csr_array(inverse @ C), csr_array(inverse), index
+
+
+def _system(scene: Scene, omega: float) -> tuple[kernel.System, int]:
+    """The equations of a scene in the angle tau = omega t, and the coordinate observed."""
+    A, B, W, index = _equations(scene)
+    A, B, W = A / omega**2, B / omega, W / omega**2
+    forces = scene.excitation
+    system = kernel.System(
+        A_start=A.indptr.astype(np.int64),
+        A_column=A.indices.astype(np.int64),
+        A_value=A.data,
+        B_start=B.indptr.astype(np.int64),
+        B_column=B.indices.astype(np.int64),
+        B_value=B.data,
+        W_start=W.indptr.astype(np.int64),
+        W_column=W.indices.astype(np.int64),
+        W_value=W.data,
+        force_dof=np.array([index[force.dof] for force in forces], dtype=np.int64),
+        force_amplitude=np.array([force.amplitude for force in forces]),
+        force_phase=np.array([force.phase for force in forces]),
+        force_harmonic=np.array([force.harmonic for force in forces], dtype=np.int64),
+        **columns(rows(scene.contacts), index),
+    )
+    return system, index[scene.observe.dof]
+
+
+def _at_rest(system: kernel.System) -> kernel.State:
+    """No motion, no friction force; open where nothing presses at tau = 0 or friction never acts."""
+    n, n_contacts = system.A_start.size - 1, system.kt.size
+    load = system.N0 + system.N1 * np.cos(system.N1_phase)
+    closed = np.where(system.law == kernel.ELASTIC_NORMAL, load, system.mu * load) > 0.0
+    closed = np.where(system.law == kernel.GAP, system.gap < 0.0, closed) | (system.law == kernel.POLYNOMIAL)
+    mode = np.where(closed, kernel.STICK, kernel.SEPARATED).astype(np.int64)
+    return kernel.State(np.zeros(n), np.zeros(n), np.zeros(n_contacts), mode)
+
+
+def _with_tractions(
+    system: kernel.System, start: kernel.State, names: tuple[str, ...], tractions: Mapping[str, float]
+) -> kernel.State:
+    """Put friction forces into the contacts of a start, no more than their limits there."""
+    force = start.force.copy()
+    load = np.maximum(system.N0 + system.N1 * np.cos(system.N1_phase), 0.0)
+    for name, traction in tractions.items():
+        if name not in names:
+            raise SettingError("tractions", name, f"must be of contacts with friction: {listing(names)}")
+        at = names.index(name)
+        if system.law[at] not in (kernel.COULOMB, kernel.ELASTIC_NORMAL) or not math.isfinite(traction):
+            raise SettingError("tractions", traction, f"must be a friction force in newtons, of {name!r}")
+        limit = float(system.mu[at] * load[at])
+        force[at] = min(max(float(traction), -limit), limit)
+    return start._replace(force=force)
+
+
+def _run(plan: _Plan, start: kernel.State, steps: int, *, done: int) -> _Run:
+    """March until the motion repeats, then one period more with a record."""
+    state = kernel.State(start.x.copy(), start.v.copy(), start.force.copy(), start.mode.copy())
+    nothing = _record(plan, 0)
+    status, changes, fraction = MarchStatus.MAX_PERIODS, np.empty(0), 0.9 if done else 0.0
+    drift, places = 0.0, [_copied(state)]
+    many = max(1, min(MOST_PERIODS, int(WORK / (steps * (state.x.size + 8 * state.force.size)))))
+    while changes.size < plan.max_periods:
+        chunk = np.empty(min(many, plan.max_periods - changes.size))
+        code, periods = stepping.run_periods(
+            plan.system, state, steps, plan.tolerance, plan.dof, nothing, chunk
+        )
+        changes = np.append(changes, chunk[:periods])
+        if code != kernel.RAN:
+            status = _STATUS[code]
+            break
+        places = [*places[-2:], _copied(state)]
+        drift = _drift(places) / chunk.size
+        if drift > 0.0:
+            status = MarchStatus.RATCHETS
+            break
+        if plan.on_progress is not None:
+            fraction = max(fraction, _fraction(changes[-1], plan.tolerance))
+            plan.on_progress(fraction, done + changes.size)
+        if plan.should_stop is not None and plan.should_stop():
+            status = MarchStatus.STOPPED
+            break
+    record = _record(plan, steps * math.ceil(SAMPLES_PER_PERIOD / steps))
+    if status not in (MarchStatus.CHATTER, MarchStatus.NOT_FINITE):
+        code, _ = stepping.run_periods(plan.system, state, steps, 0.0, plan.dof, record, np.empty(1))
+        status = _STATUS.get(code, status) if code in (kernel.CHATTER, kernel.NOT_FINITE) else status
+    drift = drift if status is MarchStatus.RATCHETS else 0.0
+    return _Run(state=state, record=record, status=status, steps=steps, changes=changes, drift=drift)
+
+
+def _copied(state: kernel.State) -> kernel.State:
+    return kernel.State(state.x.copy(), state.v.copy(), state.force.copy(), state.mode.copy())
+
+
+def _drift(places: list[kernel.State]) -> float:
+    """How far a part has drifted between the last two of three states as far apart [m]; 0 if none has.
+
+    All but the displacements is the same in all three, and these have moved on by the same twice.
+    """
+    if len(places) < 3:
+        return 0.0
+    first, second, third = places
+    moved = third.x - second.x
+    far = float(np.abs(moved).max(initial=0.0))
+    if not far > REPEATS * float(np.abs(third.v).max(initial=0.0)):
+        return 0.0
+    same = (
+        (third.v, second.v, third.v), (third.v, first.v, third.v),
+        (third.force, second.force, third.force), (third.force, first.force, third.force),
+        (moved, second.x - first.x, moved),
+    )  # fmt: skip
+    repeats = all(np.abs(a - b).max(initial=0.0) <= REPEATS * np.abs(c).max(initial=0.0) for a, b, c in same)
+    return far if repeats else 0.0
+
+
+def _record(plan: _Plan, n: int) -> kernel.Record:
+    rows = plan.system.kt.size
+    one, many = (n,), (rows, n)
+    shapes = (one, one, many, many, many)
+    return kernel.Record(*(np.full(shape, np.nan) for shape in shapes))
+
+
+def _fraction(change: float, tolerance: float) -> float:
+    """Progress of the first run on the scale of the logarithm of the change; it counts as nine tenths."""
+    return 0.9 * min(max(math.log(max(change, tolerance)) / math.log(tolerance), 0.0), 1.0)
+
+
+def _left_to_decay(coarse: FloatArray, fine: FloatArray) -> float:
+    """What decay as fast as at the end of the coarse run leaves after the last change; at most 1."""
+    if coarse.size == 0 or fine.size == 0:
+        return 1.0
+    tail = coarse[-20:]
+    decay = float(tail[-1] / tail[0]) ** (1.0 / max(tail.size - 1, 1)) if tail[0] > 0.0 else 0.0
+    return min(float(fine[-1]) * decay / (1.0 - decay), 1.0) if decay < 1.0 else 1.0

@@ -1,0 +1,232 @@
+"""What a time march returns, and how it is read from the samples of the last period."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.marching.kernels.state import Record
+from solver.results.base import Shown, Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.results.dataset import Dataset
+    from solver.scene.scene import Scene
+    from solver.views.plots.style import Into
+
+
+FloatArray = NDArray[np.float64]
+N_HARMONICS = 10
+
+
+class MarchStatus(Enum):
+    """How a march ended; the value is a sentence for the user."""
+
+    CONVERGED = "The motion repeats from period to period within the tolerance."
+    MAX_PERIODS = (
+        "The motion did not repeat within max_periods: allow more periods, or look at the history, "
+        "it may not have the period of the excitation."
+    )
+    STOPPED = "Stopped on request before the motion repeated."
+    CHATTER = (
+        "A contact changes its state without end at one instant: change the load, the stiffness or the "
+        "frequency a little."
+    )
+    RATCHETS = (
+        "There is no periodic motion: everything repeats from period to period, but a part that contacts "
+        "alone hold drifts by the same distance each period."
+    )
+    NOT_FINITE = "The motion grows without bound: use more steps per period."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class MarchResult(Shown):
+    """The last period of a time march, from the run with the smaller step.
+
+    Attributes
+    ----------
+    status : MarchStatus
+        How it ended.
+    max_abs : float
+        Largest abs(x) of the observed DOF [m].
+    half_peak_to_peak : float
+        (max - min) / 2 [m].
+    mean : float
+        Mean [m]. In full stick it depends on the history, here a start from rest.
+    harmonics : (11,) tuple
+        abs(mean) and the amplitudes of harmonics 1 to 10 [m].
+    frequency_hz : float
+        Excitation frequency [Hz].
+    time : (n,) array
+        Instants of the samples of the last period [s], evenly spaced from 0.
+    displacement, velocity : (n,) array
+        Observed DOF [m], [m/s].
+    contacts : tuple of str
+        Names of the contacts; of the whole annulus in a cyclic scene.
+    slip, contact_force, normal_load : (n_contacts, n) array
+        Relative displacement [m], friction force [N], normal load (0 when separated) [N].
+    periods : int
+        Periods marched, of both step sizes.
+    steps_per_period : int
+        Steps of the finer run.
+    drift : float
+        How far the part that RATCHETS moves on in a period [m], else 0.
+    error_estimate : float
+        Estimated error of `max_abs` relative to it: Richardson's from two step sizes, and what the transient
+        has left to decay. It does not see the history a stuck contact remembers (its mean).
+    seconds : float
+        Time taken [s].
+    """
+
+    status: MarchStatus
+    max_abs: float
+    half_peak_to_peak: float
+    mean: float
+    harmonics: tuple[float, ...]
+    frequency_hz: float
+    time: FloatArray
+    displacement: FloatArray
+    velocity: FloatArray
+    contacts: tuple[str, ...]
+    slip: FloatArray
+    contact_force: FloatArray
+    normal_load: FloatArray
+    periods: int
+    steps_per_period: int
+    drift: float
+    error_estimate: float
+    seconds: float
+
+    @property
+    def converged(self) -> bool:
+        """The motion repeats within the tolerance."""
+        return self.status is MarchStatus.CONVERGED
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.views.summary import of_march
+
+        return of_march(self)
+
+    def to_dataset(self) -> Dataset:
+        """The last period; SI units."""
+        from solver.views.to_dataset import march_dataset
+
+        return march_dataset(self)
+
+    def plot(self, ax: Into = None, *, scene: Scene | None = None) -> Figure:
+        """Draw the last period and its hysteresis loops.
+
+        Parameters
+        ----------
+        ax : axes to draw into, else a new figure.
+        scene : what was marched, for the title.
+        """
+        from solver.views.plots.motion import Motion, motion_figure
+
+        motion = Motion.of_march(self)
+        if scene is not None:
+            motion = Motion.of_march(self, scene.name, scene.observe.dof)
+        return motion_figure(motion, ax=ax)
+
+    def to_json(self) -> dict[str, object]:
+        """The result without its histories, for JSON; a number that does not exist is None."""
+        drift = {"drift": self.drift} if self.status is MarchStatus.RATCHETS else {}
+        return drift | {
+            "max_abs": _finite(self.max_abs),
+            "half_peak_to_peak": _finite(self.half_peak_to_peak),
+            "mean": _finite(self.mean),
+            "harmonics": [_finite(amplitude) for amplitude in self.harmonics],
+            "periods": self.periods,
+            "steps_per_period": self.steps_per_period,
+            "error_estimate": _finite(self.error_estimate),
+            "status": self.status.value,
+            "seconds": self.seconds,
+        }
+
+
+def _finite(number: float) -> float | None:
+    return number if math.isfinite(number) else None
+
+
+def describe(
+    *,
+    record: Record,
+    coarse: Record,
+    order: int,
+    transient: float,
+    periods: int,
+    contacts: tuple[str, ...],
+    frequency_hz: float,
+    steps_per_period: int,
+    status: MarchStatus,
+    drift: float,
+    seconds: float,
+) -> MarchResult:
+    """Read the result of a march from its records.
+
+    Parameters
+    ----------
+    record, coarse : Record
+        Last period of the runs with the smaller and with twice the step; the same if there was one run.
+    order : int
+        Order of the steps.
+    transient : float
+        What the transient has left to decay, relative.
+    contacts : tuple of str
+        Names of the contacts.
+    periods, frequency_hz, steps_per_period, status, drift, seconds
+        As in `MarchResult`.
+    """
+    omega = 2.0 * math.pi * frequency_hz
+    low, high = _extremes(record)
+    max_abs = max(abs(low), abs(high))
+    spectrum = np.fft.rfft(record.x)[: N_HARMONICS + 1] / record.x.size
+    harmonics = np.abs(spectrum) * np.array([1.0, *[2.0] * N_HARMONICS])
+    return MarchResult(
+        status=status,
+        max_abs=max_abs,
+        half_peak_to_peak=0.5 * (high - low),
+        mean=float(spectrum[0].real),
+        harmonics=tuple(harmonics.tolist()),
+        frequency_hz=frequency_hz,
+        time=np.arange(record.x.size) / (record.x.size * frequency_hz),
+        displacement=record.x,
+        velocity=record.v * omega,
+        contacts=contacts,
+        slip=record.slip,
+        contact_force=record.force,
+        normal_load=record.load,
+        periods=periods,
+        steps_per_period=steps_per_period,
+        drift=drift,
+        error_estimate=_step_error(max_abs, coarse, order) + transient,
+        seconds=seconds,
+    )
+
+
+def _extremes(record: Record) -> tuple[float, float]:
+    """Least and largest displacement of the period: of the cubics through samples and their slopes."""
+    x, v = record.x, record.v
+    h = 2.0 * math.pi / x.size
+    x1, v0, v1 = np.roll(x, -1), h * v, h * np.roll(v, -1)
+    turning = np.flatnonzero(v0 * v1 < 0.0)
+    a = (2.0 * x + v0 - 2.0 * x1 + v1)[turning]
+    b = (-3.0 * x - 2.0 * v0 + 3.0 * x1 - v1)[turning]
+    v0, x0 = v0[turning], x[turning]
+    root = np.sqrt(np.maximum(b**2 - 3.0 * a * v0, 0.0))
+    s = np.clip(-v0 / (b + np.where(v0 > 0.0, -root, root)), 0.0, 1.0)
+    values = np.concatenate([x, x0 + s * (v0 + s * (b + s * a))])
+    return float(values.min()), float(values.max())
+
+
+def _step_error(max_abs: float, coarse: Record, order: int) -> float:
+    low, high = _extremes(coarse)
+    difference = abs(max_abs - max(abs(low), abs(high))) / (2.0**order - 1.0)
+    return difference / max_abs if max_abs > 0.0 else difference

@@ -1,0 +1,166 @@
+"""The matrices of one structure from their files: rows brought together by their labels, in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array, diags_array
+
+from solver.matrices.files import MatrixFileError, read_labelled
+from solver.matrices.labels import Label, labels_beside, read_labels
+from solver.matrices.labels import label as parsed
+from solver.matrices.readers.numbers_in_text import FormatError
+from solver.matrices.readers.triplets import Labelled
+
+# Forces over displacements, and moments over angles, in the units of the files: what they are in N/m and
+# N m. Masses go with them, as seconds stay seconds: t, mm, N and lbf s²/in, in, lbf are consistent units.
+UNITS = {"SI": (1.0, 1.0), "mm": (1e3, 1e-3), "in": (4.4482216152605 / 0.0254, 4.4482216152605 * 0.0254)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MatrixSet:
+    """M, K and maybe C of a structure.
+
+    Attributes
+    ----------
+    matrices : dict
+        Sparse, by their keys.
+    labels : tuple of Label or None
+        Node and component of each row.
+    held : int
+        Rows left out because a boundary condition holds them.
+    """
+
+    matrices: dict[str, coo_array]
+    labels: tuple[Label, ...] | None = None
+    held: int = 0
+
+    def row(self, label: Label) -> int | None:
+        """The row of a label (zero-based); None if there is none."""
+        return None if self.labels is None or label not in self.labels else self.labels.index(label)
+
+    def name(self, row: int) -> str:
+        """A row by its number and, where it is known, its label."""
+        return f"row {row}" if self.labels is None else f"row {row} ({self.labels[row]})"
+
+    def no_row(self, given: str) -> str:
+        """Why `given` names no row, and what would: the end of a sentence."""
+        if self.labels is None:
+            return (
+                f"is {given[:40]!r}, but the files do not tell the nodes of their rows: give the row, or a "
+                "file of labels (name.mapping of Ansys, name.dof of CalculiX) beside the matrices"
+            )
+        wanted = parsed(given)
+        if wanted is None:
+            return f"must be a row or a label such as {self.labels[0]}, got {given[:40]!r}"
+        there = [label for label in self.labels if label.node == wanted.node]
+        if there:
+            return f"is {given}, but node {wanted.node} has the DOFs {', '.join(map(str, there[:12]))}"
+        nodes = f"{self.labels[0].node} to {max(label.node for label in self.labels)}"
+        return f"is {given}, but there is no node {wanted.node} in use (nodes {nodes})"
+
+
+def read_set(paths: Mapping[str, Path], mapping: Path | None = None) -> MatrixSet:
+    """Read the matrices of a structure.
+
+    Rows that files label (Abaqus, DMIG) are brought together by their labels; a file of labels, given or
+    found beside a matrix under its name (.mapping of Ansys, .dof of CalculiX), names the rows as they stand.
+
+    Parameters
+    ----------
+    paths : file of each of M, K and C.
+    mapping : a file of labels.
+
+    Raises
+    ------
+    MatrixFileError
+        A file that cannot be used, or files that do not belong together.
+    """
+    return put_together({key: read_labelled(path, key) for key, path in paths.items()}, paths, mapping)
+
+
+def put_together(
+    parts: Mapping[str, Labelled], paths: Mapping[str, Path], mapping: Path | None = None
+) -> MatrixSet:
+    """The structure of matrices that were read from `paths`, as `read_set` makes it.
+
+    Raises
+    ------
+    MatrixFileError
+        A file of labels that cannot be used.
+    """
+    if all(part.labels is not None for part in parts.values()):
+        return _together(parts)
+    sizes = {key: part.matrix.shape[0] for key, part in parts.items()}
+    matrices = {key: part.matrix for key, part in parts.items()}
+    if len(set(sizes.values())) > 1:
+        return MatrixSet(matrices=matrices)
+    found = mapping or next((name for name in map(labels_beside, paths.values()) if name), None)
+    labels = next((part.labels for part in parts.values() if part.labels is not None), None)
+    if found is not None:
+        labels = labels_of(found)
+        size = next(iter(sizes.values()))
+        if len(labels) != size:
+            twice = (
+                ": the real and imaginary parts of a cyclic step; store the sector without *CYCLIC SYMMETRY"
+                if size == 2 * len(labels)
+                else ""
+            )
+            raise MatrixFileError(f"{str(found)!r} names {len(labels)} rows, the matrices have {size}{twice}")
+    return MatrixSet(matrices=matrices, labels=labels)
+
+
+def labels_of(path: Path) -> tuple[Label, ...]:
+    """Read a file of labels.
+
+    Raises
+    ------
+    MatrixFileError
+        It cannot be read, or names no rows.
+    """
+    try:
+        return read_labels(path)
+    except FormatError as error:
+        raise MatrixFileError(f"{str(path)!r}: {error}") from error
+    except OSError as error:
+        raise MatrixFileError(f"{str(path)!r} cannot be read: {error.strerror or error}") from error
+
+
+def _together(parts: Mapping[str, Labelled]) -> MatrixSet:
+    """Matrices with a row for each label of any of them, those that are held left out."""
+    every = {label for part in parts.values() for label in part.labels or ()}
+    held = {label for part in parts.values() for label in part.held}
+    labels = tuple(sorted(every - held, key=lambda label: label.place))
+    if not labels:
+        raise MatrixFileError("every DOF is held by a boundary condition: none is left")
+    row = {label: i for i, label in enumerate(labels)}
+    matrices = {}
+    for key, part in parts.items():
+        to = np.array([row.get(label, -1) for label in part.labels or ()])
+        rows, columns = to[part.matrix.row], to[part.matrix.col]
+        kept = (rows >= 0) & (columns >= 0)
+        matrices[key] = coo_array(
+            (part.matrix.data[kept], (rows[kept], columns[kept])), shape=(len(labels), len(labels))
+        )
+    return MatrixSet(matrices=matrices, labels=labels, held=len(held))
+
+
+def in_si(found: MatrixSet, units: str) -> MatrixSet:
+    """The same matrices in SI units.
+
+    Parameters
+    ----------
+    units : of the files, a key of `UNITS`: ``mm`` is mm, t, N, s; ``in`` is in, lbf s²/in, lbf, s. Rotations
+        are told by the labels; without any, every row is a displacement.
+    """
+    along, about = UNITS[units]
+    if along == 1.0:
+        return found
+    size = next(iter(found.matrices.values())).shape[0]
+    turns = np.array([label.rotation for label in found.labels or ()] or [False] * size)
+    scale = diags_array(np.sqrt(np.where(turns, about, along)))
+    scaled = {key: coo_array(scale @ csr_array(matrix) @ scale) for key, matrix in found.matrices.items()}
+    return MatrixSet(matrices=scaled, labels=found.labels, held=found.held)

@@ -1,0 +1,90 @@
+"""Undamped modes whose low frequencies are accurate however stiff the model is elsewhere.
+
+The modes are found from M ψ = μ (K + σ M) ψ, so that rounding is relative to the flexibility of the lowest
+mode, not to the stiffness of the highest: a fine mesh may spread ω² over twelve decades, of which the lowest
+few carry the response.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+# Not that of `solver.jit.fourier`, which brings the compiled loops along: files of strangers are read
+# without.
+Real = NDArray[np.float64]
+SMALL_PIVOT = 1e-12  # of the scaled K: below it K alone may be singular, and is shifted
+SHIFT = 1e-10  # shift σ relative to the largest K_ii / M_ii
+LEAST = 1e-16  # smallest μ relative to the largest: below is rounding, and only the static share counts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UndampedModes:
+    """Modes ψ with ψᴴ (K + σ M) ψ = 1 and ψᴴ M ψ = μ, lowest frequency first.
+
+    Attributes
+    ----------
+    mu : (m,) array
+        1 / (ω² + σ) [s²].
+    psi : (n, m) array
+        One mode a column.
+    sigma : float
+        σ [rad²/s²], 0 if K alone is positive definite.
+    """
+
+    mu: Real
+    psi: NDArray[Any]
+    sigma: float
+
+    @property
+    def omega2(self) -> Real:
+        """Squares of the natural frequencies [rad²/s²]."""
+        return 1.0 / self.mu - self.sigma
+
+    @property
+    def phi(self) -> NDArray[Any]:
+        """Mass-normalised modes, (n, m)."""
+        return self.psi / np.sqrt(self.mu)
+
+
+def undamped_modes(K: NDArray[Any], M: NDArray[Any]) -> UndampedModes:
+    """Find all modes of Hermitian K and M.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The mass matrix is not positive definite.
+    """
+    sigma = 0.0 if _definite(K) else SHIFT * float(np.max(np.abs(np.diag(K)) / np.diag(M).real, initial=0.0))
+    try:
+        mu, psi = linalg.eigh(M, K + sigma * M if sigma else K)
+    except np.linalg.LinAlgError:
+        # K has eigenvalues well below zero: the plain problem, mass-normalised.
+        values, phi = linalg.eigh(K, M)
+        sigma = float(-2.0 * values[0] + SHIFT * np.abs(values).max()) or 1.0
+        mu = 1.0 / (values + sigma)
+        return UndampedModes(mu=mu, psi=phi * np.sqrt(mu), sigma=sigma)
+    mu, psi = mu[::-1], psi[:, ::-1]
+    return UndampedModes(mu=np.maximum(mu, LEAST * mu[0]), psi=np.ascontiguousarray(psi), sigma=sigma)
+
+
+def _definite(K: NDArray[Any]) -> bool:
+    """Return whether K is positive definite, whatever the units of its rows, with room to spare."""
+    return least_stiffness(K) > SMALL_PIVOT
+
+
+def least_stiffness(K: NDArray[Any]) -> float:
+    """Return the smallest squared pivot of K scaled to a unit diagonal; 0 if it is not positive definite."""
+    diagonal = np.diag(K).real
+    if not np.all(diagonal > 0.0):
+        return 0.0
+    scale = 1.0 / np.sqrt(diagonal)
+    try:
+        factor = np.linalg.cholesky(K * scale[:, None] * scale)
+    except np.linalg.LinAlgError:
+        return 0.0
+    return float(np.min(np.diag(factor).real, initial=1.0) ** 2)

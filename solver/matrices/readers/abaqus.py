@@ -1,0 +1,99 @@
+"""Matrices that Abaqus writes as text (``*MATRIX OUTPUT`` after ``*MATRIX GENERATE``), files ``.mtx``.
+
+The formats, from the Abaqus Analysis User's Guide ("Generating matrices", and ``*MATRIX INPUT`` in the
+Keywords Guide): MATRIX INPUT has ``node, DOF, node, DOF, value`` a line, COORDINATE has row,
+column (from 1) and value. Of a symmetric matrix one triangle or all is there. A DOF that a boundary condition
+holds has 1e36 on the diagonal of the stiffness; nodes below 0 are internal ones of Abaqus.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+
+from solver.matrices.labels import Label, component
+from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines, table, whole_numbers
+from solver.matrices.readers.triplets import MOST_ROWS, Labelled, mirrored
+
+_HELD = 1e30  # diagonal entries from here on are the penalty of a boundary condition
+_LINE = "node, DOF, node, DOF and value (or row, column and value)"
+_COMMENT = "**"
+_HARWELL_BOEING = ("RSA", "RUA", "RRA", "PSA", "PUA")
+
+
+def is_matrix_market(start: bytes) -> bool:
+    """Whether a file that begins so is MatrixMarket, not a matrix of Abaqus."""
+    return start.startswith(b"%%")
+
+
+def read_abaqus(path: Path) -> Labelled:
+    """Read a matrix in one of the text formats.
+
+    Raises
+    ------
+    FormatError
+        With the line that leaves the format.
+    OSError
+        The file cannot be read.
+    """
+    lines = ascii_lines(path, "a matrix of Abaqus")
+    for number, line in enumerate(lines, start=1):
+        if line.startswith("*") and not line.startswith(_COMMENT):
+            raise FormatError(
+                f"line {number}: {line.strip()[:60]!r} belongs to matrices of elements or substructures: "
+                "write the assembled ones by *MATRIX GENERATE and *MATRIX OUTPUT, FORMAT=MATRIX INPUT"
+            )
+    _other_format(lines)
+    data = table(lines, (5, 3), _LINE, _COMMENT)
+    if data.shape[1] == 3:
+        return _coordinate(data, lines)
+    rows, columns, labels = _places(data, lines)
+    size = len(labels)
+    matrix = mirrored(rows, columns, data[:, 4], size)
+    stiff = (rows == columns) & (data[:, 4] >= _HELD)
+    return Labelled(matrix=matrix, labels=labels, held=frozenset(labels[row] for row in rows[stiff]))
+
+
+def _other_format(lines: list[str]) -> None:
+    """Refuse what another program wrote, by its name."""
+    if lines and lines[0].lstrip().startswith("%"):
+        raise FormatError(
+            "line 1 is a comment of MatrixMarket, whose first line must be `%%MatrixMarket matrix coordinate "
+            "real symmetric` (or `general`): put it back"
+        )
+    if len(lines) > 2 and lines[2][:3].upper() in _HARWELL_BOEING:
+        raise FormatError(
+            "line 3 is that of a Harwell-Boeing matrix (HBMAT of Ansys): let its name end in .matrix or .rsa"
+        )
+
+
+def _coordinate(data: NDArray[np.float64], lines: list[str]) -> Labelled:
+    rows, columns = (
+        whole_numbers(data[:, i], 1, what, lines, _COMMENT) - 1 for i, what in ((0, "row"), (1, "column"))
+    )
+    size = int(max(rows.max(), columns.max())) + 1
+    if rows[0] == columns[0] == size - 1 and data.shape[0] > 1 and data[0, 2] == data.shape[0] - 1:
+        raise FormatError(
+            "line 1 counts rows, columns and entries, as in MatrixMarket: its first line, `%%MatrixMarket "
+            "matrix coordinate real symmetric` (or `general`), is missing"
+        )
+    if size > MOST_ROWS:
+        raise FormatError(f"a matrix may have {MOST_ROWS} rows, got {size}")
+    return Labelled(matrix=coo_array(mirrored(rows, columns, data[:, 2], size)))
+
+
+def _places(
+    data: NDArray[np.float64], lines: list[str]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[Label, ...]]:
+    """Rows and columns of the entries, and the labels: those of the file, sorted by node and DOF."""
+    nodes = [whole_numbers(data[:, i], -LARGEST, "node", lines, _COMMENT) for i in (0, 2)]
+    dofs = [whole_numbers(data[:, i], 0, "DOF", lines, _COMMENT) for i in (1, 3)]
+    width = int(max(dofs[0].max(), dofs[1].max())) + 1
+    keys = [node * width + dof for node, dof in zip(nodes, dofs, strict=True)]
+    known, places = np.unique(np.concatenate(keys), return_inverse=True)
+    labels = tuple(Label(int(key // width), component(str(key % width))) for key in known)
+    rows, columns = places[: keys[0].size], places[keys[0].size :]
+    return rows.astype(np.int64), columns.astype(np.int64), labels

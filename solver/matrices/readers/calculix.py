@@ -1,0 +1,33 @@
+"""Matrices that CalculiX stores (``*FREQUENCY, SOLVER=MATRIXSTORAGE``): ``.sti``, ``.mas`` and ``.dof``.
+
+As its routine ``matrixstorage`` writes them: a line for each entry of one triangle, row, column (from 1) and
+value; the file ``.dof`` names the rows, ``node.direction`` a line.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from solver.matrices.readers.numbers_in_text import FormatError, ascii_lines, table, whole_numbers
+from solver.matrices.readers.triplets import MOST_ROWS, Labelled, mirrored
+
+CALCULIX = (".sti", ".mas")
+
+
+def read_calculix(path: Path) -> Labelled:
+    """Read a stored matrix.
+
+    Raises
+    ------
+    FormatError
+        With the line that leaves the format.
+    OSError
+        The file cannot be read.
+    """
+    lines = ascii_lines(path, "a matrix of CalculiX")
+    data = table(lines, (3,), "row, column and value")
+    rows, columns = (whole_numbers(data[:, i], 1, what, lines) - 1 for i, what in ((0, "row"), (1, "column")))
+    size = int(max(rows.max(), columns.max())) + 1
+    if size > MOST_ROWS:
+        raise FormatError(f"a matrix may have {MOST_ROWS} rows, got {size}")
+    return Labelled(matrix=mirrored(rows, columns, data[:, 2], size))

@@ -1,0 +1,1 @@
+"""Large models reduced onto the DOFs in use."""

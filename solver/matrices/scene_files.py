@@ -1,0 +1,154 @@
+"""A scene file of kind ``matrices`` with its files read: their names replaced by what they hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array
+
+from solver.errors import Issue, SceneError
+from solver.matrices.files import MatrixFileError, read_labelled, read_modes
+from solver.matrices.labels import label
+from solver.matrices.load_set import UNITS, MatrixSet, in_si, put_together
+from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton
+from solver.matrices.validation import DofTable
+from solver.matrices.values import MOST_DOFS, Matrix, Modes
+
+KEEP_MODES = "keep_modes"
+MAPPING, IN_UNITS = "mapping", "units"
+_MATRICES = ("M", "K", "C")
+
+
+def with_files(raw: Mapping[str, object], folder: Path) -> dict[str, object]:
+    """The tables of a scene with the files of its structure read; a scene of another kind as it is.
+
+    Parameters
+    ----------
+    folder : where relative names of files begin.
+
+    Raises
+    ------
+    SceneError
+        A file that cannot be used, or a model too large as it stands; the pointer is that of the key.
+    """
+    structure = raw.get("structure")
+    if not isinstance(structure, dict) or structure.get("kind") != "matrices":
+        return dict(raw)
+    tables = dict(structure)
+    try:
+        if isinstance(tables.get("modes"), str):
+            tables["modes"] = read_modes(folder / tables["modes"])
+    except MatrixFileError as error:
+        raise SceneError([_issue("modes", f"`modes`: {error}")]) from error
+    found = read_matrices(tables, folder)
+    if isinstance(tables.get("modes"), Modes):
+        tables = _rows_in_use(tables)
+    return {**raw, "structure": as_kept(tables, found.matrices)[0]}
+
+
+def read_matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:
+    """The matrices that the files of a structure hold, in SI units.
+
+    `mapping` and `units` are taken out of `tables`, and labels among its DOFs become rows.
+
+    Raises
+    ------
+    SceneError
+        A file that cannot be used, or a label that is not there; the pointer is that of the key.
+    """
+    paths = {key: folder / tables[key] for key in _MATRICES if isinstance(tables.get(key), str)}
+    mapping, units = tables.pop(MAPPING, None), tables.pop(IN_UNITS, "SI")
+    if mapping is not None and not isinstance(mapping, str):
+        raise SceneError([_issue(MAPPING, f"`{MAPPING}` must be the name of a file, got {mapping!r}")])
+    if units not in UNITS:
+        known = ", ".join(UNITS)
+        raise SceneError([_issue(IN_UNITS, f"`{IN_UNITS}` must be one of {known}, got {units!r}")])
+    if not paths:
+        return MatrixSet(matrices={})
+    issues, parts = [], {}
+    for key, path in paths.items():
+        try:
+            parts[key] = read_labelled(path, key)
+        except MatrixFileError as error:
+            issues.append(_issue(key, f"`{key}`: {error}"))
+    if issues:
+        raise SceneError(issues)
+    try:
+        found = in_si(put_together(parts, paths, None if mapping is None else folder / mapping), units)
+    except MatrixFileError as error:
+        raise SceneError([_issue(MAPPING, str(error))]) from error
+    if isinstance(tables.get("dofs"), dict):
+        tables["dofs"] = {name: _row(name, row, found) for name, row in tables["dofs"].items()}
+    return found
+
+
+def _row(name: str, given: object, found: MatrixSet) -> object:
+    """The row that a label such as 1203.UX names; anything else as it is."""
+    if not isinstance(given, str):
+        return given
+    wanted = label(given)
+    row = None if wanted is None else found.row(wanted)
+    if row is None:
+        raise SceneError([_issue(f"dofs/{name}", f"`dofs`: {name!r} {found.no_row(given)}")])
+    return row
+
+
+def _issue(key: str, message: str) -> Issue:
+    return Issue(pointer=f"/structure/{key}", message=message)
+
+
+def _rows_in_use(tables: dict[str, Any]) -> dict[str, Any]:
+    """Modes without the rows that no DOF of the scene names; as they are if the table of DOFs is bad."""
+    try:
+        dofs = DofTable.read(tables.get("dofs"))
+    except ValueError:
+        return tables
+    modes: Modes = tables["modes"]
+    if max(dofs.rows) >= modes.size:
+        return tables
+    kept = Modes(omega2=modes.omega2, modes=modes.modes[list(dofs.rows)], damping_ratio=modes.damping_ratio)
+    return {**tables, "modes": kept, "dofs": {name: row for row, name in enumerate(dofs)}}
+
+
+def as_kept(tables: dict[str, Any], sparse: dict[str, coo_array]) -> tuple[dict[str, Any], Reduced | None]:
+    """Tables with the matrices as the scene keeps them: as they are, or reduced if `keep_modes` asks for it.
+
+    Raises
+    ------
+    SceneError
+        A model too large as it stands, or one that cannot be reduced so.
+    """
+    keep = tables.pop(KEEP_MODES, None)
+    sizes = {key: matrix.shape[0] for key, matrix in sparse.items()}
+    if keep is None:
+        large = next((key for key in sizes if sizes[key] > MOST_DOFS), None)
+        if large is not None:
+            raise SceneError([_issue(large, _too_large(large, sizes[large]))])
+        return {**tables, **{key: Matrix(matrix.toarray()) for key, matrix in sparse.items()}}, None
+    if isinstance(keep, bool) or not isinstance(keep, int) or not 0 <= keep <= MOST_DOFS:
+        message = f"`{KEEP_MODES}` must be a whole number from 0 to {MOST_DOFS}, got {keep!r}"
+        raise SceneError([_issue(KEEP_MODES, message)])
+    if not {"M", "K"} <= set(sparse) or len(set(sizes.values())) != 1:
+        what = ", ".join(f"{key} with {size} rows" for key, size in sizes.items()) or "none"
+        message = f"`{KEEP_MODES}` needs M and K (and C) from files, of one size, got {what}"
+        raise SceneError([_issue(KEEP_MODES, message)])
+    try:
+        dofs = DofTable.read(tables.get("dofs"))
+        found = craig_bampton(sparse["M"], sparse["K"], sparse.get("C"), dofs, keep)
+    except ValueError as error:
+        raise SceneError([_issue("dofs" if "`dofs`" in str(error) else KEEP_MODES, str(error))]) from error
+    matrices = {key: Matrix(np.asarray(value)) for key, value in found.matrices.items()}
+    reduction = {"dofs": sizes["M"], "modes": found.modes, "highest_hz": found.highest_hz}
+    rows = {name: row for row, name in enumerate(dofs)}
+    return {**tables, **matrices, "dofs": rows, "reduction": reduction}, found
+
+
+def _too_large(key: str, size: int) -> str:
+    return (
+        f"`{key}` has {size} rows, {MOST_DOFS} are the most without reduction: `stickslip import --reduce` "
+        f"reduces them once onto the DOFs in use and modes of the rest; `{KEEP_MODES}` = 40 (say) in "
+        "[structure] does it whenever the scene is loaded"
+    )

@@ -1,0 +1,1 @@
+"""Peaks tracked over a parameter: `track_peak` and `least_peak`."""

@@ -1,0 +1,1 @@
+"""One periodic response and what is read off it: histories, power, wear, stability."""

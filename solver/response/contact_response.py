@@ -1,0 +1,140 @@
+"""What each contact does at a periodic response: its motion, force, state and utilisation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from itertools import pairwise
+
+import numpy as np
+
+from solver.balance.workspace import Workspace
+from solver.contacts.kernels.columns import CLOSED, DEFORMING, TOUCHING
+from solver.contacts.kernels.stick_slip_events import LIFTING, SEPARATED, SLIPPING, STUCK
+from solver.jit import fourier
+from solver.jit.fourier import Real
+from solver.scene.scene import AnyContact, ElasticNormalContact, FrictionContact, PlanarContact
+
+
+class ContactState(Enum):
+    """What a contact does over a period; the value is what a user reads."""
+
+    SEPARATED = "separated"
+    STUCK = "stuck"
+    SLIPPING = "stick and slip"
+    LIFTING = "stick, slip and separation"
+    CLOSED = "closed"
+    TOUCHING = "opens and closes"
+    DEFORMING = "deforms"
+
+
+_STATES = {
+    SEPARATED: ContactState.SEPARATED,
+    STUCK: ContactState.STUCK,
+    SLIPPING: ContactState.SLIPPING,
+    LIFTING: ContactState.LIFTING,
+    CLOSED: ContactState.CLOSED,
+    TOUCHING: ContactState.TOUCHING,
+    DEFORMING: ContactState.DEFORMING,
+}
+
+
+def state_of(code: int) -> ContactState:
+    """The state a compiled loop says by a number, as in `Branch.states`."""
+    return _STATES[code]
+
+
+OPENS = (ContactState.SEPARATED, ContactState.LIFTING, ContactState.TOUCHING)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactResponse:
+    """The motion and force of one contact.
+
+    Attributes
+    ----------
+    name : str
+        Name of the contact.
+    state : ContactState
+        What it does over the period.
+    slip : (2H + 1,) array
+        Coefficients of the slip motion u [m].
+    force : (2H + 1,) array
+        Coefficients of the friction force [N].
+    load : (3,) or (2H + 1,) array
+        Coefficients of the normal load N [N] before it is cut at 0; 0 of a contact without friction.
+    second_motion, second_force : (2H + 1,) array or None
+        The other relative motion of the contact [m] and the force along it [N]: the normal one of a rubbing
+        contact, or the second direction it slides in.
+    utilisation : float
+        max|f| / (μ N) of a stuck contact, 1 for one that slips, NaN for one that is separated throughout.
+    """
+
+    name: str
+    state: ContactState
+    slip: Real
+    force: Real
+    load: Real
+    utilisation: float
+    second_motion: Real | None = None
+    second_force: Real | None = None
+
+    @property
+    def motions(self) -> tuple[Real, ...]:
+        """Coefficients of all its relative motions [m]."""
+        return (self.slip,) if self.second_motion is None else (self.slip, self.second_motion)
+
+    @property
+    def forces(self) -> tuple[Real, ...]:
+        """Coefficients of the forces along them [N]."""
+        return (self.force,) if self.second_force is None else (self.force, self.second_force)
+
+
+def contact_responses(workspace: Workspace, u: Real, p: float) -> tuple[ContactResponse, ...]:
+    """Return motion, force and state of every contact at a solution (u, λ = p)."""
+    balance = workspace.balance
+    _, point = workspace.evaluate(u, p)
+    ks, top = balance.system.ks, balance.highest_harmonic
+    slips = fourier.to_full(u.reshape(balance.n_ports, balance.n_coefficients), ks, top)
+    forces = fourier.to_full(point.F, ks, top)
+    ports = [slice(first, end) for first, end in pairwise(balance.system.first_port)]
+    return tuple(
+        _contact(contact, int(state), slips[port], forces[port])
+        for contact, state, port in zip(balance.scene.contacts, point.states, ports, strict=True)
+    )
+
+
+def _load(contact: AnyContact, motions: Real) -> Real:
+    """Return the coefficients of N0 + N1 cos(τ + phase), and of kn v where the load moves with the parts."""
+    if not isinstance(contact, FrictionContact):
+        return np.zeros(3)
+    N1, phase = contact.N1_value, contact.N1_phase
+    load = np.array([contact.N0, N1 * math.cos(phase), -N1 * math.sin(phase)])
+    if isinstance(contact, ElasticNormalContact):
+        moving = contact.kn * motions[1]
+        load = np.pad(load, (0, max(moving.size - load.size, 0)))
+        load[: moving.size] += moving
+    return load
+
+
+def _contact(contact: AnyContact, state: int, motions: Real, forces: Real) -> ContactResponse:
+    load, utilisation = _load(contact, motions), 1.0
+    if state == STUCK and isinstance(contact, FrictionContact):
+        tau = np.linspace(0.0, 2.0 * np.pi, max(360, 8 * motions.shape[1]), endpoint=False)
+        limit = contact.mu * (fourier.basis(tau, (load.size - 1) // 2) @ load)
+        parts = np.abs(forces @ fourier.basis(tau, (motions.shape[1] - 1) // 2).T)
+        carried = parts[0]
+        if isinstance(contact, PlanarContact):
+            carried = parts.max(axis=0) if contact.limit == "box" else np.hypot(*parts)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shares = np.where(carried > 0.0, carried / limit, 0.0)
+        utilisation = float(min(shares.max(), 1.0))
+    elif state == SEPARATED:
+        utilisation = math.nan
+    return ContactResponse(
+        name=contact.name, state=state_of(state), slip=motions[0], force=forces[0], load=load,
+        utilisation=utilisation,
+        second_motion=motions[1] if len(motions) > 1 else None,
+        second_force=forces[1] if len(forces) > 1 else None,
+    )  # fmt: skip

@@ -1,0 +1,263 @@
+"""Stability of periodic responses: Floquet multipliers, with the places of the sliders in the state."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contacts.kernels.state_durations import find_segments
+from solver.contacts.kernels.stick_slip_events import (
+    BEGIN,
+    END,
+    FAILED,
+    MOTION,
+    SEGMENT_COLUMNS,
+    STICK,
+    segment_capacity,
+)
+from solver.continuation.branch import Branch
+from solver.errors import SettingError
+from solver.jit import fourier
+from solver.jit.fourier import Complex, Real
+from solver.jit.trig_polynomial import grid_size, grid_tables
+from solver.linear.assembly import linear_model
+from solver.response.monodromy import PERIOD, SHORTEST, Element, Monodromy, Piece, Structure, monodromy
+from solver.response.solve import Solution
+from solver.results.base import Shown, Summary
+from solver.scene.annulus import annulus
+from solver.scene.scene import Contact, CyclicStructure, Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.results.dataset import Dataset
+    from solver.views.plots.style import Into
+
+GROWS = 1e-9  # a multiplier's modulus beyond 1 that is more than rounding
+REAL = 1e-7  # imaginary part, relative to the modulus, that counts as none
+
+
+class Growth(Enum):
+    """How a perturbation grows, if one does; the value is what a user reads."""
+
+    NONE = "no perturbation grows"
+    FOLD = "a real multiplier is above 1: beyond a fold, or where another branch leaves this one"
+    PERIOD_DOUBLING = "a real multiplier is below -1: the motion goes over to twice the period"
+    TORUS = "a pair of complex multipliers is beyond 1: a second frequency grows (Neimark-Sacker)"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Stability(Shown):
+    """Whether small perturbations of a periodic response die out.
+
+    Attributes
+    ----------
+    multipliers : complex array
+        Floquet multipliers, largest modulus first, without the neutral ones. Contacts that slip leave
+        zeros: friction forgets.
+    neutral : int
+        Multipliers that are 1 by construction and left out: one for the slider of each contact that sticks
+        all the time (its residual force is history), one for each displacement that nothing resists.
+    growth : Growth
+        The kind of the largest multiplier, if it is beyond the unit circle.
+    frequency_hz : float
+        Of the response [Hz].
+    seconds : float
+        What it took.
+    """
+
+    multipliers: Complex
+    neutral: int
+    growth: Growth
+    frequency_hz: float
+    seconds: float
+
+    @property
+    def radius(self) -> float:
+        """Largest modulus of the multipliers that are not neutral."""
+        return float(np.abs(self.multipliers).max(initial=0.0))
+
+    @property
+    def stable(self) -> bool:
+        """Whether no perturbation grows."""
+        return self.growth is Growth.NONE
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.views.summary import of_stability
+
+        return of_stability(self)
+
+    def to_dataset(self) -> Dataset:
+        """A multiplier a row."""
+        from solver.views.to_dataset import stability_dataset
+
+        return stability_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the multipliers and the unit circle; `ax`: axes to draw into, else a new figure."""
+        from solver.views.plots.multipliers import multipliers_figure
+
+        return multipliers_figure(self, ax=ax)
+
+    def to_json(self) -> dict[str, object]:
+        """Return the answer as one JSON object; multipliers as [real, imaginary]."""
+        return {
+            "stable": self.stable,
+            "growth": self.growth.value,
+            "radius": self.radius,
+            "neutral": self.neutral,
+            "multipliers": [[float(m.real), float(m.imag)] for m in self.multipliers],
+            "frequency_hz": self.frequency_hz,
+            "seconds": self.seconds,
+        }
+
+
+def stability(solution: Solution) -> Stability:
+    """Return the Floquet multipliers of a periodic response.
+
+    Of a cyclic scene the whole annulus is perturbed: contacts in their states join all nodal diameters, so
+    the sector that stands for the motion does not stand for its perturbations.
+
+    Raises
+    ------
+    SettingError
+        The solution did not converge.
+    """
+    if not solution.converged:
+        raise SettingError("solution", solution.status.value, "must have converged")
+    slips = np.array([contact.slip for contact in solution.contacts])
+    return _stability(solution.scene, solution.frequency_hz, slips)
+
+
+def branch_stability(branch: Branch, points: Iterable[int] | None = None) -> tuple[Stability, ...]:
+    """Return the stability of points of a branch.
+
+    Parameters
+    ----------
+    branch : from `sweep`.
+    points : indices into its points; all of them if left out.
+
+    Raises
+    ------
+    SettingError
+        An index beyond the branch.
+    """
+    balance, found = branch.balance, []
+    for i in range(len(branch.values)) if points is None else points:
+        if not -len(branch.values) <= i < len(branch.values):
+            raise SettingError("points", i, f"must be indices of a branch of {len(branch.values)} points")
+        value = float(branch.values[i])
+        slips = fourier.to_full(branch.coefficients[i], balance.system.ks, balance.highest_harmonic)
+        if branch.parameter == "frequency":
+            found.append(_stability(balance.scene, value, slips))
+        else:
+            scene = balance.scene.with_values({branch.parameter: value})
+            found.append(_stability(scene, balance.system.omega / PERIOD, slips))
+    return tuple(found)
+
+
+def _stability(scene: Scene, frequency_hz: float, slips: Real) -> Stability:
+    begun = time.perf_counter()
+    found = scene_monodromy(scene, frequency_hz, slips)
+    values = np.linalg.eigvals(found.reduced).astype(np.complex128)
+    multipliers = values[np.argsort(-np.abs(values), kind="stable")]
+    return Stability(
+        multipliers=multipliers, neutral=found.neutral, growth=growth_of(multipliers),
+        frequency_hz=frequency_hz, seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def growth_of(multipliers: Complex) -> Growth:
+    """Return how a perturbation grows, from the multipliers with the largest modulus first."""
+    if multipliers.size == 0 or abs(multipliers[0]) <= 1.0 + GROWS:
+        return Growth.NONE
+    largest = complex(multipliers[0])
+    if abs(largest.imag) > REAL * abs(largest):
+        return Growth.TORUS
+    return Growth.FOLD if largest.real > 0.0 else Growth.PERIOD_DOUBLING
+
+
+def scene_monodromy(scene: Scene, frequency_hz: float, slips: Real) -> Monodromy:
+    """Return the monodromy matrix of a scene in a periodic motion, of all sectors if it is cyclic.
+
+    Parameters
+    ----------
+    scene : with the values of the motion.
+    frequency_hz : excitation frequency [Hz].
+    slips : (n_contacts, 2H + 1) full coefficients of the slip motions [m].
+    """
+    whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
+    model = linear_model(whole)
+    pieces = _pieces(scene, slips)
+    elements = tuple(
+        Element(ports=row[None, :], pieces=pieces[contact.name])
+        for row, contact in zip(model.contact_here, whole.contacts, strict=True)
+    )
+    structure = Structure(M=model.M, C=model.C0, K=model.K0)
+    return monodromy(structure, elements, PERIOD * frequency_hz)
+
+
+def _pieces(scene: Scene, slips: Real) -> dict[str, tuple[Piece, ...]]:
+    """The states of every contact; those of the next sector are the same a part of a period earlier."""
+    for contact in scene.contacts:
+        if not isinstance(contact, Contact):
+            wanted = "must have contacts of the law coulomb only: the stability of others is not computed"
+            raise SettingError("solution", contact.name, wanted)
+    coulomb = [contact for contact in scene.contacts if isinstance(contact, Contact)]
+    own = {c.name: coulomb_pieces(c, slip) for c, slip in zip(coulomb, slips, strict=True)}
+    structure = scene.structure
+    if not isinstance(structure, CyclicStructure):
+        return own
+    n, order = structure.sectors, scene.engine_order
+    return {
+        f"{name}@{j}": tuple(_earlier(piece, PERIOD * (order * j % n) / n) for piece in pieces)
+        for j in range(n)
+        for name, pieces in own.items()
+    }
+
+
+def _earlier(piece: Piece, turn: float) -> Piece:
+    return Piece(
+        begin=piece.begin - turn,
+        end=piece.end - turn,
+        tangent=piece.tangent,
+        grip=piece.grip,
+        catch=piece.catch,
+    )
+
+
+def coulomb_pieces(contact: Contact, slip: Real) -> tuple[Piece, ...]:
+    """The states of an elastic Coulomb contact in a given motion (full coefficients of its slip [m])."""
+    ks = fourier.all_harmonics((slip.size - 1) // 2)
+    top = max(int(ks[-1]), 1)
+    load = np.array(
+        [
+            contact.N0,
+            contact.N1_value * math.cos(contact.N1_phase),
+            -contact.N1_value * math.sin(contact.N1_phase),
+        ]
+    )
+    segments = np.zeros((segment_capacity(top), SEGMENT_COLUMNS))
+    tables = grid_tables(grid_size(top), top)
+    state, count = find_segments(
+        slip, ks, load, fourier.all_harmonics(1), contact.kt, contact.mu, *tables, segments
+    )
+    if state == FAILED:
+        raise SettingError(
+            "solution", contact.name, "must have a motion of every contact that can be followed"
+        )
+    stiff, none = np.array([[contact.kt]]), np.zeros((1, 1))
+    return tuple(
+        Piece(begin=row[BEGIN], end=row[END], tangent=stiff, grip=-stiff[0], catch=np.ones(1))
+        if row[MOTION] == STICK
+        else Piece(begin=row[BEGIN], end=row[END], tangent=none)
+        for row in segments[:count]
+        if row[END] - row[BEGIN] > SHORTEST
+    )

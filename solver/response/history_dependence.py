@@ -1,0 +1,375 @@
+"""What of a periodic response depends on how the vibration began.
+
+Under loads that are given, two motions of one scene never move apart: their distance
+
+    D = ½ Δvᵀ M Δv + ½ Δxᵀ K Δx + Σ Δf² / (2 kt)
+
+only falls, by Δvᵀ C Δv and by what slips differently (the elastic sliders are a sweeping process in moving
+convex sets: J. J. Moreau, J. Differ. Equ. 26 (1977) 347, doi:10.1016/0022-0396(77)90085-7). Two periodic
+responses therefore keep their distance: they have the same velocities, and the forces of each contact differ
+by a constant Δf. A contact that slips anywhere in the period, or opens, leaves no room for one: Δf = 0. A
+contact that sticks all the time leaves every constant that keeps |f + Δf| ≤ μN, so
+
+- all means that any history can leave are an interval, `mean_range`, and half peak to peak is the same;
+- a start from rest without contact forces leads to Δf = 0 if the contact has not slipped on the way. Its
+  motion is Δu away from the response, D is known at τ = 0, and as long as nothing of what sticks has slipped
+
+      ½ K_s[Δx, Δx] ≤ D(0),  so  |Δu| ≤ √(2 D(0) L K_s⁻¹ Lᵀ),  K_s = K + Σ kt Lᵀ L over what sticks.
+
+  If |f| + kt |Δu| stays below μN the contact never slips. Else the mean counts as not determined.
+
+Where every contact sticks and stays closed a load that moves is a spring and the same bound holds; in all
+other cases with a moving load, a gap or a nonlinear spring nothing is known to decay, so a contact that
+sticks leaves the mean open, and half peak to peak with it, since a displaced mean moves loads and springs.
+There several responses may exist without any contact that sticks all the time, too: `solve` looks for one
+more from no motion, and says so if it finds one, but no more than that.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.balance.balance import build
+from solver.balance.parameter import Kind
+from solver.balance.workspace import PointSolution, Workspace
+from solver.jit import fourier
+from solver.jit.fourier import Complex, Real
+from solver.linear.assembly import LinearModel, linear_model
+from solver.linear.contact_table import port_counts, port_stiffnesses
+from solver.linear.rigid_body_modes import CANCELLED
+from solver.matrices.normal_modes import least_stiffness
+from solver.response.contact_response import ContactResponse, ContactState
+from solver.response.force_history import force_at
+from solver.response.solve import Solution, describe
+from solver.response.start_from_rest import Start, keeps_sticking
+from solver.response.time_history import all_coordinates
+from solver.scene.scene import AnyContact, ElasticNormalContact, FrictionContact, PlanarContact
+
+if TYPE_CHECKING:
+    from solver.continuation.branch import Branch
+
+_TURN = 2.0 * math.pi
+# A force with a circular limit that differs from kt u + c by less, relative to it, has not slipped.
+SLIPS = 1e-6
+_ELSEWHERE = 1e-5  # relative difference of two motions beyond which they are two
+_ROUNDING = 1e-10  # of a damping matrix
+_INSTANTS = 360  # at least, over the period
+# What a transient may do between two instants 0.1 rad of its fastest motion apart, relative: (0.1)²/8.
+_BETWEEN = 2e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class History:
+    """What a response does not say without its history.
+
+    Attributes
+    ----------
+    mean_open : bool
+        Whether a start from rest may lead to another mean.
+    half_range_open : bool
+        Whether it may lead to another half peak to peak too.
+    mean_range : (float, float)
+        Bounds of the mean of the observed DOF over every history [m], residual forces from assembly
+        included; NaN where no bound is known.
+    """
+
+    mean_open: bool
+    half_range_open: bool
+    mean_range: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Contact:
+    """A contact that sticks all the time, its answer, and where it stands among the ports."""
+
+    given: FrictionContact
+    found: ContactResponse
+    ports: slice
+
+    @property
+    def moves_load(self) -> bool:
+        """Whether its normal motion changes its load."""
+        return isinstance(self.given, ElasticNormalContact)
+
+    @property
+    def boxed(self) -> bool:
+        """Whether each direction has its own limit."""
+        return isinstance(self.given, PlanarContact) and self.given.limit == "box"
+
+    def forces(self, tau: Real) -> Real:
+        """Return the friction force [N], (directions, n)."""
+        parts = self.found.forces[:1] if self.moves_load else self.found.forces
+        return np.array([fourier.basis(tau, (part.size - 1) // 2) @ part for part in parts])
+
+    def limit(self, tau: Real) -> Real:
+        """Return μN [N], (n,)."""
+        load = self.found.load
+        return np.asarray(self.given.mu * (fourier.basis(tau, (load.size - 1) // 2) @ load))
+
+    def size(self, forces: Real) -> Real:
+        """Return what counts against the limit of forces (directions, ...)."""
+        return np.asarray(np.abs(forces).max(axis=0) if self.boxed else np.sqrt((forces**2).sum(axis=0)))
+
+
+def history_of(solution: Solution) -> History:
+    """Return what a converged response does not say without its history."""
+    sticking, scene = _sticking(solution), solution.scene
+    given = all(load_is_given(contact) for contact in scene.contacts)
+    if not sticking:
+        only = (solution.mean, solution.mean) if given else (math.nan, math.nan)
+        return History(mean_open=False, half_range_open=False, mean_range=only)
+    closed = len(sticking) == len(scene.contacts)
+    bounded = given or closed
+    mean_open = not (bounded and _sticks_from_rest(solution, sticking))
+    return History(
+        mean_open=mean_open, half_range_open=mean_open and not given,
+        mean_range=_mean_range(solution, sticking) if given else (math.nan, math.nan),
+    )  # fmt: skip
+
+
+def has_another_solution(workspace: Workspace, u: Real, p: float) -> bool:
+    """Return whether Newton's method from no motion leads elsewhere.
+
+    Under loads that are given, without gaps and nonlinear springs, there is one solution but for residual
+    forces; else there may be several, of which this looks for one more: finding none proves nothing.
+    """
+    if all(load_is_given(contact) for contact in workspace.balance.scene.contacts):
+        return False
+    other = workspace.solve(p, np.zeros_like(u))
+    if not other.converged:
+        return False
+    return float(np.abs(other.u - u).max(initial=0.0)) > _ELSEWHERE * float(np.abs(u).max(initial=0.0))
+
+
+def peak_flags(branch: Branch) -> tuple[str, ...]:
+    """Return the flags of the response at the highest peak of a branch that has one, see `Solution`."""
+    balance, (peak, *_) = branch.balance, branch.peaks
+    scene, frequency_hz = balance.scene, peak.at
+    if balance.parameter.kind is not Kind.FREQUENCY:
+        scene, frequency_hz = scene.with_values({branch.parameter: peak.at}), balance.system.omega / _TURN
+        effects = replace(balance.effects, even_harmonics=int(balance.system.ks[0]) == 0)
+        balance = build(scene, harmonics=balance.n_harmonics, effects=effects)
+    found = PointSolution(converged=True, u=peak.solution, iterations=0, residual=0.0)
+    return describe(Workspace.of(balance), found, frequency_hz, time.perf_counter(), estimated=False).flags
+
+
+def load_is_given(contact: AnyContact) -> bool:
+    """Return whether a contact is friction whose load does not depend on the motion."""
+    return isinstance(contact, FrictionContact) and not isinstance(contact, ElasticNormalContact)
+
+
+def _sticking(solution: Solution) -> tuple[_Contact, ...]:
+    """Return the contacts that stick all the time and can hold a force."""
+    ends = np.append(0, np.cumsum(port_counts(solution.scene)))
+    found = []
+    for contact, response, (begin, end) in zip(
+        solution.scene.contacts, solution.contacts, pairwise(ends.tolist()), strict=True
+    ):
+        if not isinstance(contact, FrictionContact) or not _sticks(contact, response):
+            continue
+        found.append(_Contact(given=contact, found=response, ports=slice(begin, end)))
+    return tuple(found)
+
+
+def _sticks(contact: FrictionContact, response: ContactResponse) -> bool:
+    """Return whether a contact sticks all the time; a sampled one may graze its limit without any slip."""
+    if response.state is ContactState.STUCK:
+        return True
+    circular = isinstance(contact, PlanarContact) and contact.limit != "box"
+    if not circular or response.state is not ContactState.SLIPPING:
+        return False
+    pairs = zip(response.motions, response.forces, strict=True)
+    slips = [float(np.abs(force[1:] - contact.kt * u[1:]).max(initial=0.0)) for u, force in pairs]
+    largest = max(float(np.abs(force[1:]).max(initial=0.0)) for force in response.forces)
+    return max(slips) <= SLIPS * largest
+
+
+def _instants(solution: Solution) -> Real:
+    n = max(_INSTANTS, 8 * solution.observed.size)
+    return np.linspace(0.0, 2.0 * math.pi, n, endpoint=False)
+
+
+def _sticks_from_rest(solution: Solution, sticking: tuple[_Contact, ...]) -> bool:
+    """Return whether what sticks has certainly not slipped on the way from rest."""
+    tau = _instants(solution)
+    room = [contact.limit(tau) - contact.size(contact.forces(tau)) for contact in sticking]
+    if any(np.any(each <= 0.0) for each in room):
+        return False
+    model = linear_model(solution.scene)
+    stiffness = np.zeros(model.contact_here.shape[0])
+    for contact in sticking:
+        stiffness[contact.ports] = port_stiffnesses(solution.scene, model)[contact.ports]
+    reach = _compliances(model, stiffness, [contact.ports for contact in sticking])
+    if reach is None:
+        return False
+
+    def is_over(distance: float) -> bool:
+        """Whether this distance [J] cannot make a contact slip."""
+        return all(
+            float(np.min(left)) > _most_lost(contact.given, distance, *compliances)
+            for contact, left, compliances in zip(sticking, room, reach, strict=True)
+        )
+
+    start = _start(solution, model, stiffness)
+    if is_over(start.distance(start.x, start.v) + _in_sliders(solution, model, stiffness)):
+        return True
+    if len(sticking) < len(solution.contacts):
+        return False
+    angles = np.arange(model.sectors, dtype=np.float64) * model.interblade_phase
+    return keeps_sticking(start, _Fits(sticking, angles), is_over)
+
+
+def _most_lost(given: FrictionContact, distance: float, slip: float, approach: float) -> float:
+    """Return the most that motion within a distance [J] takes of the room below the limit [N]."""
+    lost = given.kt * math.sqrt(2.0 * distance * slip)
+    if isinstance(given, ElasticNormalContact):
+        lost += given.mu * given.kn * math.sqrt(2.0 * distance * approach)
+    return lost
+
+
+class _Fits:
+    """Whether every contact sticks where its ports are moved away from the response.
+
+    The sectors run ahead by `angles`. What the response does at the instants of a period is found once:
+    a transient may take thousands of periods.
+    """
+
+    def __init__(self, sticking: tuple[_Contact, ...], angles: Real) -> None:
+        self._sticking, self._angles = sticking, angles.tolist()
+        self._tau = np.zeros(0)
+        self._known: list[tuple[_Contact, int, Real, Real]] = []
+
+    def __call__(self, moved: Real, tau: Real) -> bool:
+        """Judge motions `moved` (n, sectors, n_ports) [m] at `tau` (n,)."""
+        if tau is not self._tau:
+            self._tau = tau
+            self._known = [
+                (contact, sector, contact.limit(tau + angle), contact.forces(tau + angle))
+                for contact in self._sticking
+                for sector, angle in enumerate(self._angles)
+            ]
+        return all(self._sticks(moved, *known) for known in self._known)
+
+    @staticmethod
+    def _sticks(moved: Real, contact: _Contact, sector: int, limit: Real, forces: Real) -> bool:
+        away = moved[:, sector, contact.ports].T
+        if isinstance(contact.given, ElasticNormalContact):
+            limit = limit + contact.given.mu * contact.given.kn * away[1]
+            away = away[:1]
+        change = contact.given.kt * away
+        between = _BETWEEN * float(np.abs(change).max(initial=0.0))
+        return not bool(np.any(contact.size(forces + change) + between >= limit))
+
+
+def _sector_turns(model: LinearModel) -> Complex:
+    """Return e^{jθ} of every nodal diameter, (sectors,)."""
+    return np.asarray(np.exp(2j * np.pi * np.arange(model.sectors) / model.sectors))
+
+
+def _at_turn(model: LinearModel, turn: complex) -> tuple[Complex, Complex]:
+    """Return K and L at the interblade phase factor `turn`."""
+    return (
+        np.asarray(model.K0 + model.Kp * turn + model.Kp.T / turn),
+        np.asarray(model.contact_here + model.contact_next * turn),
+    )
+
+
+def _compliances(model: LinearModel, stiffness: Real, ports: list[slice]) -> list[tuple[float, float]] | None:
+    """Return L K_s⁻¹ Lᵀ of slip and approach of each contact [m/N].
+
+    None where nothing holds a part, or where damping gives power, so that distances may grow.
+
+    Of two directions the larger one stands for both: it is the largest eigenvalue. In an annulus it is the
+    average over its nodal diameters.
+    """
+    total = np.zeros((stiffness.size, stiffness.size), dtype=np.complex128)
+    for turn in _sector_turns(model):
+        K, L = _at_turn(model, turn)
+        C = model.C0 + model.Cp * turn + model.Cp.T / turn
+        if np.linalg.eigvalsh(C)[0] < -_ROUNDING * np.abs(C).max():
+            return None
+        held = K + L.conj().T @ (stiffness[:, None] * L)
+        try:
+            np.linalg.cholesky(held)
+            total += L @ np.linalg.solve(held, L.conj().T) / model.sectors
+        except np.linalg.LinAlgError:
+            return None
+    reach = []
+    for port in ports:
+        block = total[port, port]
+        if block.shape[0] == 1:
+            reach.append((float(block[0, 0].real), 0.0))
+            continue
+        both = float(np.linalg.eigvalsh(block)[-1])
+        reach.append((both, both))
+    return reach
+
+
+def _start(solution: Solution, model: LinearModel, stiffness: Real) -> Start:
+    """Return the response of all sectors at τ = 0."""
+    ks = np.arange(solution.harmonics.size)
+    amplitudes = all_coordinates(solution)
+    turns = np.exp(1j * np.outer(np.arange(model.sectors), ks) * model.interblade_phase)
+    omega = 2.0 * math.pi * solution.frequency_hz
+    v = (turns @ (1j * omega * ks[:, None] * amplitudes)).real
+    return Start(model=model, stiffness=stiffness, x=(turns @ amplitudes).real, v=v, omega=omega)
+
+
+def _in_sliders(solution: Solution, model: LinearModel, stiffness: Real) -> float:
+    """Return Σ f² / (2 kt) over what slips, at the beginning [J]; a part of a force is below its limit."""
+    ends = np.append(0, np.cumsum(port_counts(solution.scene)))
+    angles = np.arange(model.sectors, dtype=np.float64) * model.interblade_phase
+    total = 0.0
+    for contact, response, port in zip(solution.scene.contacts, solution.contacts, ends, strict=False):
+        if stiffness[port] > 0.0 or not isinstance(contact, FrictionContact):
+            continue
+        load = fourier.basis(angles, (response.load.size - 1) // 2) @ response.load
+        limits = (contact.mu * np.maximum(load, 0.0)) ** 2
+        if isinstance(contact, PlanarContact):
+            limits = limits * (2.0 if contact.limit == "box" else 1.0)
+        else:
+            limits = np.minimum(limits, force_at(contact, response, angles % (2.0 * math.pi)) ** 2)
+        total += float(np.sum(limits)) / (2.0 * contact.kt)
+    return total
+
+
+def _mean_range(solution: Solution, sticking: tuple[_Contact, ...]) -> tuple[float, float]:
+    """Return bounds of the mean over all residual forces [m].
+
+    The mean moves by −observe K⁻¹ Lᵀ Δf. Two directions are bounded by the rectangle around what each
+    instant leaves, so the bounds may be somewhat wide there; one direction reaches its bounds.
+    """
+    gains = _mean_gains(linear_model(solution.scene))
+    if gains is None:
+        return math.nan, math.nan
+    low = high = solution.mean
+    tau = _instants(solution)
+    for contact in sticking:
+        limit, forces = contact.limit(tau), contact.forces(tau)
+        for port, force in zip(range(contact.ports.start, contact.ports.stop), forces, strict=True):
+            room = max(float(np.min(limit + force)), 0.0), max(float(np.min(limit - force)), 0.0)
+            for gain in gains[:, port].tolist():
+                # f may fall by room[0] and rise by room[1], and the mean moves by −gain Δf.
+                low -= room[1] * gain if gain > 0.0 else -room[0] * gain
+                high += room[0] * gain if gain > 0.0 else -room[1] * gain
+    return low, high
+
+
+def _mean_gains(model: LinearModel) -> Real | None:
+    """Return observe K⁻¹ Lᵀ of contacts of each sector [m/N], (sectors, n_ports); None if it is singular.
+
+    What rounding leaves of the stiffness against a rigid-body motion is none.
+    """
+    rows = []
+    for turn in _sector_turns(model):
+        K, L = _at_turn(model, turn)
+        if least_stiffness(K) <= CANCELLED:
+            return None
+        rows.append(model.observe @ np.linalg.solve(K, L.conj().T))
+    return np.asarray(np.fft.fft(np.array(rows), axis=0).real / model.sectors)

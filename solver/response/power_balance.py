@@ -1,0 +1,86 @@
+"""Where the power goes: what the excitation puts in, what dampers and contacts take out, over a period."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from solver.jit import fourier
+from solver.linear.assembly import linear_model
+from solver.linear.condensation import force_amplitudes
+from solver.response.solve import Solution
+from solver.response.time_history import coordinates, matrices
+from solver.results.base import Piece
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class PowerBalance(Piece):
+    """Mean power over a period, of one sector if the structure is cyclic.
+
+    A solution of the balance loses none: input = viscous + friction to rounding, whatever the number of
+    harmonics.
+
+    Attributes
+    ----------
+    input_w : float
+        Put in by the excitation [W].
+    viscous_w : float
+        Taken out by the dampers of the structure [W].
+    friction_w : float
+        Taken out by all contacts [W].
+    contacts_w : dict of str to float
+        Taken out by each contact [W].
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "input_w": "W",
+        "viscous_w": "W",
+        "friction_w": "W",
+        "contacts_w": "W",
+    }
+
+    input_w: float
+    viscous_w: float
+    friction_w: float
+    contacts_w: dict[str, float]
+
+    @property
+    def imbalance(self) -> float:
+        """What is unaccounted for, relative to the largest of the three (0 if nothing moves)."""
+        largest = max(abs(self.input_w), abs(self.viscous_w), abs(self.friction_w))
+        return abs(self.input_w - self.viscous_w - self.friction_w) / largest if largest > 0.0 else 0.0
+
+
+def power_balance(solution: Solution) -> PowerBalance:
+    """Return the mean powers of a periodic response.
+
+    With velocities v̂_k = ikω x̂_k: input ½ Re Σ f̂ᴴ v̂, viscous ½ Σ v̂ᴴ C v̂, friction ½ Re Σ F̂* ikω û.
+
+    Raises
+    ------
+    SettingError
+        The solution did not converge.
+    """
+    model = linear_model(solution.scene)
+    put_in = taken = 0.0
+    for k in range(solution.highest_harmonic + 1):
+        speed = 2.0 * math.pi * solution.frequency_hz * k
+        velocity = 1j * speed * coordinates(solution, k)
+        force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]
+        _, C, _ = matrices(model, k)
+        put_in += 0.5 * float(np.vdot(force, velocity).real)
+        taken += 0.5 * float(np.vdot(velocity, C @ velocity).real)
+    omega = 2.0 * math.pi * solution.frequency_hz
+    friction = {}
+    for contact in solution.contacts:
+        friction[contact.name] = 0.5 * sum(
+            float(force[1:] @ (omega * fourier.derivative(motion))[1:])
+            for motion, force in zip(contact.motions, contact.forces, strict=True)
+        )
+    return PowerBalance(
+        input_w=put_in, viscous_w=taken, friction_w=sum(friction.values()), contacts_w=friction
+    )

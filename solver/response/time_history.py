@@ -1,0 +1,142 @@
+"""What moves behind a solution: every degree of freedom, time histories, the loop of force over slip.
+
+A solution keeps the contacts and the observed DOF; the rest of the structure follows from the contact forces,
+Z_k x̂_k = f̂_k − Lᴴ F̂_k for each harmonic k.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.errors import SettingError
+from solver.jit import fourier
+from solver.jit.fourier import Complex, Real
+from solver.linear.assembly import LinearModel, linear_model
+from solver.linear.condensation import force_amplitudes
+from solver.linear.contact_table import port_stiffnesses
+from solver.response.force_history import force_at
+from solver.response.solve import Solution
+from solver.scene.validation import listing
+
+LARGEST_SAMPLES = 10_000_000
+
+
+def motion(solution: Solution) -> Real:
+    """Return the coefficients of every DOF [m], (n_dofs, 2H + 1), of one sector if the structure is cyclic.
+
+    Raises
+    ------
+    SettingError
+        The solution did not converge.
+    """
+    amplitudes = [response(solution, k) for k in range(solution.highest_harmonic + 1)]
+    return fourier.to_real(np.array(amplitudes).T)
+
+
+def time_history(solution: Solution, dof: str, *, samples: int = 512) -> tuple[Real, Real]:
+    """Return instants [s] and motion [m] of a DOF over one period, (samples,) each, evenly spaced from 0.
+
+    Raises
+    ------
+    SettingError
+        The solution did not converge, an unknown DOF, or a bad number of samples.
+    """
+    dofs = solution.scene.structure.dofs
+    if dof not in dofs:
+        raise SettingError("dof", dof, f"must be one of {listing(dofs)}")
+    tau = _angles(samples)
+    x = fourier.basis(tau, solution.highest_harmonic) @ motion(solution)[dofs.index(dof)]
+    return tau / (2.0 * math.pi * solution.frequency_hz), x
+
+
+def hysteresis_loop(solution: Solution, contact: str, *, samples: int = 512) -> tuple[Real, Real]:
+    """Return motion [m] and force [N] of a contact over one period, (samples,) each.
+
+    Of a contact with two relative motions they are the first. The force is the one the law gives for the
+    motion of the solution, with its corners, not the sum of the harmonics kept.
+
+    Raises
+    ------
+    SettingError
+        The solution did not converge, an unknown contact, or a bad number of samples.
+    """
+    tau = _angles(samples)
+    _check_converged(solution)
+    names = [each.name for each in solution.contacts]
+    if contact not in names:
+        raise SettingError("contact", contact, f"must be one of {listing(names)}")
+    at = names.index(contact)
+    given, found = solution.scene.contacts[at], solution.contacts[at]
+    basis = fourier.basis(tau, solution.highest_harmonic)
+    return basis @ found.slip, force_at(given, found, tau)
+
+
+def response(solution: Solution, k: int) -> Complex:
+    """Return the complex amplitudes x̂_k [m] of all DOFs, (n_dofs,), behind a converged solution."""
+    return np.asarray(linear_model(solution.scene).shapes @ coordinates(solution, k), dtype=np.complex128)
+
+
+def coordinates(solution: Solution, k: int) -> Complex:
+    """Return the complex amplitudes of all coordinates of the matrices, (n,), behind a converged solution.
+
+    They are the DOFs, or those of the matrices or modes a structure is given by. The mean is found with
+    contact stiffnesses on both sides, (K + Lᵀ kt L) x̂_0 = f̂_0 − Lᵀ (F̂_0 − kt û_0), because a part may
+    be held in place by its contacts alone.
+    """
+    _check_converged(solution)
+    model = linear_model(solution.scene)
+    K, C, L = matrices(model, k)
+    force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]
+    forces = [fourier.to_complex(force)[k] for c in solution.contacts for force in c.forces]
+    friction = np.array(forces, dtype=np.complex128)
+    if k == 0 and solution.contacts:
+        kt = port_stiffnesses(solution.scene, model)
+        friction = friction - kt * np.array([motion[0] for c in solution.contacts for motion in c.motions])
+        K = K + L.conj().T @ (kt[:, None] * L)
+    speed = 2.0 * math.pi * solution.frequency_hz * k
+    dynamic = K - speed**2 * model.M + 1j * speed * C
+    return np.asarray(np.linalg.solve(dynamic, force - L.conj().T @ friction), dtype=np.complex128)
+
+
+def all_coordinates(solution: Solution) -> Complex:
+    """Return the complex amplitudes of all coordinates for every harmonic at once, (H + 1, n)."""
+    _check_converged(solution)
+    model = linear_model(solution.scene)
+    ks = np.arange(solution.highest_harmonic + 1)
+    turns = np.exp(1j * ks * model.interblade_phase)[:, None, None]
+    K = model.K0 + model.Kp * turns + model.Kp.T / turns
+    C = model.C0 + model.Cp * turns + model.Cp.T / turns
+    L = model.contact_here + model.contact_next * turns
+    forces = [fourier.to_complex(force) for c in solution.contacts for force in c.forces]
+    friction = np.array(forces, dtype=np.complex128).reshape(-1, ks.size).T
+    if solution.contacts:
+        kt = port_stiffnesses(solution.scene, model)
+        friction[0] -= kt * np.array([motion[0] for c in solution.contacts for motion in c.motions])
+        K[0] += L[0].conj().T @ (kt[:, None] * L[0])
+    speed = (2.0 * math.pi * solution.frequency_hz * ks)[:, None, None]
+    pushes = force_amplitudes(model, ks) - np.einsum("kpn,kp->kn", L.conj(), friction)
+    return np.asarray(np.linalg.solve(K - speed**2 * model.M + 1j * speed * C, pushes[:, :, None])[:, :, 0])
+
+
+def matrices(model: LinearModel, k: int) -> tuple[Complex, Complex, Complex]:
+    """Return K [N/m], C [N s/m] and the contact rows L as harmonic k sees them (its interblade phase)."""
+    turn = np.exp(1j * k * model.interblade_phase)
+    return (
+        model.K0 + model.Kp * turn + model.Kp.T / turn,
+        model.C0 + model.Cp * turn + model.Cp.T / turn,
+        model.contact_here + model.contact_next * turn,
+    )
+
+
+def _check_converged(solution: Solution) -> None:
+    if not solution.converged:
+        raise SettingError("solution", solution.status.value, "must have converged")
+
+
+def _angles(samples: int) -> Real:
+    good = isinstance(samples, (int, np.integer)) and not isinstance(samples, bool)
+    if not good or not 2 <= samples <= LARGEST_SAMPLES:
+        raise SettingError("samples", samples, f"must be a whole number from 2 to {LARGEST_SAMPLES}")
+    return np.asarray(2.0 * math.pi / samples * np.arange(samples))

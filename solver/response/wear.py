@@ -1,0 +1,234 @@
+"""Wear of the contacts at a periodic response: friction work, least load and slip travel, with derivatives.
+
+Every derivative goes through the whole solve, du/dp = −(∂r/∂u)⁻¹ ∂r/∂p. The Jacobian is factorised once, and
+one substitution a parameter serves all measures of all contacts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.balance.balance import Balance, build, for_parameter
+from solver.balance.kernels.jacobian import factorise, step_back
+from solver.balance.kernels.residual import contact_values, evaluate
+from solver.balance.parameter import Kind
+from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.balance.workspace import Workspace
+from solver.contacts.kernels import columns
+from solver.contacts.kernels.system import KT, MU, System, by_reference, evaluation_by_value
+from solver.contacts.segments import Shares, sampled_shares, segments_of, shares_of
+from solver.errors import SettingError
+from solver.jit import fourier
+from solver.jit.fourier import Real
+from solver.linear.contact_table import DEFAULT_SAMPLES
+from solver.linear.kernels.receptance import receptance
+from solver.response.solve import Solution
+from solver.response.wear_measures import Change, Cycle, friction_work, least_load, slip_travel
+from solver.results.base import Piece
+from solver.scene.validation import listing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Measured(Piece):
+    """A number of a response with its derivatives through the whole solve; NaN where that is singular.
+
+    Attributes
+    ----------
+    value : float
+        In its SI unit.
+    by_frequency : float
+        By the excitation frequency [unit/Hz].
+    gradient : (n_paths,) array
+        By each parameter path, at a fixed frequency.
+    """
+
+    value: float
+    by_frequency: float
+    gradient: Real
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class ContactWear(Piece):
+    """What one contact goes through in a period.
+
+    Attributes
+    ----------
+    name : str
+        Name of the contact.
+    work : Measured
+        Work that friction takes out [J], of one sector's contact if the structure is cyclic.
+    least_load : Measured or None
+        Least normal load [N], below 0 if the contact separates; None of a law without friction.
+    travel : Measured or None
+        Distance rubbed [m]; None of a law whose slider does not move on a line.
+    shares : Shares or None
+        Shares of the period in stick, slip and separation; a spring on one side sticks while it is closed.
+        None of a polynomial spring.
+    """
+
+    name: str
+    work: Measured
+    least_load: Measured | None
+    travel: Measured | None
+    shares: Shares | None
+
+
+class WearPoint:
+    """The measures of all contacts at one solution."""
+
+    def __init__(self, cycle: Cycle, changes: Sequence[Change]) -> None:
+        self._cycle = cycle
+        self._changes = changes
+
+    def work(self, contact: str) -> Measured:
+        """Return the friction work of a contact in one period [J]; 0 of a law without friction."""
+        return _measured(friction_work(self._cycle, self._at(contact), self._changes))
+
+    def least_load(self, contact: str) -> Measured | None:
+        """Return the least normal load of a contact over the period [N]."""
+        found = least_load(self._cycle, self._at(contact), self._changes)
+        return None if found is None else _measured(found)
+
+    def travel(self, contact: str) -> Measured | None:
+        """Return the distance a contact rubs in one period [m]."""
+        found = slip_travel(self._cycle, self._at(contact), self._changes)
+        return None if found is None else _measured(found)
+
+    def shares(self, contact: str) -> Shares | None:
+        """Return the shares of the period a contact spends in stick, slip and separation."""
+        return period_shares(self._cycle, self._at(contact))
+
+    def _at(self, contact: str) -> int:
+        return contact_index(self._cycle.balance, contact)
+
+
+class WearSensitivity:
+    """Measures of the contacts at solutions of a frequency response, with derivatives by parameter paths.
+
+    Parameters
+    ----------
+    balance : of a frequency response, `Branch.balance`; with even harmonics if a path calls for them.
+    paths : parameters to differentiate by.
+
+    Raises
+    ------
+    SettingError
+        The balance is not one of a frequency response, an unknown path, or one that needs harmonics which
+        the balance leaves out.
+    """
+
+    def __init__(self, balance: Balance, paths: Sequence[str] = ()) -> None:
+        if balance.parameter.kind is not Kind.FREQUENCY:
+            raise SettingError("parameter", balance.parameter.path, "must be `frequency` for these measures")
+        self._workspace = Workspace.of(balance)
+        self._by_path = [for_parameter(balance, path, 1.0) for path in paths]
+
+    @property
+    def balance(self) -> Balance:
+        """The balance of the response."""
+        return self._workspace.balance
+
+    def at(self, frequency_hz: float, u: Real) -> WearPoint:
+        """Return the measures at a solution `u` (n_unknowns,) of the balance [m] at a frequency [Hz]."""
+        workspace, omega = self._workspace, 2.0 * math.pi * frequency_hz
+        system, linear, point = workspace.system, workspace.linear, workspace.point
+        receptance(system, omega, linear)
+        evaluate(system, linear, u, omega, 0.0, point)
+        cycle = Cycle.of(workspace.balance, u, omega, evaluation_by_value(point))
+        good = factorise(system, linear, point, np.empty(u.size), 0.0, 0.0) != 0.0
+        changes = [self._change(workspace.balance, system, omega, good=good)]
+        # What follows evaluates into the same arrays, but for the factors, which stay.
+        for balance in self._by_path:
+            there = replace(balance, system=balance.system._replace(omega=omega))
+            moved = by_reference(there.system)
+            p = balance.parameter.inside(balance.scene.value(balance.parameter.path))
+            receptance(moved, p, linear)
+            evaluate(moved, linear, u, p, 0.0, point)
+            changes.append(self._change(there, moved, p, good=good))
+        return WearPoint(cycle, changes)
+
+    def _change(self, balance: Balance, system: System, p: float, *, good: bool) -> Change:
+        """Return how the solution moves with λ, in user units, where the point was evaluated last."""
+        workspace = self._workspace
+        point = evaluation_by_value(workspace.point)
+        per_unit = 2.0 * math.pi if balance.parameter.kind is Kind.FREQUENCY else 1.0
+        du = -per_unit * point.dr_dp
+        if good:
+            step_back(workspace.system, workspace.point, du)
+        else:
+            du[:] = math.nan
+        _, _, row, load = contact_values(system, p, 0.0)
+        return Change(dU=du.reshape(point.F.shape), dF=per_unit * point.dF_dp, row=row, load=load)
+
+
+def contact_wear(solution: Solution, paths: Sequence[str] = ()) -> dict[str, ContactWear]:
+    """Return what every contact goes through in one period of a response, with derivatives.
+
+    Parameters
+    ----------
+    solution : a converged response.
+    paths : parameters to differentiate by, at a fixed frequency.
+
+    Raises
+    ------
+    SettingError
+        The solution did not converge, or an unknown path.
+    """
+    if not solution.converged:
+        raise SettingError("solution", solution.status.value, "must have converged")
+    scene = solution.scene
+    effects = Effects(even_harmonics=even_harmonics_reason(scene, paths) is not None)
+    balance = build(scene, harmonics=solution.n_harmonics, effects=effects)
+    motions = [motion for contact in solution.contacts for motion in contact.motions]
+    u = np.concatenate([fourier.from_full(motion, balance.system.ks) for motion in motions] or [np.empty(0)])
+    point = WearSensitivity(balance, paths).at(solution.frequency_hz, u)
+    return {
+        contact.name: ContactWear(
+            name=contact.name, work=point.work(contact.name), least_load=point.least_load(contact.name),
+            travel=point.travel(contact.name), shares=point.shares(contact.name),
+        )
+        for contact in scene.contacts
+    }  # fmt: skip
+
+
+def contact_index(balance: Balance, contact: str) -> int:
+    """Return the number of a contact by its name.
+
+    Raises
+    ------
+    SettingError
+        There is none of that name.
+    """
+    names = [each.name for each in balance.scene.contacts]
+    if contact not in names:
+        raise SettingError("contact", contact, f"must be one of {listing(names)}")
+    return names.index(contact)
+
+
+def period_shares(cycle: Cycle, e: int) -> Shares | None:
+    """Return the shares of the period in stick, slip and separation; None of a polynomial spring."""
+    law, row, ports = int(cycle.balance.system.laws[e]), cycle.table[e], cycle.ports(e)
+    slips = cycle.full(cycle.U[ports.start : ports.stop])
+    if law == columns.POLYNOMIAL:
+        return None
+    if law == columns.GAP_SPRING:
+        # Closed where u − gap > 0: that is the load of a contact which does not slide.
+        opening = slips[0].copy()
+        opening[0] -= row[columns.GAP]
+        return shares_of(segments_of(np.zeros(opening.size), opening, 1.0, 1.0))
+    load = cycle.normal_load(e)
+    if law == columns.COULOMB_PLANE:
+        samples = int(row[columns.SAMPLES]) or DEFAULT_SAMPLES
+        return sampled_shares(slips, load, row[KT], row[MU], samples)
+    if law == columns.COULOMB_BOX:
+        return shares_of(*(segments_of(slip, load, row[KT], row[MU]) for slip in slips))
+    return shares_of(cycle.segments(e))
+
+
+def _measured(found: tuple[float, Real]) -> Measured:
+    value, slopes = found
+    return Measured(value=value, by_frequency=float(slopes[0]), gradient=slopes[1:])

@@ -1,0 +1,263 @@
+"""What a contact goes through in one period, for wear: friction work, least normal load, distance rubbed.
+
+Each measure comes with its slopes along any changes of the solution and of λ, exactly:
+
+- friction work W = ∮ f du = π Σ_k F_k · (dU/dτ)_k, bilinear in force and motion. The motion has the harmonics
+  kept only, so this is the work of the whole force of the law, not of its first harmonics.
+- least normal load: N0 − |N1| of a given load; of N0 + N1 cos(τ + φ) + kn v its minimum over the period,
+  whose place is stationary (envelope theorem).
+- slip travel: with w_ξ = ξ kt u − μ N the slider moves by dw_ξ/kt while the contact slips towards ξ, so every
+  slip adds the difference of w_ξ at its ends. It begins where w_ξ = −ξ c, with the offset c of the stick
+  before, fixed at that stick's onset, and ends where dw_ξ/dτ = 0: these instants drop out of the
+  derivative. Where N = 0 begins or ends it, or begins the stick before it, dτ = −dN/(dN/dτ) does not.
+
+Design derivation of the last from the law of `solver.contacts.kernels.stick_slip_events`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.balance.balance import Balance
+from solver.balance.kernels.residual import contact_values
+from solver.contacts.kernels import columns
+from solver.contacts.kernels.stick_slip_events import (
+    AFTER_SLIP,
+    BEGAN,
+    BEGIN,
+    DIRECTION,
+    END,
+    LIFTING,
+    MOTION,
+    ONSET,
+    SLIP,
+    UNLOADED,
+    largest,
+)
+from solver.contacts.kernels.system import KT, MU, Evaluation
+from solver.contacts.segments import Segments, segments_of
+from solver.jit import fourier
+from solver.jit.fourier import Integer, Real
+from solver.jit.trig_polynomial import grid_size, grid_tables, on_grid
+
+# Relative motions of each law that rub; the other one of a rubbing contact is normal to its surface.
+_RUBBING: dict[int, tuple[int, ...]] = {
+    columns.COULOMB: (0,),
+    columns.ELASTIC_NORMAL: (0,),
+    columns.COULOMB_BOX: (0, 1),
+    columns.COULOMB_PLANE: (0, 1),
+}
+_ROUNDING = 1e-13  # of the terms of a sum that cancel
+# Laws whose slider moves on a line.
+_ON_A_LINE = (columns.COULOMB, columns.ELASTIC_NORMAL)
+
+
+class Change(NamedTuple):
+    """A change of a solution and of λ, to the first order: what a slope is taken along."""
+
+    dU: Real  # (n_ports, n) motions
+    dF: Real  # (n_ports, n) forces, the share of λ at fixed motions
+    row: Real  # (n_contacts, COLUMNS) contact table
+    load: Real  # (n_contacts, 3) coefficients of the given normal load
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cycle:
+    """All contacts over one period at a solution; copies, so that the workspace may go on.
+
+    Attributes
+    ----------
+    balance : Balance
+        What was solved.
+    U, F : (n_ports, n) array
+        Coefficients of motions [m] and forces [N].
+    dF_dU : (blocks, n, n) array
+        As in `solver.contacts.kernels.system.Evaluation`.
+    table : (n_contacts, COLUMNS) array
+        Parameters of the contacts at this λ.
+    load : (n_contacts, 3) array
+        Coefficients of the given normal loads [N].
+    """
+
+    balance: Balance
+    U: Real
+    F: Real
+    dF_dU: Real
+    table: Real
+    load: Real
+
+    @classmethod
+    def of(cls, balance: Balance, u: Real, p: float, point: Evaluation) -> Cycle:
+        """Return the cycle at (u, λ = `p`, inside unit), where `point` was evaluated last."""
+        table, load, _, _ = contact_values(balance.system, p, 0.0)
+        U = u.reshape(balance.n_ports, -1).copy()
+        return cls(balance=balance, U=U, F=point.F.copy(), dF_dU=point.dF_dU.copy(), table=table, load=load)
+
+    @property
+    def top(self) -> int:
+        """Highest harmonic of the full coefficients below; a given load has the first."""
+        return max(self.balance.highest_harmonic, 1)
+
+    def ports(self, e: int) -> range:
+        """Return the relative motions of contact `e`."""
+        first = self.balance.system.first_port
+        return range(int(first[e]), int(first[e + 1]))
+
+    def full(self, coefficients: Real) -> Real:
+        """Return coefficients (..., n) of the harmonics kept, spread over all up to `top`."""
+        return fourier.to_full(coefficients, self.balance.system.ks, self.top)
+
+    def normal_load(self, e: int) -> Real:
+        """Return the coefficients (2 top + 1,) of the normal load of contact `e`, not cut at 0 [N]."""
+        N = np.zeros(2 * self.top + 1)
+        N[:3] = self.load[e]
+        if self.balance.system.laws[e] == columns.ELASTIC_NORMAL:
+            N += self.table[e, columns.KN] * self.full(self.U[self.ports(e)[1]])
+        return N
+
+    def load_change(self, e: int, change: Change) -> Real:
+        """Return the change of `normal_load`."""
+        dN = np.zeros(2 * self.top + 1)
+        dN[:3] = change.load[e]
+        if self.balance.system.laws[e] == columns.ELASTIC_NORMAL:
+            normal = self.ports(e)[1]
+            dN += change.row[e, columns.KN] * self.full(self.U[normal])
+            dN += self.table[e, columns.KN] * self.full(change.dU[normal])
+        return dN
+
+    def has_friction(self, e: int) -> bool:
+        """Return whether contact `e` has a normal load and rubs."""
+        return int(self.balance.system.laws[e]) in _RUBBING
+
+    def segments(self, e: int) -> Segments:
+        """Return what contact `e`, whose slider moves on a line, does over the period."""
+        row, slip = self.table[e], self.full(self.U[self.ports(e)[0]])
+        return segments_of(slip, self.normal_load(e), row[KT], row[MU])
+
+
+def friction_work(cycle: Cycle, e: int, changes: Sequence[Change]) -> tuple[float, Real]:
+    """Return the work that friction takes out at contact `e` in one period [J], and its slopes.
+
+    Of a rubbing contact it is that of the tangential force: the normal one moves nothing across the surface.
+    """
+    work, slopes = 0.0, np.zeros(len(changes))
+    system, ports = cycle.balance.system, cycle.ports(e)
+    for a in _RUBBING.get(int(system.laws[e]), ()):
+        speed, force = _speed(cycle.U[ports[a]], system.ks), cycle.F[ports[a]]
+        done = float(force @ speed)
+        if abs(done) <= _ROUNDING * float(np.abs(force) @ np.abs(speed)):
+            continue  # a stuck contact: what is left of terms that cancel; 0 is the least, so the slope is 0
+        work += math.pi * done
+        for j, change in enumerate(changes):
+            dF = change.dF[ports[a]].copy()
+            for b, port in enumerate(ports):
+                dF += cycle.dF_dU[system.first_block[e] + a * len(ports) + b] @ change.dU[port]
+            dspeed = _speed(change.dU[ports[a]], system.ks)
+            slopes[j] += math.pi * float(dF @ speed + force @ dspeed)
+    return work, slopes
+
+
+def _speed(coefficients: Real, ks: Integer) -> Real:
+    """Return the coefficients (n,) of dq/dτ for those of the ascending harmonics `ks` alone."""
+    first = int(ks[0] == 0)
+    orders = ks[first:]
+    result = np.zeros_like(coefficients)
+    result[first::2] = orders * coefficients[first + 1 :: 2]
+    result[first + 1 :: 2] = -orders * coefficients[first::2]
+    return result
+
+
+def least_load(cycle: Cycle, e: int, changes: Sequence[Change]) -> tuple[float, Real] | None:
+    """Return the least normal load of contact `e` over the period [N], and its slopes.
+
+    Below 0 the contact separates: the number is what the load would be if it could pull. None of a law
+    without friction. A load that does not vary has a corner there: its slope is that of any variation's rise.
+    """
+    if not cycle.has_friction(e):
+        return None
+    N, dN = cycle.normal_load(e), [cycle.load_change(e, change) for change in changes]
+    if not np.any(N[3:]) and not any(np.any(each[3:]) for each in dN):
+        swing = math.hypot(N[1], N[2])
+        rises = [(N[1:3] @ d[1:3]) / swing if swing > 0.0 else math.hypot(d[1], d[2]) for d in dN]
+        slopes = [float(d[0] - rise) for d, rise in zip(dN, rises, strict=True)]
+        return float(N[0] - swing), np.array(slopes)
+    if not np.all(np.isfinite(N)):
+        return math.nan, np.full(len(changes), math.nan)
+    at = fourier.basis(np.array([_lowest(N)]), cycle.top)[0]
+    return float(at @ N), np.array([float(at @ each) for each in dN])
+
+
+def slip_travel(cycle: Cycle, e: int, changes: Sequence[Change]) -> tuple[float, Real] | None:
+    """Return the distance that contact `e` rubs in one period [m], and its slopes.
+
+    None of a law whose slider does not move on a line.
+    """
+    system = cycle.balance.system
+    if int(system.laws[e]) not in _ON_A_LINE:
+        return None
+    kt, mu, port = cycle.table[e, KT], cycle.table[e, MU], cycle.ports(e)[0]
+    U, N = cycle.full(cycle.U[port]), cycle.normal_load(e)
+    ends = _slip_ends(cycle.segments(e))
+    e_tau = fourier.basis(ends.tau, cycle.top)
+    xi, sign = ends.direction, ends.sign
+    u, load = e_tau @ U, e_tau @ N
+    travel = float(sign @ (xi * kt * u - mu * load) / kt)
+    du_dtau, dN_dtau = e_tau @ fourier.derivative(U), e_tau @ fourier.derivative(N)
+    moving = ends.moves & (dN_dtau != 0.0)
+    slopes = np.zeros(len(changes))
+    for j, change in enumerate(changes):
+        du = e_tau @ cycle.full(change.dU[port])
+        dload = e_tau @ cycle.load_change(e, change)
+        dtau = np.where(moving, -dload / np.where(moving, dN_dtau, 1.0), 0.0)
+        dkt, dmu = change.row[e, KT], change.row[e, MU]
+        dw = xi * (dkt * u + kt * (du + du_dtau * dtau)) - dmu * load - mu * (dload + dN_dtau * dtau)
+        slopes[j] = (float(sign @ dw) - travel * dkt) / kt
+    return travel, slopes
+
+
+class _Ends(NamedTuple):
+    """Terms ± w_ξ(τ) whose sum is kt times the distance rubbed, (count,) each."""
+
+    sign: Real
+    direction: Real
+    tau: Real
+    moves: np.ndarray  # bool: an instant of N = 0
+
+
+def _slip_ends(found: Segments) -> _Ends:
+    """Return where the slips of a period begin and end, as terms of the travel."""
+    rows, lifting = found.rows, found.state == LIFTING
+    terms: list[tuple[float, float, float, bool]] = []
+    for i, row in enumerate(rows):
+        if row[MOTION] != SLIP:
+            continue
+        xi = float(row[DIRECTION])
+        followed = i + 1 < len(rows) and rows[i + 1, BEGIN] == row[END]
+        terms.append((1.0, xi, float(row[END]), lifting and not followed))
+        follows = i > 0 and rows[i - 1, END] == row[BEGIN]
+        before = rows[i - 1]
+        if not follows or before[MOTION] == SLIP:
+            terms.append((-1.0, xi, float(row[BEGIN]), lifting and not follows))
+        elif before[BEGAN] == AFTER_SLIP:
+            d = float(before[DIRECTION])
+            terms.append((-xi * d, d, float(before[ONSET]), False))
+        elif before[BEGAN] != UNLOADED:
+            terms.append((-1.0, xi, float(before[ONSET]), True))
+    table = np.array(terms, dtype=np.float64).reshape(-1, 4)
+    return _Ends(sign=table[:, 0], direction=table[:, 1], tau=table[:, 2], moves=table[:, 3] > 0.0)
+
+
+def _lowest(N: Real) -> float:
+    """Return where a load with coefficients `N` is least [rad]."""
+    top = (N.size - 1) // 2
+    c, s = np.zeros(top + 1), np.zeros(top + 1)
+    c[0], c[1:], s[1:] = -N[0], -N[1::2], -N[2::2]
+    n = grid_size(top)
+    value, slope = np.zeros(n), np.zeros(n)
+    on_grid(c, s, top, *grid_tables(n, top), value, slope)
+    return float(largest(c, s, top, value, slope)[1])

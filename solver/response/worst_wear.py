@@ -1,0 +1,264 @@
+"""The worst a contact goes through over a response: every local maximum of a measure along a branch.
+
+At a maximum inside the range the slope along the branch is 0, and at an end the frequency does not move
+either, so the derivative of the worst value by a parameter is the one at that fixed frequency (envelope
+theorem). A maximum may also be a corner of the response, closed in by bracketing; its derivative takes both
+sides of it (`solver.response.wear_nonsmooth`).
+
+Two maxima may hide between two points of a branch: near the top it is made dense until cubics through its
+points predict the measure between them, as for the peaks of the amplitude (`solver.extrema.extrema`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from solver.balance.kernels.locate import between
+from solver.balance.kernels.output import MEASURES
+from solver.balance.kernels.residual import contact_values, evaluate
+from solver.balance.parameter import Kind
+from solver.balance.workspace import Workspace
+from solver.contacts.kernels.system import evaluation_by_value
+from solver.continuation.branch import Branch
+from solver.errors import SettingError
+from solver.extrema.extrema import MOST_HALVINGS, NEAR_THE_TOP, PREDICTED
+from solver.extrema.nodes import share_scales
+from solver.jit.fourier import Real
+from solver.linear.kernels.receptance import receptance
+from solver.response.wear import contact_index
+from solver.response.wear_measures import Change, Cycle, friction_work, least_load, slip_travel
+from solver.results.base import Piece
+
+# Maxima below this share of the highest cannot lead within one step of an optimiser.
+COMPETES = 0.6
+_HALVINGS_BELOW = 2  # of an interval whose maximum could compete, but not lead
+_FLAT = 1e-11  # slope over the whole interval, relative to the value, at which a maximum is found
+_NARROW = 1e-12  # share of the interval at which a corner is found
+_MOST_TRIALS = 100
+_MOST_ITERATIONS = 12
+
+
+class Measure(Enum):
+    """What a contact goes through in a period; the value is what a user reads."""
+
+    FRICTION_WORK = "friction work"
+    LEAST_LOAD = "least normal load"
+    SLIP_TRAVEL = "slip travel"
+
+
+_MEASURES: dict[Measure, Callable[[Cycle, int, Sequence[Change]], tuple[float, Real] | None]] = {
+    Measure.FRICTION_WORK: friction_work,
+    Measure.LEAST_LOAD: least_load,
+    Measure.SLIP_TRAVEL: slip_travel,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class WorstWear(Piece):
+    """A local worst value of a measure over a branch.
+
+    Attributes
+    ----------
+    value : float
+        Friction work [J], least normal load [N] or slip travel [m].
+    at : float
+        Value of the branch's parameter there, in user units (Hz for a frequency).
+    solution : (n_unknowns,) array
+        Slip motions of all contacts there [m].
+    interior : bool
+        Not at an end of the branch.
+    """
+
+    value: float
+    at: float
+    solution: Real
+    interior: bool
+
+
+def worst_friction_work(branch: Branch, contact: str) -> WorstWear:
+    """Return the largest friction work of a contact in one period over a branch.
+
+    Raises
+    ------
+    SettingError
+        An unknown contact, or a branch without a point.
+    """
+    return worst_wear(branch, contact, Measure.FRICTION_WORK)[0]
+
+
+def worst_wear(
+    branch: Branch, contact: str, measure: Measure = Measure.FRICTION_WORK
+) -> tuple[WorstWear, ...]:
+    """Return every local worst value of a measure over a branch that competes, worst first.
+
+    Of work and travel they are the maxima above `COMPETES` times the highest, of the least load all minima;
+    the ends of the branch are among them where it is worst there. Only a completed branch covers its range.
+
+    Raises
+    ------
+    SettingError
+        An unknown contact, a law the measure has no meaning for, or a branch without a point.
+    """
+    e = contact_index(branch.balance, contact)
+    if not len(branch.values):
+        raise SettingError("branch", branch.status.value, "must have a point")
+    found = _Search(branch, e, measure).maxima()
+    if measure is Measure.LEAST_LOAD:
+        return tuple(found)
+    return tuple(one for one in found if one.value >= COMPETES * found[0].value)
+
+
+@dataclass(frozen=True, slots=True)
+class _Node:
+    """A point of the branch with the number to be made largest and its slope along the tangent."""
+
+    solution: Real
+    tangent: Real
+    value: float
+    slope: float
+
+
+class _Search:
+    """Looks for the maxima of one measure of one contact along a branch."""
+
+    def __init__(self, branch: Branch, e: int, measure: Measure) -> None:
+        self._workspace = Workspace.of(branch.balance)
+        self._point = evaluation_by_value(self._workspace.point)  # views: they follow the workspace
+        frequency = branch.balance.parameter.kind is Kind.FREQUENCY
+        self._fixed = contact_values(branch.balance.system, 0.0, 0.0) if frequency else None
+        self._e = e
+        self._measure = measure
+        self._sign = -1.0 if measure is Measure.LEAST_LOAD else 1.0
+        rows = zip(branch.solutions, branch.tangents, strict=True)
+        nodes = [self._on_branch(solution, tangent) for solution, tangent in rows]
+        top = max(node.value for node in nodes)
+        self._size = max(abs(node.value) for node in nodes)
+        self._nodes = [nodes[0]]
+        for right in nodes[1:]:
+            self._nodes.extend(self._halved(self._nodes[-1], right, top, MOST_HALVINGS))
+            self._nodes.append(right)
+
+    def maxima(self) -> list[WorstWear]:
+        """Return all local maxima, highest first."""
+        found = []
+        for left, right in zip(self._nodes[:-1], self._nodes[1:], strict=True):
+            if (left.slope > 0.0) == (right.slope > 0.0):
+                continue  # both tangents point along the branch: the measure rises, or falls, all the way
+            by_share = share_scales(left, right, self._workspace.balance.system.least_size)
+            g_left, g_right = left.slope * by_share[0], right.slope * by_share[1]
+            if g_left > 0.0 >= g_right:
+                found.append(self._worst(self._polished(left, right, g_left, g_right), interior=True))
+        first, last = self._nodes[0], self._nodes[-1]
+        if len(self._nodes) == 1 or first.slope <= 0.0:
+            found.append(self._worst(first, interior=False))
+        if len(self._nodes) > 1 and last.slope >= 0.0:
+            found.append(self._worst(last, interior=False))
+        return sorted(found, key=lambda one: -self._sign * one.value)
+
+    def _worst(self, node: _Node, *, interior: bool) -> WorstWear:
+        at = float(self._workspace.balance.parameter.outside(float(node.solution[-1])))
+        solution = node.solution[:-1].copy()
+        return WorstWear(value=self._sign * node.value, at=at, solution=solution, interior=interior)
+
+    def _halved(self, left: _Node, right: _Node, top: float, depth: int) -> list[_Node]:
+        """Return the nodes to be inserted between two, until a cubic predicts what is between."""
+        below = top - (1.0 - COMPETES) * self._size
+        if depth == 0 or max(left.value, right.value) < below:
+            return []
+        by_share = share_scales(left, right, self._workspace.balance.system.least_size)
+        g_left, g_right = left.slope * by_share[0], right.slope * by_share[1]
+        if g_left == 0.0 == g_right:
+            return []  # a given load does not change with the frequency
+        reach = max(left.value, right.value) + 0.25 * (max(g_left, 0.0) + max(-g_right, 0.0))
+        if reach < top - (1.0 - NEAR_THE_TOP) * self._size and depth <= MOST_HALVINGS - _HALVINGS_BELOW:
+            return []
+        middle = self._between(left, right, 0.5)
+        if middle is None:
+            return []
+        cubic = 0.5 * (left.value + right.value) + (g_left - g_right) / 8.0
+        if abs(cubic - middle.value) <= PREDICTED * self._size:
+            return [middle]
+        before = self._halved(left, middle, top, depth - 1)
+        return [*before, middle, *self._halved(middle, right, top, depth - 1)]
+
+    def _polished(self, left: _Node, right: _Node, g_left: float, g_right: float) -> _Node:
+        """Return the maximum between two nodes: the slope by the share of the chord brought to 0.
+
+        A bracketed secant (Illinois) that halves the bracket where the secant does not; at a corner, where
+        the slope jumps over 0, the bracket closes on it. Where no solution is found the best one stands in.
+        """
+        lo, hi, g_lo, g_hi, side = 0.0, 1.0, g_left, g_right, 0
+        best = left if left.value >= right.value else right
+        for trial in range(_MOST_TRIALS):
+            share = lo + (hi - lo) * g_lo / (g_lo - g_hi)
+            if not lo < share < hi or trial % 3 == 2:
+                share = 0.5 * (lo + hi)
+            node = self._between(left, right, share)
+            if node is None:
+                break
+            best = node if node.value >= best.value else best
+            if abs(node.slope) <= _FLAT * self._size or hi - lo <= _NARROW:
+                break
+            now = -1 if node.slope > 0.0 else 1
+            if now < 0:
+                lo, g_lo = share, node.slope
+                g_hi = 0.5 * g_hi if side == now else g_hi
+            else:
+                hi, g_hi = share, node.slope
+                g_lo = 0.5 * g_lo if side == now else g_lo
+            side = now
+        return best
+
+    def _on_branch(self, solution: Real, tangent: Real) -> _Node:
+        """Return a point of the branch."""
+        workspace, p = self._workspace, float(solution[-1])
+        receptance(workspace.system, p, workspace.linear)
+        evaluate(workspace.system, workspace.linear, solution[:-1], p, 0.0, workspace.point)
+        return self._node(solution, tangent)
+
+    def _between(self, left: _Node, right: _Node, share: float) -> _Node | None:
+        """Return the solution at a share of the chord, its slope by the share; None if there is none."""
+        workspace, by_share = (
+            self._workspace,
+            share_scales(left, right, self._workspace.balance.system.least_size),
+        )
+        found, tangent = np.zeros(left.solution.size), np.zeros(left.solution.size)
+        observed, values = np.zeros(workspace.balance.n_coefficients), np.zeros(MEASURES)
+        good, _ = between(
+            workspace.system, workspace.linear, workspace.point, left.solution, left.tangent * by_share[0],
+            right.solution, right.tangent * by_share[1], share, _MOST_ITERATIONS, found, tangent, observed,
+            values,
+        )  # fmt: skip
+        # It leaves the workspace evaluated at the solution found.
+        return self._node(found, tangent) if good else None
+
+    def _contacts(self, p: float) -> tuple[Real, Real, Real, Real]:
+        """Return the contacts at λ = `p`, see `contact_values`; the frequency does not change them."""
+        if self._fixed is not None:
+            return self._fixed
+        return contact_values(self._workspace.balance.system, p, 0.0)
+
+    def _node(self, solution: Real, tangent: Real) -> _Node:
+        """Measure the contact where the workspace was evaluated last."""
+        balance, point, dp = self._workspace.balance, self._point, float(tangent[-1])
+        table, load, dtable, dload = self._contacts(float(solution[-1]))
+        cycle = Cycle(
+            balance=balance, U=solution[:-1].reshape(point.F.shape), F=point.F, dF_dU=point.dF_dU,
+            table=table, load=load,
+        )  # fmt: skip
+        along = Change(
+            dU=tangent[:-1].reshape(point.F.shape), dF=dp * point.dF_dp, row=dp * dtable, load=dp * dload
+        )
+        found = _MEASURES[self._measure](cycle, self._e, [along])
+        if found is None:
+            name = balance.scene.contacts[self._e].name
+            raise SettingError("contact", name, f"must be one whose law has a {self._measure.value}")
+        value, slope = self._sign * found[0], self._sign * float(found[1][0])
+        if not math.isfinite(value):
+            value, slope = -math.inf, 0.0
+        return _Node(solution, tangent, value, slope)

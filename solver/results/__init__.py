@@ -1,0 +1,1 @@
+"""What every result can do, named arrays, and their files."""

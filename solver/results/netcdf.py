@@ -1,0 +1,92 @@
+"""Results as NetCDF 3, the form that every reader knows, through SciPy alone."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.results.dataset import Dataset, Variable
+
+_ROWS, _KIND = "stickslip_rows", "kind"
+_TEXT = "string_of_"  # dimensions of characters, joined to texts by readers
+
+
+def write(data: Dataset, path: Path) -> None:
+    """Write every variable with its unit; texts as characters, booleans and integers as NetCDF has them."""
+    from scipy.io import netcdf_file
+
+    with netcdf_file(path, "w", version=2) as file:
+        for dim, size in data.sizes.items():
+            file.createDimension(dim, size)
+        for name, variable in data.variables.items():
+            values, dims, extra = _encoded(name, variable)
+            if len(dims) > len(variable.dims):
+                file.createDimension(dims[-1], values.shape[-1])
+            target = file.createVariable(name, values.dtype, dims)
+            target[:] = values
+            for key, text in {**variable.attributes, **extra}.items():
+                setattr(target, key, text.encode())
+        file.Conventions = b"CF-1.10"
+        given = {_KIND: data.kind, _ROWS: json.dumps(list(data.rows)), **data.attributes}
+        for key, value in given.items():
+            setattr(file, key, value.encode() if isinstance(value, str) else value)
+
+
+def read(path: Path) -> Dataset:
+    """Read what `write` wrote.
+
+    Raises
+    ------
+    OSError, ValueError, TypeError, KeyError
+        Not a NetCDF 3 file, or not one of these.
+    """
+    from scipy.io import netcdf_file
+
+    with netcdf_file(path, "r", mmap=False) as file:
+        attributes = {key: _plain(value) for key, value in file._attributes.items()}
+        variables = {name: _decoded(variable) for name, variable in file.variables.items()}
+    rows, kind = json.loads(str(attributes.pop(_ROWS))), str(attributes.pop(_KIND))
+    attributes.pop("Conventions", None)
+    return Dataset(kind=kind, rows=tuple(rows), variables=variables, attributes=attributes)
+
+
+def _encoded(name: str, variable: Variable) -> tuple[NDArray[Any], tuple[str, ...], dict[str, str]]:
+    """The values as NetCDF 3 can hold them, their dimensions, and what a reader must know to undo it."""
+    values, dims = variable.values, variable.dims
+    if values.dtype.kind == "U":
+        packed = np.char.encode(values, "utf-8")
+        wide = max(packed.dtype.itemsize, 1)
+        characters = np.ascontiguousarray(packed.astype(f"S{wide}")).view("S1").reshape(*values.shape, wide)
+        return characters, (*dims, _TEXT + name), {"_Encoding": "utf-8"}
+    if values.dtype.kind == "b":
+        return values.astype(np.int8), dims, {"dtype": "bool"}
+    if values.dtype.kind in "iu":
+        fits = not values.size or np.abs(values).max() < 2**31
+        return values.astype(np.int32 if fits else np.float64), dims, {"stickslip_dtype": values.dtype.name}
+    return values.astype(np.float64), dims, {}
+
+
+def _decoded(variable: Any) -> Variable:
+    about = {key: _plain(value) for key, value in variable._attributes.items()}
+    values, dims = np.array(variable[:]), tuple(variable.dimensions)
+    if dims and dims[-1].startswith(_TEXT):
+        rows = np.ascontiguousarray(values).reshape(-1, values.shape[-1])
+        texts = [b"".join(row.tolist()).rstrip(b"\0").decode() for row in rows]
+        values, dims = np.array(texts, dtype=np.str_).reshape(values.shape[:-1]), dims[:-1]
+    elif about.get("dtype") == "bool":
+        values = values.astype(bool)
+    else:
+        values = values.astype(str(about.get("stickslip_dtype", "float64")))
+    return Variable(
+        dims=dims, values=values, unit=str(about.get("units", "")), about=str(about.get("long_name", ""))
+    )
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.decode()
+    return value.item() if isinstance(value, (np.generic, np.ndarray)) else value

@@ -1,0 +1,1 @@
+"""What a user describes: structure, contacts, excitation, what to observe; read, checked, written."""

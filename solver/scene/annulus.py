@@ -1,0 +1,299 @@
+"""The whole annulus of a cyclic scene as a lumped scene: every sector with its own degrees of freedom.
+
+One sector stands for all where the disk is tuned and everything on it is one travelling wave. Otherwise the
+annulus is written out: `sectors_needed` says which it is and why, `written_out` does it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeVar
+
+from solver.errors import SettingError
+from solver.results.base import Piece
+from solver.scene.scene import (
+    AnyContact,
+    ContactOfAnyLaw,
+    CyclicStructure,
+    Damper,
+    ElasticNormalContact,
+    Excitation,
+    FrictionContact,
+    GapSpring,
+    LumpedStructure,
+    Mass,
+    Observe,
+    PolynomialSpring,
+    Scene,
+    Spring,
+    parse_end,
+)
+from solver.scene.validation import BETWEEN_KEYS, listing
+
+_JoinT = TypeVar("_JoinT", Spring, Damper)
+_NamedT = TypeVar("_NamedT", Spring, Damper, Mass)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Extent(Piece):
+    """How many sectors a scene has to be solved with, and why.
+
+    Attributes
+    ----------
+    sectors : int
+        1 where one sector (or the lumped structure itself) is enough, else all.
+    reason : str
+        In words and numbers.
+    assumed : bool
+        One sector stands for all only if the response is the travelling wave, which the laws of the contacts
+        do not make the only one.
+    """
+
+    sectors: int
+    reason: str
+    assumed: bool = False
+
+
+def sectors_needed(scene: Scene) -> Extent:
+    """Return how many sectors a scene has to be solved with.
+
+    A standing wave of an engine order i is a travelling one as well where 2 i is a multiple of the number of
+    sectors: then every sector is in phase or in antiphase with its neighbour.
+    """
+    structure, order = scene.structure, scene.engine_order
+    if not isinstance(structure, CyclicStructure):
+        given = "lumped" if isinstance(structure, LumpedStructure) else "given by its matrices"
+        return Extent(sectors=1, reason=f"the structure is {given}, it has no sectors")
+    n = structure.sectors
+    factors = structure.mistuning.factors(n) if structure.mistuning is not None else (1.0,)
+    least, most = min(factors), max(factors)
+    if least != 1.0 or most != 1.0:
+        reason = f"the disk is mistuned by factors from {least:.4g} to {most:.4g}: all {n} sectors are solved"
+        return Extent(sectors=n, reason=reason)
+    if _standing(scene) and (2 * order) % n:
+        reason = (
+            f"the excitation is a standing wave of engine order {order}, which friction does not let stand "
+            f"for every sector alike: all {n} sectors are solved"
+        )
+        return Extent(sectors=n, reason=reason)
+    if "@" in scene.observe.dof:
+        reason = f"one sector is observed by its number ({scene.observe.dof}): all {n} sectors are solved"
+        return Extent(sectors=n, reason=reason)
+    reason = (
+        f"the disk is tuned and the excitation a travelling wave of engine order {order}: "
+        f"one sector stands for all {n}"
+    )
+    loose = [c.name for c in scene.contacts if not keeps_together(c)]
+    if not loose or n == 1:
+        return Extent(sectors=1, reason=reason)
+    reason += (
+        f", assumed, not proven: with the law of {listing(loose)} the sectors may also move otherwise than "
+        "in that wave, and the wave be unstable; the effect every-sector solves all of them"
+    )
+    return Extent(sectors=1, reason=reason, assumed=True)
+
+
+def keeps_together(contact: AnyContact) -> bool:
+    """Return whether a contact never lets two motions under the same forces move apart.
+
+    Friction under a load that is given does not, nor does a spring of constant stiffness. One that closes,
+    stiffens or softens does, and so does friction whose load moves with the parts.
+    """
+    if isinstance(contact, PolynomialSpring):
+        first, *others = contact.coefficients
+        return first >= 0.0 and not any(others)
+    return not isinstance(contact, GapSpring | ElasticNormalContact)
+
+
+def written_out(scene: Scene, *, every_sector: bool = False) -> Scene:
+    """Return the annulus of a scene that one sector does not stand for, under its own name; else itself.
+
+    With `every_sector` a disk is written out whether it needs to be or not.
+    """
+    if not isinstance(scene.structure, CyclicStructure):
+        return scene
+    if sectors_needed(scene).sectors == 1 and not every_sector:
+        return scene
+    return annulus(scene).model_copy(update={"name": scene.name})
+
+
+def check_in_annulus(scene: Scene, path: str) -> None:
+    """Raise SettingError if `path` of a cyclic scene is not one value in its annulus.
+
+    A contact's load has a phase (in a standing wave, an amplitude) of its own in every sector: set it in
+    the scene, there it stands for all sectors.
+    """
+    owner, _, key = path.rpartition(".")
+    differs = ("N1", "N1_ratio") if _standing(scene) else ("N1_phase",)
+    if owner != "structure" and key in differs:
+        reason = sectors_needed(scene).reason
+        raise SettingError(
+            "path",
+            path,
+            f"differs from sector to sector and cannot be continued in: {reason}; set it instead",
+        )
+
+
+def annulus(scene: Scene) -> Scene:
+    """Write a cyclic scene out as a lumped one, sector by sector.
+
+    DOF ``tip`` of sector j is ``tip@j``, contact ``shroud`` becomes ``shroud@j`` in the group ``shroud``
+    (or in the group it had), a named spring ``k`` becomes ``k@j`` in the group ``k``, times
+    the sector's factor of the mistuning. In a travelling wave sector j has
+    harmonic * engine_order * j * 2 pi / sectors added to the phase of its forces and
+    engine_order * j * 2 pi / sectors to that of its loads; in a standing wave the amplitudes are multiplied
+    by the cosines of these angles instead. What joins a sector to itself (one sector only)
+    never moves and is left out. Observed is sector 0, or the one that the scene names.
+
+    Raises
+    ------
+    SettingError
+        The scene is not cyclic.
+    """
+    structure = scene.structure
+    if not isinstance(structure, CyclicStructure):
+        raise SettingError("scene", scene.name, "must have a cyclic structure to be written out")
+    n, sectors = structure.sectors, range(structure.sectors)
+    order, standing = scene.engine_order, _standing(scene)
+    scaled = [_mistuned(structure, factor) for factor in _factors(structure)]
+    observed = scene.observe.dof
+    return Scene(
+        name=f"{scene.name}-annulus"[:100],
+        structure=LumpedStructure(
+            kind="lumped",
+            stiffness_proportional_damping=structure.stiffness_proportional_damping,
+            masses=tuple(_mass(mass, j) for j in sectors for mass in scaled[j].masses),
+            springs=tuple(_renamed(s, j) for j in sectors for s in _joining(scaled[j].springs, j, n)),
+            dampers=tuple(_renamed(d, j) for j in sectors for d in _joining(scaled[j].dampers, j, n)),
+        ),
+        contacts=tuple(
+            _contact(c, j, _turn(order * j, n), standing=standing)
+            for j in sectors
+            for c in _placed(scene.contacts, j, n)
+        ),
+        excitation=tuple(
+            _force(e, j, _turn(e.harmonic * order * j, n), standing=standing)
+            for j in sectors
+            for e in scene.excitation
+        ),
+        observe=Observe(
+            dof=observed if "@" in observed else _in_sector(observed, 0), band=scene.observe.band
+        ),
+    )
+
+
+def _standing(scene: Scene) -> bool:
+    return any(force.pattern == "standing" for force in scene.excitation)
+
+
+def _factors(structure: CyclicStructure) -> tuple[float, ...]:
+    mistuning = structure.mistuning
+    return (1.0,) * structure.sectors if mistuning is None else mistuning.factors(structure.sectors)
+
+
+def _mistuned(structure: CyclicStructure, factor: float) -> CyclicStructure:
+    """The structure with `factor` on every part that the mistuning names."""
+    if structure.mistuning is None:
+        return structure
+    of = structure.mistuning.of
+    parts: tuple[Mass | Spring | Damper, ...] = (*structure.masses, *structure.springs, *structure.dampers)
+    dofs = set(of) - {part.name for part in parts}
+    return structure.model_copy(
+        update={
+            "masses": tuple(
+                _scaled(m, {"m": factor * m.m}, factor) if m.name in of or m.dof in dofs else m
+                for m in structure.masses
+            ),
+            "springs": tuple(
+                _scaled(s, {"k": factor * s.k}, factor) if s.name in of else s for s in structure.springs
+            ),
+            "dampers": tuple(
+                _scaled(d, {"c": factor * d.c}, factor) if d.name in of else d for d in structure.dampers
+            ),
+        }
+    )
+
+
+def _scaled(part: _NamedT, value: dict[str, float], factor: float) -> _NamedT:
+    named = {} if part.name is None or factor == 1.0 else {"factor": factor}
+    return part.model_copy(update={**value, **named})
+
+
+def _in_sector(name: str, j: int) -> str:
+    return f"{name}@{j}"
+
+
+def _end(text: str, j: int, n: int) -> str:
+    end = parse_end(text)
+    return text if end.dof is None else _in_sector(end.dof, (j + 1) % n if end.next else j)
+
+
+def _joining(parts: tuple[_JoinT, ...], j: int, n: int) -> tuple[_JoinT, ...]:
+    """The parts of sector j between their ends in the annulus."""
+    placed = [(part, (_end(part.between[0], j, n), _end(part.between[1], j, n))) for part in parts]
+    return tuple(part.model_copy(update={"between": ends}) for part, ends in placed if ends[0] != ends[1])
+
+
+def _placed(contacts: tuple[ContactOfAnyLaw, ...], j: int, n: int) -> tuple[ContactOfAnyLaw, ...]:
+    """The contacts of sector j between their ends in the annulus."""
+    placed = []
+    for contact in contacts:
+        pairs = {
+            key: (_end(pair[0], j, n), _end(pair[1], j, n))
+            for key in BETWEEN_KEYS
+            if (pair := getattr(contact, key, None)) is not None
+        }
+        joined = [ends for ends in pairs.values() if ends[0] != ends[1]]
+        if joined and len(joined) < len(pairs):
+            wanted = f"must have two sectors or more: `{contact.name}` joins one to itself in one direction"
+            raise SettingError("sectors", n, wanted)
+        if joined:
+            placed.append(contact.model_copy(update=pairs))
+    return tuple(placed)
+
+
+def _renamed(part: _NamedT, j: int) -> _NamedT:
+    if part.name is None:
+        return part
+    return part.model_copy(update={"name": _in_sector(part.name, j), "group": part.name})
+
+
+def _mass(mass: Mass, j: int) -> Mass:
+    return _renamed(mass, j).model_copy(update={"dof": _in_sector(mass.dof, j)})
+
+
+def _contact(contact: ContactOfAnyLaw, j: int, turn: float, *, standing: bool) -> ContactOfAnyLaw:
+    update: dict[str, object] = {
+        "name": _in_sector(contact.name, j),
+        "group": contact.group or contact.name,
+    }
+    if isinstance(contact, FrictionContact) and standing:
+        share = _cosine(turn)
+        update |= {key: share * value for key in ("N1", "N1_ratio") if (value := getattr(contact, key))}
+    elif isinstance(contact, FrictionContact):
+        update["N1_phase"] = contact.N1_phase + turn
+    return contact.model_copy(update=update)
+
+
+def _force(force: Excitation, j: int, turn: float, *, standing: bool) -> Excitation:
+    return force.model_copy(
+        update={
+            "dof": _in_sector(force.dof, j),
+            "phase": force.phase + (0.0 if standing else turn),
+            "amplitude": force.amplitude * (_cosine(turn) if standing else 1.0),
+            "engine_order": None,
+            "pattern": None,
+        }
+    )
+
+
+def _turn(steps: int, n: int) -> float:
+    """Angle of `steps` sectors [rad], whole turns left out."""
+    return 2.0 * math.pi * (steps % n) / n
+
+
+def _cosine(angle: float) -> float:
+    """The cosine, with the nodes of a standing wave at exactly 0."""
+    value = math.cos(angle)
+    return value if abs(value) > 1e-15 else 0.0

@@ -1,0 +1,119 @@
+"""What is wrong with mistuning, wave patterns and groups, on the plain tables and lists of a scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic import ValidationError
+
+from solver.errors import Issue
+from solver.scene.parts import Mistuning
+from solver.scene.validation import listing, nearest, quoted
+
+
+def cyclic_issues(raw: dict[str, Any]) -> list[Issue]:
+    """Patterns and groups that do not fit, mistuned parts that do not exist, factors too few or not > 0."""
+    structure = raw.get("structure")
+    structure = structure if isinstance(structure, dict) else {}
+    found = [*_pattern_issues(raw.get("excitation"), structure.get("kind"))]
+    found += _group_issues(structure)
+    mistuning = structure.get("mistuning")
+    if structure.get("kind") == "cyclic" and isinstance(mistuning, dict):
+        found += [*_name_issues(structure, mistuning), *_factor_issues(mistuning, structure.get("sectors"))]
+    return found
+
+
+def _pattern_issues(excitation: object, kind: object) -> Iterator[Issue]:
+    one = isinstance(excitation, dict)
+    rows = [excitation] if one else excitation if isinstance(excitation, list) else []
+    first: object = None
+    for i, row in enumerate(rows):
+        pattern = row.get("pattern") if isinstance(row, dict) else None
+        if pattern is None:
+            continue
+        pointer = "/excitation/pattern" if one else f"/excitation/{i}/pattern"
+        if kind in ("lumped", "matrices"):
+            message = f"`pattern` = {quoted(pattern)} needs a cyclic structure; remove it from a {kind} one"
+            yield Issue(pointer=pointer, message=message)
+        elif first is not None and pattern != first:
+            message = f"`pattern` must be the same everywhere, got {quoted(pattern)} after {quoted(first)}"
+            yield Issue(pointer=pointer, message=message)
+        first = pattern if first is None else first
+
+
+def _parts(structure: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Masses, springs and dashpots that are tables, with their pointers."""
+    masses = structure.get("masses")
+    for dof, row in masses.items() if isinstance(masses, dict) else ():
+        if isinstance(row, dict):
+            yield "/structure/masses/" + str(dof).replace("~", "~0").replace("/", "~1"), row
+    for key in ("springs", "dampers"):
+        table = structure.get(key)
+        for i, row in enumerate(table if isinstance(table, list) else []):
+            if isinstance(row, dict):
+                yield f"/structure/{key}/{i}", row
+
+
+def _names(structure: dict[str, Any]) -> list[str]:
+    return [row["name"] for _, row in _parts(structure) if isinstance(row.get("name"), str)]
+
+
+def _group_issues(structure: dict[str, Any]) -> Iterator[Issue]:
+    """Groups named like a part, in a cyclic structure, or of parts of another kind."""
+    names, quantities = set(_names(structure)), dict[str, str]()
+    for pointer, row in _parts(structure):
+        group, quantity = row.get("group"), pointer.split("/")[2]
+        if not isinstance(group, str):
+            continue
+        where = f"{pointer}/group"
+        if structure.get("kind") == "cyclic":
+            message = f"`group` = {quoted(group)}: a named part of a cyclic structure is a group already"
+            yield Issue(pointer=where, message=message)
+        elif group in names:
+            yield Issue(pointer=where, message=f"`group` = {quoted(group)} is also the name of a part")
+        elif quantities.setdefault(group, quantity) != quantity:
+            message = f"`group` = {quoted(group)} has {quantities[group]} in it already, and no {quantity}"
+            yield Issue(pointer=where, message=message)
+
+
+def _name_issues(structure: dict[str, Any], mistuning: dict[str, Any]) -> Iterator[Issue]:
+    """Names in `of` that are neither a DOF nor the name of a spring, dashpot or mass, or stand twice."""
+    masses = structure.get("masses")
+    known = [*_names(structure), *map(str, masses if isinstance(masses, dict) else ())]
+    of = mistuning.get("of")
+    named = of if isinstance(of, list) else []
+    for i, name in enumerate(named):
+        if not isinstance(name, str):
+            continue
+        pointer = f"/structure/mistuning/of/{i}"
+        if name not in known:
+            message = (
+                f"`of`: there is no spring, damper, mass or DOF {quoted(name)} (parts need a `name`); "
+                f"known: {listing(known)}{nearest(name, known)}"
+            )
+            yield Issue(pointer=pointer, message=message)
+        elif name in named[:i]:
+            yield Issue(pointer=pointer, message=f"`of` has {name!r} twice: its factor would count twice")
+
+
+def _factor_issues(mistuning: dict[str, Any], sectors: object) -> Iterator[Issue]:
+    """Factors of another number than sectors, or drawn ones that are not above 0."""
+    try:
+        read = Mistuning.model_validate(mistuning)
+    except ValidationError:
+        return
+    if not isinstance(sectors, int) or isinstance(sectors, bool) or not 1 <= sectors <= 10_000:
+        return
+    factors = read.factors(sectors)
+    if len(factors) != sectors:
+        message = f"`values` must have one factor for each of the {sectors} sectors, got {len(factors)}"
+        yield Issue(pointer="/structure/mistuning/values", message=message)
+    bad = next((j for j, factor in enumerate(factors) if not 0.0 < factor < math.inf), None)
+    if bad is not None:
+        message = (
+            f"`spread` = {read.spread:g} gives sector {bad} the factor {factors[bad]:.3g}, which must be "
+            "> 0: choose a smaller spread or another `seed`"
+        )
+        yield Issue(pointer="/structure/mistuning/spread", message=message)

@@ -1,0 +1,92 @@
+"""Which harmonics a balance keeps: those up to the number asked for, and always those of forces and loads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.jit.fourier import Integer, Real
+from solver.scene.scene import FrictionContact, Scene
+
+Flags: TypeAlias = NDArray[np.bool_]
+
+MOST_HARMONICS = 1000
+# A force of this harmonic or above is a fast wave of its own: it gets its multiples, as harmonic 1 does.
+FAST = 4
+MULTIPLES = 5  # of a fast wave; the closed form costs by the highest harmonic
+_SIDEBANDS = 2  # harmonics on either side of a fast wave that a slow one makes of it
+
+
+def kept_harmonics(
+    scene: Scene, paths: Iterable[str], highest: int, *, odd: bool, multiples: int = MULTIPLES
+) -> Integer:
+    """Return the harmonics kept, ascending; more of them for a larger `highest`, never others.
+
+    All up to `highest`; those of every force and of the normal loads, whatever `highest` is; and of a force
+    whose harmonic h is 4 or more also its multiples up to 5 h (H h for a smaller `highest` H), and where
+    something else drives the structure too h ± 1, h ± 2: friction makes of a fast wave the same multiples as
+    of a slow one, and the two together make the sums and differences.
+
+    Parameters
+    ----------
+    scene : what vibrates.
+    paths : parameters that will be changed; a load's amplitude makes the load vary.
+    highest : the number of harmonics asked for.
+    multiples : most multiples of a fast wave.
+    odd : the response is half-wave symmetric: its odd harmonics are enough.
+    """
+    forced = forced_harmonics(scene, paths)
+    kept = {*range(highest + 1), *forced}
+    for h in forced:
+        if h < FAST:
+            continue
+        kept |= {m * h for m in range(1, min(highest, multiples) + 1) if m * h <= MOST_HARMONICS}
+        if any(other % h for other in forced):
+            reach = min(_SIDEBANDS, max(highest - 1, 0))
+            kept |= set(range(h - reach, h + reach + 1))
+    chosen = sorted(k for k in kept if not odd or k % 2 == 1)
+    return np.array(chosen or [1], dtype=np.int64)
+
+
+def forced_harmonics(scene: Scene, paths: Iterable[str] = ()) -> tuple[int, ...]:
+    """Return the harmonics of the forces and of the normal loads that vary, ascending."""
+    found = {force.harmonic for force in scene.excitation}
+    varies = any(isinstance(c, FrictionContact) and c.N1_value != 0.0 for c in scene.contacts)
+    if varies or any(path.endswith((".N1", ".N1_ratio")) for path in paths):
+        found |= {0, 1}
+    return tuple(sorted(found))
+
+
+def is_fast(scene: Scene, ks: Integer) -> Flags:
+    """Return which of the harmonics `ks` are multiples of a fast force's."""
+    found = np.zeros(ks.size, np.bool_)
+    for h in forced_harmonics(scene):
+        if h >= FAST:
+            found |= (ks > 0) & (ks % h == 0)
+    return found
+
+
+def spread(coefficients: Real, ks: Integer, wider: Integer) -> Real:
+    """Return coefficients (..., n) of the harmonics `ks` among those of `wider`, zero where there is none.
+
+    A harmonic that `wider` lacks is left out.
+    """
+    full = np.zeros((*coefficients.shape[:-1], _numbers(wider).size))
+    here, there = places(ks, wider)
+    full[..., there] = coefficients[..., here]
+    return full
+
+
+def places(ks: Integer, wider: Integer) -> tuple[Integer, Integer]:
+    """Return where the coefficients that two sets of harmonics share stand in each of them."""
+    _, here, there = np.intersect1d(_numbers(ks), _numbers(wider), assume_unique=True, return_indices=True)
+    return here.astype(np.int64), there.astype(np.int64)
+
+
+def _numbers(ks: Integer) -> Integer:
+    """Return where the coefficients of `ks` stand among those of all harmonics, in the order of `fourier`."""
+    pairs = np.stack([2 * ks - 1, 2 * ks], axis=1).reshape(-1)
+    return pairs[1:] if ks[0] == 0 else pairs

@@ -1,0 +1,131 @@
+"""The scene file as JSON Schema (2020-12), so that editors complete and check it.
+
+Types, ranges and defaults are those of the models, descriptions those of their docstrings; what a schema
+cannot say (a DOF that must exist, low < high) is left to `load_scene`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema
+
+from solver.matrices.load_set import UNITS
+from solver.scene import contacts as scene_contacts
+from solver.scene import matrices_structure as matrices_part
+from solver.scene import parts as scene_parts
+from solver.scene.descriptions import EXAMPLES, WORDS
+from solver.scene.scene import Scene
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+_ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*\n((?:    .*\n?)+)", re.MULTILINE)
+_HOMES = (scene_parts, scene_contacts, matrices_part)
+
+
+class _Generator(GenerateJsonSchema):
+    """Matrices are read by code: whatever holds them is described by hand below."""
+
+    def handle_invalid_for_json_schema(
+        self, schema: core_schema.CoreSchema, error_info: str
+    ) -> JsonSchemaValue:  # fmt: skip
+        del schema, error_info
+        return {}
+
+
+def scene_schema() -> dict[str, Any]:
+    """The schema of a scene file: every table and key with unit, range, default and examples."""
+    found = Scene.model_json_schema(schema_generator=_Generator)
+    definitions: dict[str, Any] = found["$defs"]
+    for name, definition in definitions.items():
+        _describe(definition, _model(name), name)
+    _describe(found, Scene, "Scene")
+    _matrices(definitions["MatricesStructure"]["properties"])
+    number = {"type": "number", "exclusiveMinimum": 0.0, "description": "Mass [kg]."}
+    for name in ("LumpedStructure", "CyclicStructure"):
+        masses = definitions[name]["properties"]["masses"]
+        entry = {"anyOf": [number, {"$ref": "#/$defs/_MassEntry"}]}
+        masses["patternProperties"] = dict.fromkeys(masses["patternProperties"], entry)
+        masses["additionalProperties"] = False
+    for definition in definitions.values():
+        if {"N1", "N1_ratio"} <= set(definition["properties"]):
+            definition["not"] = {"required": ["N1", "N1_ratio"]}
+    forces = found["properties"]["excitation"]
+    forces.pop("type")
+    many = {"type": "array", "minItems": 1, "items": forces.pop("items")}
+    found["properties"]["excitation"] = {**forces, "anyOf": [{"$ref": "#/$defs/Excitation"}, many]}
+    return {"$schema": DIALECT, "title": "stickslip scene", **plain(found)}
+
+
+def plain(schema: Any) -> Any:
+    """A schema as editors want it: TOML has no null, patterns end in ``$``, no titles made up from keys."""
+    if isinstance(schema, list):
+        return [plain(one) for one in schema]
+    if not isinstance(schema, Mapping):
+        return schema.replace(r"\z", "$") if isinstance(schema, str) else schema
+    kept = dict(schema)
+    choices = kept.get("anyOf")
+    if isinstance(choices, list) and {"type": "null"} in choices:
+        others = [one for one in choices if one != {"type": "null"}]
+        del kept["anyOf"]
+        kept = {**(others[0] if len(others) == 1 else {"anyOf": others}), **kept}
+    if kept.get("default", 0) is None:
+        del kept["default"]
+    kept.pop("discriminator", None)
+    if isinstance(kept.get("title"), str):
+        del kept["title"]
+    return {plain(key): plain(value) for key, value in kept.items()}
+
+
+def _model(name: str) -> type[BaseModel]:
+    found: type[BaseModel] = next(getattr(home, name) for home in _HOMES if hasattr(home, name))
+    return found
+
+
+def _describe(definition: dict[str, Any], model: type[BaseModel], name: str) -> None:
+    """Put the words of a model's docstring, and of those it is made from, into its schema."""
+    words = {key: text for base in reversed(model.__mro__) for key, text in _words(base).items()}
+    words |= WORDS.get("*", {}) | WORDS.get(name, {})
+    text = _docstring(model)
+    definition["description"] = " ".join(re.split(r"\n\s*(?:Attributes|Parameters)\n", text)[0].split())
+    for key, given in definition["properties"].items():
+        if key in words:
+            given["description"] = words[key]
+        if key in EXAMPLES:
+            given["examples"] = EXAMPLES[key]
+
+
+def _words(model: type) -> dict[str, str]:
+    """What a numpy docstring says of every attribute."""
+    found = {}
+    for names, text in _ENTRY.findall(_docstring(model)):
+        for name in names.split(", "):
+            found[name] = " ".join(text.split())
+    return found
+
+
+def _docstring(model: type) -> str:
+    lines = (model.__doc__ or "").splitlines()
+    return "\n".join([line.removeprefix("    ") for line in lines]) + "\n"
+
+
+def _matrices(properties: dict[str, Any]) -> None:
+    """The keys of a structure from matrices as a file gives them: names of files, rows, labels."""
+    rows = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
+    for key in ("M", "K", "C"):
+        properties[key] |= {"anyOf": [{"type": "string"}, rows, {"type": "object"}]}
+        properties[key].pop("default", None)
+    properties["modes"] |= {"anyOf": [{"type": "string"}, {"type": "object"}]}
+    row = {"type": ["integer", "string"], "minimum": 0}
+    names = {"type": "array", "items": {"type": "string"}, "minItems": 1}
+    properties["dofs"] |= {
+        "anyOf": [{"type": "object", "additionalProperties": row, "minProperties": 1}, names]
+    }
+    properties["keep_modes"] = {"type": "integer", "minimum": 0}
+    properties["units"] = {"enum": list(UNITS), "default": "SI"}
+    properties["mapping"] = {"type": "string"}
+    for key, text in WORDS["MatricesStructure"].items():
+        properties[key]["description"] = text

@@ -1,0 +1,229 @@
+"""Parameter paths of a scene: read and set ``shroud.N0``, ``excitation.amplitude``, ``structure.k1``, …"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, TypeVar, cast
+
+from pydantic import ValidationError
+
+from solver.errors import SettingError
+from solver.scene.contacts import AnyContact, FrictionContact
+from solver.scene.parts import (
+    LARGEST,
+    Damper,
+    Excitation,
+    Mass,
+    MatricesStructure,
+    Part,
+    Spring,
+    Structure,
+)
+from solver.scene.validation import listing, nearest
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+FREQUENCY = "frequency"
+AMPLITUDE = "excitation.amplitude"
+PHASE = "excitation.phase"
+PROPORTIONAL = ("stiffness_proportional_damping", "mass_proportional_damping")
+_RANGES = {
+    "N0": "must be a number >= 0 (from -1e15 with the law elastic-normal) and <= 1e15 [N]",
+    "kn": "must be a number > 0 and <= 1e15 [N/m]",
+    "gap": "must be a number from -1e15 to 1e15 [m]",
+    "N1": "must be a number from -1e15 to 1e15 [N]",
+    "N1_ratio": "must be a number from -1e15 to 1e15",
+    "N1_phase": "must be a number from -1e4 to 1e4 [rad]",
+    "kt": "must be a number > 0 and <= 1e15 [N/m]",
+    "mu": "must be a number >= 0 and <= 100",
+    "m": "must be a number > 0 and <= 1e15 [kg]",
+    "k": "must be a number >= 0 and <= 1e15 [N/m]",
+    "c": "must be a number >= 0 and <= 1e15 [N s/m]",
+    "amplitude": "must be a number from -1e15 to 1e15 [N]",
+    "phase": "must be a number from -1e4 to 1e4 [rad]",
+}
+_PartT = TypeVar("_PartT", bound=Part)
+_Named = Mass | Spring | Damper
+
+
+def parameter_paths(scene: Scene) -> tuple[str, ...]:
+    """Every path that has a value in the scene."""
+    contacts = dict.fromkeys(
+        f"{contact.group}.{key}" for contact in scene.contacts if contact.group for key in contact.PARAMETERS
+    )
+    contacts |= dict.fromkeys(f"{c.name}.{key}" for c in scene.contacts for key in c.PARAMETERS)
+    return (AMPLITUDE, PHASE, *contacts, *(f"structure.{name}" for name in structure_names(scene.structure)))
+
+
+def structure_names(structure: Structure) -> tuple[str, ...]:
+    """Names that are parameters: of groups, then of masses, springs and dashpots, as in the tables.
+
+    Of a structure given by its matrices, the proportional damping is what can be changed.
+    """
+    if isinstance(structure, MatricesStructure):
+        return PROPORTIONAL
+    parts: tuple[_Named, ...] = (*structure.masses, *structure.springs, *structure.dampers)
+    groups = dict.fromkeys(part.group for part in parts if part.group is not None)
+    return (*groups, *(part.name for part in parts if part.name is not None))
+
+
+def share(part: _Named, name: str) -> float:
+    """Value of a part as a multiple of that of the parameter `name`, its own or its group's; 0 if neither."""
+    if part.name == name:
+        return 1.0
+    if part.group != name:
+        return 0.0
+    return 1.0 if part.factor is None else part.factor
+
+
+def has_parameter(contact: AnyContact, owner: str, key: str) -> bool:
+    """Whether the path ``owner.key`` acts on a contact: its name or group, and a parameter of its law."""
+    return owner in (contact.name, contact.group) and key in contact.PARAMETERS
+
+
+def check_path(scene: Scene, path: str) -> None:
+    """Raise SettingError unless `path` is ``frequency`` or a path of the scene."""
+    if path != FREQUENCY and path not in parameter_paths(scene):
+        raise _unknown(scene, path, FREQUENCY)
+
+
+def value(scene: Scene, path: str) -> float:
+    """Value of a path; of a group, its first member's."""
+    if path == AMPLITUDE:
+        return scene.excitation[0].amplitude
+    if path == PHASE:
+        return next((force.phase for force in scene.excitation if force.harmonic), 0.0)
+    owner, _, key = path.rpartition(".") if isinstance(path, str) else ("", "", "")
+    if owner == "structure" and isinstance(scene.structure, MatricesStructure) and key in PROPORTIONAL:
+        return cast(float, getattr(scene.structure, key))
+    if owner == "structure":
+        part = next(iter(_structure_parts(scene.structure, key)), None)
+        if part is None:
+            raise _unknown(scene, path)
+        return cast(float, getattr(part, _quantity(part))) / share(part, key)
+    contact = next((c for c in scene.contacts if has_parameter(c, owner, key)), None)
+    if contact is None:
+        raise _unknown(scene, path)
+    return _contact_value(contact, key)
+
+
+def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
+    """The scene with other values; only what changes is checked again."""
+    for path, new in values.items():
+        if not isinstance(path, str):
+            raise _unknown(scene, path)
+        scene = _with_value(scene, path, _number(path, new))
+    return scene
+
+
+def _with_value(scene: Scene, path: str, new: float) -> Scene:
+    if path in (AMPLITUDE, PHASE):
+        change = _with_amplitude if path == AMPLITUDE else _with_phase
+        return scene.model_copy(update={"excitation": change(scene.excitation, new)})
+    owner, _, key = path.rpartition(".")
+    if owner == "structure":
+        return scene.model_copy(update={"structure": _with_structure(scene, path, key, new)})
+    if not any(has_parameter(contact, owner, key) for contact in scene.contacts):
+        raise _unknown(scene, path)
+    update: dict[str, object] = {key: new}
+    if key in ("N1", "N1_ratio"):
+        update = {"N1": None, "N1_ratio": None, key: new}
+    contacts = tuple(
+        _changed(contact, update, path, new) if has_parameter(contact, owner, key) else contact
+        for contact in scene.contacts
+    )
+    return scene.model_copy(update={"contacts": contacts})
+
+
+def _with_structure(scene: Scene, path: str, name: str, new: float) -> Structure:
+    if isinstance(scene.structure, MatricesStructure) and name in PROPORTIONAL:
+        if not 0.0 <= new <= LARGEST:
+            unit = "s" if name == PROPORTIONAL[0] else "1/s"
+            raise SettingError(path, new, f"must be a number >= 0 and <= 1e15 [{unit}]")
+        return scene.structure.model_copy(update={name: new})
+    members = _structure_parts(scene.structure, name)
+    if not members:
+        raise _unknown(scene, path)
+    changed = {
+        id(part): _changed(part, {_quantity(part): new * share(part, name)}, path, new) for part in members
+    }
+    tables = {table: getattr(scene.structure, table) for table in ("masses", "springs", "dampers")}
+    return scene.structure.model_copy(
+        update={table: tuple(changed.get(id(old), old) for old in parts) for table, parts in tables.items()}
+    )
+
+
+def _with_amplitude(forces: tuple[Excitation, ...], new: float) -> tuple[Excitation, ...]:
+    first = forces[0].amplitude
+    if first == 0.0 and len(forces) > 1:
+        raise SettingError(AMPLITUDE, new, "scales all forces by one factor, but the first one is 0")
+    scaled = [new, *(force.amplitude * (new / first) for force in forces[1:])]
+    return tuple(_changed(f, {"amplitude": a}, AMPLITUDE, new) for f, a in zip(forces, scaled, strict=True))
+
+
+def _with_phase(forces: tuple[Excitation, ...], new: float) -> tuple[Excitation, ...]:
+    """Shift every force but static ones so that the first has the phase `new`."""
+    moving = [force for force in forces if force.harmonic]
+    if not moving:
+        raise SettingError(PHASE, new, "has no meaning: every force of this scene is static")
+    shift = new - moving[0].phase
+    phases = {id(force): force.phase + shift for force in moving} | {id(moving[0]): new}
+    return tuple(
+        _changed(force, {"phase": phases[id(force)]}, PHASE, new) if force.harmonic else force
+        for force in forces
+    )
+
+
+def _changed(part: _PartT, update: Mapping[str, object], path: str, new: float) -> _PartT:
+    try:
+        return type(part).model_validate({**part.__dict__, **update})
+    except ValidationError as error:
+        key = next((k for k in update if update[k] is not None), "")
+        wanted = _RANGES.get(key, "must be a number from -1e15 to 1e15")
+        raise SettingError(path, new, wanted) from error
+
+
+def _contact_value(contact: AnyContact, key: str) -> float:
+    if not isinstance(contact, FrictionContact):
+        return getattr(contact, key) or 0.0
+    if key == "N1":
+        return contact.N1_value
+    if key != "N1_ratio":
+        return cast(float, getattr(contact, key))
+    if contact.N1_ratio is not None:
+        return contact.N1_ratio
+    if contact.N0 == 0.0 and contact.N1_value != 0.0:
+        raise SettingError(
+            f"{contact.name}.N1_ratio", None, f"is undefined with N0 = 0 and N1 = {contact.N1_value:g}"
+        )
+    return contact.N1_value / contact.N0 if contact.N0 else 0.0
+
+
+def _structure_parts(structure: Structure, name: str) -> tuple[_Named, ...]:
+    if isinstance(structure, MatricesStructure):
+        return ()
+    parts: tuple[_Named, ...] = (*structure.springs, *structure.dampers, *structure.masses)
+    return tuple(part for part in parts if name and name in (part.name, part.group))
+
+
+def _quantity(part: _Named) -> str:
+    return {Mass: "m", Spring: "k", Damper: "c"}[type(part)]
+
+
+def _number(path: str, new: object) -> float:
+    try:
+        number = float(new)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SettingError(str(path), new, "must be a number") from error
+    if isinstance(new, str | bool) or not math.isfinite(number):
+        raise SettingError(str(path), new, "must be a finite number")
+    return number
+
+
+def _unknown(scene: Scene, path: object, *besides: str) -> SettingError:
+    if path == FREQUENCY:
+        return SettingError("path", path, "must name a value of the scene; the frequency belongs to the run")
+    known = (*besides, *parameter_paths(scene))
+    return SettingError("path", path, f"must be one of {listing(known)}", nearest(str(path), known))

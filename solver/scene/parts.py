@@ -1,0 +1,282 @@
+"""The parts of a scene: structure, contacts, excitation, what to observe. Frozen, checked, SI units."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, NamedTuple, Self, cast
+
+import numpy as np
+from pydantic import (
+    Field,
+    GetCoreSchemaHandler,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import CoreSchema, core_schema
+
+from solver.scene.fields import LARGEST as LARGEST
+from solver.scene.fields import NonNegative as NonNegative
+from solver.scene.fields import Part as Part
+from solver.scene.matrices_structure import MatricesStructure as MatricesStructure
+from solver.scene.matrices_structure import Reduction as Reduction
+
+GROUND = "ground"
+NEXT = "next"
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+\z", max_length=100)]
+MemberName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(@[0-9]+)?\z", max_length=100)]
+EndName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(@([0-9]+|next))?\z", max_length=105)]
+Between = tuple[EndName, EndName]
+Positive = Annotated[float, Field(strict=True, gt=0.0, le=LARGEST, allow_inf_nan=False)]
+Signed = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+Friction = Annotated[float, Field(strict=True, ge=0.0, le=100.0, allow_inf_nan=False)]
+Angle = Annotated[float, Field(strict=True, ge=-1e4, le=1e4, allow_inf_nan=False)]
+Sectors = Annotated[int, Field(strict=True, ge=1, le=10_000)]
+Seed = Annotated[int, Field(strict=True, ge=0, le=2**63 - 1)]
+Order = Annotated[int, Field(strict=True, ge=0, le=10_000)]
+HarmonicIndex = Annotated[int, Field(strict=True, ge=0, le=1_000)]
+
+
+class End(NamedTuple):
+    """One end of a spring, dashpot or contact: a DOF (None = ground), here or in the next sector."""
+
+    dof: str | None
+    next: bool
+
+
+def parse_end(text: str) -> End:
+    """Read ``"tip"``, ``"tip@next"``, ``"tip@3"`` (a DOF of an annulus) or ``"ground"``."""
+    if text == GROUND:
+        return End(None, False)
+    base, at, suffix = text.partition("@")
+    return End(base, True) if at and suffix == NEXT else End(text, False)
+
+
+class Element(Part):
+    """Something that joins two ends."""
+
+    between: Between
+
+    @property
+    def ends(self) -> tuple[End, End]:
+        """The two ends, read."""
+        return parse_end(self.between[0]), parse_end(self.between[1])
+
+
+class _Grouped(Part):
+    """A part whose value may be set together with others'.
+
+    Attributes
+    ----------
+    name : str or None
+        Makes it a parameter ``structure.<name>``.
+    group : str or None
+        Makes the value of the whole group a parameter ``structure.<group>``.
+    factor : float or None
+        The part's value as a multiple of its group's; 1 if left out.
+    """
+
+    name: MemberName | None = None
+    group: Name | None = None
+    factor: Positive | None = None
+
+    @model_validator(mode="after")
+    def _factor_of_a_group(self) -> Self:
+        if self.factor is not None and self.group is None:
+            raise ValueError(
+                f"`factor` = {self.factor!r} needs a `group`: it is relative to the group's value"
+            )
+        return self
+
+
+class Mass(_Grouped):
+    """A point mass: one degree of freedom.
+
+    Attributes
+    ----------
+    dof : str
+        The degree of freedom it makes.
+    m : float
+        Mass [kg].
+    """
+
+    dof: str
+    m: Positive
+
+
+class Spring(Element, _Grouped):
+    """A spring, with an optional dashpot beside it: `k` [N/m], `c` [N s/m]."""
+
+    k: NonNegative
+    c: NonNegative = 0.0
+
+
+class Damper(Element, _Grouped):
+    """A dashpot: `c` [N s/m]."""
+
+    c: NonNegative
+
+
+class _MassEntry(_Grouped):
+    """A mass as a scene file gives it: a number, or a table with `m`, `name`, `group` and `factor`."""
+
+    m: Positive
+
+    @model_validator(mode="before")
+    @classmethod
+    def _number_is_mass(cls, data: object) -> object:
+        return data if isinstance(data, dict) else {"m": data}
+
+
+class _MassTable:
+    """Reads a table ``{dof: mass}`` into a tuple of `Mass`, and writes it back as a table."""
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        table = handler.generate_schema(Annotated[dict[MemberName, _MassEntry], Field(min_length=1)])
+        masses = core_schema.no_info_after_validator_function(cls._read, table)
+        write = core_schema.plain_serializer_function_ser_schema(cls._write)
+        return core_schema.no_info_before_validator_function(cls._as_table, masses, serialization=write)
+
+    @classmethod
+    def _as_table(cls, data: object) -> object:
+        ready = isinstance(data, tuple) and all(isinstance(mass, Mass) for mass in data)
+        return cls._write(cast(tuple[Mass, ...], data)) if ready else data
+
+    @staticmethod
+    def _read(table: dict[str, _MassEntry]) -> tuple[Mass, ...]:
+        return tuple(Mass.model_construct(dof=dof, **entry.__dict__) for dof, entry in table.items())
+
+    @staticmethod
+    def _write(masses: tuple[Mass, ...]) -> dict[str, object]:
+        tables = {mass.dof: mass.model_dump(exclude={"dof"}, exclude_none=True) for mass in masses}
+        return {dof: table["m"] if len(table) == 1 else table for dof, table in tables.items()}
+
+
+class _Structure(Part):
+    """Masses, springs and dashpots."""
+
+    stiffness_proportional_damping: NonNegative = 0.0
+    masses: Annotated[tuple[Mass, ...], _MassTable]
+    springs: tuple[Spring, ...] = ()
+    dampers: tuple[Damper, ...] = ()
+
+    @property
+    def dofs(self) -> tuple[str, ...]:
+        """Names of the degrees of freedom, in the order of the masses."""
+        return tuple(mass.dof for mass in self.masses)
+
+
+class LumpedStructure(_Structure):
+    """A structure of point masses."""
+
+    kind: Literal["lumped"]
+
+
+class Mistuning(Part):
+    """Blades that are not quite equal: one factor for each sector, on the parts `of` names.
+
+    Attributes
+    ----------
+    of : tuple of str
+        Names of springs (the factor multiplies k), dashpots (c) and masses, or DOFs (their mass).
+    spread : float or None
+        Standard deviation of the factors: 1 + spread * z, z independent and normal.
+    seed : int or None
+        Of the random numbers z: numpy's Generator with PCG64; 1 if left out.
+    values : tuple of float or None
+        The factors themselves, one for each sector, instead of `spread` and `seed`.
+    """
+
+    of: Annotated[tuple[MemberName, ...], Field(min_length=1)]
+    spread: NonNegative | None = None
+    seed: Seed | None = None
+    values: tuple[Positive, ...] | None = None
+
+    @model_validator(mode="after")
+    def _drawn_or_given(self) -> Mistuning:
+        if self.values is None and self.spread is None:
+            raise ValueError("`mistuning` needs `spread` (with an optional `seed`) or `values`, got neither")
+        if self.values is not None and (self.spread is not None or self.seed is not None):
+            other = "spread" if self.spread is not None else "seed"
+            raise ValueError(
+                f"`values` and `{other}` of `mistuning` exclude each other: give one, "
+                f"got {other} = {getattr(self, other)!r} beside {len(self.values)} values"
+            )
+        return self
+
+    def factors(self, sectors: int) -> tuple[float, ...]:
+        """The factor of each sector; those drawn may be 0 or less if the spread is large."""
+        if self.values is not None:
+            return self.values
+        draw = np.random.Generator(np.random.PCG64(1 if self.seed is None else self.seed))
+        return tuple((1.0 + (self.spread or 0.0) * draw.standard_normal(sectors)).tolist())
+
+
+class CyclicStructure(_Structure):
+    """One sector of a disk of `sectors` sectors; ``X@next`` is DOF X of the next one.
+
+    The sectors are equal but for `mistuning`.
+    """
+
+    kind: Literal["cyclic"]
+    sectors: Sectors
+    mistuning: Mistuning | None = None
+
+
+Structure = LumpedStructure | CyclicStructure | MatricesStructure
+KINDS: tuple[str, ...] = ("lumped", "cyclic", "matrices")
+
+
+class Excitation(Part):
+    """A force amplitude * cos(harmonic * omega t + phase) on a DOF; harmonic 0 is a static load.
+
+    Attributes
+    ----------
+    dof : str
+        Where it acts.
+    amplitude : float
+        Force [N].
+    phase : float
+        Phase [rad]; 0 for a static load.
+    harmonic : int
+        Multiple of the excitation frequency.
+    engine_order : int or None
+        Cyclic structures only: sector j has harmonic * engine_order * j * 2 pi / sectors added to the phase.
+        A wave that runs backward with the order i is the engine order sectors - i: the forces are the same.
+    pattern : "travelling", "standing" or None
+        Cyclic structures only: a travelling wave (also if left out), or the same angle as a factor
+        cos(harmonic * engine_order * j * 2 pi / sectors) instead of a phase, half the sum of the two waves
+        that run forward and backward. The loads of the contacts follow the same pattern.
+    """
+
+    dof: MemberName
+    amplitude: Signed
+    phase: Angle = 0.0
+    harmonic: HarmonicIndex = 1
+    engine_order: Order | None = None
+    pattern: Literal["travelling", "standing"] | None = None
+
+    @model_validator(mode="after")
+    def _static_has_no_phase(self) -> Excitation:
+        if self.harmonic == 0 and self.phase != 0.0:
+            raise ValueError(f"`phase` of a static load (harmonic = 0) must be 0, got {self.phase!r}")
+        return self
+
+
+class Observe(Part):
+    """The observed DOF and the frequency band of interest [Hz].
+
+    ``tip@3`` in a cyclic scene is the tip of sector 3, ``tip`` that of sector 0.
+    """
+
+    dof: MemberName
+    band: tuple[Positive, Positive]
+
+    @field_validator("band")
+    @classmethod
+    def _ordered(cls, band: tuple[float, float]) -> tuple[float, float]:
+        low, high = band
+        if not low < high or not math.isfinite(high - low):
+            raise ValueError(f"`band` must be [low, high] in Hz with low < high, got [{low!r}, {high!r}]")
+        return band

@@ -1,0 +1,202 @@
+"""What a user describes: structure, contacts, excitation, what to observe."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import Field, ModelWrapValidatorHandler, ValidationError, field_validator, model_validator
+
+from solver.errors import Issue, SceneError
+from solver.scene import parameter_paths as scene_paths
+from solver.scene.contacts import (
+    AnyContact,
+    Contact,
+    ContactOfAnyLaw,
+    ElasticNormalContact,
+    FrictionContact,
+    GapSpring,
+    PlanarContact,
+    PolynomialSpring,
+)
+from solver.scene.cyclic_validation import cyclic_issues
+from solver.scene.io import load_raw, scene_folder, shipped_scenes
+from solver.scene.parts import (
+    KINDS,
+    CyclicStructure,
+    Damper,
+    End,
+    Excitation,
+    LumpedStructure,
+    Mass,
+    MatricesStructure,
+    Mistuning,
+    Name,
+    Observe,
+    Part,
+    Spring,
+    Structure,
+    parse_end,
+)
+from solver.scene.validation import cross_issues, field_issues, plain
+
+__all__ = [
+    "KINDS",
+    "AnyContact",
+    "Contact",
+    "ContactOfAnyLaw",
+    "CyclicStructure",
+    "Damper",
+    "ElasticNormalContact",
+    "End",
+    "Excitation",
+    "FrictionContact",
+    "GapSpring",
+    "LumpedStructure",
+    "Mass",
+    "MatricesStructure",
+    "Mistuning",
+    "Observe",
+    "PlanarContact",
+    "PolynomialSpring",
+    "Scene",
+    "Spring",
+    "Structure",
+    "load_scene",
+    "parse_end",
+    "shipped_scenes",
+]
+
+
+class Scene(Part):
+    """A structure with friction contacts, how it is excited and what is observed. Frozen, SI units.
+
+    Parameters
+    ----------
+    name : str
+        Name of the scene.
+    structure : LumpedStructure, CyclicStructure or MatricesStructure
+        Masses, springs and dashpots, or matrices.
+    contacts : tuple of Contact and the classes of other laws
+        What is not linear: friction contacts, rubbing contacts, gaps, nonlinear springs; may be empty.
+    excitation : tuple of Excitation
+        The forces, at least one. A single one may be given without a list.
+    observe : Observe
+        The DOF whose amplitude counts, and the band of frequencies [Hz].
+
+    Raises
+    ------
+    SceneError
+        Lists everything that is wrong, each with a JSON pointer.
+    """
+
+    name: Name
+    structure: Annotated[Structure, Field(discriminator="kind")]
+    contacts: tuple[ContactOfAnyLaw, ...] = ()
+    excitation: tuple[Excitation, ...]
+    observe: Observe
+
+    @field_validator("excitation", mode="before")
+    @classmethod
+    def _one_or_many(cls, data: object) -> object:
+        return [data] if isinstance(data, Mapping | Excitation) else data
+
+    @field_validator("excitation")
+    @classmethod
+    def _at_least_one(cls, forces: tuple[Excitation, ...]) -> tuple[Excitation, ...]:
+        if not forces:
+            raise ValueError("`excitation` must have at least one force, got []")
+        return forces
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _report_everything(cls, data: Any, handler: ModelWrapValidatorHandler[Scene]) -> Scene:
+        if isinstance(data, Scene):
+            return data
+        raw = plain(data)
+        if not isinstance(raw, dict):
+            raise SceneError(
+                [Issue(pointer="", message=f"a scene must be a table, got {type(raw).__name__}")]
+            )
+        try:
+            scene, issues = handler(data), []
+        except ValidationError as error:
+            scene, issues = None, field_issues(error, raw)
+        issues = [*issues, *cross_issues(raw), *cyclic_issues(raw)]
+        if scene is None or issues:
+            raise SceneError(issues)
+        return scene
+
+    @classmethod
+    def from_dict(cls, obj: Mapping[str, object]) -> Scene:
+        """Read a scene from tables and lists, as TOML or JSON gives them.
+
+        Raises
+        ------
+        SceneError
+            Lists everything that is wrong.
+        """
+        return cls.model_validate(obj)
+
+    def to_dict(self) -> dict[str, object]:
+        """The scene as tables and lists for JSON; `from_dict` gives back an equal scene."""
+        obj: dict[str, Any] = self.model_dump(mode="json", exclude_none=True)
+        if len(self.excitation) == 1:
+            obj["excitation"] = obj["excitation"][0]
+        return obj
+
+    @property
+    def engine_order(self) -> int:
+        """Engine order of the excitation; 0 for a lumped structure."""
+        return next((e.engine_order for e in self.excitation if e.engine_order is not None), 0)
+
+    def value(self, path: str) -> float:
+        """Value of a parameter path, for example ``"shroud.N0"``; of a group, its first member's.
+
+        Raises
+        ------
+        SettingError
+            The path is unknown, or it has no value in this scene.
+        """
+        return scene_paths.value(self, path)
+
+    def with_values(self, values: Mapping[str, float]) -> Scene:
+        """A scene with other values on parameter paths, set in the given order.
+
+        ``<contact>.N1`` unties the amplitude of the load from N0, ``<contact>.N1_ratio`` ties it again.
+        A group sets all its members, ``excitation.amplitude`` scales every force by the factor that brings
+        the first to the value, ``excitation.phase`` shifts every force alike.
+
+        Raises
+        ------
+        SettingError
+            The path is unknown or the value is out of its range.
+        """
+        return scene_paths.with_values(self, values)
+
+    def parameter_paths(self) -> tuple[str, ...]:
+        """Every path `value` and `with_values` take (``frequency`` belongs to the run, not to the scene)."""
+        return scene_paths.parameter_paths(self)
+
+    def check_path(self, path: str) -> None:
+        """Raise SettingError unless `path` is ``frequency`` or one of `parameter_paths`."""
+        scene_paths.check_path(self, path)
+
+
+def load_scene(name_or_path: object) -> Scene:
+    """Load a shipped scene by name, or a scene file (.toml or .json) by path.
+
+    Files of matrices that the scene names are read too, relative to its own folder.
+
+    Raises
+    ------
+    SceneError
+        No such scene, a file that cannot be read, or everything that is wrong with its content.
+    """
+    raw = load_raw(name_or_path)
+    structure = raw.get("structure")
+    if isinstance(structure, Mapping) and structure.get("kind") == "matrices":
+        from solver.matrices.scene_files import with_files
+
+        raw = with_files(raw, scene_folder(name_or_path))
+    return Scene.from_dict(raw)

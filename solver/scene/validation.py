@@ -1,0 +1,338 @@
+"""What is wrong with a scene, all of it at once: pydantic's findings in our words, and cross references.
+
+The cross references are checked on the plain tables and lists, so that a negative friction coefficient does
+not hide a misspelt degree of freedom.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain, islice
+from typing import Any, cast
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from solver.errors import Issue
+from solver.scene.contacts import LAW_TAG, LAWS
+from solver.scene.parts import (
+    GROUND,
+    KINDS,
+    CyclicStructure,
+    Damper,
+    Excitation,
+    LumpedStructure,
+    MatricesStructure,
+    Mistuning,
+    Observe,
+    Reduction,
+    Spring,
+    parse_end,
+)
+
+MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
+RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe")
+BETWEEN_KEYS = ("between", "normal_between", "between_second")
+_SCENE_KEYS = ("name", "structure", "contacts", "excitation", "observe")
+_KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
+    (): ("a scene", _SCENE_KEYS),
+    ("structure", "lumped"): ("a lumped structure", tuple(LumpedStructure.model_fields)),
+    ("structure", "cyclic"): ("a cyclic structure", tuple(CyclicStructure.model_fields)),
+    ("structure", "matrices"): ("a matrices structure", tuple(MatricesStructure.model_fields)),
+    ("structure", "matrices", "reduction"): ("reduction", tuple(Reduction.model_fields)),
+    ("structure", "masses"): ("a mass", ("m", "name", "group", "factor")),
+    ("structure", "springs"): ("a spring", tuple(Spring.model_fields)),
+    ("structure", "dampers"): ("a damper", tuple(Damper.model_fields)),
+    ("structure", "mistuning"): ("mistuning", tuple(Mistuning.model_fields)),
+    ("contacts",): ("a contact", tuple(LAWS["coulomb"].model_fields)),
+    **{
+        ("contacts", LAW_TAG + law): (
+            "a contact" if law == "coulomb" else f"a contact with the law `{law}`",
+            tuple(each.model_fields),
+        )
+        for law, each in LAWS.items()
+    },
+    ("excitation",): ("an excitation", tuple(Excitation.model_fields)),
+    ("observe",): ("observe", tuple(Observe.model_fields)),
+}
+_BOUNDS = {"greater_than": (">", "gt"), "greater_than_equal": (">=", "ge"), "less_than_equal": ("<=", "le")}
+_WANTED = {
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "finite_number": "must be a finite number",
+    "string_type": "must be a text",
+    "string_pattern_mismatch": "may have only letters, digits, _ and -",
+    "tuple_type": "must be a list",
+    "dict_type": "must be a table",
+    "too_short": "must not be empty",
+    "too_long": "has too many entries",
+    "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
+}
+
+
+def plain(data: object, depth: int = 0) -> object:
+    """Models inside `data` replaced by the tables they stand for (a scene is five levels deep, not fifty)."""
+    if isinstance(data, BaseModel):
+        return data.model_dump(exclude_none=True)
+    if depth < 50 and isinstance(data, Mapping):
+        return {key: plain(value, depth + 1) for key, value in data.items()}
+    if depth < 50 and isinstance(data, list | tuple):
+        return [plain(value, depth + 1) for value in data]
+    return data
+
+
+def nearest(name: str, known: Sequence[str]) -> str:
+    """A hint ``; did you mean `x`?``, or nothing when no known name is near (or there are too many)."""
+    few = len(known) <= 300 and len(name) <= 200
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5) if few else []
+    return f"; did you mean `{near[0]}`?" if near else ""
+
+
+def listing(known: Sequence[str]) -> str:
+    """The known names for a message, cut after twenty."""
+    more = f", … ({len(known) - 20} more)" if len(known) > 20 else ""
+    return ", ".join(known[:20]) + more
+
+
+def quoted(value: object) -> str:
+    """A value for a message, cut at 80 characters."""
+    if isinstance(value, dict | list) and len(value) > 8:
+        return f"a {'table' if isinstance(value, dict) else 'list'} of {len(value)}"
+    try:
+        text = repr(value)
+    except (RecursionError, ValueError):
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def field_issues(error: ValidationError, raw: dict[str, Any]) -> list[Issue]:
+    """Pydantic's findings as issues: pointers into the tables the user wrote, messages in our words."""
+    return [_field_issue(found, raw) for found in error.errors(include_url=False)[:MOST_ISSUES]]
+
+
+def _field_issue(found: ErrorDetails, raw: dict[str, Any]) -> Issue:
+    steps, last = _walk(found["loc"], raw)
+    kind, context = found["type"], found.get("ctx", {})
+    key = _key(steps)
+    if kind == "missing" and isinstance(found["loc"][-1], int):
+        message = f"`{key}` has too few entries, got {quoted(last)}"
+    elif kind == "missing":
+        steps, key = [*steps, str(found["loc"][-1])], str(found["loc"][-1])
+        message = f"`{key}` is missing: {_table(found['loc'])[0]} needs it"
+    elif kind == "extra_forbidden":
+        table, keys = _table(found["loc"])
+        known = f"known keys: {listing(keys)}{nearest(key, keys)}"
+        message = f"`{key}` = {quoted(last)} is not a key of {table}; {known}"
+    elif kind in ("union_tag_invalid", "union_tag_not_found"):
+        tag, tags = ("law", tuple(LAWS)) if steps[:1] == ["contacts"] else ("kind", KINDS)
+        got = last.get(tag) if isinstance(last, dict) else None
+        steps = [*steps, tag]
+        hint = nearest(got, tags) if isinstance(got, str) else ""
+        message = f"`{tag}` must be one of {listing(tags)}, got {quoted(got)}{hint}"
+    elif kind == "value_error":
+        message = str(context["error"])
+    elif kind in _BOUNDS:
+        sign, bound = _BOUNDS[kind]
+        message = f"`{key}` must be {sign} {context[bound]:g}, got {quoted(last)}"
+    elif kind in _WANTED:
+        message = f"`{key}` {_WANTED[kind]}, got {quoted(last)}"
+    else:
+        message = f"`{key}`: {found['msg']}, got {quoted(last)}"
+    return Issue(pointer=_pointer(steps), message=message)
+
+
+def _key(steps: Sequence[int | str]) -> str:
+    """The last key, with its index in a list: ``mu``, ``contacts[1]``."""
+    if steps and isinstance(steps[-1], int):
+        return f"{_key(steps[:-1])}[{steps[-1]}]"
+    return str(steps[-1]) if steps else "scene"
+
+
+def _walk(loc: Iterable[int | str], raw: object) -> tuple[list[int | str], object]:
+    """Follow pydantic's location as far as it exists in the user's tables (it also names union members)."""
+    steps: list[int | str] = []
+    for step in loc:
+        in_list = isinstance(raw, list) and isinstance(step, int) and step < len(raw)
+        if in_list or (isinstance(raw, dict) and step in raw):
+            raw = cast(Any, raw)[step]
+            steps.append(step)
+    return steps, raw
+
+
+def _table(loc: tuple[int | str, ...]) -> tuple[str, tuple[str, ...]]:
+    """Name and known keys of the innermost table on the way to a location."""
+    names = tuple(step for step in loc[:-1] if isinstance(step, str))
+    for known, answer in reversed(_KEYS.items()):
+        without_tag = tuple(name for name in names if name not in KINDS)
+        if names[: len(known)] == known or (known and without_tag[: len(known)] == known):
+            return answer
+    return _KEYS[()]
+
+
+def _pointer(steps: Iterable[int | str]) -> str:
+    return "".join("/" + str(step).replace("~", "~0").replace("/", "~1") for step in steps)
+
+
+def cross_issues(raw: dict[str, Any]) -> list[Issue]:
+    """What is wrong between the parts of a scene: unknown DOFs, duplicate names, engine orders."""
+    structure = raw.get("structure")
+    structure = structure if isinstance(structure, dict) else {}
+    table = "dofs" if structure.get("kind") == "matrices" else "masses"
+    dofs = _dof_names(structure.get(table), table)
+    cyclic = structure.get("kind") == "cyclic"
+    found = chain(
+        _reserved_dofs(dofs or (), table, cyclic),
+        _end_issues(raw, structure, dofs, cyclic),
+        _dof_issues(raw, dofs, structure.get("sectors") if cyclic else 0),
+        _duplicates(_structure_names(structure), "structure"),
+        _contact_name_issues(raw, cyclic),
+        _engine_order_issues(raw, structure.get("kind")),
+    )
+    return list(islice(found, MOST_ISSUES))
+
+
+_Known = dict[str, None]
+
+
+def _dof_names(given: object, table: str) -> _Known | None:
+    """The names of the DOFs: keys of a table, or (of matrices) a list; None if they cannot be told."""
+    if isinstance(given, dict):
+        return dict.fromkeys(map(str, given))
+    if table == "dofs" and isinstance(given, list | tuple) and all(isinstance(name, str) for name in given):
+        return dict.fromkeys(given)
+    return None
+
+
+def _reserved_dofs(dofs: Iterable[str], table: str, cyclic: bool) -> Iterator[Issue]:
+    for dof in dofs:
+        pointer = _pointer(["structure", table, dof])
+        if dof == GROUND:
+            what = "mass" if table == "masses" else "DOF"
+            yield Issue(pointer=pointer, message=f"`{GROUND}` is reserved: give the {what} another name")
+        if cyclic and "@" in dof:
+            yield Issue(pointer=pointer, message=f"`{dof}`: no '@' in a DOF of a cyclic structure")
+
+
+def _rows(table: dict[str, Any], key: str) -> Iterator[tuple[list[int | str], dict[str, Any]]]:
+    """The tables under `key`, whether one or a list, with their steps."""
+    rows = table.get(key)
+    if isinstance(rows, dict):
+        yield [key], rows
+    for i, row in enumerate(rows if isinstance(rows, list) else []):
+        if isinstance(row, dict):
+            yield [key, i], row
+
+
+def _end_issues(
+    raw: dict[str, Any], structure: dict[str, Any], dofs: _Known | None, cyclic: bool
+) -> Iterator[Issue]:
+    elements = [
+        (["structure", *steps], row) for key in ("springs", "dampers") for steps, row in _rows(structure, key)
+    ]
+    for steps, row in [*elements, *_rows(raw, "contacts")]:
+        for key in BETWEEN_KEYS:
+            yield from _pair_issues([*steps, key], row.get(key), dofs, cyclic)
+
+
+def _pair_issues(steps: list[int | str], pair: object, dofs: _Known | None, cyclic: bool) -> Iterator[Issue]:
+    """What is wrong with a pair of ends; its form is pydantic's matter."""
+    if not (isinstance(pair, list) and len(pair) == 2 and all(isinstance(end, str) for end in pair)):
+        return
+    key = steps[-1]
+    if pair[0] == pair[1]:
+        yield Issue(pointer=_pointer(steps), message=f"`{key}` must join two different ends, got {pair!r}")
+    elif all(parse_end(end).next for end in pair):
+        message = f"`{key}` must have one end in this sector, got {pair!r}"
+        yield Issue(pointer=_pointer(steps), message=message)
+    for i, end in enumerate(pair):
+        yield from _one_end([*steps, i], end, dofs, cyclic)
+
+
+def _one_end(steps: list[int | str], text: str, dofs: _Known | None, cyclic: bool) -> Iterator[Issue]:
+    end, key = parse_end(text), str(steps[-2])
+    if end.next and not cyclic:
+        message = f"`{key}`: {text!r} needs a cyclic structure; this one has no next sector"
+        yield Issue(pointer=_pointer(steps), message=message)
+    if end.dof is not None and dofs is not None and end.dof not in dofs:
+        yield Issue(pointer=_pointer(steps), message=_unknown_dof(key, text, end.dof, [*dofs, GROUND]))
+
+
+def _unknown_dof(key: str, text: str, dof: str, known: Sequence[str]) -> str:
+    return f"`{key}`: there is no DOF {quoted(text)}; known: {listing(known)}{nearest(dof, known)}"
+
+
+def _dof_issues(raw: dict[str, Any], dofs: _Known | None, sectors: object) -> Iterator[Issue]:
+    if dofs is None:
+        return
+    for steps, row in [*_rows(raw, "excitation"), *_rows(raw, "observe")]:
+        dof = row.get("dof")
+        if isinstance(dof, str) and steps[0] == "observe" and isinstance(sectors, int):
+            base, _, sector = dof.rpartition("@")
+            if base in dofs and sector.isdecimal() and int(sector[:10]) < sectors:
+                continue
+        if isinstance(dof, str) and dof not in dofs:
+            yield Issue(pointer=_pointer([*steps, "dof"]), message=_unknown_dof("dof", dof, dof, list(dofs)))
+
+
+_Named = list[tuple[list[int | str], str]]
+
+
+def _structure_names(structure: dict[str, Any]) -> _Named:
+    masses = structure.get("masses")
+    rows: list[tuple[list[int | str], Any]] = [
+        (["masses", dof], mass) for dof, mass in (masses.items() if isinstance(masses, dict) else ())
+    ]
+    rows += [row for key in ("springs", "dampers") for row in _rows(structure, key)]
+    return [
+        (["structure", *steps, "name"], row["name"])
+        for steps, row in rows
+        if isinstance(row, dict) and isinstance(row.get("name"), str)
+    ]
+
+
+def _duplicates(named: _Named, what: str) -> Iterator[Issue]:
+    seen: dict[str, str] = {}
+    for steps, name in named:
+        pointer = _pointer(steps)
+        if name in seen:
+            message = f"`name` = {name!r} is taken by {seen[name]}: names in {what} must differ"
+            yield Issue(pointer=pointer, message=message)
+        seen.setdefault(name, pointer)
+
+
+def _contact_name_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
+    rows = list(_rows(raw, "contacts"))
+    names: _Named = [([*s, "name"], row["name"]) for s, row in rows if isinstance(row.get("name"), str)]
+    groups: _Named = [([*s, "group"], row["group"]) for s, row in rows if isinstance(row.get("group"), str)]
+    yield from _duplicates(names, "contacts")
+    taken = {name for _, name in names}
+    for steps, name in [*names, *groups]:
+        key = steps[-1]
+        if name in RESERVED_PREFIXES:
+            message = f"`{key}` = {name!r} is reserved in parameter paths: give the contact another {key}"
+            yield Issue(pointer=_pointer(steps), message=message)
+        if key == "group" and name in taken:
+            yield Issue(pointer=_pointer(steps), message=f"`group` = {name!r} is also the name of a contact")
+        if cyclic and "@" in name:
+            yield Issue(pointer=_pointer(steps), message=f"`{key}` = {name!r}: no '@' in a cyclic scene")
+
+
+def _engine_order_issues(raw: dict[str, Any], kind: object) -> Iterator[Issue]:
+    first: object = None
+    for steps, row in _rows(raw, "excitation"):
+        order = row.get("engine_order")
+        if order is None:
+            continue
+        pointer = _pointer([*steps, "engine_order"])
+        if kind in ("lumped", "matrices"):
+            message = (
+                f"`engine_order` = {quoted(order)} needs a cyclic structure; remove it from a {kind} one"
+            )
+            yield Issue(pointer=pointer, message=message)
+        elif first is not None and order != first:
+            message = f"`engine_order` must be the same everywhere, got {quoted(order)} after {quoted(first)}"
+            yield Issue(pointer=pointer, message=message)
+        first = order if first is None else first

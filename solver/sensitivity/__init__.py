@@ -1,0 +1,1 @@
+"""Exact first and second derivatives of amplitudes and peaks by parameters."""

@@ -1,0 +1,334 @@
+"""Exact derivatives of the amplitude at a point of a frequency response, by any number of parameters at once.
+
+One factorisation and one adjoint (`solver.sensitivity.kernels.adjoint`) give the derivatives by frequency and
+excitation and by the numbers of every contact, and each parameter path is a row of weights of those. A
+structural path needs the whole motion x = Z⁻¹ (f − Lᴴ F) and the adjoint motion y of every harmonic: −Re yᵀ
+(∂Z/∂q) x.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from solver.balance.balance import Balance
+from solver.balance.contact_hessian import ContactForces, check_laws, check_loads, contact_forces
+from solver.balance.dynamic_stiffness import WholeMotion, times, whole_motion
+from solver.balance.kernels.jacobian import factorise, step_back
+from solver.balance.parameter import Kind
+from solver.balance.parameter_derivatives import contact_slopes, matrices_of_paths, modal_dampings, resolved
+from solver.balance.workspace import Workspace
+from solver.contacts.kernels.columns import COULOMB
+from solver.contacts.kernels.laws import law_force
+from solver.contacts.kernels.system import KT, MU, N0, N1, PHASE, evaluation_by_value
+from solver.errors import SettingError
+from solver.jit.fourier import Complex, Real, cosine_position
+from solver.results.base import Piece
+from solver.sensitivity.hessian import (
+    Adjoint,
+    AmplitudeHessian,
+    Directions,
+    PeakHessian,
+    Responses,
+    lagrangian_hessian,
+    no_hessian,
+)
+from solver.sensitivity.kernels.adjoint import (
+    AMPLITUDE,
+    BESIDES,
+    BY_KT,
+    BY_LEVEL,
+    BY_LOAD,
+    BY_MU,
+    BY_OMEGA,
+    BY_PHASE,
+    EXTREME_COLUMNS,
+    PER_ELEMENT,
+    SIGN,
+    TAU,
+    amplitude_slopes,
+)
+
+TWO_PI = 2.0 * math.pi
+_KINK = 1e-8  # relative difference of the slopes of max x and −min x beyond which a parameter parts them
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Gradient(Piece):
+    """The amplitude at a solution with its derivatives, all others held fixed; NaN where it is singular.
+
+    Attributes
+    ----------
+    value : float
+        max|x| of the observed DOF [m].
+    by_frequency : float
+        [m/Hz].
+    by_parameters : (n_paths,) array
+        At a fixed frequency [m per unit of each].
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"value": "m", "by_frequency": "m/Hz"}
+
+    value: float
+    by_frequency: float
+    by_parameters: Real
+
+
+class Amplitudes:
+    """Real coefficients of kept harmonics as complex amplitudes v̂ = v_c − i v_s."""
+
+    def __init__(self, balance: Balance) -> None:
+        ks = balance.system.ks
+        self.ks = ks
+        self._cosines = np.array([cosine_position(ks, i) for i in range(ks.size)])
+        self._sines = np.where(ks > 0, self._cosines + 1, 0)
+        self._moving = (ks > 0).astype(np.float64)
+        self._size = balance.n_coefficients
+
+    def of(self, coefficients: Real) -> Complex:
+        """Return the amplitudes (..., nk) of coefficients (..., n)."""
+        sines = coefficients[..., self._sines] * self._moving
+        return np.asarray(coefficients[..., self._cosines] - 1j * sines)
+
+    def coefficients(self, amplitudes: Complex) -> Real:
+        """Return the coefficients (..., n) of amplitudes (..., nk)."""
+        found = np.empty((*amplitudes.shape[:-1], self._size))
+        found[..., self._sines] = -amplitudes.imag
+        found[..., self._cosines] = amplitudes.real
+        return found
+
+    def turn(self, tau: float) -> Complex:
+        """Return e^{ikτ}, (nk,)."""
+        return np.asarray(np.exp(1j * tau * self.ks))
+
+
+class Sensitivities:
+    """Derivatives of the amplitude at points of one frequency response, by parameter paths.
+
+    Parameters
+    ----------
+    balance : of a frequency response.
+    paths : parameter paths of its scene; groups too.
+
+    Raises
+    ------
+    SettingError
+        The balance continues something else, or its contact forces come from samples; an unknown path, or one
+        that calls for even harmonics the balance left out.
+    """
+
+    def __init__(self, balance: Balance, paths: Sequence[str]) -> None:
+        if balance.parameter.kind is not Kind.FREQUENCY:
+            raise SettingError("balance", balance.parameter.path, "must continue in the frequency")
+        if balance.system.samples > 0:
+            raise SettingError("balance", balance.system.samples, "must have contact forces in closed form")
+        self.balance, self.paths = balance, tuple(paths)
+        self._parameters = resolved(balance, paths)
+        self._slopes, self._loads = contact_slopes(balance, self._parameters)
+        self._rows = self._rows_of_paths()
+        self._matrices = matrices_of_paths(balance, self._parameters)
+        self._dampings = modal_dampings(balance, self._parameters)
+        self._amplitudes = Amplitudes(balance)
+        self._workspace = Workspace.of(balance)
+        self._point = evaluation_by_value(self._workspace.point)
+        ne, nc, n = balance.system.laws.size, balance.n_ports, balance.n_coefficients
+        acts = np.any(self._slopes != 0.0, axis=(0, 2))
+        self._wanted = (acts & (balance.system.laws == COULOMB)).astype(np.int64)
+        self._others = np.flatnonzero(acts & (balance.system.laws != COULOMB))
+        self._x, self._tops = np.zeros(n), np.zeros((2, EXTREME_COLUMNS))
+        self._weights, self._pulls = np.zeros((2, nc, n)), np.zeros((2, nc * n))
+        self._by = np.zeros((2, ne * PER_ELEMENT + BESIDES))
+
+    def gradient(self, solution: Real, at_hz: float) -> Gradient:
+        """Return the amplitude and its derivatives at a solution.
+
+        Parameters
+        ----------
+        solution : (n_unknowns,) slip motions [m], converged.
+        at_hz : their frequency [Hz].
+
+        Where max x and −min x are the same, the derivatives are those of the one that leads onward.
+        """
+        found = self._slopes_of(np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz)
+        if not found:
+            nothing = np.full(len(self.paths), math.nan)
+            return Gradient(value=math.nan, by_frequency=math.nan, by_parameters=nothing)
+        by_frequency, by_parameters = found[0]
+        for other_frequency, other_parameters in found[1:]:
+            by_frequency = max(by_frequency, other_frequency)
+            by_parameters = np.maximum(by_parameters, other_parameters)
+        return Gradient(
+            value=float(self._tops[0, AMPLITUDE]), by_frequency=by_frequency * TWO_PI,
+            by_parameters=by_parameters,
+        )  # fmt: skip
+
+    def hessian(self, solution: Real, at_hz: float) -> AmplitudeHessian:
+        """Return the amplitude to second order in the frequency and all parameters.
+
+        Parameters
+        ----------
+        solution : (n_unknowns,) slip motions [m], converged.
+        at_hz : their frequency [Hz].
+
+        Rows and columns of a parameter are NaN where the amplitude has a kink by it (it breaks a symmetry in
+        which max x = −min x), and of a load or friction coefficient where that coefficient is 0.
+
+        Raises
+        ------
+        SettingError
+            A contact that is not elastic Coulomb friction under a given load, or paths of one load that
+            contradict each other.
+        """
+        system = self.balance.system
+        check_laws(self.balance.scene)
+        check_loads(system, self._parameters, self._slopes)
+        u, omega = np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz
+        found = self._slopes_of(u, omega)
+        if not found:
+            return no_hessian(len(self.paths))
+        try:
+            motion, contacts = (
+                whole_motion(system, self._matrices, self._dampings, omega),
+                contact_forces(system, u),
+            )
+        except (np.linalg.LinAlgError, FloatingPointError):
+            return no_hessian(len(self.paths))
+        turn = self._tops[0, SIGN] * self._amplitudes.turn(self._tops[0, TAU])
+        adjoint = Adjoint(w=self._weights[0].copy(), y=self._adjoint_motion(motion, 0), turn=turn)
+        along = self._directions()
+        responses = self._responses(u, omega, motion, contacts, along)
+        if responses is None:
+            return no_hessian(len(self.paths))
+        twice = lagrangian_hessian(self._amplitudes.ks, motion, contacts, along, responses, adjoint)
+        by_frequency, gradient = found[0]
+        for _, other in found[1:]:
+            kinks = np.flatnonzero(np.abs(other - gradient) > _KINK * np.abs(gradient).clip(np.abs(other)))
+            twice[kinks + 1], twice[:, kinks + 1] = math.nan, math.nan
+        return AmplitudeHessian(
+            value=float(self._tops[0, AMPLITUDE]), by_frequency=by_frequency * TWO_PI, gradient=gradient,
+            by_frequency_twice=float(twice[0, 0]) * TWO_PI**2, mixed=twice[0, 1:] * TWO_PI,
+            hessian=twice[1:, 1:],
+        )  # fmt: skip
+
+    def peak_hessian(self, solution: Real, at_hz: float) -> PeakHessian:
+        """Return a peak, where the amplitude is stationary in the frequency, to second order; as `hessian`.
+
+        Of a peak at an end of the band, which does not move, `hessian` is the answer.
+        """
+        return self.hessian(solution, at_hz).of_peak()
+
+    def _slopes_of(self, u: Real, omega: float) -> list[tuple[float, Real]]:
+        """Return the derivatives by ω and by the paths of each extreme that is max|x|; none if singular."""
+        count = amplitude_slopes(
+            self._workspace.system, self._workspace.linear, u, omega, self._workspace.point, self._wanted,
+            self._x, self._tops, self._weights, self._pulls, self._by,
+        )  # fmt: skip
+        return [self._one(u, omega, top) for top in range(count)]
+
+    def _directions(self) -> Directions:
+        """Return what ω and every path change."""
+        n_paths = len(self._parameters)
+        kinds = np.array([parameter.kind for parameter in self._parameters], dtype=np.int64)
+        level = np.where(kinds == Kind.LEVEL, 1.0 / _level(self.balance), 0.0)
+        phase = (kinds == Kind.FORCE_PHASE).astype(np.float64)
+        return Directions(
+            slopes=np.concatenate([np.zeros((1, *self._slopes.shape[1:])), self._slopes]),
+            loads=np.concatenate([np.zeros((1, *self._loads.shape[1:])), self._loads]),
+            level=np.append(0.0, level), phase=np.append(0.0, phase).reshape(n_paths + 1),
+        )  # fmt: skip
+
+    def _responses(
+        self, u: Real, omega: float, motion: WholeMotion, contacts: ContactForces, along: Directions
+    ) -> Responses | None:
+        """Return the derivatives of the solution along ω and every path; None where dr/du is singular.
+
+        With v_i = Z⁻¹ (f_i − Lᴴ ∂F/∂p_i − Z_i x) the slip motions obey dr/du U_i = L v_i.
+        """
+        workspace, amplitudes, shift = self._workspace, self._amplitudes, self.balance.system.shift[:, None]
+        if not math.isfinite(workspace.evaluate(u, omega)[0]):
+            return None
+        if factorise(workspace.system, workspace.linear, workspace.point, u, 0.0, 0.0) == 0.0:
+            return None
+        x = motion.solve(motion.forces - motion.pushed(amplitudes.of(contacts.F - shift * contacts.U)))
+        rates = along.level[:, None] + 1j * along.phase[:, None] * (amplitudes.ks > 0)
+        pushes = rates[:, :, None] * motion.forces
+        pushes -= motion.pushed(amplitudes.of(contacts.along(along.slopes, along.loads)))
+        pushes[0] -= times(motion.by_omega, x)
+        for i, (by_q, _) in motion.by_structure.items():
+            pushes[i + 1] -= times(by_q, x)
+        v = motion.solve(pushes)
+        dU = amplitudes.coefficients(motion.relative(v))
+        for row in dU.reshape(len(dU), u.size):
+            step_back(workspace.system, workspace.point, row)
+        dF = np.einsum("cij,pcj->pci", contacts.dF_dU, dU) - shift * dU
+        return Responses(x=x, dx=v - motion.solve(motion.pushed(amplitudes.of(dF))), dU=dU)
+
+    def _one(self, u: Real, omega: float, top: int) -> tuple[float, Real]:
+        """Return the derivatives of one extreme by ω and by the paths."""
+        by = self._by[top]
+        slopes = self._rows @ by
+        for e in self._others:
+            self._add_other_law(int(e), u, self._weights[top], slopes)
+        if self._matrices is not None or self._dampings:
+            self._add_structure(u, omega, top, slopes)
+        return float(by[self.balance.system.laws.size * PER_ELEMENT + BY_OMEGA]), slopes
+
+    def _rows_of_paths(self) -> Real:
+        """Return what each path takes of the derivatives the kernel gives, (n_paths, ·)."""
+        system, ne = self.balance.system, self.balance.system.laws.size
+        rows = np.zeros((len(self._parameters), ne * PER_ELEMENT + BESIDES))
+        parts = rows[:, : ne * PER_ELEMENT].reshape(len(rows), ne, PER_ELEMENT)
+        plain = system.laws == COULOMB
+        parts[:, plain, BY_KT] = self._slopes[:, plain, KT]
+        parts[:, plain, BY_MU] = self._slopes[:, plain, MU]
+        parts[:, plain, BY_LOAD:] = self._loads[:, plain]
+        for row, parameter in zip(rows, self._parameters, strict=True):
+            if parameter.kind is Kind.LEVEL:
+                row[ne * PER_ELEMENT + BY_LEVEL] = 1.0 / _level(self.balance)
+            elif parameter.kind is Kind.FORCE_PHASE:
+                row[ne * PER_ELEMENT + BY_PHASE] = 1.0
+        return rows
+
+    def _add_other_law(self, e: int, u: Real, weights: Real, slopes: Real) -> None:
+        """Add w·∂F/∂p of an element that follows another law: its force once for each path that acts."""
+        system, n, point = self.balance.system, self.balance.n_coefficients, self._point
+        begin, end = int(system.first_port[e]), int(system.first_port[e + 1])
+        blocks = slice(int(system.first_block[e]), int(system.first_block[e + 1]))
+        row = np.ascontiguousarray(system.contacts[e])
+        cosine, sine = math.cos(row[PHASE]), math.sin(row[PHASE])
+        load = np.array([row[N0], row[N1] * cosine, -row[N1] * sine])
+        for i in np.flatnonzero(np.any(self._slopes[:, e] != 0.0, axis=1)):
+            law_force(
+                system.laws[e], u[begin * n : end * n].reshape(-1, n), system.ks, load, system.load_ks, row,
+                self._slopes[i, e], self._loads[i, e], system.cos_table, system.sin_table,
+                point.segments, point.F[begin:end], point.dF_dU[blocks], point.dF_dp[begin:end],
+            )  # fmt: skip
+            slopes[i] += float(np.sum(weights[begin:end] * point.dF_dp[begin:end]))
+
+    def _add_structure(self, u: Real, omega: float, top: int, slopes: Real) -> None:
+        """Add −Re yᵀ (∂Z/∂q) x of every harmonic."""
+        try:
+            motion = whole_motion(self.balance.system, self._matrices, self._dampings, omega)
+        except np.linalg.LinAlgError:
+            slopes[[p.kind is Kind.STRUCTURE for p in self._parameters]] = math.nan
+            return
+        shifted = self._point.F - self.balance.system.shift[:, None] * u.reshape(self._weights[top].shape)
+        x = motion.solve(motion.forces - motion.pushed(self._amplitudes.of(shifted)))
+        y = self._adjoint_motion(motion, top)
+        for i, (by_q, _) in motion.by_structure.items():
+            slopes[i] -= np.vdot(y.conj(), times(by_q, x)).real
+
+    def _adjoint_motion(self, motion: WholeMotion, top: int) -> Complex:
+        """Return y = Z⁻ᵀ η, η the weights of the motion in the amplitude and the balance."""
+        pulls = self._amplitudes.of(self._pulls[top].reshape(self._weights[top].shape)).conj()
+        turn = self._tops[top, SIGN] * self._amplitudes.turn(self._tops[top, TAU])
+        return motion.solve_transposed(motion.seen(turn, pulls))
+
+
+def _level(balance: Balance) -> float:
+    """Return the excitation amplitude that all forces are in proportion to."""
+    return balance.scene.value("excitation.amplitude") or 1.0

@@ -1,0 +1,241 @@
+"""The exact Hessian of the amplitude at a point of a frequency response, and of a peak.
+
+With the Lagrangian L = ξ x(τ) + λᵀ r of `solver.sensitivity.kernels.adjoint`, stationary in u and τ, the
+amplitude has the second derivatives of L along the directions v_i = (du/dP_i, e_i, dτ/dP_i), P = (ω, p_1, …):
+
+    H_ij = −Re yᵀ (Z_i x_j + Z_j x_i + Z_ij x − f_ij) + w·F_ij − q_i q_j / (ξ x''(τ)),
+
+with the whole motion x = Z⁻¹ φ of every harmonic, its derivatives x_i along v_i, the adjoint motion y, the
+weights w of the forces, w·F_ij their second derivative along v_i and v_j, and q_i = ξ dx'(τ)/dP_i. Where the
+amplitude is stationary in ω the peak A(p) has the Hessian H_pp − H_pω H_ωp/H_ωω, and ω* drifts by −H_pω/H_ωω.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from solver.balance.contact_hessian import ContactForces, second_forces, second_loads
+from solver.balance.dynamic_stiffness import WholeMotion, times, times_transposed
+from solver.contacts.kernels.system import KT, MU
+from solver.jit.fourier import Complex, Integer, Real
+from solver.results.base import Piece
+
+STATIONARY = 1e-10  # largest share of a peak's height that a solution may lie below it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class PeakHessian(Piece):
+    """A peak that moves with its parameters, to second order.
+
+    Drift and Hessian are NaN where the peak is not a smooth maximum over the frequency: at a kink (a contact
+    changes state there), at an end of the band, or where the solution is not at the peak.
+
+    Attributes
+    ----------
+    value : float
+        max|x| at the peak [m].
+    gradient : (n,) array
+        d peak / dp [m per unit].
+    drift : (n,) array
+        d frequency / dp [Hz per unit].
+    hessian : (n, n) array
+        d² peak / dp² [m per both units].
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"value": "m"}
+
+    value: float
+    gradient: Real
+    drift: Real
+    hessian: Real
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class EdgeHessian(Piece):
+    """A band edge, where the amplitude equals a limit, to second order.
+
+    Attributes
+    ----------
+    gradient : (n,) array
+        d frequency / dp [Hz per unit].
+    hessian : (n, n) array
+        d² frequency / dp² [Hz per both units].
+    """
+
+    gradient: Real
+    hessian: Real
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class AmplitudeHessian(Piece):
+    """The amplitude at a solution to second order in frequency and parameters; NaN where it has no such.
+
+    Attributes
+    ----------
+    value : float
+        max|x| of the observed DOF [m].
+    by_frequency : float
+        [m/Hz].
+    gradient : (n,) array
+        At a fixed frequency [m per unit].
+    by_frequency_twice : float
+        [m/Hz²].
+    mixed : (n,) array
+        By the frequency and each parameter [m/Hz per unit].
+    hessian : (n, n) array
+        At a fixed frequency, that of a peak at an end of the band [m per both units].
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"value": "m", "by_frequency": "m/Hz", "by_frequency_twice": "m/Hz²"}
+
+    value: float
+    by_frequency: float
+    gradient: Real
+    by_frequency_twice: float
+    mixed: Real
+    hessian: Real
+
+    def of_peak(self) -> PeakHessian:
+        """Return the same of the peak, where the amplitude is stationary in the frequency."""
+        bend, drift = self.by_frequency_twice, np.full(self.mixed.shape, math.nan)
+        # What a step to the stationary point would still gain; at a kink the slope does not vanish.
+        if bend < 0.0 and self.by_frequency**2 <= -2.0 * bend * STATIONARY * self.value:
+            drift = -self.mixed / bend
+        return PeakHessian(
+            value=self.value, gradient=self.gradient, drift=drift,
+            hessian=self.hessian + np.outer(self.mixed, drift),
+        )  # fmt: skip
+
+    def of_edge(self, dlimit: Real | None = None, ddlimit: Real | None = None) -> EdgeHessian:
+        """Return the same of the frequency where the amplitude equals a limit, from a(ω(p), p) = limit(p).
+
+        Parameters
+        ----------
+        dlimit, ddlimit : (n,), (n, n) derivatives of the limit by the parameters; it is fixed if left out.
+        """
+        if self.by_frequency == 0.0:
+            return EdgeHessian(gradient=self.gradient * math.nan, hessian=self.hessian * math.nan)
+        first = (0.0 if dlimit is None else dlimit) - self.gradient
+        gradient = first / self.by_frequency
+        both = np.outer(self.mixed, gradient)
+        moved = both + both.T + self.by_frequency_twice * np.outer(gradient, gradient)
+        second = (0.0 if ddlimit is None else ddlimit) - self.hessian - moved
+        return EdgeHessian(gradient=gradient, hessian=second / self.by_frequency)
+
+
+def no_hessian(n: int) -> AmplitudeHessian:
+    """Return NaN for `n` parameters, where the balance is singular."""
+    nothing = np.full(n, math.nan)
+    return AmplitudeHessian(
+        value=math.nan, by_frequency=math.nan, gradient=nothing, by_frequency_twice=math.nan, mixed=nothing,
+        hessian=np.full((n, n), math.nan),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Directions:
+    """What each of P parameters changes; the first is ω, the others are paths.
+
+    Attributes
+    ----------
+    slopes, loads : (P, nc, COLUMNS), (P, nc, 3) array
+        Derivatives of the contact table and of the loads.
+    level, phase : (P,) array
+        Relative change of all forces, and turn of all that are not static [rad].
+    """
+
+    slopes: Real
+    loads: Real
+    level: Real
+    phase: Real
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Responses:
+    """The solution and its derivatives along each of P parameters.
+
+    Attributes
+    ----------
+    x : (nk, N) array
+        The whole motion of each harmonic.
+    dx : (P, nk, N) array
+        Its derivatives.
+    dU : (P, nc, n) array
+        Those of the slip motions [m].
+    """
+
+    x: Complex
+    dx: Complex
+    dU: Real
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Adjoint:
+    """What the amplitude weighs: the weights of the contact forces, and the adjoint motion of each harmonic.
+
+    Attributes
+    ----------
+    w : (nc, n) array
+    y : (nk, N) array
+    turn : (nk,) array
+        ξ e^{ikτ} at the extremum.
+    """
+
+    w: Real
+    y: Complex
+    turn: Complex
+
+
+def lagrangian_hessian(
+    ks: Integer,
+    motion: WholeMotion,
+    contacts: ContactForces,
+    along: Directions,
+    found: Responses,
+    adjoint: Adjoint,
+) -> Real:
+    """Return the second derivatives of the amplitude by ω and the paths, (P, P), inside units."""
+    y, x = adjoint.y, found.x
+    pulled = np.zeros(found.dx.shape, np.complex128)
+    pulled[0] = times_transposed(motion.by_omega, y)
+    for i, (by_q, _) in motion.by_structure.items():
+        pulled[i + 1] = times_transposed(by_q, y)
+    hessian = -np.einsum("ikn,jkn->ij", pulled, found.dx).real
+    hessian += hessian.T
+    hessian[0, 0] -= _dot(y, times(motion.by_omega_twice, x))
+    for i, (_, by_both) in motion.by_structure.items():
+        both = _dot(y, times(by_both, x))
+        hessian[0, i + 1] -= both
+        hessian[i + 1, 0] -= both
+    twice = second_forces(ks, motion.forces, along.level, along.phase)
+    hessian += np.einsum("kn,ijkn->ij", y, twice).real
+    hessian += _of_contacts(contacts, along, found.dU, adjoint.w)
+    moved = np.einsum("k,kn,ikn->ik", adjoint.turn, motion.observe, found.dx)
+    bend = -(ks**2 * adjoint.turn * np.einsum("kn,kn->k", motion.observe, x)).sum().real
+    q = (1j * ks * moved).sum(axis=1).real
+    hessian -= np.outer(q, q) / bend if bend != 0.0 else 0.0
+    return np.asarray(0.5 * (hessian + hessian.T))
+
+
+def _dot(y: Complex, x: Complex) -> float:
+    """Return Re yᵀ x over all harmonics."""
+    return float(np.einsum("kn,kn->", y, x).real)
+
+
+def _of_contacts(contacts: ContactForces, along: Directions, dU: Real, w: Real) -> Real:
+    """Return w·F_ij of all contacts along the directions."""
+    total = np.einsum("cn,cnm,ijcm->ij", w, contacts.dF_dN, second_loads(contacts.system, along.slopes))
+    for c in range(w.shape[0]):
+        numbers = along.slopes[:, c, [KT, MU]]
+        for i in range(dU.shape[0]):
+            by_U, by_N, by_numbers = contacts.second(c, w[c], dU[i, c], along.loads[i, c], *numbers[i])
+            total[i] += dU[:, c] @ by_U + along.loads[:, c] @ by_N
+            for column in range(2):
+                acts = numbers[:, column] != 0.0
+                total[i, acts] += by_numbers[column] * numbers[acts, column]
+    return np.asarray(total)

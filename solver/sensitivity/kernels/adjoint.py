@@ -1,0 +1,194 @@
+"""The derivatives of an amplitude by everything at once: one factorisation, one adjoint, then dot products.
+
+The amplitude is a = ξ x(τ*) at an extremum of the observed motion. With the adjoint λ of the balance,
+(I + A G)ᵀ λ = −Gᵀ z, z = −ξ Bᵀ e(τ*), G = ∂F/∂U − shift, the weights w = z + Aᵀ λ of the contact forces solve
+
+    (I + Aᵀ Gᵀ) w = z,   λ = −Gᵀ w,
+
+a balance's Jacobian again, with A and G transposed: it condenses as `solver.balance.kernels.jacobian` does.
+Then da/dp = w·∂F/∂p for a contact, and ξ e·∂x_linear + λ·(∂A F − ∂ū) − ξ e·∂B F for the linear part. Of real
+coefficients, the transpose of a complex factor a is its conjugate.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.balance.kernels.jacobian import factorise, step_back
+from solver.balance.kernels.output import SAME_HEIGHT, extremes, observed_motion
+from solver.balance.kernels.residual import contact_values, evaluate
+from solver.contacts.kernels.columns import COULOMB
+from solver.contacts.kernels.coulomb import contact_force
+from solver.contacts.kernels.stick_slip_events import FAILED
+from solver.contacts.kernels.system import KT, LOAD_COEFFICIENTS, MU, Evaluation, Receptance, System
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Integer, Real, coefficient_count, cosine_position
+from solver.jit.separate import apart
+from solver.linear.kernels.receptance import receptance
+
+# Entries of `by`: for each element the slopes by kt, mu and its load, then those of the linear part.
+BY_KT, BY_MU, BY_LOAD, PER_ELEMENT = 0, 1, 2, 5
+BY_OMEGA, BY_LEVEL, BY_PHASE, BESIDES = 0, 1, 2, 3
+# Columns of the extremes.
+AMPLITUDE, SIGN, TAU, EXTREME_COLUMNS = 0, 1, 2, 3
+
+
+@apart
+def amplitude_slopes(
+    system: System, linear: Receptance, u: Real, omega: float, point: Evaluation, wanted: Integer, x: Real,
+    tops: Real, weights: Real, pulls: Real, by: Real,
+) -> int:  # fmt: skip
+    """Differentiate max|x| of the observed DOF at the solution (u, ω); λ of `system` is the frequency.
+
+    Parameters
+    ----------
+    wanted : (ne,) 1 for the elastic Coulomb contacts whose slopes are asked for.
+    x : (n,) the observed motion; tops : (2, EXTREME_COLUMNS) the extremes that are max|x|; filled, as below.
+    weights : (2, nc, n) w; pulls : (2, nt) λ.
+    by : (2, ne·PER_ELEMENT + BESIDES) derivatives; those by level and phase are of a unit factor on all
+        forces, and of the angle by which all that are not static turn.
+
+    Returns
+    -------
+    How many extremes are max|x|: 2 where max x = −min x but for rounding; 0 where the balance is singular.
+    """
+    receptance(system, omega, linear)
+    if not math.isfinite(evaluate(system, linear, u, omega, 0.0, point)):
+        return 0
+    observed_motion(system, linear, u, point, x)
+    high, at_high, low, at_low = extremes(system, x)
+    tops[0, AMPLITUDE], tops[0, SIGN], tops[0, TAU] = high, 1.0, at_high
+    tops[1, AMPLITUDE], tops[1, SIGN], tops[1, TAU] = -low, -1.0, at_low
+    # Without a mean and even harmonics both extremes are the same by symmetry.
+    both = system.ks[0] == 0 and abs(high + low) <= SAME_HEIGHT * max(high, -low)
+    if not both and -low > high:
+        for column in range(EXTREME_COLUMNS):
+            tops[0, column], tops[1, column] = tops[1, column], tops[0, column]
+    _transpose(system, linear, point)
+    if factorise(system, linear, point, u, 0.0, 0.0) == 0.0:
+        return 0
+    count = 2 if both else 1
+    for top in range(count):
+        _fill_weights(system, linear, tops[top, SIGN], tops[top, TAU], pulls[top])
+        step_back(system, point, pulls[top])
+        _fill_pull(system, point, weights[top], pulls[top])
+        _by_linear_part(system, linear, u, point, tops[top], pulls[top], by[top])
+    _by_contacts(system, u, omega, point, wanted, count, weights, by)
+    return count
+
+
+@apart
+def _transpose(system: System, linear: Receptance, point: Evaluation) -> None:
+    """Transpose A and ∂F/∂U in place."""
+    for i in range(system.ks.size):
+        A = linear.A[0, i]
+        for c in range(A.shape[0]):
+            for d in range(c + 1):
+                A[c, d], A[d, c] = A[d, c].conjugate(), A[c, d].conjugate()
+    n = coefficient_count(system.ks)
+    for e in range(system.laws.size):
+        first, m = system.first_block[e], system.first_port[e + 1] - system.first_port[e]
+        for a in range(m):
+            for b in range(a + 1):
+                one, other = point.dF_dU[first + a * m + b], point.dF_dU[first + b * m + a]
+                for i in range(n):
+                    for j in range(i + 1 if a == b else n):
+                        one[i, j], other[j, i] = other[j, i], one[i, j]
+
+
+@compiled
+def _fill_weights(system: System, linear: Receptance, sign: float, tau: float, z: Real) -> None:
+    """Fill z (nt,) with −ξ Bᵀ e(τ)."""
+    n = coefficient_count(system.ks)
+    for i in range(system.ks.size):
+        here, k = cosine_position(system.ks, i), system.ks[i]
+        turn = sign * complex(math.cos(k * tau), math.sin(k * tau))
+        for d in range(system.owner.size):
+            weight = -turn * linear.B[0, i, d]
+            z[d * n + here] = weight.real
+            if k > 0:
+                z[d * n + here + 1] = weight.imag
+
+
+@compiled
+def _fill_pull(system: System, point: Evaluation, weights: Real, pull: Real) -> None:
+    """Keep the solution in `pull` as w and replace it by λ = −Gᵀ w; `point.G` is transposed already."""
+    n = coefficient_count(system.ks)
+    for c in range(system.owner.size):
+        for i in range(n):
+            weights[c, i] = pull[c * n + i]
+    for e in range(system.laws.size):
+        first, m = system.first_port[e], system.first_port[e + 1] - system.first_port[e]
+        for a in range(m):
+            for i in range(n):
+                total = 0.0
+                for b in range(m):
+                    G = point.G[system.first_block[e] + a * m + b]
+                    for j in range(n):
+                        total -= G[i, j] * weights[first + b, j]
+                pull[(first + a) * n + i] = total
+
+
+@apart
+def _by_linear_part(
+    system: System, linear: Receptance, u: Real, point: Evaluation, top: Real, pull: Real, by: Real
+) -> None:
+    """Fill the slopes by ω, and by level and phase of the excitation."""
+    nc, n = system.owner.size, coefficient_count(system.ks)
+    sign, tau = top[SIGN], top[TAU]
+    by_omega, level, phase = 0.0, 0.0, 0.0
+    for i in range(system.ks.size):
+        here, k = cosine_position(system.ks, i), system.ks[i]
+        turn = sign * complex(math.cos(k * tau), math.sin(k * tau))
+        driven = turn * linear.x_linear[0, i]
+        by_omega += (turn * linear.x_linear[1, i]).real
+        for c in range(nc):
+            at = c * n + here
+            lam = complex(pull[at], pull[at + 1] if k > 0 else 0.0)
+            driven -= lam * linear.u_linear[0, i, c]
+            by_omega -= (lam * linear.u_linear[1, i, c]).real
+        for d in range(nc):
+            weight = -turn * linear.B[1, i, d]
+            for c in range(nc):
+                at = c * n + here
+                weight += complex(pull[at], pull[at + 1] if k > 0 else 0.0) * linear.A[1, i, c, d]
+            at = d * n + here
+            by_omega += weight.real * (point.F[d, here] - system.shift[d] * u[at])
+            if k > 0:
+                by_omega += weight.imag * (point.F[d, here + 1] - system.shift[d] * u[at + 1])
+        level += driven.real
+        if k > 0:
+            phase -= driven.imag
+    first = system.laws.size * PER_ELEMENT
+    by[first + BY_OMEGA], by[first + BY_LEVEL], by[first + BY_PHASE] = by_omega, level, phase
+
+
+@apart
+def _by_contacts(
+    system: System, u: Real, omega: float, point: Evaluation, wanted: Integer, count: int, weights: Real,
+    by: Real,
+) -> None:  # fmt: skip
+    """Fill w·∂F/∂kt, w·∂F/∂mu and w·∂F/∂N of the elastic Coulomb contacts asked for."""
+    n = coefficient_count(system.ks)
+    table, load, _, _ = contact_values(system, omega, 0.0)
+    for e in range(system.laws.size):
+        if wanted[e] == 0 or system.laws[e] != COULOMB:
+            continue
+        c, block = system.first_port[e], system.first_block[e]
+        state, _ = contact_force(
+            u[c * n : (c + 1) * n], system.ks, load[e], system.load_ks, table[e, KT], table[e, MU],
+            system.cos_table, system.sin_table, point.segments, point.dF_dU[block], point.dF_dkt,
+            point.dF_dmu, point.dF_dN, point.F[c],
+        )  # fmt: skip
+        for top in range(count):
+            row = by[top, e * PER_ELEMENT : (e + 1) * PER_ELEMENT]
+            for column in range(PER_ELEMENT):
+                row[column] = np.nan if state == FAILED else 0.0
+            for i in range(n):
+                weight = weights[top, c, i]
+                row[BY_KT] += weight * point.dF_dkt[i]
+                row[BY_MU] += weight * point.dF_dmu[i]
+                for j in range(LOAD_COEFFICIENTS):
+                    row[BY_LOAD + j] += weight * point.dF_dN[i, j]

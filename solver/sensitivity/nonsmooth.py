@@ -1,0 +1,104 @@
+"""The derivative of a peak by parameters, also where its top is a corner.
+
+At a smooth maximum over the frequency the slope by ω is 0, so the derivative by a parameter is the partial
+one (envelope theorem). Where a contact changes its state at the very top, two smooth pieces meet there at
+ω_k(p), a⁻ rising and a⁺ falling: a⁻(ω_k(p), p) = a⁺(ω_k(p), p) gives
+
+    dω_k/dp = −(a⁺_p − a⁻_p)/(a⁺_ω − a⁻_ω),   dA/dp = a⁻_p + a⁻_ω dω_k/dp.
+
+A partial derivative of either side alone may be far off. Both sides are taken at solutions beside the corner,
+at two distances, and extrapolated to it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import ClassVar
+
+import numpy as np
+
+from solver.balance.workspace import Workspace
+from solver.continuation.branch import Peak
+from solver.jit.fourier import Real
+from solver.results.base import Piece
+from solver.sensitivity.gradient import Gradient, Sensitivities
+
+SMOOTH = 1e-6  # slope da/dω · ω/a below which a peak is a smooth maximum
+BESIDE = 1e-6  # distance of the nearer solutions from a corner, relative to its frequency
+FAR = 1e-2  # relative change of the motion beyond which a solution beside lies on another branch
+
+
+class PeakKind(Enum):
+    """What a peak is over the frequency; the value is a sentence about its derivative."""
+
+    SMOOTH = "A smooth maximum: the derivative is that at a fixed frequency."
+    END = "An end of the band: the derivative is that at this frequency."
+    CORNER = "A contact changes its state at the top: the derivative is that of the corner."
+    UNRESOLVED = (
+        "The solution is not at a maximum, or nothing was found beside it: the derivative is that at a fixed "
+        "frequency."
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class PeakGradient(Piece):
+    """The derivatives of a peak.
+
+    Attributes
+    ----------
+    value : float
+        max|x| at the peak [m].
+    gradient : (n_paths,) array
+        d peak / dp [m per unit]; NaN where the balance is singular.
+    kind : PeakKind
+        What the derivative is.
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"value": "m"}
+
+    value: float
+    gradient: Real
+    kind: PeakKind
+
+
+def peak_gradient(sensitivities: Sensitivities, peak: Peak) -> PeakGradient:
+    """Return the derivatives of a peak of the response that `sensitivities` belongs to.
+
+    Parameters
+    ----------
+    sensitivities : of the balance and the paths.
+    peak : one of the branch, as `solver.sweep` returns them.
+    """
+    here = sensitivities.gradient(peak.solution, peak.at)
+    kind, gradient = PeakKind.UNRESOLVED, here.by_parameters
+    if not peak.interior:
+        kind = PeakKind.END
+    elif abs(here.by_frequency) * peak.at <= SMOOTH * here.value:
+        kind = PeakKind.SMOOTH
+    elif math.isfinite(here.by_frequency):
+        near, far = (_across(sensitivities, peak, share * BESIDE) for share in (1.0, 2.0))
+        if near is not None and far is not None:
+            kind, gradient = PeakKind.CORNER, 2.0 * near - far
+    return PeakGradient(value=here.value, gradient=gradient, kind=kind)
+
+
+def _across(sensitivities: Sensitivities, peak: Peak, distance: float) -> Real | None:
+    """Return the derivatives of a corner from solutions at a relative distance on both sides."""
+    left, right = (_beside(sensitivities, peak, way * distance) for way in (-1.0, 1.0))
+    if left is None or right is None or not left.by_frequency > 0.0 > right.by_frequency:
+        return None
+    drift = -(right.by_parameters - left.by_parameters) / (right.by_frequency - left.by_frequency)
+    return np.asarray(left.by_parameters + left.by_frequency * drift)
+
+
+def _beside(sensitivities: Sensitivities, peak: Peak, distance: float) -> Gradient | None:
+    """Return the gradient at the solution beside a peak; None if there is none on the same branch."""
+    at_hz = peak.at * (1.0 + distance)
+    found = Workspace.of(sensitivities.balance).solve(2.0 * math.pi * at_hz, peak.solution)
+    change = np.abs(found.u - peak.solution).max(initial=0.0)
+    if not found.converged or change > FAR * np.abs(peak.solution).max(initial=0.0):
+        return None
+    return sensitivities.gradient(found.u, at_hz)

@@ -1,0 +1,1 @@
+"""Studies of a scene: plan, response map, mistuning, what accuracy costs."""

@@ -1,0 +1,311 @@
+"""Mistuned disks: blades that are not quite equal, and how much more the worst of them moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.branches.observation import observing
+from solver.branches.sweep import sweep
+from solver.contacts.kernels.stick_slip_events import largest
+from solver.continuation.branch import Branch, BranchStatus
+from solver.continuation.settings import ContinuationSettings
+from solver.errors import SettingError
+from solver.jit import fourier
+from solver.jit.fourier import Real
+from solver.jit.trig_polynomial import grid_size, grid_tables, on_grid
+from solver.response.solve import Solution
+from solver.response.time_history import motion
+from solver.results.base import Shown, Summary
+from solver.scene.annulus import annulus, sectors_needed
+from solver.scene.scene import CyclicStructure, Observe, Scene
+from solver.scene.validation import listing, nearest
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.results.dataset import Dataset
+    from solver.views.plots.style import Into
+
+_OF_THE_SWEEP = 0.4  # share of the time; the rest looks for the peaks of the other blades
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class BladeAmplitudes(Shown):
+    """The motion of one DOF in every sector.
+
+    Attributes
+    ----------
+    dof : str
+        Its name in one sector.
+    max_abs, half_peak_to_peak : (sectors,) array
+        Over the period [m].
+    """
+
+    dof: str
+    max_abs: Real
+    half_peak_to_peak: Real
+
+    @property
+    def largest(self) -> float:
+        """Largest max|x| of all blades [m]."""
+        return float(self.max_abs.max())
+
+    @property
+    def worst(self) -> int:
+        """The sector that has it."""
+        return int(self.max_abs.argmax())
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.views.summary import of_amplitudes
+
+        return of_amplitudes(self)
+
+    def to_dataset(self) -> Dataset:
+        """A sector a row."""
+        from solver.views.to_dataset import amplitudes_dataset
+
+        return amplitudes_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the amplitude of every blade; `ax`: axes to draw into, else a new figure."""
+        from solver.views.plots.disks import blades_figure
+
+        return blades_figure(self.max_abs, f"max |{self.dof}|", ax=ax)
+
+    def magnification(self, tuned: Solution | BladeAmplitudes) -> float:
+        """Largest amplitude relative to that of another disk, usually the tuned one."""
+        return self.largest / (tuned.largest if isinstance(tuned, BladeAmplitudes) else tuned.max_abs)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class BladePeaks(Shown):
+    """The highest peak of one DOF in every sector over a range of the frequency.
+
+    Attributes
+    ----------
+    dof : str
+        Its name in one sector.
+    value : (sectors,) array
+        Largest max|x| [m]; NaN where the branch did not reach the end of the range.
+    at_hz : (sectors,) array
+        Where [Hz].
+    status : tuple of BranchStatus
+        How each sector's branch ended.
+    branches : tuple of Branch
+        The response of each blade, the same one where all are alike; without those that were not reached.
+    """
+
+    dof: str
+    value: Real
+    at_hz: Real
+    status: tuple[BranchStatus, ...]
+    branches: tuple[Branch, ...]
+
+    @property
+    def largest(self) -> float:
+        """Highest peak of all blades [m]; NaN if one is not known."""
+        return float(self.value.max())
+
+    @property
+    def worst(self) -> int:
+        """The sector that has it."""
+        return int(self.value.argmax())
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.views.summary import of_blade_peaks
+
+        return of_blade_peaks(self)
+
+    def to_dataset(self) -> Dataset:
+        """A sector a row."""
+        from solver.views.to_dataset import blade_peaks_dataset
+
+        return blade_peaks_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the highest peak of every blade; `ax`: axes to draw into, else a new figure."""
+        from solver.views.plots.disks import blades_figure
+
+        return blades_figure(self.value, f"highest peak, max |{self.dof}|", ax=ax)
+
+    def magnification(self, tuned: BladePeaks) -> float:
+        """The amplitude magnification factor: the highest peak relative to that of the tuned disk."""
+        return self.largest / tuned.largest
+
+
+def blade_peaks(
+    scene: Scene,
+    start: float | None = None,
+    stop: float | None = None,
+    *,
+    dof: str | None = None,
+    harmonics: int = 11,
+    settings: ContinuationSettings | None = None,
+    on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> BladePeaks:
+    """Return the highest peak of every blade, all from one sweep of the frequency.
+
+    Parameters
+    ----------
+    scene : an annulus, or a cyclic scene.
+    start, stop : the range [Hz], the scene's band if left out.
+    dof : name of the DOF in one sector; the observed one if left out.
+    harmonics : highest harmonic kept.
+    settings : of the continuation.
+    on_progress : called with (share done, blades so far).
+    should_stop : asked between stretches of the sweep and between blades.
+
+    Raises
+    ------
+    SettingError
+        No sector has such a DOF, or a bad range or number of harmonics.
+    """
+    name = scene.observe.dof.partition("@")[0] if dof is None else dof
+    structure = scene.structure
+    names, repeats = [scene.structure.dofs[i] for i in _rows(scene, name)], 1
+    if isinstance(structure, CyclicStructure):
+        names, repeats = [name], structure.sectors
+        if sectors_needed(_observing(scene, name)).sectors > 1:
+            names, repeats = [f"{name}@{j}" for j in range(structure.sectors)], 1
+
+    def progress(share: float, _points: int) -> None:
+        if on_progress is not None:
+            on_progress(share if len(names) == 1 else _OF_THE_SWEEP * share, 0)
+
+    branch = sweep(
+        _observing(scene, names[0]), start=start, stop=stop, harmonics=harmonics, settings=settings,
+        on_progress=progress, should_stop=should_stop,
+    )  # fmt: skip
+    branches = [branch] * repeats
+    for done, each in enumerate(names[1:], 1):
+        if should_stop is not None and should_stop():
+            break
+        # Every blade moves in the same solutions.
+        branches.append(observing(branch, each))
+        if on_progress is not None:
+            on_progress(_OF_THE_SWEEP + (1.0 - _OF_THE_SWEEP) * (done + 1.0) / len(names), done)
+    missing = len(names) * repeats - len(branches)
+    known = [each.peak if each.completed else None for each in branches] + [None] * missing
+    return BladePeaks(
+        dof=name,
+        value=np.array([math.nan if peak is None else peak.value for peak in known]),
+        at_hz=np.array([math.nan if peak is None else peak.at for peak in known]),
+        status=tuple(each.status for each in branches) + (BranchStatus.STOPPED,) * missing,
+        branches=tuple(branches),
+    )
+
+
+def _observing(scene: Scene, dof: str) -> Scene:
+    return scene.model_copy(update={"observe": Observe(dof=dof, band=scene.observe.band)})
+
+
+def mistuned(
+    scene: Scene,
+    *,
+    of: str | Sequence[str],
+    spread: float = 0.02,
+    seed: int = 1,
+    values: Sequence[float] | None = None,
+) -> Scene:
+    """Write a cyclic scene out as an annulus whose blades are not quite equal.
+
+    Sector j has the parts in `of` multiplied by its factor. The same as ``[structure.mistuning]`` in a scene
+    file, which `solve` and `sweep` write out by themselves.
+
+    Parameters
+    ----------
+    scene : a cyclic scene; mistuning that it has is replaced.
+    of : names of springs (k), dashpots (c) and masses, or DOFs (their mass).
+    spread : standard deviation of the factors 1 + spread z, with independent normal z.
+    seed : of the random numbers (numpy's Generator with PCG64), so that a disk can be had again.
+    values : the factors themselves, one for each sector, instead of `spread` and `seed`.
+
+    Raises
+    ------
+    SettingError
+        The scene is not cyclic.
+    SceneError
+        A part that does not exist, factors that are not one for each sector or not above 0.
+    """
+    table: dict[str, object] = {"of": [of] if isinstance(of, str) else list(of)}
+    table |= {"spread": spread, "seed": seed} if values is None else {"values": list(values)}
+    return annulus(with_mistuning(scene, table))
+
+
+def with_mistuning(scene: Scene, table: Mapping[str, object]) -> Scene:
+    """Return a cyclic scene with another ``[structure.mistuning]``, one sector still.
+
+    Raises
+    ------
+    SettingError
+        The scene is not cyclic.
+    SceneError
+        A part that does not exist, or values that do not fit.
+    """
+    if not isinstance(scene.structure, CyclicStructure):
+        raise SettingError("scene", scene.name, "must have a cyclic structure to be mistuned")
+    raw = scene.to_dict()
+    raw["structure"] = {
+        **scene.structure.model_dump(mode="json", exclude_none=True),
+        "mistuning": dict(table),
+    }
+    return Scene.from_dict(raw)
+
+
+def blade_amplitudes(solution: Solution, dof: str | None = None) -> BladeAmplitudes:
+    """Return the amplitudes of a DOF in every sector.
+
+    Parameters
+    ----------
+    solution : of an annulus, mistuned or not, or of the one sector that stands for all.
+    dof : name of the DOF in one sector; the observed one if left out.
+
+    Raises
+    ------
+    SettingError
+        The solution did not converge, or no sector has such a DOF.
+    """
+    name = solution.scene.observe.dof.partition("@")[0] if dof is None else dof
+    rows = _rows(solution.scene, name)
+    moves = motion(solution)
+    ranges = np.array([_extremes(moves[row]) for row in rows])
+    return BladeAmplitudes(
+        dof=name,
+        max_abs=np.abs(ranges).max(axis=1),
+        half_peak_to_peak=0.5 * (ranges[:, 0] - ranges[:, 1]),
+    )
+
+
+def _rows(scene: Scene, name: str) -> list[int]:
+    """Index of a DOF in each sector; in a cyclic scene the same one again and again."""
+    dofs, structure = scene.structure.dofs, scene.structure
+    if isinstance(structure, CyclicStructure):
+        rows = [dofs.index(name)] * structure.sectors if name in dofs else []
+    else:
+        rows = [i for i, each in enumerate(dofs) if name != each and name == each.partition("@")[0]]
+    if not rows:
+        known = tuple(dict.fromkeys(each.partition("@")[0] for each in dofs))
+        needs = f"must be a DOF of every sector, one of {listing(known)}"
+        raise SettingError("dof", name, needs, nearest(str(name), known))
+    return rows
+
+
+def _extremes(x: Real) -> tuple[float, float]:
+    """Return max and min over the period of a motion with full coefficients `x`."""
+    amplitudes = fourier.to_complex(x)
+    c, s = amplitudes.real.copy(), -amplitudes.imag
+    top = c.size - 1
+    tables = grid_tables(grid_size(max(top, 1)), max(top, 1))
+    value, slope = (np.empty(2 * (tables[0].shape[1] - 1)) for _ in range(2))
+    on_grid(c, s, top, *tables, value, slope)
+    high, _ = largest(c, s, top, value, slope)
+    low, _ = largest(-c, -s, top, -value, -slope)
+    return high, -low

@@ -1,0 +1,328 @@
+"""What accuracy costs: error against time, for numbers of harmonics, in closed form and by samples."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from solver.balance.balance import Balance, build, check_frequency, check_harmonics
+from solver.balance.kernels.output import MAX_ABS
+from solver.balance.more_harmonics import more_harmonics, pad
+from solver.balance.workspace import Workspace
+from solver.branches.sweep import sweep
+from solver.continuation.branch import Branch
+from solver.errors import SettingError
+from solver.extrema.error_estimate import truncation_error
+from solver.jit.fourier import Real
+from solver.results.base import Piece, Shown, Summary
+from solver.scene.harmonics import kept_harmonics
+from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.results.dataset import Dataset
+    from solver.views.plots.style import Into
+
+
+CLOSED_FORM, SAMPLED = "closed form", "sampled"
+HARMONICS = (1, 3, 5, 7, 11, 15, 21, 31, 41)
+SAMPLES = (64, 256, 1024, 8192)
+LEAST_REFERENCE = 101  # harmonics
+_BEYOND = 3  # reference harmonics over the most studied
+_AWAY = 1e-3  # relative distance in frequency of the neighbour that Newton's method starts from
+REPEATS = 15
+# Fewest samples for the shortest wave kept: below, the harmonics are aliased.
+_PER_WAVE = 4
+
+
+class AccuracyStatus(Enum):
+    """How a study ended; the value is a sentence a user can act on."""
+
+    COMPLETED = "Every way that converges was measured."
+    STOPPED = "The study was stopped by the caller: it has no rows, none was timed to the end."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class AccuracyRow(Piece):
+    """One way to compute one point.
+
+    Attributes
+    ----------
+    harmonics : int
+        Highest harmonic kept.
+    evaluator : str
+        Of the contact forces: ``closed form`` or ``sampled``.
+    samples : int
+        In a period; 0 in closed form.
+    max_abs : float
+        The amplitude [m].
+    error : float
+        |max_abs − reference| [m].
+    milliseconds : float
+        Median processor time of Newton's method from a neighbouring solution.
+    iterations : int
+        Newton iterations of it.
+    residual : float
+        Relative residual left.
+    pareto : bool
+        No other row is both at least as accurate and at least as fast.
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"max_abs": "m", "error": "m", "milliseconds": "ms"}
+
+    harmonics: int
+    evaluator: str
+    samples: int
+    max_abs: float
+    error: float
+    milliseconds: float
+    iterations: int
+    residual: float
+    pareto: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class AccuracyStudy(Shown):
+    """Rows of `accuracy_study` with what they are measured against.
+
+    Attributes
+    ----------
+    reference : float
+        max|x| with `reference_harmonics` harmonics in closed form [m].
+    reference_error : float
+        Its estimated error [m]; errors below it are not known.
+    rows : tuple of AccuracyRow
+        Closed form first, then by samples; ways that did not converge are not in it.
+    branch : Branch or None
+        The sweep that found the highest peak; None if the frequency was given.
+    status : AccuracyStatus
+        How it ended.
+    """
+
+    scene: str
+    frequency_hz: float
+    reference: float
+    reference_harmonics: int
+    reference_error: float
+    rows: tuple[AccuracyRow, ...]
+    branch: Branch | None
+    status: AccuracyStatus
+
+    @property
+    def completed(self) -> bool:
+        """Whether no way was left out."""
+        return self.status is AccuracyStatus.COMPLETED
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.views.summary import of_accuracy
+
+        return of_accuracy(self)
+
+    def to_dataset(self) -> Dataset:
+        """A way to compute the point a row."""
+        from solver.views.to_dataset import accuracy_dataset
+
+        return accuracy_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw error against time; `ax`: axes to draw into, else a new figure."""
+        from solver.views.plots.accuracy import accuracy_figure
+
+        return accuracy_figure(self.to_json(), ax=ax)
+
+    def to_json(self) -> dict[str, object]:
+        """Return the study as one JSON object."""
+        known = math.isfinite(self.reference_error)
+        return {
+            "scene": self.scene,
+            "frequency_hz": self.frequency_hz,
+            "reference": self.reference,
+            "reference_harmonics": self.reference_harmonics,
+            "reference_error": self.reference_error if known else None,
+            "rows": [
+                {
+                    "harmonics": row.harmonics, "evaluator": row.evaluator, "samples": row.samples,
+                    "max_abs": row.max_abs, "error": row.error, "milliseconds": row.milliseconds,
+                    "iterations": row.iterations, "residual": row.residual, "pareto": row.pareto,
+                }
+                for row in self.rows
+            ],
+            "completed": self.completed,
+            "status": self.status.value,
+        }  # fmt: skip
+
+
+def accuracy_study(
+    scene: Scene,
+    frequency_hz: float | None = None,
+    *,
+    harmonics: Sequence[int] = HARMONICS,
+    samples: Sequence[int] = SAMPLES,
+    repeats: int = REPEATS,
+    on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> AccuracyStudy:
+    """Measure error and time of one point for several numbers of harmonics and both evaluators.
+
+    Parameters
+    ----------
+    scene : what vibrates.
+    frequency_hz : where [Hz]; at the highest peak of the scene's band if left out.
+    harmonics : highest harmonics to try.
+    samples : in a period, to try for each of them; multiples of 4. Fewer than four for the shortest wave are
+        left out.
+    repeats : of each timing.
+    on_progress : called with (share done, rows so far).
+    should_stop : asked between ways and between turns of the timing.
+
+    Raises
+    ------
+    SettingError
+        A bad frequency, number of harmonics or of samples, or no solution at the frequency to compare with.
+    """
+    _check_ways(harmonics, samples, repeats)
+    branch = None
+    if frequency_hz is None:
+        branch = sweep(scene, should_stop=should_stop)
+        if branch.peak is None:
+            raise SettingError("frequency_hz", None, "is needed: the scene's band gave no response")
+        frequency_hz = branch.peak.at
+    p = 2.0 * math.pi * check_frequency("frequency_hz", frequency_hz)
+    reference = _reference(scene, p, max(LEAST_REFERENCE, _BEYOND * max(harmonics)))
+    if reference is None:
+        raise SettingError("frequency_hz", frequency_hz, "has no solution to compare with")
+    workspace, u, exact = reference
+    ways = [(h, 0) for h in harmonics]
+    shortest = {h: int(kept_harmonics(scene, (), h, odd=False)[-1]) for h in harmonics}
+    ways += [(h, n) for n in samples for h in harmonics if n >= _PER_WAVE * max(shortest[h], 1)]
+    prepared: list[tuple[AccuracyRow, Callable[[], object]]] = []
+    asked = should_stop or (lambda: False)
+    tell = on_progress or (lambda _share, _rows: None)
+    steps = len(ways) + repeats
+    for done, (highest, count) in enumerate(ways):
+        if asked():
+            break
+        way = _prepared(scene, p, highest, count, exact)
+        if way is not None:
+            prepared.append(way)
+        tell((done + 1) / steps, len(prepared))
+    rows = _timed(prepared, repeats, asked, lambda turns: tell((len(ways) + turns) / steps, len(prepared)))
+    stopped = asked()
+    return AccuracyStudy(
+        scene=scene.name, frequency_hz=frequency_hz, reference=exact,
+        reference_harmonics=workspace.balance.n_harmonics,
+        reference_error=truncation_error(workspace, u, p).max_abs,
+        rows=() if stopped else tuple(replace(row, pareto=_leads(row, rows)) for row in rows),
+        branch=branch, status=AccuracyStatus.STOPPED if stopped else AccuracyStatus.COMPLETED,
+    )  # fmt: skip
+
+
+def _check_ways(harmonics: Sequence[int], samples: Sequence[int], repeats: int) -> None:
+    for count in harmonics:
+        check_harmonics(count)
+    for count in samples:
+        check_samples(count)
+    if not harmonics or repeats < 1:
+        raise SettingError("harmonics", list(harmonics), "needs one number at least, and one repetition")
+
+
+def check_samples(samples: int) -> int:
+    """Return `samples` if a period may be sampled so.
+
+    Raises
+    ------
+    SettingError
+        Not a positive multiple of 4.
+    """
+    whole = isinstance(samples, (int, np.integer)) and not isinstance(samples, bool)
+    if not whole or samples < 4 or samples % 4:
+        raise SettingError("samples", samples, "must be a positive multiple of 4")
+    return int(samples)
+
+
+def sampled(balance: Balance, samples: int) -> Balance:
+    """Return the balance with contact forces from so many samples of a period, instead of in closed form.
+
+    Raises
+    ------
+    SettingError
+        Not a multiple of 4, or not above twice the highest harmonic.
+    """
+    if check_samples(samples) <= 2 * balance.highest_harmonic:
+        raise SettingError("samples", samples, f"must be > {2 * balance.n_harmonics} for these harmonics")
+    return replace(balance, system=balance.system._replace(samples=samples))
+
+
+def _reference(scene: Scene, p: float, top: int) -> tuple[Workspace, Real, float] | None:
+    """Return the solution with `top` harmonics and its max|x|, reached by and by."""
+    workspace = Workspace.of(build(scene, harmonics=11))
+    found = workspace.solve(p)
+    while found.converged and workspace.balance.n_harmonics < top:
+        balance = workspace.balance
+        workspace = Workspace.of(more_harmonics(balance, min(2 * balance.n_harmonics, top)))
+        found = workspace.solve(p, pad(found.u, balance, workspace.balance))
+    measures = workspace.measure(found.u, p) if found.converged else None
+    return None if measures is None else (workspace, found.u, float(measures.values[MAX_ABS]))
+
+
+def _prepared(
+    scene: Scene, p: float, harmonics: int, samples: int, exact: float
+) -> tuple[AccuracyRow, Callable[[], object]] | None:
+    """Return one way's row without its time, and what is to be timed; None where it does not converge."""
+    balance = build(scene, harmonics=harmonics)
+    workspace = Workspace.of(sampled(balance, samples) if samples else balance)
+    neighbour = workspace.solve(p * (1.0 + _AWAY))
+    if not neighbour.converged:
+        return None
+    found = workspace.solve(p, neighbour.u)
+    measures = workspace.measure(found.u, p) if found.converged else None
+    if measures is None:
+        return None
+    max_abs = float(measures.values[MAX_ABS])
+    row = AccuracyRow(
+        harmonics=harmonics, evaluator=SAMPLED if samples else CLOSED_FORM, samples=samples, max_abs=max_abs,
+        error=abs(max_abs - exact), milliseconds=math.nan, iterations=found.iterations,
+        residual=found.residual,
+    )  # fmt: skip
+    return row, lambda: workspace.solve(p, neighbour.u)
+
+
+def _timed(
+    prepared: list[tuple[AccuracyRow, Callable[[], object]]],
+    repeats: int,
+    asked: Callable[[], bool],
+    tell: Callable[[int], None],
+) -> list[AccuracyRow]:
+    """Return the rows with their times, all measured in turn: a busy moment slows every one of them."""
+    seconds = np.zeros((repeats, len(prepared)))
+    for turn in range(repeats):
+        if asked():
+            return []
+        for i, (_, work) in enumerate(prepared):
+            work()  # the one before may have filled the caches
+            begun = time.thread_time()  # other programs do not count
+            work()
+            seconds[turn, i] = time.thread_time() - begun
+        tell(turn + 1)
+    medians = 1e3 * np.median(seconds, axis=0)
+    return [
+        replace(row, milliseconds=float(ms)) for (row, _), ms in zip(prepared, medians, strict=True)
+    ]  # fmt: skip
+
+
+def _leads(row: AccuracyRow, rows: Sequence[AccuracyRow]) -> bool:
+    """Return whether no other row is at least as good in both, and better in one."""
+    return not any(
+        other.error <= row.error
+        and other.milliseconds <= row.milliseconds
+        and (other.error < row.error or other.milliseconds < row.milliseconds)
+        for other in rows
+    )

@@ -1,0 +1,1 @@
+"""Compiled rows of a response map."""

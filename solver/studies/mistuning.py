@@ -1,0 +1,337 @@
+"""Many mistuned disks: how much more their blades move than those of the tuned one.
+
+Disk k of a study has the factors of the seed `seed` + k, so that each can be had again by `mistuned`, in any
+order and on any number of machines.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.continuation.branch import Branch
+from solver.errors import SettingError
+from solver.jit.fourier import Real
+from solver.results.base import Piece, Shown, Summary
+from solver.scene.parts import Mistuning
+from solver.scene.scene import CyclicStructure, Scene
+from solver.studies.blades import BladePeaks, blade_peaks, mistuned, with_mistuning
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.results.dataset import Dataset
+    from solver.views.plots.style import Into
+
+
+QUANTILES = (0.05, 0.5, 0.95, 0.99)
+MOST_SAMPLES = 1_000_000
+
+
+class MistuningStatus(Enum):
+    """How a study ended; the value is a sentence a user can act on."""
+
+    COMPLETED = "The peaks of all blades of every disk are known."
+    INCOMPLETE = (
+        "Some responses did not reach the end of the band, so their disks are left out of the figures: use "
+        "more harmonics or another band."
+    )
+    NO_RESPONSE = (
+        "The tuned disk has no peak to compare with, or its response did not reach the end of the band: use "
+        "another band or an excitation above 0."
+    )
+    STOPPED = "The study was stopped by the caller: the figures are those of the disks so far."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class MistunedDisk(Piece):
+    """One disk of a study.
+
+    Attributes
+    ----------
+    seed : int
+        Of its factors.
+    factors : tuple of float
+        One for each sector.
+    peaks : BladePeaks
+        Of every blade; without the branches.
+    magnification : float
+        Its highest peak relative to that of the tuned disk; NaN if a blade's is not known.
+    """
+
+    seed: int
+    factors: tuple[float, ...]
+    peaks: BladePeaks
+    magnification: float
+
+    @property
+    def known(self) -> bool:
+        """Whether the peaks of all blades are."""
+        return math.isfinite(self.magnification)
+
+    def to_json(self) -> dict[str, object]:
+        """Return the disk as one JSON object."""
+        return {
+            "seed": self.seed,
+            "factors": list(self.factors),
+            "peaks": [_number(value) for value in self.peaks.value.tolist()],
+            "at_hz": [_number(value) for value in self.peaks.at_hz.tolist()],
+            "largest": self.peaks.largest if self.known else None,
+            "worst_blade": self.peaks.worst if self.known else None,
+            "magnification": _number(self.magnification),
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class MistuningStudy(Shown):
+    """What becomes of the highest peak when blades are not quite equal.
+
+    Attributes
+    ----------
+    scene : str
+        Its name.
+    of : tuple of str
+        The parts that have factors.
+    spread : float
+        Standard deviation of the factors.
+    tuned : BladePeaks
+        Of the disk without mistuning.
+    disks : tuple of MistunedDisk
+        In the order of their seeds.
+    branches : tuple of Branch
+        The responses of the worst blade of the tuned disk and of the worst one.
+    """
+
+    scene: str
+    of: tuple[str, ...]
+    spread: float
+    tuned: BladePeaks
+    disks: tuple[MistunedDisk, ...]
+    branches: tuple[Branch, ...]
+    n_harmonics: int
+    status: MistuningStatus
+    seconds: float
+
+    @property
+    def completed(self) -> bool:
+        """Whether all peaks are known."""
+        return self.status is MistuningStatus.COMPLETED
+
+    @property
+    def magnifications(self) -> Real:
+        """The amplitude magnification factors of the disks whose peaks are known, in their order."""
+        return np.array([disk.magnification for disk in self.disks if disk.known])
+
+    @property
+    def worst(self) -> MistunedDisk | None:
+        """The disk with the highest peak."""
+        return max((d for d in self.disks if d.known), key=lambda disk: disk.magnification, default=None)
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.views.summary import of_mistuning
+
+        return of_mistuning(self)
+
+    def to_dataset(self) -> Dataset:
+        """A disk a row."""
+        from solver.views.to_dataset import mistuning_dataset
+
+        return mistuning_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the magnifications and the worst disk; `ax`: axes to draw into, else a new figure."""
+        from solver.views.plots.disks import mistuning_figure
+
+        return mistuning_figure(self.to_json(), ax=ax)
+
+    def to_json(self) -> dict[str, object]:
+        """Return the study as one JSON object."""
+        factors, worst = self.magnifications, self.worst
+        several = factors.size > 1
+        tuned = math.isfinite(self.tuned.largest)
+        return {
+            "scene": self.scene,
+            "dof": self.tuned.dof,
+            "of": list(self.of),
+            "spread": self.spread,
+            "tuned": {
+                "peak": self.tuned.largest if tuned else None,
+                "at_hz": float(self.tuned.at_hz[self.tuned.worst]) if tuned else None,
+            },
+            "samples": [disk.to_json() for disk in self.disks],
+            "mean": float(factors.mean()) if factors.size else None,
+            "deviation": float(factors.std(ddof=1)) if several else None,
+            "quantiles": [
+                {"share": share, "magnification": float(np.quantile(factors, share))}
+                for share in (QUANTILES if factors.size else ())
+            ],
+            "worst": None if worst is None else worst.to_json(),
+            "n_harmonics": self.n_harmonics,
+            "seconds": self.seconds,
+            "completed": self.completed,
+            "status": self.status.value,
+        }
+
+
+def mistuning_study(
+    scene: Scene,
+    *,
+    of: str | Sequence[str],
+    spread: float = 0.02,
+    samples: int = 100,
+    seed: int = 1,
+    start: float | None = None,
+    stop: float | None = None,
+    dof: str | None = None,
+    harmonics: int = 11,
+    on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> MistuningStudy:
+    """Compute the peaks of every blade of disks with random factors.
+
+    Parameters
+    ----------
+    scene : a cyclic scene; mistuning that it has is left out.
+    of : names of springs (k), dashpots (c) and masses, or DOFs (their mass), see `mistuned`.
+    spread : standard deviation of the factors.
+    samples : how many disks.
+    seed : of the first disk, those of the others follow.
+    start, stop : frequencies [Hz], the scene's band if left out.
+    dof : name of the DOF in one sector; the observed one if left out.
+    harmonics : highest harmonic kept.
+    on_progress : called with (share done, disks so far).
+    should_stop : asked between disks and between the steps of their responses.
+
+    Returns
+    -------
+    The study; equal arguments give equal numbers.
+
+    Raises
+    ------
+    SettingError, SceneError
+        The scene is not cyclic, a part or DOF it does not have, factors that are not above 0, a bad number of
+        samples, range or number of harmonics.
+    """
+    begun = time.perf_counter()
+    names = (of,) if isinstance(of, str) else tuple(of)
+    disk_factors(scene, names, spread, samples, seed)  # refuses what cannot be drawn
+    asked = should_stop or (lambda: False)
+
+    def peaks_of(disk: Scene, done: int) -> BladePeaks:
+        def progress(share: float, _sweeps: int) -> None:
+            if on_progress is not None:
+                on_progress((done + share) / (samples + 1.0), max(done - 1, 0))
+
+        return blade_peaks(
+            disk, start, stop, dof=dof, harmonics=harmonics, on_progress=progress, should_stop=should_stop
+        )
+
+    tuned = peaks_of(without_mistuning(scene), 0)
+    disks: list[BladePeaks] = []
+    first = worst_branch(tuned)
+    highest, branches, stopped = -math.inf, first, asked()
+    for k in range(samples if first and not stopped else 0):
+        peaks = peaks_of(mistuned(scene, of=names, spread=spread, seed=seed + k), k + 1)
+        stopped = asked()
+        if stopped:
+            break
+        disks.append(replace(peaks, branches=()))
+        if peaks.largest > highest:
+            highest, branches = peaks.largest, first + worst_branch(peaks)
+    study = joined_study(
+        scene, of=names, spread=spread, seed=seed, harmonics=harmonics, tuned=tuned, disks=disks,
+        seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+    return replace(study, branches=branches, status=MistuningStatus.STOPPED if stopped else study.status)
+
+
+def joined_study(
+    scene: Scene,
+    *,
+    of: Sequence[str],
+    spread: float,
+    seed: int,
+    harmonics: int,
+    tuned: BladePeaks,
+    disks: Sequence[BladePeaks],
+    seconds: float,
+) -> MistuningStudy:
+    """Return the study of disks whose peaks are known already, wherever they were computed; no branches.
+
+    Parameters
+    ----------
+    scene, of, spread, seed, harmonics : as in `mistuning_study`.
+    tuned : peaks of the disk `without_mistuning`.
+    disks : peaks of the disks ``mistuned(scene, of=of, spread=spread, seed=seed + k)``, k = 0, 1, …
+    seconds : that they took.
+    """
+    compared = tuned.largest > 0.0
+    drawn = disk_factors(scene, of, spread, max(len(disks), 1), seed)
+    found = [
+        MistunedDisk(
+            seed=seed + k, factors=drawn[k], peaks=peaks, magnification=peaks.magnification(tuned)
+        )
+        for k, peaks in enumerate(disks if compared else ())
+    ]  # fmt: skip
+    return MistuningStudy(
+        scene=scene.name, of=tuple(of), spread=spread, tuned=replace(tuned, branches=()), disks=tuple(found),
+        branches=(), n_harmonics=harmonics, status=_status(compared, found), seconds=seconds,
+    )  # fmt: skip
+
+
+def disk_factors(
+    scene: Scene, of: Sequence[str], spread: float, samples: int, seed: int
+) -> list[tuple[float, ...]]:
+    """Return the factors of every disk of a study, one for each sector.
+
+    Raises
+    ------
+    SettingError, SceneError
+        As `mistuning_study`.
+    """
+    with_mistuning(scene, {"of": list(of), "spread": 0.0, "seed": seed})  # refuses parts that are not there
+    if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
+        raise SettingError("samples", samples, f"must be a whole number from 1 to {MOST_SAMPLES}")
+    if not (math.isfinite(spread) and spread >= 0.0):
+        raise SettingError("spread", spread, "must be a number >= 0")
+    structure = scene.structure
+    sectors = structure.sectors if isinstance(structure, CyclicStructure) else 1
+    drawn = [Mistuning(of=tuple(of), spread=spread, seed=seed + k).factors(sectors) for k in range(samples)]
+    for k, row in enumerate(drawn):
+        if min(row) <= 0.0:
+            wanted = f"must be smaller: with it the disk of seed {seed + k} has the factor {min(row):.4g}"
+            raise SettingError("spread", spread, wanted)
+    return drawn
+
+
+def without_mistuning(scene: Scene) -> Scene:
+    """Return the scene with sectors that are equal."""
+    structure = scene.structure
+    if not isinstance(structure, CyclicStructure):
+        return scene
+    return scene.model_copy(update={"structure": structure.model_copy(update={"mistuning": None})})
+
+
+def worst_branch(peaks: BladePeaks) -> tuple[Branch, ...]:
+    """Return the response of the blade with the highest peak, if all are known and one moves."""
+    return (peaks.branches[peaks.worst],) if peaks.largest > 0.0 else ()
+
+
+def _status(compared: bool, disks: Sequence[MistunedDisk]) -> MistuningStatus:
+    """Return how a study ended that was not stopped."""
+    if not compared:
+        return MistuningStatus.NO_RESPONSE
+    known = all(disk.known for disk in disks)
+    return MistuningStatus.COMPLETED if known else MistuningStatus.INCOMPLETE
+
+
+def _number(value: float) -> float | None:
+    """Return a float that JSON can carry (null for NaN)."""
+    return value if math.isfinite(value) else None

@@ -1,0 +1,306 @@
+"""The plan: which effects a scene calls for, which are left out, and why, in words and numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.balance.balance import Balance, build
+from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.balance.workspace import Workspace
+from solver.contacts.kernels.system import DENSE, MODES, POLES
+from solver.jit.fourier import Real
+from solver.linear.contact_table import DEFAULT_SAMPLES
+from solver.results.base import Shown, Summary
+from solver.scene.annulus import sectors_needed
+from solver.scene.parts import CyclicStructure, MatricesStructure
+from solver.scene.scene import (
+    AnyContact,
+    Contact,
+    ElasticNormalContact,
+    FrictionContact,
+    PlanarContact,
+    PolynomialSpring,
+    Scene,
+)
+
+if TYPE_CHECKING:
+    from solver.results.dataset import Dataset
+
+
+# Fitted to responses of the shipped scenes at 11 harmonics on one core of a server: seconds of a Newton
+# iteration, of one contact with n coefficients (times n²), and of a solve with n unknowns (times n³).
+_SECONDS_AN_ITERATION = 5e-6
+_SECONDS_A_CONTACT = 2e-8
+_SECONDS_A_SOLVE = 1.5e-10
+_ITERATIONS_A_POINT = 4.0
+_FREQUENCIES = 101  # of the band at which the stuck response is looked at
+
+_FORMS = {
+    MODES: "undamped modes: the damping is diagonal in them, so a frequency costs modes x contacts^2",
+    POLES: "poles and residues: the damping couples the modes, the complex eigenvectors span the state space",
+    DENSE: "the matrices themselves: the eigenvectors do not span the state space",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effect:
+    """One effect, whether it is paid for, and why.
+
+    Attributes
+    ----------
+    name : str
+        For example ``separation``.
+    used : bool
+        Whether it is computed.
+    reason : str
+        In words and numbers.
+    """
+
+    name: str
+    used: bool
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Plan(Shown):
+    """What solving a scene will take.
+
+    Attributes
+    ----------
+    effects : tuple of Effect
+        Those in use and those left out.
+    unknowns : int
+        Real unknowns of the condensed balance.
+    linear_dofs, contacts, harmonics : int
+        Sizes behind it.
+    seconds_a_point : float
+        Estimated cost of a point of a branch [s].
+    """
+
+    scene: str
+    effects: tuple[Effect, ...]
+    unknowns: int
+    linear_dofs: int
+    contacts: int
+    harmonics: int
+    seconds_a_point: float
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.views.summary import of_plan
+
+        return of_plan(self)
+
+    def to_dataset(self) -> Dataset:
+        """An effect a row."""
+        from solver.views.to_dataset import plan_dataset
+
+        return plan_dataset(self)
+
+    def to_json(self) -> dict[str, object]:
+        """Return the plan as one JSON object."""
+        return {
+            "scene": self.scene,
+            "effects": [
+                {"name": effect.name, "used": effect.used, "reason": effect.reason} for effect in self.effects
+            ],
+            "unknowns": self.unknowns,
+            "linear_dofs": self.linear_dofs,
+            "contacts": self.contacts,
+            "n_harmonics": self.harmonics,
+            "estimated_seconds_a_point": self.seconds_a_point,
+        }
+
+
+def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -> Plan:
+    """Return what solving a scene takes: the effects in use and left out, sizes and estimated cost.
+
+    Parameters
+    ----------
+    scene : what will vibrate.
+    harmonics : highest harmonic kept.
+    effects : what is to be paid for though the scene does not call for it.
+
+    Raises
+    ------
+    SettingError
+        A bad number of harmonics.
+    """
+    asked = effects or Effects()
+    balance = build(scene, harmonics=harmonics, effects=asked)
+    n, contacts = balance.n_unknowns, balance.n_ports
+    carried = _stuck_force(balance)
+    slips = tuple(_slip(balance, i, carried) for i in range(len(balance.scene.contacts)))
+    kept = sum(effect.used for effect in slips) * balance.n_coefficients
+    iteration = (
+        _SECONDS_AN_ITERATION
+        + _SECONDS_A_CONTACT * contacts * balance.n_coefficients**2
+        + _SECONDS_A_SOLVE * kept**3
+    )
+    return Plan(
+        scene=scene.name,
+        effects=(
+            _condensation(balance),
+            _one_sector(scene, asked),
+            *(_separation(contact) for contact in balance.scene.contacts),
+            *slips,
+            _even_harmonics(balance),
+            *_reduction(scene),
+            Effect(name="linear part", used=True, reason=_linear_part(balance)),
+            _stiffness_shift(balance.system.shift),
+        ),
+        unknowns=n,
+        linear_dofs=_linear_dofs(balance.scene),
+        contacts=len(balance.scene.contacts),
+        harmonics=harmonics,
+        seconds_a_point=_ITERATIONS_A_POINT * iteration,
+    )
+
+
+def _condensation(balance: Balance) -> Effect:
+    dofs, coefficients = _linear_dofs(balance.scene), balance.n_coefficients
+    return Effect(
+        name="condensation",
+        used=True,
+        reason=(
+            f"the {dofs} linear DOFs are eliminated exactly: {balance.n_unknowns} unknowns "
+            f"(contacts x coefficients) instead of {dofs * coefficients}"
+        ),
+    )
+
+
+def _linear_dofs(scene: Scene) -> int:
+    """DOFs of the structure, of which a structure given by matrices names only those in use."""
+    structure = scene.structure
+    return structure.n_coordinates if isinstance(structure, MatricesStructure) else len(structure.dofs)
+
+
+def _reduction(scene: Scene) -> tuple[Effect, ...]:
+    """What was left out of a large model when it was loaded, if it was reduced."""
+    structure = scene.structure
+    found = structure.reduction if isinstance(structure, MatricesStructure) else None
+    if found is None:
+        return ()
+    reason = (
+        f"{found.dofs} DOFs were reduced to the {len(structure.dofs)} in use and {found.modes} modes of the "
+        f"rest, the highest at {found.highest_hz:.5g} Hz: raise `keep_modes` until the answer stays"
+    )
+    return (Effect(name="reduction of the model", used=True, reason=reason),)
+
+
+def _one_sector(scene: Scene, asked: Effects) -> Effect:
+    extent = sectors_needed(scene)
+    cyclic = isinstance(scene.structure, CyclicStructure)
+    forced = cyclic and extent.sectors == 1 and asked.every_sector
+    return Effect(
+        name="one sector for the annulus",
+        used=cyclic and extent.sectors == 1 and not forced,
+        reason=f"every sector was asked for, though {extent.reason}" if forced else extent.reason,
+    )
+
+
+def _slip(balance: Balance, i: int, stuck: Real) -> Effect:
+    """Say whether a contact is expected to slip: from the response of the structure with all contacts stuck.
+
+    Only the expectation comes from here. Whether a contact is its spring is decided at every Newton step.
+    """
+    contact = balance.scene.contacts[i]
+    name = f"slip of {contact.name}"
+    if balance.effects.every_contact:
+        return Effect(name=name, used=True, reason=f"{contact.name} was asked to stay in every Newton step")
+    if not isinstance(contact, Contact):
+        return Effect(name=f"law of {contact.name}", used=True, reason=_law(contact))
+    limit = contact.mu * max(contact.N0 - abs(contact.N1_value), 0.0)
+    carried = stuck[balance.system.first_port[i]]
+    words = f"stuck, {contact.name} would carry up to {carried:.4g} N in the band; its limit is {limit:.4g} N"
+    if carried <= limit:
+        return Effect(
+            name=name,
+            used=False,
+            reason=f"{words}: while it sticks it is its spring of {contact.kt:g} N/m, checked at every step",
+        )
+    return Effect(name=name, used=True, reason=words)
+
+
+def _stuck_force(balance: Balance) -> Real:
+    """Return the largest force each port carries over the band if all stick [N], without the mean."""
+    workspace, low_high = Workspace.of(balance), balance.scene.observe.band
+    kt = np.array([k for contact in balance.scene.contacts for k in contact.stiffnesses])
+    largest = np.zeros(kt.size)
+    stiffness = kt - balance.system.shift
+    for frequency in np.linspace(*low_high, _FREQUENCIES):
+        linear = workspace.receptance(2.0 * np.pi * float(frequency))
+        total = np.zeros(kt.size)
+        for k, A, free in zip(balance.system.ks, linear.A[0], linear.u_linear[0], strict=True):
+            if k > 0 and np.any(free):
+                total += np.abs(np.linalg.solve(np.eye(kt.size) + A * stiffness, free))
+        largest = np.maximum(largest, kt * total)
+    return largest
+
+
+def _even_harmonics(balance: Balance) -> Effect:
+    count = f"{balance.n_coefficients} coefficients a contact"
+    reason = even_harmonics_reason(balance.scene)
+    beyond = balance.system.ks[balance.system.ks > balance.n_harmonics]
+    if beyond.size:
+        count += f"; beyond {balance.n_harmonics} those that forces call for: " + ", ".join(map(str, beyond))
+    if reason is None and balance.system.ks[0] != 0:
+        odd = ", ".join(str(k) for k in balance.system.ks[:3])
+        reason = (
+            "loads are constant, forces odd and no stiffness changes with the motion, so the response is "
+            f"half-wave symmetric: {odd} … only"
+        )
+        return Effect(name="even harmonics and mean", used=False, reason=f"{reason}, {count}")
+    reason = reason or "they were asked for"
+    return Effect(
+        name="even harmonics and mean",
+        used=True,
+        reason=f"{reason}: harmonics 0 to {balance.n_harmonics}, {count}",
+    )
+
+
+def _linear_part(balance: Balance) -> str:
+    if balance.effects.whole_matrices:
+        return "the matrices themselves at every frequency, as asked for"
+    return _FORMS[balance.system.form]
+
+
+def _law(contact: AnyContact) -> str:
+    """Say how the force of a contact that is not plain Coulomb is found."""
+    if isinstance(contact, PlanarContact) and contact.limit != "box":
+        samples = contact.samples or DEFAULT_SAMPLES
+        return f"circular limit, marched over {samples} samples a period, of second order"
+    if isinstance(contact, PlanarContact):
+        return "a limit for each direction by itself: two contacts in closed form"
+    if isinstance(contact, ElasticNormalContact):
+        return f"the normal load moves with the parts by {contact.kn:g} N/m: friction and load in closed form"
+    if isinstance(contact, PolynomialSpring):
+        return "a polynomial: exact with enough samples"
+    return "a spring on one side: closed form"
+
+
+def _separation(contact: AnyContact) -> Effect:
+    if not isinstance(contact, FrictionContact) or isinstance(contact, ElasticNormalContact):
+        may = not isinstance(contact, PolynomialSpring)
+        reason = f"{contact.name} opens and closes as it moves" if may else f"{contact.name} has no gap"
+        return Effect(name=f"separation of {contact.name}", used=may, reason=reason)
+    least = contact.N0 - abs(contact.N1_value)
+    loses = least < 0.0
+    reason = f"the normal load of {contact.name} falls to {least:g} N" if loses else (
+        f"the normal load of {contact.name} stays at {least:g} N or more"
+    )  # fmt: skip
+    return Effect(name=f"separation of {contact.name}", used=loses, reason=reason)
+
+
+def _stiffness_shift(shift: np.ndarray) -> Effect:
+    used = bool(np.any(shift > 0.0))
+    reason = (
+        "a part is held in place by contacts alone, so their stiffness is moved into the structure and taken "
+        "out of the force again (exact)"
+        if used
+        else "the structure alone holds every part in place"
+    )
+    return Effect(name="contact stiffness in the structure", used=used, reason=reason)

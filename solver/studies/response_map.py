@@ -1,0 +1,373 @@
+"""The response over frequency and one parameter: `response_map`, and the ridge of its peaks."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.balance.balance import build
+from solver.balance.simplifications import Effects
+from solver.balance.workspace import Workspace
+from solver.continuation.parameter_scale import Scale, scale_of
+from solver.errors import SettingError
+from solver.jit.fourier import Integer, Real
+from solver.peaks.results import PeakTrack, TrackStatus
+from solver.peaks.track_peak import track_peak
+from solver.peaks.tracker import check_laws
+from solver.results.base import Shown, Summary
+from solver.scene.scene import Scene
+from solver.studies.kernels.map_rows import GIVEN, MAX_ABS, RESIDUAL, ROW_VALUES, SOLVED, solve_row
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.results.dataset import Dataset
+    from solver.views.plots.style import Into
+
+
+MOST_POINTS = 4_000_000
+OF_THE_GRID = 0.7  # share of the progress, where the peaks are tracked too
+_WORK_OF_A_STRIP = 25_000  # frequencies × harmonics: 0.1 s, measured on bladed-disk
+_MOST_STRIPS = 256
+
+
+class MapStatus(Enum):
+    """How a map ended; the value is a sentence a user can act on."""
+
+    COMPLETED = "Every point is a solution."
+    HOLES = "Some points were not solved and are empty: use more harmonics or another range."
+    STOPPED = "The map was stopped by the caller: what is empty was not reached."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class ResponseMap(Shown):
+    """max|x| of the observed DOF over a parameter and the frequency.
+
+    Attributes
+    ----------
+    scene, parameter_path, unit : str
+        Name of the scene, path and unit of the parameter.
+    parameter : (S,) array
+        Its values, evenly spaced, or in equal ratios where the ends differ by more than a few times.
+    frequency : (F,) array
+        Hz, evenly spaced over the scene's band.
+    amplitude, half_peak_to_peak : (S, F) arrays
+        m; NaN where no solution was found.
+    ridge : PeakTrack or None
+        The tracked peaks over the same range, if asked for.
+    largest_residual : float
+        Of all points that are solved.
+    given : Scene or None
+        What it is of, with the values that stayed fixed; None if it was read from a file.
+    """
+
+    scene: str
+    parameter_path: str
+    unit: str
+    parameter: Real
+    frequency: Real
+    amplitude: Real
+    half_peak_to_peak: Real
+    ridge: PeakTrack | None
+    n_harmonics: int
+    largest_residual: float
+    newton_iterations: int
+    status: MapStatus
+    seconds: float
+    given: Scene | None = None
+
+    @property
+    def completed(self) -> bool:
+        """Whether every point is a solution."""
+        return self.status is MapStatus.COMPLETED
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        from solver.views.summary import of_map
+
+        return of_map(self)
+
+    def to_dataset(self) -> Dataset:
+        """The grid, and the ridge; SI units."""
+        from solver.views.to_dataset import map_dataset
+
+        return map_dataset(self)
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the map with its ridge; `ax`: axes to draw into, else a new figure."""
+        from solver.views.plots.tracks import map_figure
+
+        return map_figure(self, dof="x" if self.given is None else self.given.observe.dof, ax=ax)
+
+    def to_json(self) -> dict[str, object]:
+        """Return the map as one JSON object."""
+        return {
+            "scene": self.scene,
+            "parameter": self.parameter.tolist(),
+            "parameter_path": self.parameter_path,
+            "unit": self.unit,
+            "frequency": self.frequency.tolist(),
+            "amplitude": _rows(self.amplitude),
+            "half_peak_to_peak": _rows(self.half_peak_to_peak),
+            "ridge": None if self.ridge is None else self.ridge.to_json(),
+            "n_harmonics": self.n_harmonics,
+            "newton_iterations": self.newton_iterations,
+            "largest_residual": self.largest_residual,
+            "seconds": self.seconds,
+            "completed": self.completed,
+            "status": self.status.value,
+        }
+
+
+def response_map(
+    scene: Scene,
+    parameter: str,
+    start: float,
+    stop: float,
+    *,
+    steps: int = 60,
+    frequencies: int = 400,
+    harmonics: int = 11,
+    ridge: bool = True,
+    effects: Effects | None = None,
+    on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> ResponseMap:
+    """Solve the response on a grid over the scene's band and the range of one parameter.
+
+    Parameters
+    ----------
+    scene : what vibrates, with the values that stay fixed.
+    parameter : path of the parameter, for example ``shroud.N0``.
+    start, stop : its range in user units.
+    steps, frequencies : points of the grid each way.
+    harmonics : highest harmonic kept.
+    ridge : track the peaks over the range too.
+    effects : what is paid for though the scene does not call for it.
+    on_progress : called with (share done, points so far).
+    should_stop : asked between rows, and several times a second while peaks are looked for.
+
+    Returns
+    -------
+    The map; every value in it is a converged solution at exactly its parameter and frequency.
+
+    Raises
+    ------
+    SettingError
+        A bad path, range, grid or number of harmonics, or a ridge asked for that cannot be tracked.
+    """
+    grid = map_grid(
+        scene, parameter, start, stop, steps=steps, frequencies=frequencies, harmonics=harmonics,
+        ridge=ridge, effects=effects,
+    )  # fmt: skip
+    strips: list[Strip] = []
+    stopped = False
+    for first, last in grid.strips:
+
+        def progress(share: float, points: int, first: int = first, rows: int = last - first) -> None:
+            if on_progress is not None:
+                done = (first + share * rows) / steps
+                on_progress(done * (OF_THE_GRID if ridge else 1.0), first * frequencies + points)
+
+        strips.append(grid.solve(first, last, on_progress=progress, should_stop=should_stop))
+        stopped = strips[-1].stopped
+        if stopped:
+            break
+    track = None
+    if ridge and not stopped:
+
+        def tracked(share: float, _sweeps: int) -> None:
+            if on_progress is not None:
+                on_progress(OF_THE_GRID + (1.0 - OF_THE_GRID) * share, steps * frequencies)
+
+        track = track_peak(
+            scene, parameter, start, stop, harmonics=harmonics, effects=effects, on_progress=tracked,
+            should_stop=should_stop,
+        )  # fmt: skip
+        stopped = track.status is TrackStatus.STOPPED
+    found = grid.joined(strips, track)
+    return replace(found, status=MapStatus.STOPPED) if stopped else found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Strip:
+    """Some consecutive rows of a map.
+
+    Attributes
+    ----------
+    first : int
+        Row of the map that is its first.
+    values : (rows, F, ROW_VALUES) array
+        Of `solver.studies.kernels.map_rows`; NaN where no solution was found.
+    stopped : bool
+        Whether it was left before its last row.
+    """
+
+    first: int
+    values: Real
+    newton_iterations: int
+    seconds: float
+    stopped: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapGrid:
+    """The points of a map, in strips of rows that need nothing of each other.
+
+    The division depends on the map alone, so that its numbers do not depend on who solves which strip.
+
+    Attributes
+    ----------
+    scene : Scene
+        With the values that stay fixed.
+    scale : Scale
+        The parameter with its range.
+    steps, frequencies : int
+        Points each way.
+    """
+
+    scene: Scene
+    scale: Scale
+    steps: int
+    frequencies: int
+    harmonics: int
+    effects: Effects | None
+
+    @property
+    def band(self) -> Real:
+        """(frequencies,) Hz."""
+        return np.linspace(*self.scene.observe.band, self.frequencies)
+
+    @property
+    def strips(self) -> tuple[tuple[int, int], ...]:
+        """First row and the one after the last of every strip; each is 0.1 s of work or more."""
+        a_row = self.frequencies * max(self.harmonics, 1)
+        rows = max(math.ceil(_WORK_OF_A_STRIP / a_row), math.ceil(self.steps / _MOST_STRIPS))
+        return tuple((first, min(first + rows, self.steps)) for first in range(0, self.steps, rows))
+
+    def solve(
+        self,
+        first: int,
+        last: int,
+        *,
+        on_progress: Callable[[float, int], None] | None = None,
+        should_stop: Callable[[], bool] | None = None,
+    ) -> Strip:
+        """Solve rows `first` to `last` - 1; a strip of `strips`, to get the numbers of the whole map.
+
+        Parameters
+        ----------
+        first, last : rows.
+        on_progress : called with (share of the strip done, its points so far).
+        should_stop : asked between rows.
+        """
+        begun, spent = time.perf_counter(), 0
+        values, omegas = self.scale.spaced(self.steps), 2.0 * math.pi * self.band
+        table = np.full((last - first, self.frequencies, ROW_VALUES), np.nan)
+        before: tuple[Real, Integer] | None = None
+        stopped = False
+        for row in range(first, last):
+            if should_stop is not None and should_stop():
+                stopped = True
+                break
+            here = self.scene.with_values({self.scale.parameter.path: float(values[row])})
+            workspace = Workspace.of(build(here, harmonics=self.harmonics, effects=self.effects))
+            before, more = _row(workspace, omegas, before, table[row - first])
+            spent += more
+            if on_progress is not None:
+                done = row - first + 1
+                on_progress(done / (last - first), done * self.frequencies)
+        return Strip(
+            first=first, values=table, newton_iterations=spent, stopped=stopped,
+            seconds=time.perf_counter() - begun,
+        )  # fmt: skip
+
+    def joined(self, strips: Sequence[Strip], ridge: PeakTrack | None = None) -> ResponseMap:
+        """Return the map of these strips; what is in none is empty. Its seconds are the sum of theirs."""
+        table = np.full((self.steps, self.frequencies, ROW_VALUES), np.nan)
+        for strip in strips:
+            table[strip.first : strip.first + len(strip.values)] = strip.values
+        solved = table[:, :, RESIDUAL][np.isfinite(table[:, :, RESIDUAL])]
+        whole = bool(np.isfinite(table[:, :, MAX_ABS]).all())
+        seconds = sum(strip.seconds for strip in strips) + (0.0 if ridge is None else ridge.seconds)
+        return ResponseMap(
+            scene=self.scene.name, parameter_path=self.scale.parameter.path, unit=self.scale.parameter.unit,
+            parameter=self.scale.spaced(self.steps), frequency=self.band,
+            amplitude=table[:, :, MAX_ABS].copy(), half_peak_to_peak=table[:, :, 1].copy(), ridge=ridge,
+            n_harmonics=self.harmonics, largest_residual=float(solved.max(initial=0.0)),
+            newton_iterations=sum(strip.newton_iterations for strip in strips),
+            status=MapStatus.COMPLETED if whole else MapStatus.HOLES, seconds=seconds, given=self.scene,
+        )  # fmt: skip
+
+
+def map_grid(
+    scene: Scene,
+    parameter: str,
+    start: float,
+    stop: float,
+    *,
+    steps: int = 60,
+    frequencies: int = 400,
+    harmonics: int = 11,
+    ridge: bool = True,
+    effects: Effects | None = None,
+) -> MapGrid:
+    """Return the points of `response_map`, to be solved in strips on several processors.
+
+    Raises
+    ------
+    SettingError
+        As `response_map`.
+    """
+    for name, value in (("steps", steps), ("frequencies", frequencies)):
+        if isinstance(value, bool) or not isinstance(value, int) or value < 2:
+            raise SettingError(name, value, "must be a whole number >= 2")
+    if steps * frequencies > MOST_POINTS:
+        raise SettingError("steps", steps, f"times the frequencies must be at most {MOST_POINTS}")
+    if ridge:
+        check_laws(scene)
+    return MapGrid(
+        scene=scene, scale=scale_of(scene, parameter, start, stop), steps=steps, frequencies=frequencies,
+        harmonics=harmonics, effects=effects,
+    )  # fmt: skip
+
+
+def _row(
+    workspace: Workspace, omegas: Real, before: tuple[Real, Integer] | None, values: Real
+) -> tuple[tuple[Real, Integer], int]:
+    """Solve one row into `values`; return its solutions with what is known of them, and Newton iterations."""
+    nt, count = workspace.balance.n_unknowns, omegas.size
+    solutions, known = np.zeros((count, nt)), np.zeros(count, np.int64)
+    if before is None or before[0].shape != solutions.shape:
+        before = np.zeros((count, nt)), np.zeros(count, np.int64)
+    at, spent = 0, 0
+    while at < count:
+        at, more = solve_row(
+            workspace.system, workspace.linear, workspace.point, omegas, at, *before, solutions, known, values
+        )
+        spent += more
+        if at == count:
+            break
+        if known[at] == GIVEN:
+            # Not even from its own solution: the point stays empty.
+            known[at], at = 0, at + 1
+            continue
+        found = workspace.solve(float(omegas[at]))
+        spent += found.iterations
+        if found.converged:
+            solutions[at], known[at] = found.u, GIVEN
+        else:
+            at += 1
+    known[known != SOLVED] = 0
+    return (solutions, known), spent
+
+
+def _rows(values: Real) -> list[list[float | None]]:
+    """Return a grid as JSON can carry it (null for NaN)."""
+    return [[value if math.isfinite(value) else None for value in row] for row in values.tolist()]

@@ -1,0 +1,1 @@
+"""Results in words, as named arrays, as files and as pictures."""

@@ -1,0 +1,64 @@
+"""What a result says of itself beside its numbers, in words: flags, and what is known between points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from solver.continuation.branch import Branch
+
+FLAGS: Mapping[str, str] = MappingProxyType(
+    {
+        "mean_undetermined": "the mean, and with it max|x|, depends on the history: go by half peak to peak",
+        "history_dependent": (
+            "half peak to peak depends on the history too: march from the starts that may occur"
+        ),
+        "all_stuck": "every contact sticks all the time",
+        "separation": "a contact opens during the period",
+        "not_unique": "its mirror image is a response too, and the symmetric one is unstable",
+        "symmetric_unstable": (
+            "a half-wave symmetric response is unstable: another one, with a mean, is seen"
+        ),
+        "travelling_wave_assumed": (
+            "the response is assumed to be the travelling wave, compare with --effects every-sector"
+        ),
+    }
+)
+NONE_HIGHER = "known, none is higher than those listed"
+
+
+def flag_words(flags: Iterable[str]) -> list[str]:
+    """What each flag says; one of a newer version as it is."""
+    return [FLAGS.get(flag, flag.replace("_", " ")) for flag in flags]
+
+
+def between_points(*, known: bool, reason: str) -> str:
+    """What is known of peaks between the points of a branch, by its certificate.
+
+    Parameters
+    ----------
+    known, reason : of a `solver.continuation.certificate.PeakCertificate`.
+    """
+    return NONE_HIGHER if known else reason[:1].lower() + reason[1:]
+
+
+def branch_notes(branch: Branch) -> list[tuple[str, str]]:
+    """The certificate of a branch and its flags, as rows of a summary."""
+    pairs: list[tuple[str, str]] = []
+    if branch.peak is not None:
+        found = branch.peak_certificate
+        pairs.append(("between points", between_points(known=found.known, reason=found.reason)))
+        if found.known and branch.band is not None and not branch.band.known:
+            pairs.append(("note", BAND_OPEN))
+    return pairs + [("note", words) for words in flag_words(branch.flags)]
+
+
+BAND_OPEN = "the band may have further pieces between points: it was not settled everywhere by solutions"
+
+
+def unsettled(branches: Iterable[Branch]) -> list[str]:
+    """Why it is not known of some of several branches that no peak hides between points, each reason once."""
+    reasons = (one.peak_certificate.reason for one in branches if not one.peak_certificate.known)
+    return list(dict.fromkeys(reasons))

@@ -1,0 +1,99 @@
+"""What is drawn: amplitude curves and what is marked on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from solver.continuation.branch import Branch
+
+FloatArray = NDArray[np.float64]
+Intervals = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Response:
+    """An amplitude curve and what is marked on it.
+
+    Attributes
+    ----------
+    scene, parameter : str
+        Name of the scene, path of the parameter.
+    values : (P,) array
+        Parameter values in user units.
+    amplitude : (P,) array
+        max|x| of the observed DOF [m].
+    dof : str
+        The observed DOF; ``x`` if it is not known.
+    peak : (float, float) or None
+        Parameter value and amplitude [m] of the highest peak; it is a point of the curve.
+    limit : float or None
+        Amplitude [m] at which the band is measured.
+    intervals : tuple of (low, high)
+        Where the amplitude is above it.
+    """
+
+    scene: str
+    parameter: str
+    values: FloatArray
+    amplitude: FloatArray
+    dof: str = "x"
+    peak: tuple[float, float] | None = None
+    limit: float | None = None
+    intervals: Intervals = ()
+
+    @classmethod
+    def of_branch(cls, branch: Branch) -> Self:
+        """The curve of a branch with at least one point."""
+        peak = None if branch.peak is None else (branch.peak.at, branch.peak.value)
+        values, amplitude = with_peak(branch.values, branch.amplitude, peak)
+        band = branch.band
+        return cls(
+            scene=branch.balance.scene.name,
+            parameter=branch.parameter,
+            values=values,
+            amplitude=amplitude,
+            dof=branch.balance.scene.observe.dof,
+            peak=peak,
+            limit=None if band is None else band.limit,
+            intervals=() if band is None else band.intervals,
+        )
+
+
+def with_peak(
+    values: FloatArray, amplitude: FloatArray, peak: tuple[float, float] | None
+) -> tuple[FloatArray, FloatArray]:
+    """The points of a curve with its polished peak among them, where the neighbours enclose it."""
+    if peak is None or peak[1] <= amplitude.max():
+        return values, amplitude
+    at, height = peak
+    enclosing = np.flatnonzero((values[:-1] - at) * (values[1:] - at) <= 0.0)
+    if enclosing.size == 0:
+        return values, amplitude
+    index = 1 + enclosing[np.argmax(np.maximum(amplitude[enclosing], amplitude[enclosing + 1]))]
+    return np.insert(values, index, at), np.insert(amplitude, index, height)
+
+
+def above(values: FloatArray, amplitude: FloatArray, limit: float) -> Intervals:
+    """Intervals of the parameter in which the polyline through the points is above a limit, ascending."""
+    pieces = []
+    for i in range(values.size - 1):
+        low, high = values[i], values[i + 1]
+        first, second = amplitude[i] - limit, amplitude[i + 1] - limit
+        if first <= 0.0 and second <= 0.0:
+            continue
+        if first * second < 0.0:
+            crossing = low + (high - low) * first / (first - second)
+            low, high = (low, crossing) if first > 0.0 else (crossing, high)
+        pieces.append((float(min(low, high)), float(max(low, high))))
+    merged: list[tuple[float, float]] = []
+    for low, high in sorted(pieces):
+        if merged and low <= merged[-1][1]:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], high))
+        else:
+            merged.append((low, high))
+    return tuple(merged)

@@ -1,0 +1,111 @@
+"""Pictures as pages that need nothing else: the picture, the numbers behind it, how to have it again."""
+
+from __future__ import annotations
+
+import base64
+import math
+from html import escape
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from solver.results.dataset import Dataset
+from solver.views.plots import style
+
+MOST_ROWS = 2000
+_DIGITS = 6
+_SHORT = 16  # characters that stay on one line: a number with its unit
+CSS = """
+:root { color-scheme: light; }
+body { font: 15px/1.5 system-ui, "DejaVu Sans", sans-serif; color: #222; background: #fff;
+  max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
+figure { margin: 1rem 0; } img { max-width: 100%; height: auto; }
+figcaption, .quiet { color: #555; font-size: .9rem; }
+table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
+th, td { padding: .2rem .7rem .2rem 0; text-align: left; vertical-align: top; }
+thead th { border-bottom: 1px solid #999; } td.number { text-align: right; }
+tbody th, td.short, td:nth-child(2):not(:last-child) { white-space: nowrap; }
+tbody tr + tr > * { border-top: 1px solid #eee; }
+pre { background: #f5f5f5; padding: .8rem; overflow-x: auto; font-size: .8rem; white-space: pre-wrap; }
+@page { size: A4; margin: 18mm; }
+@media print { body { margin: 0; max-width: none; font-size: 10.5pt; padding: 0; }
+  img { max-height: 105mm; }
+  figure, tr { break-inside: avoid; } h2, h3 { break-after: avoid; } }
+"""
+
+
+def page(title: str, body: str) -> str:
+    """A whole page; `body` is HTML, the title is not."""
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>{CSS}</style>\n</head>\n<body>\n{body}\n</body>\n</html>\n"
+    )
+
+
+def image(figure: Figure, words: str, caption: str = "") -> str:
+    """A picture inside the page; `words` are read to those who do not see it."""
+    data = base64.b64encode(style.written(figure, "svg")).decode()
+    below = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
+    return f'<figure><img src="data:image/svg+xml;base64,{data}" alt="{escape(words)}">{below}</figure>'
+
+
+def table(heads: list[str], rows: list[list[Any]]) -> str:
+    """A table; numbers are rounded and aligned right."""
+    head = "".join(f"<th scope='col'>{escape(one)}</th>" for one in heads)
+    body = "".join(f"<tr>{''.join(_cell(value) for value in row)}</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def pairs(given: list[tuple[str, str]]) -> str:
+    """Names with their values."""
+    rows = "".join(f"<tr><th scope='row'>{escape(n)}</th><td>{escape(v)}</td></tr>" for n, v in given)
+    return f"<table><tbody>{rows}</tbody></table>"
+
+
+def picture_page(figure: Figure, data: Dataset | None) -> str:
+    """The page of ``--plot F.html``."""
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    title = next((text for text in titles if text), "stickslip")
+    parts = [f"<h1>{escape(title)}</h1>", image(figure, title)]
+    if data is not None:
+        parts += _numbers(data)
+    return page(title, "\n".join(parts))
+
+
+def _numbers(data: Dataset) -> list[str]:
+    """The table behind a picture, and what the dataset says of itself."""
+    columns = {n: v for n, v in data.table().variables.items() if not n.startswith(_IN_PARTS)}
+    heads = [f"{name} [{v.unit}]" if v.unit else name for name, v in columns.items()]
+    rows = [list(row) for row in zip(*(v.values.tolist() for v in columns.values()), strict=True)]
+    shown = f"{len(rows)} rows" if len(rows) <= MOST_ROWS else f"the first {MOST_ROWS} of {len(rows)} rows"
+    about = {name: value for name, value in data.attributes.items() if name != "scene"}
+    parts = [
+        pairs([(name, _text(value)) for name, value in about.items()]),
+        f"<details><summary>Data ({shown})</summary>{table(heads, rows[:MOST_ROWS])}</details>",
+    ]
+    if "scene" in data.attributes:
+        text = escape(str(data.attributes["scene"]))
+        parts.append(f"<details><summary>Scene (TOML)</summary><pre>{text}</pre></details>")
+    return parts
+
+
+# Cosine and sine parts of every harmonic: in files, not in a table that is read.
+_IN_PARTS = ("displacement_cos", "displacement_sin")
+
+
+def _cell(value: Any) -> str:
+    text = _text(value)
+    kind = " class=short" if len(text) <= _SHORT else ""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        kind = " class=number"
+    return f"<td{kind}>{escape(text)}</td>"
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.{_DIGITS}g}" if math.isfinite(value) else ""
+    return "" if value is None else str(value)

@@ -1,0 +1,171 @@
+"""One period of a motion: its time history and the hysteresis loops of the contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+
+from solver.results import units
+from solver.views.plots import style
+from solver.views.plots.curves import FloatArray
+
+if TYPE_CHECKING:
+    from solver.marching.result import MarchResult
+    from solver.response.solve import Solution
+
+MOST_LOOPS = 3
+_SAMPLES = 1000
+_FAR_DOWN = 1e-8  # share of the largest harmonic below which there is no bar
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loop:
+    """One contact over a period: slip motion [m] and friction force [N], (n,) each."""
+
+    contact: str
+    slip: FloatArray
+    force: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motion:
+    """One period of a motion.
+
+    Attributes
+    ----------
+    title : str
+        What it is of.
+    dof : str
+        The observed DOF.
+    time : (n,) array
+        Instants from 0 to the end of the period [s].
+    displacement : (n,) array
+        Of the observed DOF [m].
+    loops : tuple of Loop
+        One for each contact; of a cyclic scene, those of one sector.
+    harmonics : (H + 1,) array or None
+        |mean| and the amplitudes of the observed DOF [m].
+    """
+
+    title: str
+    dof: str
+    time: FloatArray
+    displacement: FloatArray
+    loops: tuple[Loop, ...]
+    harmonics: FloatArray | None = None
+
+    @classmethod
+    def of_solution(cls, solution: Solution) -> Self:
+        """The motion of a converged balance; the loops have the corners of the friction law."""
+        from solver.jit.fourier import basis
+        from solver.response.time_history import hysteresis_loop
+
+        share = np.linspace(0.0, 1.0, _SAMPLES + 1)
+        functions = basis(2.0 * np.pi * share, solution.highest_harmonic)
+        return cls(
+            title=f"{solution.scene.name} at {solution.frequency_hz:g} Hz, {solution.n_harmonics} harmonics",
+            dof=solution.scene.observe.dof,
+            time=share / solution.frequency_hz,
+            displacement=functions @ solution.observed,
+            loops=tuple(
+                _loop(contact.name, *hysteresis_loop(solution, contact.name, samples=_SAMPLES))
+                for contact in solution.contacts
+            ),
+            harmonics=solution.harmonics,
+        )
+
+    @classmethod
+    def of_march(cls, march: MarchResult, scene: str = "", dof: str = "x") -> Self:
+        """The last period of a time march; it does not know what it is of."""
+        period = 1.0 / march.frequency_hz
+        # Of the whole annulus only the first sector is drawn: the others do the same later.
+        first = [i for i, name in enumerate(march.contacts) if name.partition("@")[2] in ("", "0")]
+        return cls(
+            title=f"{scene or 'time march'} at {march.frequency_hz:g} Hz{', time march' if scene else ''}",
+            dof=dof,
+            time=np.append(march.time, period),
+            displacement=_closed(march.displacement),
+            loops=tuple(
+                _loop(march.contacts[i].partition("@")[0], march.slip[i], march.contact_force[i])
+                for i in first
+            ),
+        )
+
+
+def motion_figure(motion: Motion, *, ax: style.Into = None) -> Figure:
+    """The time history; beside it the hysteresis loops of the contacts, three at most, and the harmonics.
+
+    Parameters
+    ----------
+    motion : what is drawn.
+    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    """
+    loops = motion.loops[:MOST_LOOPS]
+    bars = motion.harmonics is not None
+    unit = units.length_unit(float(np.abs(motion.displacement).max()))
+    with style.styled():
+        panels = 1 + len(loops) + bars
+        # Four side by side would be too small in a column of text.
+        rows, columns = (1, panels) if panels < 4 else (2, (panels + 1) // 2)
+        page, (history, *others) = style.figure(
+            0.6 + (2.6 if rows == 1 else 3.1) * columns, 2.9 * rows, columns, rows=rows, into=ax
+        )  # fmt: skip
+        for unused in others[panels - 1 :]:
+            unused.set_axis_off()
+        scale, second = (1e3, "ms") if motion.time[-1] < 0.1 else (1.0, "s")
+        history.plot(motion.time * scale, motion.displacement * unit.per_metre, color=style.BLUE)
+        history.margins(x=0.0)
+        history.set_title(motion.title)
+        style.label(history, f"time [{second}]", f"displacement of {motion.dof} [{unit.name}]")
+        for axes, loop in zip(others, loops, strict=False):
+            slip = units.length_unit(float(np.abs(loop.slip).max()))
+            axes.plot(loop.slip * slip.per_metre, loop.force, color=style.VERMILION)
+            axes.set_title(f"contact {loop.contact}")
+            style.label(axes, f"slip motion [{slip.name}]", "friction force [N]")
+        if motion.harmonics is not None:
+            _draw_harmonics(others[panels - 2], motion.harmonics, motion.dof, unit)
+    return page
+
+
+def harmonics_figure(heights: FloatArray, title: str, *, dof: str = "x", ax: style.Into = None) -> Figure:
+    """The harmonics alone, of a response whose motion is not known.
+
+    Parameters
+    ----------
+    heights : (H + 1,) |mean| and the amplitudes [m].
+    title : what it is of.
+    dof : the observed DOF.
+    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    """
+    with style.styled():
+        page, (axes,) = style.figure(5.0, 3.2, into=ax)
+        _draw_harmonics(axes, heights, dof, units.length_unit(float(np.nanmax(heights))))
+        axes.set_title(title)
+    return page
+
+
+def _draw_harmonics(axes: Axes, heights: FloatArray, dof: str, unit: units.LengthUnit) -> None:
+    """Bars on a logarithmic scale; what is far below the largest is not drawn."""
+    shown = np.where(heights >= _FAR_DOWN * np.nanmax(heights), heights, np.nan) * unit.per_metre
+    axes.bar(np.arange(heights.size), shown, color=style.BLUE, width=0.7)
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(numticks=6))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.grid(visible=False, axis="x")
+    axes.set_xlim(-0.7, heights.size - 0.3)
+    style.label(axes, "harmonic (0: mean)", f"amplitude of {dof} [{unit.name}]")
+
+
+def _loop(contact: str, slip: FloatArray, force: FloatArray) -> Loop:
+    return Loop(contact=contact, slip=_closed(slip), force=_closed(force))
+
+
+def _closed(samples: FloatArray) -> FloatArray:
+    """Samples of a period with the first repeated at its end."""
+    return np.append(samples, samples[:1])

@@ -1,0 +1,227 @@
+"""Amplitude over a parameter: one response, a family of responses, the peak against a design variable."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from solver.results import units
+from solver.views.plots import style
+from solver.views.plots.curves import FloatArray, Response
+
+_DOTTED = (0, (1.2, 1.8))
+_DASHED = (0, (5.0, 2.5))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Family:
+    """Frequency responses for several values of a variable.
+
+    Attributes
+    ----------
+    variable : str
+        Path of the variable, for example ``shroud.N0``.
+    members : tuple of (value, Response)
+        Ascending in the value; the optimum is among them.
+    optimum : float
+        The best value.
+    free, stuck : Response
+        The linear limits: the contact removed, and stuck throughout.
+    dof : str
+        The observed DOF.
+    """
+
+    variable: str
+    members: tuple[tuple[float, Response], ...]
+    optimum: float
+    free: Response
+    stuck: Response
+    dof: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Demands:
+    """What was asked of a response.
+
+    Attributes
+    ----------
+    limit : float or None
+        Amplitude [m] at which the band is measured, and that forbidden ranges must stay below.
+    max_peak : float or None
+        Largest amplitude allowed [m].
+    forbidden : tuple of (low, high)
+        Ranges of the parameter in which the amplitude must stay below `limit`.
+    """
+
+    limit: float | None = None
+    max_peak: float | None = None
+    forbidden: tuple[tuple[float, float], ...] = ()
+
+
+def response_figure(
+    response: Response, *, asked: Demands | None = None, title: str | None = None, ax: style.Into = None
+) -> Figure:
+    """One response with its peak marked and its band shaded, and what was asked of it.
+
+    Parameters
+    ----------
+    response : the curve.
+    asked : limits drawn as lines, forbidden ranges shaded from the limit upwards.
+    title : the scene's name if left out.
+    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    """
+    asked = asked or Demands()
+    unit = units.length_unit(float(response.amplitude.max()))
+    with style.styled():
+        page, (axes,) = style.figure(6.0, 3.4, into=ax)
+        for low, high in response.intervals:
+            axes.axvspan(low, high, color=style.SKY, alpha=0.18, linewidth=0.0)
+        axes.plot(response.values, response.amplitude * unit.per_metre, color=style.BLUE)
+        if response.peak is not None:
+            _mark_peak(axes, response, response.peak, unit)
+        style.label(axes, axis_name(response.parameter), _amplitude_name("amplitude", response.dof, unit))
+        axes.margins(x=0.0, y=0.14)
+        axes.set_ylim(bottom=0.0)
+        _mark_demands(axes, asked, unit)
+        axes.set_title(response.scene if title is None else title)
+    return page
+
+
+def family_figure(family: Family) -> Figure:
+    """Responses for several values of a variable between the two linear limits, on a logarithmic scale."""
+    unit = units.length_unit(float(np.median([curve.amplitude.max() for _, curve in family.members])))
+    first = family.members[0][1]
+    with style.styled():
+        page, (axes,) = style.figure(6.6, 4.0)
+        _draw(axes, family.free, unit, "removed (linear)", color=style.GREY, dashes=_DOTTED)
+        shades = _shades(len(family.members))
+        for (value, curve), shade in zip(family.members, shades, strict=True):
+            if value == family.optimum:
+                _draw(axes, curve, unit, f"{value:.4g} (optimum)", color=style.VERMILION, width=2.2, order=3)
+            else:
+                _draw(axes, curve, unit, f"{value:.4g}", color=shade)
+        _draw(axes, family.stuck, unit, "stuck (linear)", color=style.GREY, dashes=_DASHED)
+        axes.set_yscale("log")
+        style.plain_log(axes.yaxis)
+        style.label(axes, axis_name(first.parameter), _amplitude_name("amplitude", family.dof, unit))
+        axes.margins(x=0.0)
+        axes.set_title(first.scene)
+        title = axis_name(family.variable)
+        axes.legend(title=title, loc="center left", bbox_to_anchor=(1.0, 0.5), alignment="left")
+    return page
+
+
+def peak_figure(
+    scene: str,
+    variable: str,
+    values: FloatArray,
+    peaks: FloatArray,
+    *,
+    optimum: tuple[float, float],
+    dof: str,
+) -> Figure:
+    """Highest peak against a variable, with the optimum marked.
+
+    Parameters
+    ----------
+    scene, variable : name of the scene, path of the variable.
+    values, peaks : (P,) values of the variable, ascending, and the highest peak at each [m].
+    optimum : the best value and its peak [m].
+    dof : the observed DOF.
+    """
+    unit = units.length_unit(optimum[1])
+    best, least = optimum[0], optimum[1] * unit.per_metre
+    with style.styled():
+        page, (axes,) = style.figure(6.0, 3.4)
+        axes.plot(values, peaks * unit.per_metre, color=style.BLUE, marker="o", markersize=3.0)
+        axes.plot(
+            [best], [least], color=style.VERMILION, marker="o", markersize=6.5, linestyle="none", zorder=5
+        )
+        text = f"optimum {style.quantity(variable, best, 4)}\npeak {unit.show(optimum[1])}"
+        axes.annotate(
+            text, (best, least), xytext=(0, -9), textcoords="offset points", ha="center", va="top",
+            color=style.VERMILION, linespacing=1.35,
+        )  # fmt: skip
+        for axis, scale in ((axes.xaxis, axes.set_xscale), (axes.yaxis, axes.set_yscale)):
+            scale("log")
+            style.plain_log(axis)
+        low, high = min(least, float(peaks.min()) * unit.per_metre), float(peaks.max()) * unit.per_metre
+        # Room for the two lines of text below the curve, as a share of the logarithmic height.
+        axes.set_ylim(low * (low / high) ** 0.35, high * (high / low) ** 0.06)
+        style.label(axes, axis_name(variable), _amplitude_name("highest peak", dof, unit))
+        axes.set_title(scene)
+    return page
+
+
+def axis_name(path: str) -> str:
+    """A parameter path with its unit."""
+    unit = units.parameter_unit(path)
+    return f"{path} [{unit}]" if unit else path
+
+
+def _amplitude_name(what: str, dof: str, unit: units.LengthUnit) -> str:
+    return f"{what}, max |{dof}| [{unit.name}]"
+
+
+def _shades(count: int) -> Sequence[tuple[float, float, float, float]]:
+    """Colours from light to dark, told apart by everybody and in grey."""
+    return [tuple(colormaps["viridis"](place)) for place in np.linspace(0.85, 0.1, count)]
+
+
+def _draw(
+    axes: Axes, curve: Response, unit: units.LengthUnit, name: str, *, color: object, width: float = 1.2,
+    dashes: tuple[int, tuple[float, ...]] | str = "-", order: float = 2,
+) -> None:  # fmt: skip
+    height = curve.amplitude * unit.per_metre
+    axes.plot(curve.values, height, color=color, linewidth=width, linestyle=dashes, label=name, zorder=order)
+
+
+def _mark_peak(axes: Axes, curve: Response, peak: tuple[float, float], unit: units.LengthUnit) -> None:
+    """A dot at the peak, and above it what it is."""
+    at, height = peak
+    low, high = float(curve.values.min()), float(curve.values.max())
+    place = (at - low) / (high - low) if high > low else 0.5
+    side = "left" if place < 0.2 else "right" if place > 0.8 else "center"
+    axes.plot([at], [height * unit.per_metre], color=style.VERMILION, marker="o", markersize=5.0, zorder=5)
+    text = f"{unit.show(height)} at {style.quantity(curve.parameter, at, 5)}"
+    axes.annotate(
+        text, (at, height * unit.per_metre), xytext=(0, 7), textcoords="offset points", ha=side,
+        color=style.VERMILION, bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
+    )  # fmt: skip
+
+
+def _mark_demands(axes: Axes, asked: Demands, unit: units.LengthUnit) -> None:
+    """Lines at the limits, named at their right ends; forbidden ranges hatched above the limit."""
+    lines = [("limit", asked.limit), ("largest peak allowed", asked.max_peak)]
+    heights = [height * unit.per_metre for _, height in lines if height is not None]
+    low, high = axes.get_xlim()
+    top = max([axes.get_ylim()[1], *(1.12 * height for height in heights)])
+    axes.set_ylim(top=top)
+    for begin, end in asked.forbidden:
+        if end <= low or begin >= high:
+            continue
+        bottom = 0.0 if asked.limit is None else asked.limit * unit.per_metre
+        axes.fill_between(
+            [max(begin, low), min(end, high)], bottom, top, facecolor="none", edgecolor=style.VERMILION,
+            hatch="////", alpha=0.55, linewidth=0.0, zorder=1,
+        )  # fmt: skip
+        axes.axvspan(max(begin, low), min(end, high), color=style.VERMILION, alpha=0.08, linewidth=0.0)
+    axes.set_xlim(low, high)
+    for name, height in lines:
+        if height is not None:
+            _mark_limit(axes, name, height, unit)
+
+
+def _mark_limit(axes: Axes, name: str, limit: float, unit: units.LengthUnit) -> None:
+    """A line at a limit, named at its right end."""
+    height = limit * unit.per_metre
+    axes.axhline(height, color=style.INK, linewidth=0.9, linestyle=_DASHED)
+    axes.annotate(
+        f"{name} {unit.show(limit)}", (1.0, height), xycoords=("axes fraction", "data"), xytext=(0, 3),
+        textcoords="offset points", ha="right", va="bottom",
+    )  # fmt: skip

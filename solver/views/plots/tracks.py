@@ -1,0 +1,143 @@
+"""Tracked peaks, and the response over frequency and a parameter with the ridge of its peaks."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from solver.jit.fourier import Real
+from solver.results import units
+from solver.views.plots import style
+from solver.views.plots.responses import axis_name
+
+if TYPE_CHECKING:
+    from solver.peaks.results import PeakTrack
+    from solver.studies.response_map import ResponseMap
+
+_LOGARITHMIC_FROM = 5.0  # ratio of the ends from which an axis is logarithmic
+_SAME_FREQUENCY = 2e-3  # relative distance from a tracked peak within which a point lies on it
+
+
+def track_figure(track: PeakTrack, *, dof: str, ax: style.Into = None) -> Figure:
+    """The highest peak and its frequency over the parameter, competing peaks thin, the optimum marked.
+
+    Parameters
+    ----------
+    track : with at least one point.
+    dof : the observed DOF.
+    """
+    unit = units.length_unit(float(track.peak.min()))
+    with style.styled():
+        page, (heights, places) = style.figure(9.2, 3.6, columns=2, into=ax)
+        for line in track.competing:
+            heights.plot(line.parameter, line.peak * unit.per_metre, color=style.GREY, linewidth=0.8)
+            places.plot(line.parameter, line.frequency, color=style.GREY, linewidth=0.8)
+        heights.plot(track.parameter, track.peak * unit.per_metre, color=style.BLUE)
+        places.plot(*ridge_lines(track), color=style.BLUE)
+        best = track.optimum
+        if np.isfinite(best.at):
+            heights.plot([best.at], [best.peak * unit.per_metre], **_DOT)
+            for peak in best.active:
+                places.plot([best.at], [peak.frequency], **_DOT)
+            text = f"least at {style.quantity(track.parameter_path, best.at, 5)}\n{unit.show(best.peak)}"
+            heights.annotate(
+                text, (best.at, best.peak * unit.per_metre), xytext=(0, -10), textcoords="offset points",
+                ha="center", va="top", color=style.VERMILION, linespacing=1.35,
+            )  # fmt: skip
+        for axes in (heights, places):
+            _scaled(axes, track.parameter)
+        heights.set_yscale("log")
+        style.plain_log(heights.yaxis)
+        low, high = track.peak.min() * unit.per_metre, track.peak.max() * unit.per_metre
+        heights.set_ylim(low * (low / high) ** 0.35, high * (high / low) ** 0.06)
+        style.label(heights, axis_name(track.parameter_path), f"highest peak, max |{dof}| [{unit.name}]")
+        style.label(places, axis_name(track.parameter_path), "frequency of the peak [Hz]")
+        heights.set_title(track.scene)
+    return page
+
+
+def map_figure(found: ResponseMap, *, dof: str, ax: style.Into = None) -> Figure:
+    """The amplitude in colours over frequency and parameter; the ridge of the highest peak on it.
+
+    Parameters
+    ----------
+    found : with at least one solved point.
+    dof : the observed DOF.
+    """
+    known = found.amplitude[np.isfinite(found.amplitude) & (found.amplitude > 0.0)]
+    unit = units.length_unit(float(np.median(known)))
+    scale = LogNorm(float(known.min()) * unit.per_metre, float(known.max()) * unit.per_metre)
+    with style.styled():
+        page, (axes,) = style.figure(6.8, 4.2, into=ax)
+        mesh = axes.pcolormesh(
+            found.frequency, found.parameter, found.amplitude * unit.per_metre, norm=scale, cmap="viridis",
+            shading="nearest", rasterized=True,
+        )  # fmt: skip
+        axes.grid(visible=False)
+        if found.ridge is not None and found.ridge.parameter.size:
+            _draw_ridge(axes, found.ridge)
+        if _is_wide(found.parameter):
+            axes.set_yscale("log")
+            style.plain_log(axes.yaxis)
+        low, high = sorted((float(found.parameter[0]), float(found.parameter[-1])))
+        axes.set_ylim(low, high)
+        axes.set_xlim(float(found.frequency[0]), float(found.frequency[-1]))
+        style.label(axes, axis_name("frequency"), axis_name(found.parameter_path))
+        bar = page.colorbar(mesh, ax=axes)
+        bar.set_label(f"amplitude, max |{dof}| [{unit.name}]")
+        axes.set_title(found.scene)
+    return page
+
+
+def ridge_lines(track: PeakTrack) -> tuple[Real, Real]:
+    """Return parameter and frequency of the highest peak, with a NaN where another peak becomes the highest.
+
+    However fast a peak moves, it is one line: two points are joined if one tracked peak passes through both.
+    """
+    p, f = track.parameter, track.frequency
+    joined = np.zeros(max(p.size - 1, 0), bool)
+    for line in track.competing:
+        order = np.argsort(line.parameter)
+        known, place = line.parameter[order], line.frequency[order]
+        inside = (p >= known[0]) & (p <= known[-1])
+        on = inside & (np.abs(np.interp(p, known, place) - f) <= _SAME_FREQUENCY * f)
+        joined |= on[:-1] & on[1:] & (np.diff(p) != 0.0)
+    gaps = np.flatnonzero(~joined) + 1
+    return np.insert(p, gaps, np.nan), np.insert(f, gaps, np.nan)
+
+
+_DOT: dict[str, Any] = {
+    "color": style.VERMILION,
+    "marker": "o",
+    "markersize": 5.5,
+    "linestyle": "none",
+    "zorder": 5,
+}
+
+
+def _draw_ridge(axes: Axes, ridge: PeakTrack) -> None:
+    """Competing peaks as dots, the highest as a line that is broken where another becomes the highest."""
+    for line in ridge.competing:
+        axes.plot(line.frequency, line.parameter, color="white", linewidth=0.7, linestyle=":")
+    parameter, frequency = ridge_lines(ridge)
+    axes.plot(frequency, parameter, color="white", linewidth=1.4)
+    best = ridge.optimum
+    for peak in best.active:
+        axes.plot([peak.frequency], [best.at], **_DOT)
+
+
+def _scaled(axes: Axes, values: np.ndarray) -> None:
+    """Make the axis of the parameter logarithmic where its ends differ by more than a few times."""
+    if _is_wide(values):
+        axes.set_xscale("log")
+        style.plain_log(axes.xaxis)
+    axes.margins(x=0.0)
+
+
+def _is_wide(values: np.ndarray) -> bool:
+    low, high = float(values.min()), float(values.max())
+    return low > 0.0 and high / low >= _LOGARITHMIC_FROM

@@ -1,0 +1,194 @@
+"""The results of the solver in a few words, with units."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.continuation.branch import BranchStatus
+from solver.results import units
+from solver.results.base import Summary
+from solver.views.notes import branch_notes, flag_words
+
+if TYPE_CHECKING:
+    from solver.continuation.branch import Branch
+    from solver.marching.result import MarchResult
+    from solver.peaks.results import LeastPeak, PeakTrack
+    from solver.response.floquet import Stability
+    from solver.response.solve import Solution
+    from solver.studies.blades import BladeAmplitudes, BladePeaks
+    from solver.studies.convergence import AccuracyStudy
+    from solver.studies.mistuning import MistuningStudy
+    from solver.studies.plan import Plan
+    from solver.studies.response_map import ResponseMap
+
+Pairs = list[tuple[str, str]]
+
+
+def made(title: str, pairs: Pairs, status: str) -> Summary:
+    """A summary that ends with the status."""
+    return Summary(title=title, pairs=(*pairs, ("status", status)))
+
+
+def of_branch(branch: Branch) -> Summary:
+    """Peak, band and size of a branch."""
+    path, pairs = branch.parameter, []
+    if branch.peak is not None:
+        height = units.length(branch.peak.value)
+        pairs.append(("peak", f"{height} at {units.parameter(path, branch.peak.at)}"))
+        if math.isfinite(branch.error_estimate):
+            pairs.append(("estimated error", units.length(branch.error_estimate)))
+    if branch.band is not None:
+        width = units.parameter(path, branch.band.width)
+        pairs.append(("band", f"{width} above {units.length(branch.band.limit)}"))
+    pairs += branch_notes(branch)
+    pairs += [("points", str(len(branch.values))), ("time", units.duration(branch.seconds))]
+    title = f"{branch.balance.scene.name} over {path}, {branch.balance.n_harmonics} harmonics"
+    return made(title, pairs, branch.status.value)
+
+
+def of_solution(solution: Solution) -> Summary:
+    """Amplitude, error and contacts of a solution."""
+    pairs: Pairs = []
+    if solution.converged:
+        pairs += [
+            ("max|x|", units.length(solution.max_abs)),
+            ("estimated error", units.length(solution.error_estimate)),
+            *((contact.name, contact.state.value) for contact in solution.contacts),
+        ]
+        pairs += [("note", words) for words in flag_words(solution.flags)]
+        if "mean_undetermined" in solution.flags and math.isfinite(solution.mean_range[0]):
+            low, high = (units.length(bound) for bound in solution.mean_range)
+            pairs.append(("mean, any history", f"{low} to {high}"))
+    pairs += [("residual", f"{solution.residual:.1e}"), ("time", units.duration(solution.seconds))]
+    title = f"{solution.scene.name} at {solution.frequency_hz:.6g} Hz, {solution.n_harmonics} harmonics"
+    return made(title, pairs, solution.status.value)
+
+
+def of_march(march: MarchResult) -> Summary:
+    """Amplitude and length of a march."""
+    pairs: Pairs = []
+    if march.converged:
+        pairs += [("max|x|", units.length(march.max_abs)), ("relative error", f"{march.error_estimate:.1e}")]
+    pairs += [
+        ("periods", str(march.periods)),
+        ("steps a period", str(march.steps_per_period)),
+        ("time", units.duration(march.seconds)),
+    ]
+    return made(f"at {march.frequency_hz:.6g} Hz", pairs, march.status.value)
+
+
+def of_map(found: ResponseMap) -> Summary:
+    """Size of a map, and its ridge."""
+    rows, columns = found.amplitude.shape
+    pairs: Pairs = [("points", f"{rows} × {columns}")]
+    if found.ridge is not None:
+        pairs += _least(found.ridge)
+    pairs.append(("time", units.duration(found.seconds)))
+    title = f"{found.scene} over frequency and {found.parameter_path}, {found.n_harmonics} harmonics"
+    return made(title, pairs, found.status.value)
+
+
+def of_track(track: PeakTrack) -> Summary:
+    """The least highest peak, and what it took."""
+    pairs = [
+        *_least(track),
+        *(("warning", reason) for reason in track.peaks_open),
+        ("points", f"{len(track.parameter)}, {track.sweeps} sweeps"),
+        ("time", units.duration(track.seconds)),
+    ]
+    title = f"highest peak of {track.scene} over {track.parameter_path}, {track.n_harmonics} harmonics"
+    return made(title, pairs, track.status.value)
+
+
+def _least(track: PeakTrack) -> Pairs:
+    best = track.optimum
+    if not math.isfinite(best.at):
+        return []
+    return [("least peak", f"{units.length(best.peak)} at {units.parameter(track.parameter_path, best.at)}")]
+
+
+def of_accuracy(study: AccuracyStudy) -> Summary:
+    """The ways that no other beats, with error and time."""
+    pairs: Pairs = [("reference", units.length(study.reference))]
+    for row in study.rows:
+        if row.pareto:
+            how = row.evaluator if not row.samples else f"{row.samples} samples"
+            cost = f"error {row.error / study.reference:.1e}, {row.milliseconds:.3g} ms"
+            pairs.append((f"{row.harmonics} harmonics, {how}", cost))
+    return made(f"{study.scene} at {study.frequency_hz:.6g} Hz", pairs, study.status.value)
+
+
+def of_mistuning(study: MistuningStudy) -> Summary:
+    """Magnification over the disks, and the worst."""
+    factors, pairs = study.magnifications, []
+    if math.isfinite(study.tuned.largest):
+        pairs.append(("tuned peak", units.length(study.tuned.largest)))
+    if factors.size:
+        pairs.append(("magnification", f"{factors.mean():.4g} in the mean, {factors.max():.4g} at most"))
+    pairs.append(("time", units.duration(study.seconds)))
+    title = f"{len(study.disks)} disks of {study.scene}, spread {study.spread:g} of {', '.join(study.of)}"
+    return made(title, pairs, study.status.value)
+
+
+def of_plan(found: Plan) -> Summary:
+    """Every effect with its reason, and the cost of a point."""
+    pairs = [(("" if e.used else "left out: ") + e.name, e.reason) for e in found.effects]
+    pairs.append(("unknowns", str(found.unknowns)))
+    pairs.append(("a point takes about", units.duration(found.seconds_a_point)))
+    return Summary(title=f"{found.scene}, {found.harmonics} harmonics", pairs=tuple(pairs))
+
+
+def of_least(best: LeastPeak) -> Summary:
+    """The least highest peak, what holds it, and what else was met."""
+    pairs: Pairs = []
+    if math.isfinite(best.at):
+        pairs.append(("least peak", f"{units.length(best.peak)} at {best.at:.6g}"))
+        pairs.append(("peaks there", ", ".join(f"{one.frequency:.6g} Hz" for one in best.active)))
+    if best.plateau is not None:
+        low, high = best.plateau
+        pairs.append(("the same from", f"{low:.6g} to {high:.6g}, chosen by: {best.chosen_by}"))
+    others = [f"{units.length(basin.peak)} at {basin.at:.6g}" for basin in best.basins[1:]]
+    if others:
+        pairs.append(("other minima", "; ".join(others)))
+    pairs += [("responses", f"{best.sweeps}, the work of {best.work:.3g}")]
+    pairs.append(("time", units.duration(best.seconds)))
+    scene = "" if best.branch is None else f"of {best.branch.balance.scene.name}"
+    return made(f"highest peak {scene}".rstrip(), pairs, best.status.value)
+
+
+def of_blade_peaks(peaks: BladePeaks) -> Summary:
+    """The highest blade, the least, and those whose branch did not reach the end."""
+    known = peaks.value[np.isfinite(peaks.value)]
+    pairs: Pairs = []
+    if known.size:
+        at = int(np.nanargmax(peaks.value))
+        pairs.append(("highest", f"{units.length(known.max())} at {peaks.at_hz[at]:.6g} Hz, blade {at}"))
+        pairs.append(("lowest", units.length(known.min())))
+    pairs.append(("blades", str(peaks.value.size)))
+    reached = BranchStatus.COMPLETED
+    ended = next((one for one in peaks.status if one is not reached), reached)
+    return made(peaks.dof, pairs, ended.value)
+
+
+def of_amplitudes(blades: BladeAmplitudes) -> Summary:
+    """The blade that moves most, and the one that moves least."""
+    pairs = (
+        ("largest", f"{units.length(blades.largest)}, blade {blades.worst}"),
+        ("smallest", units.length(float(blades.max_abs.min()))),
+        ("blades", str(blades.max_abs.size)),
+    )
+    return Summary(title=f"max|x| of {blades.dof}", pairs=pairs)
+
+
+def of_stability(found: Stability) -> Summary:
+    """Whether it is stable, and the largest multiplier."""
+    pairs: Pairs = [
+        ("stable", "yes" if found.stable else "no"),
+        ("largest multiplier", f"{found.radius:.6g} in modulus"),
+        ("multipliers", f"{found.multipliers.size}, and {found.neutral} that are 1 by construction"),
+        ("time", units.duration(found.seconds)),
+    ]
+    return made(f"at {found.frequency_hz:.6g} Hz", pairs, found.growth.value)
