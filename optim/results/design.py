@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from optim.criteria.linearised import Conditions
 from optim.criteria.rows import UNITS, Evaluation, Quantity, Row
@@ -23,13 +23,11 @@ from optim.results.json import (
     row_json,
 )
 from solver.continuation.branch import Branch
-from solver.results.base import Shown, Summary
+from solver.results.base import Drawn
+from solver.results.views import Views
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from solver.results.dataset import Dataset
-    from solver.views.plots.style import Into
+    pass
 
 
 SAME_HEIGHT = 1e-5  # relative distance within which rows count as equally high
@@ -132,7 +130,7 @@ class Checked:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class DesignResult(Shown):
+class DesignResult(Drawn):
     """The best design found.
 
     Attributes
@@ -290,23 +288,7 @@ class DesignResult(Shown):
         last = [] if self.evaluation is None else [self.evaluation]
         return [(e.values, response.branch) for e in [*others, *last] for response in e.responses]
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from optim.views.summary import of_design
-
-        return of_design(self)
-
-    def to_dataset(self) -> Dataset:
-        """A design that was tried a row, the optimum marked."""
-        from optim.views.to_dataset import design_dataset
-
-        return design_dataset(self)
-
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw the response of the optimum; `ax`: axes to draw into, else a new figure."""
-        from optim.views.plots.designs import design_figure
-
-        return design_figure(self, ax=ax)
+    VIEWS: ClassVar = Views("optim.views", "of_design", "design_dataset", "of_design")
 
     def to_json(self) -> dict[str, object]:
         """Return the result as one JSON object."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -17,13 +17,11 @@ from optim.problem.uncertainty_set import Scenario, UncertainSet
 from optim.results.design import DesignResult
 from optim.robust.risk_measure import Aim, rank_of
 from optim.robust.scenarios import Outcome
-from solver.results.base import Shown, Summary
+from solver.results.base import Drawn
+from solver.results.views import Views
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from solver.results.dataset import Dataset
-    from solver.views.plots.style import Into
+    pass
 
 
 QUANTILES = (0.05, 0.5, 0.95)
@@ -184,7 +182,7 @@ class Cut:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class RobustResult(Shown):
+class RobustResult(Drawn):
     """The nominal and the robust optimum side by side.
 
     Attributes
@@ -257,23 +255,7 @@ class RobustResult(Shown):
             return math.nan
         return 1.0 - self.robust.worst_peak / self.nominal.worst_peak
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from optim.views.summary import of_robust
-
-        return of_robust(self)
-
-    def to_dataset(self) -> Dataset:
-        """A sample of the uncertainty a row."""
-        from optim.views.to_dataset import robust_dataset
-
-        return robust_dataset(self)
-
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw the peaks of both optima over the uncertainty; `ax`: axes to draw into, else a new figure."""
-        from optim.views.plots.designs import robust_figure
-
-        return robust_figure(self.to_json(), ax=ax)
+    VIEWS: ClassVar = Views("optim.views", "of_robust", "robust_dataset", "of_robust")
 
     def to_json(self) -> dict[str, object]:
         """Return the result as one JSON object."""

@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from solver.continuation.branch import Branch
-from solver.results.base import Shown, Summary
+from solver.results.base import Drawn
+from solver.results.views import Views
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from solver.results.dataset import Dataset
-    from solver.views.plots.style import Into
+    pass
 
 
 Ranges = tuple[tuple[float, float], ...]
@@ -124,7 +122,7 @@ class OrderResponse:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class CampbellDiagram(Shown):
+class CampbellDiagram(Drawn):
     """Orders of a running speed against the resonances of a scene.
 
     Attributes
@@ -172,26 +170,7 @@ class CampbellDiagram(Shown):
         known = all(one.branch.peak_certificate.known for one in self.orders)
         return False if meets else True if self.completed and known else None
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from optim.views.summary import of_campbell
-
-        return of_campbell(self)
-
-    def to_dataset(self) -> Dataset:
-        """A crossing a row, and the responses."""
-        from optim.views.to_dataset import campbell_dataset
-
-        return campbell_dataset(self)
-
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw the diagram, and the responses beside it; `ax`: axes to draw into, else a new figure."""
-        from optim.views.plots.campbell import campbell_figure
-        from solver.views.plots.curves import Response
-
-        # One object for each branch: orders that share theirs are told by it.
-        curves = {id(one.branch): Response.of_branch(one.branch) for one in self.orders}
-        return campbell_figure(self.to_json(), [curves[id(one.branch)] for one in self.orders], ax=ax)
+    VIEWS: ClassVar = Views("optim.views", "of_campbell", "campbell_dataset", "of_campbell")
 
     def to_json(self) -> dict[str, object]:
         """Return the diagram as one JSON object."""

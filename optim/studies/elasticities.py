@@ -12,7 +12,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -26,16 +26,14 @@ from solver.branches.sweep import sweep
 from solver.continuation.branch import Branch, Peak
 from solver.errors import SettingError
 from solver.extrema.extrema import HALF_POWER
-from solver.results.base import Shown, Summary
+from solver.results.base import Drawn
+from solver.results.views import Views
 from solver.scene.annulus import check_in_annulus
 from solver.scene.parameter_paths import PHASE
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from solver.results.dataset import Dataset
-    from solver.views.plots.style import Into
+    pass
 
 
 _ANGLES = (".N1_phase", PHASE)
@@ -82,7 +80,7 @@ class ParameterSensitivity:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class SensitivityResult(Shown):
+class SensitivityResult(Drawn):
     """Sensitivities of a design.
 
     Attributes
@@ -136,23 +134,7 @@ class SensitivityResult(Shown):
         """Return the per cent of the band for one per cent of a parameter; NaN where none."""
         return row.band * row.value / self.band_hz if row.relative and self.band_hz > 0.0 else math.nan
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from optim.views.summary import of_sensitivities
-
-        return of_sensitivities(self)
-
-    def to_dataset(self) -> Dataset:
-        """A parameter a row."""
-        from optim.views.to_dataset import sensitivities_dataset
-
-        return sensitivities_dataset(self)
-
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw what matters most as bars; `ax`: axes to draw into, else a new figure."""
-        from optim.views.plots.shares import sensitivities_figure
-
-        return sensitivities_figure(self.to_json(), ax=ax)
+    VIEWS: ClassVar = Views("optim.views", "of_sensitivities", "sensitivities_dataset", "of_sensitivities")
 
     def to_json(self) -> dict[str, object]:
         """Return the result as one JSON object."""

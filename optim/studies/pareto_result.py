@@ -6,17 +6,15 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from optim.problem.problem import Problem
 from optim.results.design import DesignResult
-from solver.results.base import Shown, Summary
+from solver.results.base import Drawn
+from solver.results.views import Views
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from solver.results.dataset import Dataset
-    from solver.views.plots.style import Into
+    pass
 
 
 SAME = 1e-7  # relative distance within which two points are one
@@ -102,7 +100,7 @@ class ParetoPoint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class ParetoResult(Shown):
+class ParetoResult(Drawn):
     """The front of peak against band.
 
     Attributes
@@ -148,23 +146,7 @@ class ParetoResult(Shown):
         place = max(range(len(below)), key=below.__getitem__)
         return place if below[place] > 0.0 else None
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from optim.views.summary import of_front
-
-        return of_front(self)
-
-    def to_dataset(self) -> Dataset:
-        """A point of the front a row."""
-        from optim.views.to_dataset import front_dataset
-
-        return front_dataset(self)
-
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw the front and the frequencies at risk; `ax`: axes to draw into, else a new figure."""
-        from optim.views.plots.pareto import pareto_figure
-
-        return pareto_figure(self.to_json(), ax=ax)
+    VIEWS: ClassVar = Views("optim.views", "of_front", "front_dataset", "of_front")
 
     def to_json(self) -> dict[str, object]:
         """Return the result as one JSON object."""

@@ -15,13 +15,13 @@ from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN, RESIDUAL, S
 from solver.continuation.certificate import PeakCertificate
 from solver.continuation.kernels.state import FINISHED, LEFT_RANGE, NO_START, STALLED
 from solver.jit.fourier import Integer, Real
-from solver.results.base import Piece, Shown, Summary
+from solver.results.base import Drawn, Piece
+from solver.results.views import Views, on_demand
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from solver.results.dataset import Dataset
-    from solver.views.plots.style import Into
+    from solver.results.base import Into
 
 
 class BranchStatus(Enum):
@@ -137,7 +137,7 @@ class Band(Piece):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Branch(Shown):
+class Branch(Drawn):
     """A branch of periodic responses over one parameter, P points in their order along it.
 
     They are the steps of the continuation and what was solved for between them: narrow resonances and peaks.
@@ -245,26 +245,16 @@ class Branch(Shown):
 
         It is found when it is asked for, as `solve` does.
         """
-        from solver.response.history_dependence import peak_flags
-
-        return None if self.peak is None else "mean_undetermined" in peak_flags(self)
+        if self.peak is None:
+            return None
+        return "mean_undetermined" in on_demand("solver.response.history_dependence:peak_flags")(self)
 
     @property
     def folds(self) -> int:
         """How often the branch turned back in its parameter."""
         return int(np.count_nonzero(np.diff(np.sign(np.diff(self.values)))))
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from solver.views.summary import of_branch
-
-        return of_branch(self)
-
-    def to_dataset(self) -> Dataset:
-        """A point a row, with harmonics and contact states; SI units."""
-        from solver.views.to_dataset import branch_dataset
-
-        return branch_dataset(self)
+    VIEWS: ClassVar = Views("solver.views", "of_branch", "branch_dataset", "of_branch")
 
     def plot(self, ax: Into = None, *, limit: float | None = None) -> Figure:
         """Draw the response, its peak and its band.
@@ -274,10 +264,8 @@ class Branch(Shown):
         ax : axes to draw into, else a new figure.
         limit : amplitude [m] drawn as a line.
         """
-        from solver.views.plots.curves import Response
-        from solver.views.plots.responses import Demands, response_figure
-
-        return response_figure(Response.of_branch(self), asked=Demands(limit=limit), ax=ax)
+        figure: Figure = self.VIEWS.call("plots.figures", self, ax, limit=limit)
+        return figure
 
     def to_json(self) -> dict[str, object]:
         """Return the branch as one JSON object."""

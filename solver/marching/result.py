@@ -5,20 +5,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.marching.kernels.state import Record
-from solver.results.base import Shown, Summary
+from solver.results.base import Drawn
+from solver.results.views import Views
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from solver.results.dataset import Dataset
+    from solver.results.base import Into
     from solver.scene.scene import Scene
-    from solver.views.plots.style import Into
 
 
 FloatArray = NDArray[np.float64]
@@ -46,7 +46,7 @@ class MarchStatus(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class MarchResult(Shown):
+class MarchResult(Drawn):
     """The last period of a time march, from the run with the smaller step.
 
     Attributes
@@ -108,17 +108,7 @@ class MarchResult(Shown):
         """The motion repeats within the tolerance."""
         return self.status is MarchStatus.CONVERGED
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from solver.views.summary import of_march
-
-        return of_march(self)
-
-    def to_dataset(self) -> Dataset:
-        """The last period; SI units."""
-        from solver.views.to_dataset import march_dataset
-
-        return march_dataset(self)
+    VIEWS: ClassVar = Views("solver.views", "of_march", "march_dataset", "of_march")
 
     def plot(self, ax: Into = None, *, scene: Scene | None = None) -> Figure:
         """Draw the last period and its hysteresis loops.
@@ -128,12 +118,8 @@ class MarchResult(Shown):
         ax : axes to draw into, else a new figure.
         scene : what was marched, for the title.
         """
-        from solver.views.plots.motion import Motion, motion_figure
-
-        motion = Motion.of_march(self)
-        if scene is not None:
-            motion = Motion.of_march(self, scene.name, scene.observe.dof)
-        return motion_figure(motion, ax=ax)
+        figure: Figure = self.VIEWS.call("plots.figures", self, ax, scene=scene)
+        return figure
 
     def to_json(self) -> dict[str, object]:
         """The result without its histories, for JSON; a number that does not exist is None."""

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, ClassVar
 from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.results.base import Piece, Shown, Summary
+from solver.results.base import Drawn, Piece, Shown
+from solver.results.views import Views
 from solver.views.notes import unsettled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from solver.results.dataset import Dataset
+    from solver.results.base import Into
     from solver.scene.scene import Scene
-    from solver.views.plots.style import Into
 
 
 class TrackStatus(Enum):
@@ -157,17 +157,7 @@ class LeastPeak(Shown):
     plateau: tuple[float, float] | None = None
     chosen_by: str = ChosenBy.HIGHEST_PEAK.value
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from solver.views.summary import of_least
-
-        return of_least(self)
-
-    def to_dataset(self) -> Dataset:
-        """A local minimum a row."""
-        from solver.views.to_dataset import least_dataset
-
-        return least_dataset(self)
+    VIEWS: ClassVar = Views("solver.views", "of_least", "least_dataset")
 
     def plot(self, ax: Into = None) -> Figure:
         """Draw the response at the optimum; `ax`: axes to draw into, else a new figure."""
@@ -209,7 +199,7 @@ class CompetingPeak:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class PeakTrack(Shown):
+class PeakTrack(Drawn):
     """The highest peak over a parameter.
 
     Attributes
@@ -260,23 +250,7 @@ class PeakTrack(Shown):
         """Whether the whole range was covered and checked."""
         return self.status is TrackStatus.TRACKED
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from solver.views.summary import of_track
-
-        return of_track(self)
-
-    def to_dataset(self) -> Dataset:
-        """The highest peak over the parameter; SI units."""
-        from solver.views.to_dataset import track_dataset
-
-        return track_dataset(self)
-
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw the peak and its frequency over the parameter; `ax`: axes to draw into, else a new figure."""
-        from solver.views.plots.tracks import track_figure
-
-        return track_figure(self, dof="x" if self.given is None else self.given.observe.dof, ax=ax)
+    VIEWS: ClassVar = Views("solver.views", "of_track", "track_dataset", "of_track")
 
     def to_json(self) -> dict[str, object]:
         """Return the track as one JSON object."""

@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -29,15 +29,13 @@ from solver.jit.trig_polynomial import grid_size, grid_tables
 from solver.linear.assembly import linear_model
 from solver.response.monodromy import PERIOD, SHORTEST, Element, Monodromy, Piece, Structure, monodromy
 from solver.response.solve import Solution
-from solver.results.base import Shown, Summary
+from solver.results.base import Drawn
+from solver.results.views import Views
 from solver.scene.annulus import annulus
 from solver.scene.scene import Contact, CyclicStructure, Scene
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from solver.results.dataset import Dataset
-    from solver.views.plots.style import Into
+    pass
 
 GROWS = 1e-9  # a multiplier's modulus beyond 1 that is more than rounding
 REAL = 1e-7  # imaginary part, relative to the modulus, that counts as none
@@ -53,7 +51,7 @@ class Growth(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Stability(Shown):
+class Stability(Drawn):
     """Whether small perturbations of a periodic response die out.
 
     Attributes
@@ -88,23 +86,7 @@ class Stability(Shown):
         """Whether no perturbation grows."""
         return self.growth is Growth.NONE
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from solver.views.summary import of_stability
-
-        return of_stability(self)
-
-    def to_dataset(self) -> Dataset:
-        """A multiplier a row."""
-        from solver.views.to_dataset import stability_dataset
-
-        return stability_dataset(self)
-
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw the multipliers and the unit circle; `ax`: axes to draw into, else a new figure."""
-        from solver.views.plots.multipliers import multipliers_figure
-
-        return multipliers_figure(self, ax=ax)
+    VIEWS: ClassVar = Views("solver.views", "of_stability", "stability_dataset", "of_stability")
 
     def to_json(self) -> dict[str, object]:
         """Return the answer as one JSON object; multipliers as [real, imaginary]."""

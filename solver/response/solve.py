@@ -6,7 +6,7 @@ import math
 import time
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -24,14 +24,12 @@ from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.condensation import loose_ports
 from solver.response.contact_response import OPENS, ContactResponse, ContactState, contact_responses
-from solver.results.base import Shown, Summary
+from solver.results.base import Drawn
+from solver.results.views import Views
 from solver.scene.scene import FrictionContact, Scene
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from solver.results.dataset import Dataset
-    from solver.views.plots.style import Into
+    pass
 
 
 MEAN_UNDETERMINED = "mean_undetermined"
@@ -56,7 +54,7 @@ class SolutionStatus(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Solution(Shown):
+class Solution(Drawn):
     """A periodic response at one frequency.
 
     Attributes
@@ -122,23 +120,7 @@ class Solution(Shown):
         """Whether they are, with the accuracy asked for."""
         return self.status is SolutionStatus.CONVERGED
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from solver.views.summary import of_solution
-
-        return of_solution(self)
-
-    def to_dataset(self) -> Dataset:
-        """One period in time, and the harmonics; SI units."""
-        from solver.views.to_dataset import solution_dataset
-
-        return solution_dataset(self)
-
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw a period, its hysteresis loops and harmonics; `ax`: axes to draw into, else a new figure."""
-        from solver.views.plots.motion import Motion, motion_figure
-
-        return motion_figure(Motion.of_solution(self), ax=ax)
+    VIEWS: ClassVar = Views("solver.views", "of_solution", "solution_dataset", "of_solution")
 
     def to_json(self, *, with_stability: bool = False) -> dict[str, object]:
         """Return the answer as one JSON object; on request with what `solver.stability` says, which costs."""

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from enum import Enum
 from html import escape
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
+
+from solver.results.views import Views
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from solver.results.dataset import Dataset
+
+Into: TypeAlias = "Axes | Sequence[Axes] | None"
+"""Axes to draw into; None makes a new figure."""
 
 _MOST = 30
 _FEW = 6
@@ -61,10 +68,17 @@ class Shown(Told):
     """Root of the results: each says what is worth knowing of it, and gives its arrays."""
 
     __slots__ = ()
+    VIEWS: ClassVar[Views]
 
-    @abstractmethod
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units."""
+        found: Summary = self.VIEWS.call("summary", self)
+        return found
+
     def to_dataset(self) -> Dataset:
-        """The result as named arrays with dimensions, units and attributes."""
+        """The result as named arrays with dimensions, units and attributes; SI units."""
+        found: Dataset = self.VIEWS.call("to_dataset", self)
+        return found
 
     def to_pandas(self) -> pd.DataFrame:
         """The result as a table, in SI units; needs pandas (``pip install 'stickslip[data]'``)."""
@@ -73,6 +87,17 @@ class Shown(Told):
     def to_xarray(self) -> xr.Dataset:
         """The result as arrays with coordinates, units and attributes; needs xarray (the extra ``data``)."""
         return self.to_dataset().to_xarray()
+
+
+class Drawn(Shown):
+    """Root of the results that have a picture."""
+
+    __slots__ = ()
+
+    def plot(self, ax: Into = None) -> Figure:
+        """Draw the result; `ax`: axes to draw into, else a new figure."""
+        figure: Figure = self.VIEWS.call("plots.figures", self, ax)
+        return figure
 
 
 class Piece(Told):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -20,22 +20,20 @@ from solver.jit.fourier import Real
 from solver.jit.trig_polynomial import grid_size, grid_tables, on_grid
 from solver.response.solve import Solution
 from solver.response.time_history import motion
-from solver.results.base import Shown, Summary
+from solver.results.base import Drawn
+from solver.results.views import Views
 from solver.scene.annulus import annulus, sectors_needed
 from solver.scene.scene import CyclicStructure, Observe, Scene
 from solver.scene.validation import listing, nearest
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from solver.results.dataset import Dataset
-    from solver.views.plots.style import Into
+    pass
 
 _OF_THE_SWEEP = 0.4  # share of the time; the rest looks for the peaks of the other blades
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class BladeAmplitudes(Shown):
+class BladeAmplitudes(Drawn):
     """The motion of one DOF in every sector.
 
     Attributes
@@ -60,23 +58,7 @@ class BladeAmplitudes(Shown):
         """The sector that has it."""
         return int(self.max_abs.argmax())
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from solver.views.summary import of_amplitudes
-
-        return of_amplitudes(self)
-
-    def to_dataset(self) -> Dataset:
-        """A sector a row."""
-        from solver.views.to_dataset import amplitudes_dataset
-
-        return amplitudes_dataset(self)
-
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw the amplitude of every blade; `ax`: axes to draw into, else a new figure."""
-        from solver.views.plots.disks import blades_figure
-
-        return blades_figure(self.max_abs, f"max |{self.dof}|", ax=ax)
+    VIEWS: ClassVar = Views("solver.views", "of_amplitudes", "amplitudes_dataset", "of_amplitudes")
 
     def magnification(self, tuned: Solution | BladeAmplitudes) -> float:
         """Largest amplitude relative to that of another disk, usually the tuned one."""
@@ -84,7 +66,7 @@ class BladeAmplitudes(Shown):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class BladePeaks(Shown):
+class BladePeaks(Drawn):
     """The highest peak of one DOF in every sector over a range of the frequency.
 
     Attributes
@@ -117,23 +99,7 @@ class BladePeaks(Shown):
         """The sector that has it."""
         return int(self.value.argmax())
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from solver.views.summary import of_blade_peaks
-
-        return of_blade_peaks(self)
-
-    def to_dataset(self) -> Dataset:
-        """A sector a row."""
-        from solver.views.to_dataset import blade_peaks_dataset
-
-        return blade_peaks_dataset(self)
-
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw the highest peak of every blade; `ax`: axes to draw into, else a new figure."""
-        from solver.views.plots.disks import blades_figure
-
-        return blades_figure(self.value, f"highest peak, max |{self.dof}|", ax=ax)
+    VIEWS: ClassVar = Views("solver.views", "of_blade_peaks", "blade_peaks_dataset", "of_blade_peaks")
 
     def magnification(self, tuned: BladePeaks) -> float:
         """The amplitude magnification factor: the highest peak relative to that of the tuned disk."""

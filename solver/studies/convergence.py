@@ -20,15 +20,13 @@ from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.extrema.error_estimate import truncation_error
 from solver.jit.fourier import Real
-from solver.results.base import Piece, Shown, Summary
+from solver.results.base import Drawn, Piece
+from solver.results.views import Views
 from solver.scene.harmonics import kept_harmonics
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from solver.results.dataset import Dataset
-    from solver.views.plots.style import Into
+    pass
 
 
 CLOSED_FORM, SAMPLED = "closed form", "sampled"
@@ -89,7 +87,7 @@ class AccuracyRow(Piece):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class AccuracyStudy(Shown):
+class AccuracyStudy(Drawn):
     """Rows of `accuracy_study` with what they are measured against.
 
     Attributes
@@ -120,23 +118,7 @@ class AccuracyStudy(Shown):
         """Whether no way was left out."""
         return self.status is AccuracyStatus.COMPLETED
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from solver.views.summary import of_accuracy
-
-        return of_accuracy(self)
-
-    def to_dataset(self) -> Dataset:
-        """A way to compute the point a row."""
-        from solver.views.to_dataset import accuracy_dataset
-
-        return accuracy_dataset(self)
-
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw error against time; `ax`: axes to draw into, else a new figure."""
-        from solver.views.plots.accuracy import accuracy_figure
-
-        return accuracy_figure(self.to_json(), ax=ax)
+    VIEWS: ClassVar = Views("solver.views", "of_accuracy", "accuracy_dataset", "of_accuracy")
 
     def to_json(self) -> dict[str, object]:
         """Return the study as one JSON object."""

@@ -11,23 +11,21 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.results.base import Piece, Shown, Summary
+from solver.results.base import Drawn, Piece
+from solver.results.views import Views
 from solver.scene.parts import Mistuning
 from solver.scene.scene import CyclicStructure, Scene
 from solver.studies.blades import BladePeaks, blade_peaks, mistuned, with_mistuning
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from solver.results.dataset import Dataset
-    from solver.views.plots.style import Into
+    pass
 
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
@@ -89,7 +87,7 @@ class MistunedDisk(Piece):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class MistuningStudy(Shown):
+class MistuningStudy(Drawn):
     """What becomes of the highest peak when blades are not quite equal.
 
     Attributes
@@ -133,23 +131,7 @@ class MistuningStudy(Shown):
         """The disk with the highest peak."""
         return max((d for d in self.disks if d.known), key=lambda disk: disk.magnification, default=None)
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from solver.views.summary import of_mistuning
-
-        return of_mistuning(self)
-
-    def to_dataset(self) -> Dataset:
-        """A disk a row."""
-        from solver.views.to_dataset import mistuning_dataset
-
-        return mistuning_dataset(self)
-
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw the magnifications and the worst disk; `ax`: axes to draw into, else a new figure."""
-        from solver.views.plots.disks import mistuning_figure
-
-        return mistuning_figure(self.to_json(), ax=ax)
+    VIEWS: ClassVar = Views("solver.views", "of_mistuning", "mistuning_dataset", "of_mistuning")
 
     def to_json(self) -> dict[str, object]:
         """Return the study as one JSON object."""

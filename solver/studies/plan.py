@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE, MODES, POLES
 from solver.jit.fourier import Real
 from solver.linear.contact_table import DEFAULT_SAMPLES
-from solver.results.base import Shown, Summary
+from solver.results.base import Shown
+from solver.results.views import Views
 from solver.scene.annulus import sectors_needed
 from solver.scene.parts import CyclicStructure, MatricesStructure
 from solver.scene.scene import (
@@ -27,7 +28,7 @@ from solver.scene.scene import (
 )
 
 if TYPE_CHECKING:
-    from solver.results.dataset import Dataset
+    pass
 
 
 # Fitted to responses of the shipped scenes at 11 harmonics on one core of a server: seconds of a Newton
@@ -88,17 +89,7 @@ class Plan(Shown):
     harmonics: int
     seconds_a_point: float
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from solver.views.summary import of_plan
-
-        return of_plan(self)
-
-    def to_dataset(self) -> Dataset:
-        """An effect a row."""
-        from solver.views.to_dataset import plan_dataset
-
-        return plan_dataset(self)
+    VIEWS: ClassVar = Views("solver.views", "of_plan", "plan_dataset")
 
     def to_json(self) -> dict[str, object]:
         """Return the plan as one JSON object."""

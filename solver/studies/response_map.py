@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -20,15 +20,13 @@ from solver.jit.fourier import Integer, Real
 from solver.peaks.results import PeakTrack, TrackStatus
 from solver.peaks.track_peak import track_peak
 from solver.peaks.tracker import check_laws
-from solver.results.base import Shown, Summary
+from solver.results.base import Drawn
+from solver.results.views import Views
 from solver.scene.scene import Scene
 from solver.studies.kernels.map_rows import GIVEN, MAX_ABS, RESIDUAL, ROW_VALUES, SOLVED, solve_row
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from solver.results.dataset import Dataset
-    from solver.views.plots.style import Into
+    pass
 
 
 MOST_POINTS = 4_000_000
@@ -46,7 +44,7 @@ class MapStatus(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class ResponseMap(Shown):
+class ResponseMap(Drawn):
     """max|x| of the observed DOF over a parameter and the frequency.
 
     Attributes
@@ -87,23 +85,7 @@ class ResponseMap(Shown):
         """Whether every point is a solution."""
         return self.status is MapStatus.COMPLETED
 
-    def summary(self) -> Summary:
-        """What is most worth knowing, in words and with units."""
-        from solver.views.summary import of_map
-
-        return of_map(self)
-
-    def to_dataset(self) -> Dataset:
-        """The grid, and the ridge; SI units."""
-        from solver.views.to_dataset import map_dataset
-
-        return map_dataset(self)
-
-    def plot(self, ax: Into = None) -> Figure:
-        """Draw the map with its ridge; `ax`: axes to draw into, else a new figure."""
-        from solver.views.plots.tracks import map_figure
-
-        return map_figure(self, dof="x" if self.given is None else self.given.observe.dof, ax=ax)
+    VIEWS: ClassVar = Views("solver.views", "of_map", "map_dataset", "of_map")
 
     def to_json(self) -> dict[str, object]:
         """Return the map as one JSON object."""

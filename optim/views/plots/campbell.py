@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from solver.results import units
+from solver.results.base import Into
 from solver.views.plots import style
 from solver.views.plots.curves import Response
 
@@ -40,7 +41,7 @@ class _Order:
         return int(self.answer["order"])
 
 
-def campbell_figure(answer: Json, curves: Sequence[Response], *, ax: style.Into = None) -> Figure:
+def campbell_figure(answer: Json, curves: Sequence[Response], *, ax: Into = None) -> Figure:
     """Frequency over speed, and beside it the amplitude of every order over the same frequencies.
 
     Parameters

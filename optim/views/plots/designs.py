@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from solver.jit.fourier import Real
 from solver.results import units
+from solver.results.base import Into
 from solver.views.plots import style
 from solver.views.plots.curves import Response
 from solver.views.plots.responses import Demands, response_figure
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from optim.results.design import DesignResult
 
 
-def design_figure(result: DesignResult, *, ax: style.Into = None) -> Figure:
+def design_figure(result: DesignResult, *, ax: Into = None) -> Figure:
     """The response at the optimum of the case with the highest peak, with its limits and forbidden ranges.
 
     Parameters
@@ -44,7 +45,7 @@ def design_figure(result: DesignResult, *, ax: style.Into = None) -> Figure:
     return response_figure(Response.of_branch(branch), asked=asked, title=title, ax=ax)
 
 
-def robust_figure(found: Mapping[str, Any], *, ax: style.Into = None) -> Figure:
+def robust_figure(found: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """The highest peak of both optima over the samples of the uncertainty, sorted, with the worst of all.
 
     Parameters

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from solver.results import units
+from solver.results.base import Into
 from solver.results.units import LengthUnit
 from solver.views.plots import style
 
@@ -20,7 +21,7 @@ _PRICED = 0.02  # share of the peak, rounded down to a power of ten, that the pr
 _TANGENT = 0.06  # half length of a tangent, as a share of the front's width and height
 
 
-def pareto_figure(answer: Mapping[str, Any], *, ax: style.Into = None) -> Figure:
+def pareto_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """The front with its slopes and its knee, and beside it the frequencies at risk of every point.
 
     Parameters

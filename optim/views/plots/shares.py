@@ -9,13 +9,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from solver.results import units
+from solver.results.base import Into
 from solver.views.plots import style
 
 MOST = 12  # parameters shown, those that matter most
 _LEAST = 1e-3  # per cent below which a bar is not worth a line
 
 
-def sensitivities_figure(answer: Mapping[str, Any], *, ax: style.Into = None) -> Figure:
+def sensitivities_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """Bars of the per cent of the highest peak, and of the band, for one per cent of a parameter.
 
     Parameters

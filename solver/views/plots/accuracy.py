@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from solver.results import units
+from solver.results.base import Into
 from solver.views.plots import style
 
 Row = Mapping[str, Any]
@@ -22,7 +23,7 @@ _SAMPLED = (
 )  # fmt: skip
 
 
-def accuracy_figure(study: Mapping[str, Any], *, ax: style.Into = None) -> Figure:
+def accuracy_figure(study: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """The rows of an accuracy study, as the JSON object a program reads."""
     rows: Sequence[Row] = study["rows"]
     least = max(study["reference_error"] or 0.0, 1e-15 * study["reference"])

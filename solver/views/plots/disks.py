@@ -11,10 +11,11 @@ from matplotlib.ticker import MaxNLocator
 
 from solver.jit.fourier import Real
 from solver.results import units
+from solver.results.base import Into
 from solver.views.plots import style
 
 
-def mistuning_figure(answer: Mapping[str, Any], *, ax: style.Into = None) -> Figure:
+def mistuning_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
     """The share of disks below every magnification; beside it the peaks of the blades of the worst disk.
 
     Parameters
@@ -50,7 +51,7 @@ def mistuning_figure(answer: Mapping[str, Any], *, ax: style.Into = None) -> Fig
     return page
 
 
-def blades_figure(heights: Real, what: str, *, ax: style.Into = None) -> Figure:
+def blades_figure(heights: Real, what: str, *, ax: Into = None) -> Figure:
     """One number of every blade of a disk, the largest in another colour.
 
     Parameters

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from solver.results import units
+from solver.results.base import Into
 from solver.views.plots import style
 from solver.views.plots.curves import FloatArray
 
@@ -97,7 +98,7 @@ class Motion:
         )
 
 
-def motion_figure(motion: Motion, *, ax: style.Into = None) -> Figure:
+def motion_figure(motion: Motion, *, ax: Into = None) -> Figure:
     """The time history; beside it the hysteresis loops of the contacts, three at most, and the harmonics.
 
     Parameters
@@ -132,7 +133,7 @@ def motion_figure(motion: Motion, *, ax: style.Into = None) -> Figure:
     return page
 
 
-def harmonics_figure(heights: FloatArray, title: str, *, dof: str = "x", ax: style.Into = None) -> Figure:
+def harmonics_figure(heights: FloatArray, title: str, *, dof: str = "x", ax: Into = None) -> Figure:
     """The harmonics alone, of a response whose motion is not known.
 
     Parameters

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from solver.results.base import Into
 from solver.views.plots import style
 
 if TYPE_CHECKING:
     from solver.response.floquet import Stability
 
 
-def multipliers_figure(found: Stability, *, ax: style.Into = None) -> Figure:
+def multipliers_figure(found: Stability, *, ax: Into = None) -> Figure:
     """The multipliers and the unit circle, inside which perturbations die out.
 
     Parameters

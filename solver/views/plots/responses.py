@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from solver.results import units
+from solver.results.base import Into
 from solver.views.plots import style
 from solver.views.plots.curves import FloatArray, Response
 
@@ -64,7 +65,7 @@ class Demands:
 
 
 def response_figure(
-    response: Response, *, asked: Demands | None = None, title: str | None = None, ax: style.Into = None
+    response: Response, *, asked: Demands | None = None, title: str | None = None, ax: Into = None
 ) -> Figure:
     """One response with its peak marked and its band shaded, and what was asked of it.
 

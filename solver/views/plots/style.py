@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -17,6 +17,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from solver.errors import SettingError
 from solver.results import units
+from solver.results.base import Into
 from solver.results.dataset import Dataset
 from solver.results.files import whole
 
@@ -25,7 +26,6 @@ BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
 SKY = "#56B4E9"
 INK, GREY = "#222222", "#7A7A7A"
 
-Into: TypeAlias = Axes | Sequence[Axes] | None
 
 DOTS_PER_INCH = 200
 _STYLE: dict[Any, Any] = {

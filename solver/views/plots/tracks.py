@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from solver.jit.fourier import Real
 from solver.results import units
+from solver.results.base import Into
 from solver.views.plots import style
 from solver.views.plots.responses import axis_name
 
@@ -22,7 +23,7 @@ _LOGARITHMIC_FROM = 5.0  # ratio of the ends from which an axis is logarithmic
 _SAME_FREQUENCY = 2e-3  # relative distance from a tracked peak within which a point lies on it
 
 
-def track_figure(track: PeakTrack, *, dof: str, ax: style.Into = None) -> Figure:
+def track_figure(track: PeakTrack, *, dof: str, ax: Into = None) -> Figure:
     """The highest peak and its frequency over the parameter, competing peaks thin, the optimum marked.
 
     Parameters
@@ -60,7 +61,7 @@ def track_figure(track: PeakTrack, *, dof: str, ax: style.Into = None) -> Figure
     return page
 
 
-def map_figure(found: ResponseMap, *, dof: str, ax: style.Into = None) -> Figure:
+def map_figure(found: ResponseMap, *, dof: str, ax: Into = None) -> Figure:
     """The amplitude in colours over frequency and parameter; the ridge of the highest peak on it.
 
     Parameters

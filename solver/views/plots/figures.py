@@ -1,0 +1,76 @@
+"""The figure of each class of result, for its ``plot``."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from solver.continuation.branch import Branch
+from solver.marching.result import MarchResult
+from solver.peaks.results import PeakTrack
+from solver.response.floquet import Stability
+from solver.response.solve import Solution
+from solver.results.base import Into
+from solver.scene.scene import Scene
+from solver.studies.blades import BladeAmplitudes, BladePeaks
+from solver.studies.convergence import AccuracyStudy
+from solver.studies.mistuning import MistuningStudy
+from solver.studies.response_map import ResponseMap
+from solver.views.plots.accuracy import accuracy_figure
+from solver.views.plots.curves import Response
+from solver.views.plots.disks import blades_figure, mistuning_figure
+from solver.views.plots.motion import Motion, motion_figure
+from solver.views.plots.multipliers import multipliers_figure
+from solver.views.plots.responses import Demands, response_figure
+from solver.views.plots.tracks import map_figure, track_figure
+
+
+def of_branch(branch: Branch, ax: Into = None, *, limit: float | None = None) -> Figure:
+    """Draw the response, its peak and its band; `limit` is an amplitude [m] drawn as a line."""
+    return response_figure(Response.of_branch(branch), asked=Demands(limit=limit), ax=ax)
+
+
+def of_solution(solution: Solution, ax: Into = None) -> Figure:
+    """Draw a period, its hysteresis loops and harmonics."""
+    return motion_figure(Motion.of_solution(solution), ax=ax)
+
+
+def of_march(march: MarchResult, ax: Into = None, *, scene: Scene | None = None) -> Figure:
+    """Draw the last period and its hysteresis loops; `scene`, what was marched, gives the title."""
+    if scene is None:
+        return motion_figure(Motion.of_march(march), ax=ax)
+    return motion_figure(Motion.of_march(march, scene.name, scene.observe.dof), ax=ax)
+
+
+def of_track(track: PeakTrack, ax: Into = None) -> Figure:
+    """Draw the peak and its frequency over the parameter."""
+    return track_figure(track, dof="x" if track.given is None else track.given.observe.dof, ax=ax)
+
+
+def of_map(found: ResponseMap, ax: Into = None) -> Figure:
+    """Draw the map with its ridge."""
+    return map_figure(found, dof="x" if found.given is None else found.given.observe.dof, ax=ax)
+
+
+def of_stability(found: Stability, ax: Into = None) -> Figure:
+    """Draw the multipliers and the unit circle."""
+    return multipliers_figure(found, ax=ax)
+
+
+def of_accuracy(study: AccuracyStudy, ax: Into = None) -> Figure:
+    """Draw error against time."""
+    return accuracy_figure(study.to_json(), ax=ax)
+
+
+def of_mistuning(study: MistuningStudy, ax: Into = None) -> Figure:
+    """Draw the magnifications and the worst disk."""
+    return mistuning_figure(study.to_json(), ax=ax)
+
+
+def of_amplitudes(blades: BladeAmplitudes, ax: Into = None) -> Figure:
+    """Draw the amplitude of every blade."""
+    return blades_figure(blades.max_abs, f"max |{blades.dof}|", ax=ax)
+
+
+def of_blade_peaks(peaks: BladePeaks, ax: Into = None) -> Figure:
+    """Draw the highest peak of every blade."""
+    return blades_figure(peaks.value, f"highest peak, max |{peaks.dof}|", ax=ax)
