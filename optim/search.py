@@ -18,7 +18,8 @@ from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
 from optim.methods.peak_tracking import Tracked, tracked_optimum
 from optim.problem.problem import Method, Problem, pose
 from optim.problem.watch import OnProgress, ShouldStop
-from optim.results.design import Basin, DesignResult, DesignStatus
+from optim.results.basins import Basin
+from optim.results.design import DesignResult, DesignStatus
 from solver.scene.scene import Scene
 
 SAME_HEIGHT = 1e-9  # relative, of two levels that are one

@@ -178,3 +178,7 @@ class ServiceProblem(ServiceError):  # noqa: N818 - named after RFC 9457's "prob
         self.status = status
         self.problem = problem
         super().__init__(str(problem.get("detail") or problem.get("title") or f"HTTP status {status}"))
+
+
+class InputError(Exception):
+    """An argument or option of the command that cannot be used; the message names it and quotes its value."""

@@ -20,7 +20,7 @@ from service.rendering.tables import design as design_reports
 from service.rendering.tables import results as reports
 from service.rendering.tables import track as track_reports
 from solver.continuation.certificate import uncertain
-from solver.views.notes import FLAGS, NONE_HIGHER, flag_words
+from solver.results.notes import FLAGS, NONE_HIGHER, flag_words
 
 WHY = "a resonance was left at 1.5"
 

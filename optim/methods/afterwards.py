@@ -13,7 +13,8 @@ from optim.methods.evaluator import Search, StoppedError
 from optim.methods.kkt import KEPT, KKT_TOLERANCE
 from optim.methods.plateau import Plateau, plateau_of
 from optim.problem.watch import ShouldStop
-from optim.results.design import Basin, Checked, DesignResult, DesignStatus
+from optim.results.basins import Basin, Checked
+from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import DOUBTFUL, open_peaks
 from optim.results.json import errors_of
 

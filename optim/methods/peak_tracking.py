@@ -8,7 +8,8 @@ from optim.criteria.evaluation import Judge, effects_of, evaluate
 from optim.criteria.rows import Evaluation, Quantity, Response
 from optim.problem.problem import Problem
 from optim.problem.watch import OnProgress, ShouldStop
-from optim.results.design import Basin, DesignStatus
+from optim.results.basins import Basin
+from optim.results.design import DesignStatus
 from solver.peaks.minimise_peak import least_peak
 from solver.peaks.results import LeastPeak, TrackStatus
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 from optim.criteria.linearised import Conditions
 from optim.criteria.rows import UNITS, Evaluation, Quantity, Row
 from optim.problem.problem import Method, Problem
+from optim.results.basins import Basin, Checked
 from optim.results.doubts import doubts_of
 from optim.results.json import (
     bands_json,
@@ -77,56 +78,6 @@ class DesignPeak:
 
     value: float
     at: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Basin:
-    """A local optimum.
-
-    Attributes
-    ----------
-    values : mapping
-        Variable name to value.
-    peak : float
-        Highest peak [m].
-    objective : float
-        What is minimised.
-    settled, feasible : bool
-        Whether the first-order conditions hold and the limits are kept there.
-    proven : bool
-        Whether a response there was computed, so that no peak is higher than `peak`. A further basin of the
-        tracked peak is solved for along the peaks that were followed: it is at least that high.
-    """
-
-    values: Mapping[str, float]
-    peak: float
-    objective: float
-    settled: bool
-    feasible: bool
-    proven: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Checked:
-    """A local optimum again with more harmonics.
-
-    Attributes
-    ----------
-    values : mapping
-        Variable name to value.
-    harmonics : int
-        Highest harmonic kept.
-    peak, objective : float
-        Highest peak [m] and what is minimised; NaN where a response could not be computed.
-    feasible : bool
-        Whether the limits are kept.
-    """
-
-    values: Mapping[str, float]
-    harmonics: int
-    peak: float
-    objective: float
-    feasible: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -224,7 +175,13 @@ class DesignResult(Drawn):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What makes the numbers doubtful, in words."""
-        return doubts_of(self)
+        return doubts_of(
+            self.evaluation,
+            harmonics=self.problem.harmonics,
+            optimum=self.optimum,
+            checked=self.checked,
+            feasible=not self.broken,
+        )
 
     @property
     def band_hz(self) -> float | None:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from optim.criteria.linearised import Conditions
 from optim.criteria.rows import UNITS, Evaluation, Row
+from optim.results.basins import Basin, Checked
 from solver.continuation.branch import Branch
-
-if TYPE_CHECKING:
-    from optim.results.design import Basin, Checked
 
 
 def bands_json(evaluation: Evaluation) -> list[dict[str, object]]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from solver.continuation.certificate import unsettled
 from solver.results import units
 from solver.results.base import Summary
-from solver.views.notes import unsettled
 from solver.views.summary import Pairs, made
 
 if TYPE_CHECKING:
@@ -75,7 +75,9 @@ def of_campbell(diagram: CampbellDiagram) -> Summary:
         if highest is not None:
             text = f"at most {units.length(highest.amplitude)}, at {highest.speed_rpm:.6g} rpm"
         pairs.append((f"order {one.order}", text))
-    pairs += [("warning", reason) for reason in unsettled(one.branch for one in diagram.orders)]
+    pairs += [
+        ("warning", reason) for reason in unsettled(one.branch.peak_certificate for one in diagram.orders)
+    ]
     pairs.append(("time", units.duration(diagram.seconds)))
     low, high = diagram.speeds_rpm[0][0], diagram.speeds_rpm[-1][1]
     return made(f"{diagram.scene.name}, {low:g} to {high:g} rpm", pairs, diagram.status.value)
@@ -89,6 +91,6 @@ def of_sensitivities(result: SensitivityResult) -> Summary:
             band = result.band_elasticity(row)
             text = f"peak {result.peak_elasticities(row)[0]:+.4f} %"
             pairs.append((row.path, text if math.isnan(band) else f"{text}, band {band:+.4f} %"))
-    pairs += [("warning", reason) for reason in unsettled([result.branch])]
+    pairs += [("warning", reason) for reason in unsettled([result.branch.peak_certificate])]
     pairs.append(("time", units.duration(result.seconds)))
     return made(f"{result.scene.name}, for 1 % more of each", pairs, result.status.value)

@@ -13,10 +13,11 @@ from pathlib import Path
 import numpy as np
 
 import solver
-from service.cli.failures import InputError, ShortfallError
+from service.cli.failures import ShortfallError
 from service.cli.progress import OnProgress, bars, patience
 from service.client.embedded import EmbeddedService
 from service.db.models import JobState
+from service.errors import InputError
 from service.jobs.kinds import warm_up
 from service.rendering.stored_curves import response_of
 from service.rendering.tables import design as design_reports
@@ -24,7 +25,7 @@ from service.rendering.tables.text import say
 from service.schemas.answers import JobAnswer, SweepDetail
 from service.settings.settings import load_settings
 from solver.views.plots.responses import Family, family_figure, peak_figure
-from solver.views.plots.style import save
+from solver.views.plots.saving import save
 
 REMOVED, STUCK = 0.0, 1e9
 """Normal loads [N] at which a contact does nothing, and never slips."""

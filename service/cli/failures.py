@@ -52,15 +52,11 @@ def option_name(name: str) -> str:
     return _OPTIONS.get(name.partition("[")[0], name)
 
 
-class InputError(Exception):
-    """An argument or option of the command that cannot be used; the message names it and quotes its value."""
-
-
 class ShortfallError(Exception):
     """The computation did not reach its goal; the message is its status, with what to try."""
 
 
-REPORTED = (SolverError, DesignError, errors.ServiceError, InputError, ShortfallError)
+REPORTED = (SolverError, DesignError, errors.ServiceError, errors.InputError, ShortfallError)
 
 
 def report(error: Exception) -> int:
@@ -71,7 +67,7 @@ def report(error: Exception) -> int:
 
 
 def _status(error: Exception) -> int:
-    if isinstance(error, (SceneError, SettingError, DesignError, InputError)):
+    if isinstance(error, (SceneError, SettingError, DesignError, errors.InputError)):
         return BAD_INPUT
     if isinstance(error, errors.ServiceProblem):
         return BAD_INPUT if 400 <= error.status < 500 and error.status != 409 else FELL_SHORT

@@ -64,8 +64,8 @@ class Outputs:
         if scene is not None:
             data = replace(data, attributes={**data.attributes, **scene_attributes(scene)})
         if self.picture is not None and draw is not None:
-            from solver.views.plots import style
+            from solver.views.plots import saving
 
-            style.save(draw(), self.picture, data)
+            saving.save(draw(), self.picture, data)
         if self.file is not None:
             save(data, self.file)

@@ -8,21 +8,19 @@ import multiprocessing as mp
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from multiprocessing.context import SpawnProcess
 from multiprocessing.reduction import ForkingPickler
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from service.db.repositories import Attempt
 from service.jobs.checkpoints import Kept
-from service.workers.base import Failed, Finished, Lost, Outcome, Stopped
+from service.jobs.registry import Pace, RunOn, WarmUp
+from service.workers.base import Failed, Finished, Lost, Outcome, Sink, Stopped
 from service.workers.child import Child, death
 from service.workers.worker import Done, Ready, Reply, Task
-
-if TYPE_CHECKING:
-    from service.workers.local import LocalExecutor
 
 log = logging.getLogger("stickslip.executor")
 
@@ -51,6 +49,21 @@ class _Held:
     stopping: bool = False
 
 
+class Host(Protocol):
+    """What a slot asks of the executor it belongs to."""
+
+    runs: Mapping[str, RunOn]
+    warm_up: WarmUp
+    grace_seconds: float
+    pace: Pace
+    trouble: str | None
+    warmed: threading.Event
+    sink: Sink
+
+    def room(self) -> None:
+        """The slot may have a place."""
+
+
 class Slot(threading.Thread):
     """One worker process after another, and the conversation with it.
 
@@ -59,7 +72,7 @@ class Slot(threading.Thread):
     before them turns out long.
     """
 
-    def __init__(self, executor: LocalExecutor, index: int) -> None:
+    def __init__(self, executor: Host, index: int) -> None:
         super().__init__(name=f"stickslip slot {index}", daemon=True)
         self._executor = executor
         self._waits = index > 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -67,3 +67,8 @@ def uncertain(why: str, gap: float = math.nan) -> PeakCertificate:
     return PeakCertificate(
         known=False, reason=f"Not known: {why}.", bound=math.nan, widest_gap=gap, resonances=0
     )
+
+
+def unsettled(certificates: Iterable[PeakCertificate]) -> list[str]:
+    """Return why it is not known of some branches that no peak hides between points, each reason once."""
+    return list(dict.fromkeys(one.reason for one in certificates if not one.known))

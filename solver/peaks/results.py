@@ -9,11 +9,11 @@ from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
 
 from solver.continuation.branch import Branch
+from solver.continuation.certificate import unsettled
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.results.base import Drawn, Piece, Shown
 from solver.results.views import Views
-from solver.views.notes import unsettled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -243,7 +243,7 @@ class PeakTrack(Drawn):
     @property
     def peaks_open(self) -> tuple[str, ...]:
         """Why of some sweeps it is not known that no higher peak hides between their points."""
-        return tuple(unsettled(self.branches))
+        return tuple(unsettled(one.peak_certificate for one in self.branches))
 
     @property
     def completed(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import Any, Protocol, Self, TypeVar, cast
 
 from pydantic import ValidationError
 
@@ -21,9 +21,6 @@ from solver.scene.parts import (
     Structure,
 )
 from solver.scene.validation import listing, nearest
-
-if TYPE_CHECKING:
-    from solver.scene.scene import Scene
 
 FREQUENCY = "frequency"
 AMPLITUDE = "excitation.amplitude"
@@ -48,7 +45,29 @@ _PartT = TypeVar("_PartT", bound=Part)
 _Named = Mass | Spring | Damper
 
 
-def parameter_paths(scene: Scene) -> tuple[str, ...]:
+class HasParts(Protocol):
+    """What a scene holds, as far as parameter paths go; see `solver.scene.scene.Scene`."""
+
+    @property
+    def structure(self) -> Structure:
+        """The linear part."""
+
+    @property
+    def contacts(self) -> tuple[AnyContact, ...]:
+        """Every contact."""
+
+    @property
+    def excitation(self) -> tuple[Excitation, ...]:
+        """Every force."""
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None) -> Self:
+        """Return a copy with other parts."""
+
+
+_SceneT = TypeVar("_SceneT", bound=HasParts)
+
+
+def parameter_paths(scene: HasParts) -> tuple[str, ...]:
     """Every path that has a value in the scene."""
     contacts = dict.fromkeys(
         f"{contact.group}.{key}" for contact in scene.contacts if contact.group for key in contact.PARAMETERS
@@ -83,13 +102,13 @@ def has_parameter(contact: AnyContact, owner: str, key: str) -> bool:
     return owner in (contact.name, contact.group) and key in contact.PARAMETERS
 
 
-def check_path(scene: Scene, path: str) -> None:
+def check_path(scene: HasParts, path: str) -> None:
     """Raise SettingError unless `path` is ``frequency`` or a path of the scene."""
     if path != FREQUENCY and path not in parameter_paths(scene):
         raise _unknown(scene, path, FREQUENCY)
 
 
-def value(scene: Scene, path: str) -> float:
+def value(scene: HasParts, path: str) -> float:
     """Value of a path; of a group, its first member's."""
     if path == AMPLITUDE:
         return scene.excitation[0].amplitude
@@ -109,7 +128,7 @@ def value(scene: Scene, path: str) -> float:
     return _contact_value(contact, key)
 
 
-def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
+def with_values(scene: _SceneT, values: Mapping[str, float]) -> _SceneT:
     """The scene with other values; only what changes is checked again."""
     for path, new in values.items():
         if not isinstance(path, str):
@@ -118,7 +137,7 @@ def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
     return scene
 
 
-def _with_value(scene: Scene, path: str, new: float) -> Scene:
+def _with_value(scene: _SceneT, path: str, new: float) -> _SceneT:
     if path in (AMPLITUDE, PHASE):
         change = _with_amplitude if path == AMPLITUDE else _with_phase
         return scene.model_copy(update={"excitation": change(scene.excitation, new)})
@@ -137,7 +156,7 @@ def _with_value(scene: Scene, path: str, new: float) -> Scene:
     return scene.model_copy(update={"contacts": contacts})
 
 
-def _with_structure(scene: Scene, path: str, name: str, new: float) -> Structure:
+def _with_structure(scene: HasParts, path: str, name: str, new: float) -> Structure:
     if isinstance(scene.structure, MatricesStructure) and name in PROPORTIONAL:
         if not 0.0 <= new <= LARGEST:
             unit = "s" if name == PROPORTIONAL[0] else "1/s"
@@ -222,7 +241,7 @@ def _number(path: str, new: object) -> float:
     return number
 
 
-def _unknown(scene: Scene, path: object, *besides: str) -> SettingError:
+def _unknown(scene: HasParts, path: object, *besides: str) -> SettingError:
     if path == FREQUENCY:
         return SettingError("path", path, "must name a value of the scene; the frequency belongs to the run")
     known = (*besides, *parameter_paths(scene))

@@ -10,7 +10,7 @@ import numpy as np
 from solver.continuation.branch import BranchStatus
 from solver.results import units
 from solver.results.base import Summary
-from solver.views.notes import branch_notes, flag_words
+from solver.results.notes import BAND_OPEN, between_points, flag_words
 
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
@@ -43,10 +43,21 @@ def of_branch(branch: Branch) -> Summary:
     if branch.band is not None:
         width = units.parameter(path, branch.band.width)
         pairs.append(("band", f"{width} above {units.length(branch.band.limit)}"))
-    pairs += branch_notes(branch)
+    pairs += _branch_notes(branch)
     pairs += [("points", str(len(branch.values))), ("time", units.duration(branch.seconds))]
     title = f"{branch.balance.scene.name} over {path}, {branch.balance.n_harmonics} harmonics"
     return made(title, pairs, branch.status.value)
+
+
+def _branch_notes(branch: Branch) -> list[tuple[str, str]]:
+    """The certificate of a branch and its flags, as rows of a summary."""
+    pairs: list[tuple[str, str]] = []
+    if branch.peak is not None:
+        found = branch.peak_certificate
+        pairs.append(("between points", between_points(known=found.known, reason=found.reason)))
+        if found.known and branch.band is not None and not branch.band.known:
+            pairs.append(("note", BAND_OPEN))
+    return pairs + [("note", words) for words in flag_words(branch.flags)]
 
 
 def of_solution(solution: Solution) -> Summary:

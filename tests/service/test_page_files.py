@@ -10,7 +10,7 @@ import pytest
 from service_helpers import is_problem
 
 from service.http.routes import page
-from solver.views.notes import FLAGS
+from solver.results.notes import FLAGS
 
 FOLDER = Path(page.__file__).resolve().parents[2] / "page"
 MODULES = sorted((FOLDER / "js").rglob("*.js"))

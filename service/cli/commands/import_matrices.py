@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.failures import InputError
 from service.cli.importing.files import Sources, dof_table, read_sources, rows_of, sources
 from service.cli.importing.reduction import Written, reduce, reduced_file
 from service.cli.importing.scene import band, toml
 from service.cli.options.inputs import number, output_path, whole_number
+from service.errors import InputError
 from service.rendering.tables.text import print_json, print_pairs
 from solver.results.files import whole
 

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli.commands import stored_designs
-from service.cli.failures import BAD_INPUT, FELL_SHORT, InputError, option_name
+from service.cli.failures import BAD_INPUT, FELL_SHORT, option_name
 from service.cli.options import inputs, problem_inputs
 from service.cli.options import shared as options
 from service.cli.options.keyed import given_key
 from service.cli.options.problem import NOT_OF_A_FRONT, ProblemFlags, takes_problem
 from service.cli.options.scene_files import scene_to_submit, uploaded
 from service.cli.progress import bar
+from service.errors import InputError
 from service.rendering.tables import results as reports
 from service.rendering.tables.text import print_json, print_table, say
 
@@ -249,7 +250,7 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
 
 def _draw(client: Client, kind: str, answer: ResultsAnswer, picture: Path) -> None:
     from service.rendering.plots import NothingToDrawError, result_figure
-    from solver.views.plots.style import save
+    from solver.views.plots.saving import save
 
     try:
         page = result_figure(kind, answer.result, answer.sweeps, client.sweep)

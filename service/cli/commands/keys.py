@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli.commands.service import settings_of
-from service.cli.failures import InputError
 from service.cli.options import shared as options
+from service.errors import InputError
 from service.rendering.tables.text import print_json, print_table, say
 
 if TYPE_CHECKING:

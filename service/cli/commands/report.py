@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.failures import InputError
 from service.cli.options import inputs
 from service.cli.options import shared as options
+from service.errors import InputError
 from service.rendering.tables.text import say
 
 if TYPE_CHECKING:

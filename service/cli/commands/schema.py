@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli.failures import InputError
+from service.errors import InputError
 from service.rendering.tables.text import say
 
 

@@ -10,11 +10,12 @@ from functools import partial
 
 import typer
 
-from service.cli.failures import FELL_SHORT, InputError
+from service.cli.failures import FELL_SHORT
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.output_files import Outputs
 from service.cli.progress import bar, patience
+from service.errors import InputError
 from service.rendering.tables import results as reports
 from service.rendering.tables.text import print_json
 

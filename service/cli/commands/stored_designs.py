@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.failures import InputError
 from service.cli.options.inputs import number, whole_number
+from service.errors import InputError
 from service.rendering.tables.text import print_json, print_table
 from solver.results import units
 

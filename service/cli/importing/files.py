@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service.cli.failures import InputError
+from service.errors import InputError
 
 if TYPE_CHECKING:
     from solver.matrices.load_set import MatrixSet

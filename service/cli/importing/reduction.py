@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service.cli.failures import InputError
 from service.cli.importing.files import relative
 from service.cli.options.inputs import output_path
+from service.errors import InputError
 from solver.results.files import whole
 
 if TYPE_CHECKING:

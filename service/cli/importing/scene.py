@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from service.cli.failures import InputError
+from service.errors import InputError
 
 _CONTACT = """
 # A contact joins two DOFs, or one and "ground"; take away the # and give your values.

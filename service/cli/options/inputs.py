@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from service.cli.failures import InputError
+from service.errors import InputError
 from solver.errors import SettingError
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli.failures import InputError
+from service.errors import InputError
 
 KEY_VARIABLE = "STICKSLIP_KEY"
 

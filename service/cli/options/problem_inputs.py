@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from service.cli.failures import InputError
 from service.cli.options import inputs
 from service.cli.options.problem import ProblemFlags
 from service.cli.options.scene_files import scene_to_submit
+from service.errors import InputError
 from solver.errors import Issue, SceneError, SettingError
 
 if TYPE_CHECKING:

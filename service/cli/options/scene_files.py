@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from service.cli.failures import InputError
+from service.errors import InputError
 from service.jobs.kinds.scenes import UPLOAD
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from service.cli.failures import InputError
+from service.errors import InputError
 from solver.results.files import whole
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")

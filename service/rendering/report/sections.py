@@ -13,9 +13,9 @@ import solver
 from service.rendering.report.responses import Line, comparison_figure
 from solver.continuation.branch import Branch
 from solver.results import units
+from solver.results.notes import flag_words
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
-from solver.views.notes import flag_words
 from solver.views.plots.html import image, pairs, table
 
 Json = Mapping[str, Any]

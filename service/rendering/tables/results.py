@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from service.cli.commands import mistuning as mistuning_command
 from service.rendering.tables import campbell as campbell_reports
 from service.rendering.tables import design as design_reports
+from service.rendering.tables import mistuning
 from service.rendering.tables import robust as robust_reports
 from service.rendering.tables import track as track_reports
 from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
-from solver.views.notes import BAND_OPEN, FLAGS, between_points, flag_words
+from solver.results.notes import BAND_OPEN, FLAGS, between_points, flag_words
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -163,7 +163,7 @@ BY_KIND: Mapping[str, Callable[[Json], None]] = {
     "peaks": track_reports.track,
     "accuracy": accuracy,
     "campbell": campbell_reports.diagram,
-    "mistuning": mistuning_command.report,
+    "mistuning": mistuning.report,
 }
 
 

@@ -18,8 +18,6 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from solver.errors import SettingError
 from solver.results import units
 from solver.results.base import Into
-from solver.results.dataset import Dataset
-from solver.results.files import whole
 
 # Okabe and Ito's colours, which the colour-blind can tell apart (jfly.uni-koeln.de/color).
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
@@ -125,32 +123,15 @@ def plain_log(axis: Axis) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def save(page: Figure, path: Path, data: Dataset | None = None) -> None:
-    """Write a picture, whole or not at all; the suffix chooses the format.
-
-    Parameters
-    ----------
-    page : what was drawn.
-    path : ends in one of `solver.views.plots.SUFFIXES`.
-    data : the numbers behind it, which a page of HTML lists.
-    """
-    with whole(path) as temporary:
-        if path.suffix.lower() == ".html":
-            from solver.views.plots.html import picture_page
-
-            temporary.write_text(picture_page(page, data), "utf-8")
-            return
-        _write(page, temporary, path.suffix.lower().removeprefix("."))
-
-
 def written(page: Figure, suffix: str) -> bytes:
     """Return the bytes of a picture in the format `svg` or `png`."""
     buffer = io.BytesIO()
-    _write(page, buffer, suffix)
+    write(page, buffer, suffix)
     return buffer.getvalue()
 
 
-def _write(page: Figure, file: Path | io.BytesIO, suffix: str) -> None:
+def write(page: Figure, file: Path | io.BytesIO, suffix: str) -> None:
+    """Write a picture in a format of Matplotlib."""
     # No date in the file: the same picture gives the same bytes.
     date = "CreationDate" if suffix == "pdf" else "Date"
     metadata = {} if suffix == "png" else {date: None}

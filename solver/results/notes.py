@@ -4,10 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from solver.continuation.branch import Branch
 
 FLAGS: Mapping[str, str] = MappingProxyType(
     {
@@ -26,6 +22,7 @@ FLAGS: Mapping[str, str] = MappingProxyType(
         ),
     }
 )
+BAND_OPEN = "the band may have further pieces between points: it was not settled everywhere by solutions"
 NONE_HIGHER = "known, none is higher than those listed"
 
 
@@ -42,23 +39,3 @@ def between_points(*, known: bool, reason: str) -> str:
     known, reason : of a `solver.continuation.certificate.PeakCertificate`.
     """
     return NONE_HIGHER if known else reason[:1].lower() + reason[1:]
-
-
-def branch_notes(branch: Branch) -> list[tuple[str, str]]:
-    """The certificate of a branch and its flags, as rows of a summary."""
-    pairs: list[tuple[str, str]] = []
-    if branch.peak is not None:
-        found = branch.peak_certificate
-        pairs.append(("between points", between_points(known=found.known, reason=found.reason)))
-        if found.known and branch.band is not None and not branch.band.known:
-            pairs.append(("note", BAND_OPEN))
-    return pairs + [("note", words) for words in flag_words(branch.flags)]
-
-
-BAND_OPEN = "the band may have further pieces between points: it was not settled everywhere by solutions"
-
-
-def unsettled(branches: Iterable[Branch]) -> list[str]:
-    """Why it is not known of some of several branches that no peak hides between points, each reason once."""
-    reasons = (one.peak_certificate.reason for one in branches if not one.peak_certificate.known)
-    return list(dict.fromkeys(reasons))
