@@ -5,7 +5,7 @@ BIN := .venv/bin
 # Bytecode is compiled on all cores, where pip would do it on one. Not to leave it to the first imports: where
 # Python is told to write none (PYTHONDONTWRITEBYTECODE) every process would take a second longer to start.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
-BYTECODE := $(BIN)/python -m compileall -q -j 0 .venv/lib solver optim service migrations
+BYTECODE := $(BIN)/python -m compileall -q -j 0 .venv/lib stickslip solver optim service migrations
 STAMP := .venv/.up-to-date
 DEV := .venv/.for-development
 # What pytest gets in addition, for example: make test PYTEST="-k march -x"
@@ -75,4 +75,4 @@ serve: setup
 
 clean:
 	rm -rf .venv demo-output site build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
-	find solver optim service migrations tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+	find stickslip solver optim service migrations tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -27,13 +27,14 @@ def _cases() -> dict[str, Callable[[], None]]:
         service_load,
         service_pruning,
         service_scale,
+        start,
     )  # fmt: skip
 
     return {
         "responses": responses.responses,
         "solves": responses.solves,
         "designs": responses.designs,
-        "cold-start": responses.cold_start,
+        "start": start.start,
         "case-a": against_peers.case_a_response,
         "chain-8": against_peers.chain_of_8,
         "chain-32": against_peers.chain_of_32,

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
-import sys
-import time
-
 import optim
 import solver
 from benchmarks.harness import table, timed
@@ -26,7 +21,6 @@ SOLVES = (
     ("bladed-disk", 755.0, 11),
     ("bladed-disk", 755.0, 61),
 )
-COLD_RUNS = 5
 
 
 def responses() -> None:
@@ -75,24 +69,3 @@ def designs() -> None:
              f"{1e3 * timing.median:.0f}", f"{result.optimality:.0e}")
         )  # fmt: skip
     table("Design of the normal load", ("scene", "optimum", "peak", "responses", "ms", "optimality"), rows)
-
-
-def cold_start() -> None:
-    """Time `stickslip solve` from a cold process with cached kernels."""
-    command = shutil.which("stickslip", path=sys.exec_prefix + "/bin") or "stickslip"
-    seconds = []
-    for _ in range(COLD_RUNS + 1):
-        begun = time.perf_counter()
-        subprocess.run(
-            [command, "solve", "bladed-disk", "--frequency", "755"], check=True, stdout=subprocess.DEVNULL
-        )
-        seconds.append(time.perf_counter() - begun)
-    rows = [
-        (
-            "stickslip solve bladed-disk --frequency 755",
-            f"{min(seconds[1:]):.2f}",
-            f"{max(seconds[1:]):.2f}",
-            "2",
-        )
-    ]
-    table("Cold process, cached kernels", ("command", "least s", "most s", "allowed s"), rows)

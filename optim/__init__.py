@@ -48,10 +48,17 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
-    """Load a public name on first use (CVXPY takes a second to import)."""
-    if name not in _HOME:
-        raise AttributeError(f"module 'optim' has no attribute {name!r}")
-    value = getattr(import_module(f"optim.{_HOME[name]}"), name)
-    globals()[name] = value
-    return value
+if not TYPE_CHECKING:  # a checker shall notice a name that is none
+
+    def __getattr__(name: str) -> object:
+        """Load a public name on first use (CVXPY takes a second to import)."""
+        if name not in _HOME:
+            raise AttributeError(f"module 'optim' has no attribute {name!r}")
+        value = getattr(import_module(f"optim.{_HOME[name]}"), name)
+        globals()[name] = value
+        return value
+
+
+def __dir__() -> list[str]:
+    """Return the public names too that are not loaded yet, for completion."""
+    return sorted({*globals(), *__all__})

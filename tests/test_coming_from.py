@@ -64,13 +64,13 @@ def test_their_lines_are_python(title: str) -> None:
 
 
 @pytest.mark.long
-def test_pyharm_finds_what_the_page_says() -> None:
-    """With an interpreter that has pyHarm, as for the benchmarks."""
+def test_pyharm_finds_what_the_page_says(tmp_path: Path) -> None:
+    """With an interpreter that has pyHarm, as for the benchmarks; it leaves a folder where it runs."""
     interpreter = os.environ.get("PYHARM_PYTHON")
     if interpreter is None:
         pytest.skip("PYHARM_PYTHON does not name an interpreter with pyHarm")
     done = subprocess.run(
-        [interpreter, "-c", script("By pyHarm")], capture_output=True, text=True, check=True
+        [interpreter, "-c", script("By pyHarm")], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     points, peak, at = done.stdout.splitlines()[-1].split()
     assert int(points) == 224

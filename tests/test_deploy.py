@@ -84,7 +84,15 @@ def test_what_the_image_is_made_of_is_there() -> None:
     copied = [
         word for words in found if words[0] == "COPY" and "--from=build" not in words for word in words[1:-1]
     ]
-    assert {"solver", "optim", "service", "migrations", "pyproject.toml", "constraints.txt"} <= set(copied)
+    assert {
+        "stickslip",
+        "solver",
+        "optim",
+        "service",
+        "migrations",
+        "pyproject.toml",
+        "constraints.txt",
+    } <= set(copied)
     assert [name for name in copied if not (ROOT / name).exists()] == []
     allowed = (DEPLOY / "Dockerfile.dockerignore").read_text(encoding="utf-8").splitlines()
     assert {f"!{name}" for name in copied} == {line for line in allowed if line.startswith("!")}

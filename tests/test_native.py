@@ -97,8 +97,8 @@ def test_a_result_says_what_it_is(result: Any) -> None:
     assert all(pair for pairs in result.summary().pairs for pair in pairs)
 
 
-# What a user gives, the arrays themselves, and what a stopped sweep is gone on with.
-NOT_LOOKED_AT = {"ContinuationSettings", "Effects", "Issue", "Summary", "Dataset", "Variable", "Stretch"}
+# What a user gives, and what is short by itself.
+NOT_LOOKED_AT = {"ContinuationSettings", "Effects", "Issue", "Summary"}
 
 
 def public_dataclasses() -> list[type]:
@@ -130,6 +130,21 @@ def test_pieces_say_their_numbers_with_units() -> None:
     assert "shares stick 0." in repr(wear)
     assert "<Measured: value " in repr(wear)
     assert wear._repr_html_().startswith("<table><caption style='text-align:left'>ContactWear</caption>")
+
+
+def test_everything_is_told_in_one_line() -> None:
+    scene = two_dof()
+    assert repr(scene) == str(scene)
+    assert repr(scene) == "<Scene two-dof: lumped, 2 DOFs, contacts damper, m2 observed from 0.2 to 2.6 Hz>"
+    stretches: list[solver.Stretch] = []
+    branch = solver.sweep(scene, "frequency", 0.8, 1.4, harmonics=3, on_stretch=stretches.append)
+    solution = solver.solve(scene, frequency_hz=1.2, harmonics=3)
+    data = branch.to_dataset()
+    points = len(branch.values)
+    assert repr(data).startswith(f"<Dataset branch: parameter point {points} [Hz], ")
+    assert branch.band is not None
+    shown = [branch, branch.band, solution, *solution.contacts, data, *data.variables.values(), *stretches]
+    assert [one for one in shown if "\n" in repr(one) or len(repr(one)) > 2000] == []
 
 
 def test_a_result_draws_itself(result: Any) -> None:

@@ -59,4 +59,4 @@ def test_the_script_is_short_and_uses_the_public_interface(script: Path) -> None
     text = script.read_text(encoding="utf-8")
     assert len(text.splitlines()) <= LONGEST_SCRIPT
     modules = set(re.findall(r"^(?:from|import) ([\w.]+)", text, flags=re.MULTILINE))
-    assert modules <= {"look", "solver", "optim", "numpy"}
+    assert modules <= {"look", "stickslip", "numpy"}

@@ -3,13 +3,13 @@
 import numpy as np
 from look import FREE, STUCK, curve, figure, finish, harmonic, highest, letters, linear_limits, say, shades
 
-import solver
+import stickslip
 
-scene = solver.load_scene("two-dof").with_values({"damper.N0": 100.0, "damper.N1": 200.0})
-branch = solver.sweep(scene)
+scene = stickslip.load_scene("two-dof").with_values({"damper.N0": 100.0, "damper.N1": 200.0})
+branch = stickslip.sweep(scene)
 free, stuck = linear_limits(scene, "damper")
 points = {"a": 2.328, "b": 1.198, "c": 0.769, "d": 0.346}  # Hz
-solved = {letter: solver.solve(scene, frequency_hz=at) for letter, at in points.items()}
+solved = {letter: stickslip.solve(scene, frequency_hz=at) for letter, at in points.items()}
 
 with figure("figure03") as (left, right):
     left.plot(*curve(free), label="removed", **FREE)
@@ -31,6 +31,6 @@ say("resonance near a", f"{max(main):.3f} Hz")
 say("resonance near b", f"{highest(branch).at:.3f} Hz")
 say("super-harmonic resonances", " and ".join(f"{at:.3f}" for at in low) + " Hz")
 for phase, name in ((0.0, "in phase"), (0.25 * np.pi, "load 45° ahead")):
-    other = solver.sweep(scene.with_values({"damper.N1_phase": phase}))
+    other = stickslip.sweep(scene.with_values({"damper.N1_phase": phase}))
     ratios = [(harmonic(other, k) / harmonic(other, 1))[other.values < 0.6].max() for k in (2, 3)]
     say(f"harmonics 2 and 3 below 0.6 Hz, {name}", "up to {:.2f} and {:.2f} of the first".format(*ratios))

@@ -2,11 +2,11 @@
 
 from look import FOUR, FREE, STUCK, curve, figure, finish, highest, linear_limits, say, shades
 
-import solver
+import stickslip
 
-scene = solver.load_scene("two-dof").with_values({"damper.N0": 100.0, "damper.N1": 30.0})
+scene = stickslip.load_scene("two-dof").with_values({"damper.N0": 100.0, "damper.N1": 30.0})
 levels = [5, 10, 20, 50, 100, 200, 300]  # N
-responses = {f0: solver.sweep(scene.with_values({"excitation.amplitude": f0})) for f0 in levels}
+responses = {f0: stickslip.sweep(scene.with_values({"excitation.amplitude": f0})) for f0 in levels}
 free, stuck = linear_limits(scene, "damper")
 
 with figure("figure05") as (left, right):
@@ -17,7 +17,7 @@ with figure("figure05") as (left, right):
     left.set_xlim(0.2, 2.6)
     finish(left, "frequency [Hz]", "max |m2| [m]", legend="f0 [N]")
     for (letter, color), at in zip(FOUR.items(), (2.328, 1.198, 0.769, 0.346), strict=True):
-        branch = solver.sweep(scene, "excitation.amplitude", 1.0, 300.0, frequency_hz=at)
+        branch = stickslip.sweep(scene, "excitation.amplitude", 1.0, 300.0, frequency_hz=at)
         right.plot(*curve(branch), color=color, label=f"{letter}: {at} Hz")
     finish(right, "f0 [N]", "max |m2| [m]", legend="")
 

@@ -2,12 +2,12 @@
 
 from look import FOUR, curve, figure, finish, say, shades
 
-import solver
+import stickslip
 
-scene = solver.load_scene("two-dof").with_values({"damper.N0": 100.0, "damper.N1": 30.0})
+scene = stickslip.load_scene("two-dof").with_values({"damper.N0": 100.0, "damper.N1": 30.0})
 values = [5, 10, 20, 30, 45, 60]  # N/m
-responses = {kt: solver.sweep(scene.with_values({"damper.kt": kt})) for kt in values}
-track = solver.track_peak(scene, "damper.kt", 5.0, 60.0)
+responses = {kt: stickslip.sweep(scene.with_values({"damper.kt": kt})) for kt in values}
+track = stickslip.track_peak(scene, "damper.kt", 5.0, 60.0)
 first = track.frequency < 2.0  # Hz; beyond it the peak of the second mode is higher
 
 with figure("figure06") as (left, right):
@@ -16,7 +16,7 @@ with figure("figure06") as (left, right):
     left.plot(track.frequency[first], track.peak[first], color="black", linestyle="--", label="peaks")
     finish(left, "frequency [Hz]", "max |m2| [m]", legend="kt [N/m]")
     for (letter, color), at in zip(FOUR.items(), (2.328, 1.198, 0.769, 0.346), strict=True):
-        branch = solver.sweep(scene, "damper.kt", 1.0, 100.0, frequency_hz=at)
+        branch = stickslip.sweep(scene, "damper.kt", 1.0, 100.0, frequency_hz=at)
         right.plot(*curve(branch), color=color, label=f"{letter}: {at} Hz")
     finish(right, "kt [N/m]", "max |m2| [m]", legend="")
 

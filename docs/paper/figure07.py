@@ -2,14 +2,13 @@
 
 from look import FOUR, FREE, STUCK, curve, figure, finish, highest, linear_limits, say, shades
 
-import optim
-import solver
+import stickslip
 
-scene = solver.load_scene("two-dof")
+scene = stickslip.load_scene("two-dof")
 loads = [10, 30, 50, 100, 200, 300, 500]  # N
-responses = {N0: solver.sweep(scene.with_values({"damper.N0": N0})) for N0 in loads}
+responses = {N0: stickslip.sweep(scene.with_values({"damper.N0": N0})) for N0 in loads}
 free, stuck = linear_limits(scene, "damper")
-best = optim.design(scene, variables={"damper.N0": (10.0, 500.0)})
+best = stickslip.design(scene, variables={"damper.N0": (10.0, 500.0)})
 
 with figure("figure07") as (left, right):
     left.plot(*curve(free), label="removed", **FREE)
@@ -20,7 +19,7 @@ with figure("figure07") as (left, right):
     left.set_ylim(0.0, 7.0)
     finish(left, "frequency [Hz]", "max |m2| [m]", legend="N0 [N]")
     for (letter, color), at in zip(FOUR.items(), (2.328, 1.198, 0.769, 0.346), strict=True):
-        branch = solver.sweep(scene, "damper.N0", 1.0, 500.0, frequency_hz=at)
+        branch = stickslip.sweep(scene, "damper.N0", 1.0, 500.0, frequency_hz=at)
         right.plot(*curve(branch), color=color, label=f"{letter}: {at} Hz")
     finish(right, "N0 [N]", "max |m2| [m]", legend="")
 

@@ -2,18 +2,18 @@
 
 from look import FOUR, curve, figure, finish, highest, say, shades
 
-import solver
+import stickslip
 
-scene = solver.load_scene("two-dof")
+scene = stickslip.load_scene("two-dof")
 values = [0, 50, 100, 150, 200, 300, 500]  # N
-responses = {N1: solver.sweep(scene.with_values({"damper.N1": N1})) for N1 in values}
+responses = {N1: stickslip.sweep(scene.with_values({"damper.N1": N1})) for N1 in values}
 
 with figure("figure08") as (left, right):
     for (N1, branch), color in zip(responses.items(), shades(len(values)), strict=True):
         left.plot(*curve(branch), color=color, label=f"{N1}")
     finish(left, "frequency [Hz]", "max |m2| [m]", legend="N1 [N]")
     for (letter, color), at in zip(FOUR.items(), (2.328, 1.198, 0.769, 0.346), strict=True):
-        branch = solver.sweep(scene, "damper.N1", 0.0, 500.0, frequency_hz=at)
+        branch = stickslip.sweep(scene, "damper.N1", 0.0, 500.0, frequency_hz=at)
         right.plot(*curve(branch), color=color, label=f"{letter}: {at} Hz")
     finish(right, "N1 [N]", "max |m2| [m]", legend="")
 

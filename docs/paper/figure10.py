@@ -3,12 +3,12 @@
 import numpy as np
 from look import MARCHED, figure, finish, harmonic, say, shades
 
-import solver
+import stickslip
 
-scene = solver.load_scene("bladed-disk").with_values({"shroud.N0": 200.0, "shroud.N1": 400.0})
-branch = solver.sweep(scene)
-marched = solver.march(scene, frequency_hz=755.0, tolerance=1e-6)
-kept = {H: solver.solve(scene, frequency_hz=755.0, harmonics=H) for H in (1, 3, 5, 11)}
+scene = stickslip.load_scene("bladed-disk").with_values({"shroud.N0": 200.0, "shroud.N1": 400.0})
+branch = stickslip.sweep(scene)
+marched = stickslip.march(scene, frequency_hz=755.0, tolerance=1e-6)
+kept = {H: stickslip.solve(scene, frequency_hz=755.0, harmonics=H) for H in (1, 3, 5, 11)}
 
 with figure("figure10") as (left, right):
     for k, color in zip(range(1, 6), shades(5), strict=True):
@@ -16,7 +16,7 @@ with figure("figure10") as (left, right):
     left.set_ylim(1e-4, 1.0)
     finish(left, "frequency [Hz]", "amplitude of tip [mm]", legend="harmonic")
     for (H, found), color in zip(kept.items(), shades(len(kept)), strict=True):
-        time, x = solver.time_history(found, "tip")
+        time, x = stickslip.time_history(found, "tip")
         right.plot(1e3 * time, 1e3 * x, color=color, label=f"{H} harmonics" if H > 1 else "1 harmonic")
     some = np.linspace(0, marched.time.size - 1, 41, dtype=int)[:-1]
     right.plot(1e3 * marched.time[some], 1e3 * marched.displacement[some], label="marched", **MARCHED)

@@ -2,14 +2,13 @@
 
 from look import FOUR, FREE, STUCK, curve, figure, finish, highest, linear_limits, say, shades
 
-import optim
-import solver
+import stickslip
 
-scene = solver.load_scene("bladed-disk")
+scene = stickslip.load_scene("bladed-disk")
 loads = [80, 90, 100, 200, 500, 1000, 3000]  # N
-responses = {N0: solver.sweep(scene.with_values({"shroud.N0": N0}), limit=0.08e-3) for N0 in loads}
+responses = {N0: stickslip.sweep(scene.with_values({"shroud.N0": N0}), limit=0.08e-3) for N0 in loads}
 free, stuck = linear_limits(scene, "shroud")
-best = optim.design(scene, variables={"shroud.N0": (20.0, 3000.0)})
+best = stickslip.design(scene, variables={"shroud.N0": (20.0, 3000.0)})
 
 with figure("figure11") as (left, right):
     left.semilogy(*curve(free, 1e3), label="removed", **FREE)
@@ -19,7 +18,7 @@ with figure("figure11") as (left, right):
     left.set_ylim(4e-3, 10.0)
     finish(left, "frequency [Hz]", "max |tip| [mm]", legend="N0 [N]")
     for (letter, color), at in zip(FOUR.items(), (575.0, 700.0, 755.0, 785.0), strict=True):
-        branch = solver.sweep(scene, "shroud.N0", 20.0, 3000.0, frequency_hz=at)
+        branch = stickslip.sweep(scene, "shroud.N0", 20.0, 3000.0, frequency_hz=at)
         right.loglog(*curve(branch, 1e3), color=color, label=f"{letter}: {at:.0f} Hz")
     finish(right, "N0 [N]", "max |tip| [mm]", legend="")
 

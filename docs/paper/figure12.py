@@ -2,18 +2,18 @@
 
 from look import FOUR, curve, figure, finish, highest, say, shades
 
-import solver
+import stickslip
 
-scene = solver.load_scene("bladed-disk")
+scene = stickslip.load_scene("bladed-disk")
 values = [0, 50, 100, 200, 300, 400, 500]  # N
-responses = {N1: solver.sweep(scene.with_values({"shroud.N1": N1}), limit=0.08e-3) for N1 in values}
+responses = {N1: stickslip.sweep(scene.with_values({"shroud.N1": N1}), limit=0.08e-3) for N1 in values}
 
 with figure("figure12") as (left, right):
     for (N1, branch), color in zip(responses.items(), shades(len(values)), strict=True):
         left.plot(*curve(branch, 1e3), color=color, label=f"{N1}")
     finish(left, "frequency [Hz]", "max |tip| [mm]", legend="N1 [N]")
     for (letter, color), at in zip(FOUR.items(), (530.0, 700.0, 755.0, 785.0), strict=True):
-        branch = solver.sweep(scene, "shroud.N1", 0.0, 500.0, frequency_hz=at)
+        branch = stickslip.sweep(scene, "shroud.N1", 0.0, 500.0, frequency_hz=at)
         right.plot(*curve(branch, 1e3), color=color, label=f"{letter}: {at:.0f} Hz")
     finish(right, "N1 [N]", "max |tip| [mm]", legend="")
 

@@ -2,11 +2,11 @@
 
 from look import figure, say
 
-import solver
+import stickslip
 
-scene = solver.load_scene("bladed-disk")
-mean = solver.response_map(scene, "shroud.N0", 20.0, 3000.0, frequencies=200)
-fluctuation = solver.response_map(scene, "shroud.N1", 0.0, 500.0, frequencies=200)
+scene = stickslip.load_scene("bladed-disk")
+mean = stickslip.response_map(scene, "shroud.N0", 20.0, 3000.0, frequencies=200)
+fluctuation = stickslip.response_map(scene, "shroud.N1", 0.0, 500.0, frequencies=200)
 
 with figure("figure13", height=3.6, width=10.5) as (left, right):
     mean.plot(ax=left)

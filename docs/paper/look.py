@@ -13,7 +13,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-import solver
+import stickslip
 from solver.views.plots.style import BLUE, GREEN, GREY, INK, VERMILION, plain_log, styled
 
 FOUR = dict(zip("abcd", (BLUE, VERMILION, GREEN, "#CC79A7"), strict=True))  # points a, b, c and d
@@ -50,19 +50,19 @@ def shades(count: int) -> list[Any]:
     return [colormaps["viridis"](place) for place in np.linspace(0.88, 0.08, count)]
 
 
-def linear_limits(scene: solver.Scene, contact: str) -> tuple[solver.Branch, solver.Branch]:
+def linear_limits(scene: stickslip.Scene, contact: str) -> tuple[stickslip.Branch, stickslip.Branch]:
     """The response with a contact removed, and with it stuck throughout."""
     free = {f"{contact}.N0": 0.0, f"{contact}.N1": 0.0}
     stuck = {f"{contact}.N0": 1e9, f"{contact}.N1": 0.0}
-    return solver.sweep(scene.with_values(free)), solver.sweep(scene.with_values(stuck))
+    return stickslip.sweep(scene.with_values(free)), stickslip.sweep(scene.with_values(stuck))
 
 
-def harmonic(branch: solver.Branch, k: int) -> np.ndarray:
+def harmonic(branch: stickslip.Branch, k: int) -> np.ndarray:
     """Amplitude of a harmonic of the observed DOF along a branch [m]."""
     return np.hypot(branch.observed[:, 2 * k - 1], branch.observed[:, 2 * k])
 
 
-def curve(branch: solver.Branch, unit: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+def curve(branch: stickslip.Branch, unit: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Parameter and amplitude of a branch without folds, its polished peaks among the points."""
     at = np.append(branch.values, [peak.at for peak in branch.peaks])
     height = np.append(branch.amplitude, [peak.value for peak in branch.peaks])
@@ -70,7 +70,7 @@ def curve(branch: solver.Branch, unit: float = 1.0) -> tuple[np.ndarray, np.ndar
     return at[order], unit * height[order]
 
 
-def highest(branch: solver.Branch) -> solver.Peak:
+def highest(branch: stickslip.Branch) -> stickslip.Peak:
     """The highest peak of a branch that reached its end."""
     if not branch.completed or branch.peak is None:
         raise SystemExit(branch.status.value)

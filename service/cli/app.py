@@ -3,76 +3,24 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
 
-from service.cli.commands import campbell as campbell_command
-from service.cli.commands import database as database_commands
-from service.cli.commands import design as design_commands
-from service.cli.commands import import_matrices as import_command
-from service.cli.commands import jobs as submit_commands
-from service.cli.commands import keys as key_commands
-from service.cli.commands import mistuning as mistuning_command
-from service.cli.commands import report as report_command
-from service.cli.commands import schema as schema_command
-from service.cli.commands import sensitivities as sensitivity_command
-from service.cli.commands import service as service_commands
-from service.cli.commands import solver as solver_commands
-from service.cli.commands import submit_studies
-from service.cli.commands import track as track_commands
 from service.cli.failures import REPORTED, report
+from service.cli.lazy import LazyGroup, group
 from service.cli.options.inputs import join_words
-from service.cli.options.keyed import keyed
+from service.cli.table import COMMANDS, GROUPS
 
-app = typer.Typer(
+_app = typer.Typer(
+    cls=LazyGroup,
     name="stickslip",
     help="Design friction dampers: periodic responses, continuation, and the best normal load.",
     rich_markup_mode=None,
-    add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-_database = typer.Typer(help="Look after the database.", no_args_is_help=True, rich_markup_mode=None)
-_keys = typer.Typer(help="Make and end keys to the service.", no_args_is_help=True, rich_markup_mode=None)
-_submit = typer.Typer(help="Hand a job to a running service.", no_args_is_help=True, rich_markup_mode=None)
-
-_ALONE: tuple[Callable[..., None], ...] = (
-    solver_commands.scenes, solver_commands.plan, solver_commands.solve, solver_commands.sweep,
-    solver_commands.accuracy, design_commands.design, design_commands.pareto,
-    sensitivity_command.sensitivities, solver_commands.march, service_commands.demo, service_commands.serve,
-    service_commands.worker, keyed(submit_commands.watch), keyed(submit_commands.results),
-)  # fmt: skip
-_SUBMITTED: tuple[Callable[..., None], ...] = (
-    submit_commands.design, submit_commands.pareto, submit_commands.sweep, submit_commands.solve,
-    submit_commands.march, submit_studies.peaks, submit_studies.accuracy,
-    submit_studies.campbell, submit_studies.mistuning,
-)  # fmt: skip
-
-for _command in _ALONE:
-    app.command()(_command)
-app.command(name="peaks")(track_commands.peaks)
-app.command(name="map")(track_commands.response_map)
-app.command()(campbell_command.campbell)
-app.command()(mistuning_command.mistuning)
-for _command in _SUBMITTED:
-    _submit.command()(keyed(_command))
-_submit.command(name="map")(keyed(submit_studies.response_map))
-_keys.command()(key_commands.create)
-_keys.command(name="list")(key_commands.show)
-_keys.command()(key_commands.rotate)
-_keys.command()(key_commands.revoke)
-_database.command()(service_commands.upgrade)
-_database.command()(database_commands.backup)
-_database.command()(database_commands.check)
-_database.command()(database_commands.prune)
-app.command()(schema_command.schema)
-app.command()(report_command.report)
-app.command("import")(import_command.import_scene)
-app.add_typer(_submit, name="submit")
-app.add_typer(_database, name="db")
-app.add_typer(_keys, name="keys")
 
 
 def _print_version(wanted: bool) -> None:
@@ -83,7 +31,7 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+@_app.callback()
 def _root(
     _version: Annotated[
         bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
@@ -91,15 +39,22 @@ def _root(
 ) -> None: ...
 
 
-@_database.callback()
-def _database_root() -> None: ...
+def command() -> LazyGroup:
+    """Return `stickslip` with every command under it, each imported when it is used."""
+    root = typer.main.get_command(_app)
+    if not isinstance(root, LazyGroup):
+        raise TypeError(f"typer made {type(root).__name__} of the application")
+    root.add(COMMANDS)
+    for name, summary, entries in GROUPS:
+        root.add_command(group(name, summary, entries))
+    return root
 
 
 def run(arguments: Sequence[str] | None) -> int:
     """Run the command and return its exit status."""
     given = sys.argv[1:] if arguments is None else arguments
     try:
-        app(args=join_words(given), prog_name="stickslip")
+        command()(args=join_words(given), prog_name="stickslip")
     except REPORTED as error:
         return report(error)
     except SystemExit as end:

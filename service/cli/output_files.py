@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, Self
 
 from service.cli.options.inputs import output_path
-from solver.views.io import SUFFIXES as FILES
-from solver.views.plots import SUFFIXES as PICTURES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,6 +39,11 @@ class Outputs:
         InputError
             A suffix that has no writer, or a folder that is not there.
         """
+        if plot is None and out is None:
+            return cls(picture=None, file=None)
+        from solver.views.io import SUFFIXES as FILES
+        from solver.views.plots import SUFFIXES as PICTURES
+
         return cls(picture=output_path("--plot", plot, PICTURES), file=output_path("--out", out, FILES))
 
     def write(
@@ -54,12 +57,12 @@ class Outputs:
         draw : makes its picture; None where there is nothing to draw.
         scene : of results that do not know theirs.
         """
+        if self.picture is None and self.file is None:
+            return
         from dataclasses import replace
 
         from solver.views.io import save, scene_attributes
 
-        if self.picture is None and self.file is None:
-            return
         data = result.to_dataset()
         if scene is not None:
             data = replace(data, attributes={**data.attributes, **scene_attributes(scene)})

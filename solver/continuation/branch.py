@@ -83,8 +83,8 @@ class Peak(Piece):
     interior: bool
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Edge:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Edge(Piece):
     """An end of an interval in which the amplitude exceeds a limit: where it equals the limit, or a fold.
 
     Attributes

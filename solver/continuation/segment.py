@@ -20,14 +20,15 @@ from solver.continuation.kernels.state import COUNT, ITERATIONS, Control, P, Wal
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.linear.kernels.receptance import receptance
+from solver.results.base import Piece
 
 _ENDINGS = tuple(BranchStatus)
 _NUMBERS = 12
 _ROWS = ("solutions", "tangents", "states", "observed", "measures")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Stretch:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Stretch(Piece):
     """Some consecutive points of a branch; the arrays are those of `solver.continuation.branch.Branch`.
 
     Attributes

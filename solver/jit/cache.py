@@ -22,6 +22,7 @@ from typing import Any, ClassVar
 
 import numba
 from numba.core import caching
+from numba.core.runtime import rtsys
 
 try:
     import fcntl
@@ -110,9 +111,14 @@ class KernelCache(caching.Cache):
     _impl_class = _Serialised
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return what was saved for these types, or None."""
-        with _locked(alone=False):
-            return super().load_overload(sig, target_context)
+        """Return what was saved for these types, or None.
+
+        Numba would first fill its tables of what can be compiled, for which it imports SciPy: a third of the
+        time in which a process starts. Machine code needs only the runtime; to compile, Numba fills them.
+        """
+        rtsys.initialize(target_context)
+        with _locked(alone=False), self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save what was compiled for these types."""

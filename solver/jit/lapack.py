@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numba
 import numpy as np
 
+from solver.jit import lapack_loading as lapack
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Index, Real
 from solver.jit.separate import apart
@@ -26,6 +27,7 @@ _getrf: Callable[..., int] = numba.core.types.ExternalFunction(
     "numba_xxgetrf", _int(numba.types.char, _index, _index, _doubles, _index, _pivots)
 )
 _DOUBLE = np.int8(ord("d"))
+lapack.load()
 
 
 @compiled

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-import casadi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -154,7 +153,6 @@ class _Expression(NamedTuple):
 
     parameters: Any
     stacked: Any
-    evaluate: Any
 
 
 def linear_model(scene: Scene) -> LinearModel:
@@ -274,22 +272,29 @@ def _numbers(structure: _Assembled) -> tuple[float, ...]:
 
 @lru_cache(maxsize=64)
 def _expression(topology: _Topology) -> _Expression:
-    """The matrices in the parameters, in the order of `_numbers`."""
+    """The matrices in symbols, in the order of `_numbers`, for their derivatives."""
+    import casadi  # the values of the matrices need no symbols
+
+    n = len(topology.dofs)
+    q = casadi.SX.sym("q", n + 2 * len(topology.springs) + len(topology.dampers) + 1)
+    return _Expression(q, casadi.horzcat(*_assembled(topology, q, casadi.SX(n, n))))
+
+
+def _assembled(topology: _Topology, q: Any, zero: Any) -> tuple[Any, ...]:
+    """Return M, C0, Cp, K0, Kp in floats or in symbols, as the parameters `q` and the (n, n) `zero` are."""
     n, n_springs, n_dampers = len(topology.dofs), len(topology.springs), len(topology.dampers)
-    q = casadi.SX.sym("q", n + 2 * n_springs + n_dampers + 1)
-    m, k, c, c_spring, beta = casadi.vertsplit(
-        q, np.cumsum([0, n, n_springs, n_dampers, n_springs, 1]).tolist()
-    )
+    M, C0, Cp, K0, Kp = (zero + 0.0 for _ in range(5))
+    k, c, c_spring = n, n + n_springs, n + n_springs + n_dampers
+    beta = q[c_spring + n_springs]
     index = {dof: i for i, dof in enumerate(topology.dofs)}
-    K0, Kp = casadi.SX(n, n), casadi.SX(n, n)
-    C0, Cp = casadi.SX(n, n), casadi.SX(n, n)
+    for i in range(n):
+        M[i, i] = q[i]
     for i, ends in enumerate(topology.springs):
-        _join(K0, Kp, ends, k[i], index)
-        _join(C0, Cp, ends, c_spring[i] + beta * k[i], index)
+        _join(K0, Kp, ends, q[k + i], index)
+        _join(C0, Cp, ends, q[c_spring + i] + beta * q[k + i], index)
     for i, ends in enumerate(topology.dampers):
-        _join(C0, Cp, ends, c[i], index)
-    stacked = casadi.horzcat(casadi.diag(m), C0, Cp, K0, Kp)
-    return _Expression(q, stacked, casadi.Function("matrices", [q], [stacked]))
+        _join(C0, Cp, ends, q[c + i], index)
+    return M, C0, Cp, K0, Kp
 
 
 def _join(X0: Any, Xp: Any, ends: _Ends, value: Any, index: dict[str, int]) -> None:
@@ -311,31 +316,32 @@ def _join(X0: Any, Xp: Any, ends: _Ends, value: Any, index: dict[str, int]) -> N
 
 @lru_cache(maxsize=256)
 def _matrices(topology: _Topology, numbers: tuple[float, ...]) -> _Matrices:
-    return _split(_expression(topology).evaluate(np.asarray(numbers)))
+    n = len(topology.dofs)
+    return _Matrices(*map(_frozen, _assembled(topology, numbers, np.zeros((n, n)))))
 
 
 @lru_cache(maxsize=256)
 def _derivative(topology: _Topology, numbers: tuple[float, ...], i: int) -> LinearModelDerivative:
+    import casadi
+
     expression = _expression(topology)
     derivative, affine = _derivative_function(topology, i)
     stacked = casadi.reshape(derivative(np.asarray(numbers)), *expression.stacked.shape)
-    d = _split(stacked)
+    dense = np.asarray(casadi.DM(stacked).full(), dtype=np.float64)
+    n = dense.shape[0]
+    d = _Matrices(*(_frozen(dense[:, i * n : (i + 1) * n].copy()) for i in range(5)))
     return LinearModelDerivative(dM=d.M, dC0=d.C0, dCp=d.Cp, dK0=d.K0, dKp=d.Kp, affine=affine)
 
 
 @lru_cache(maxsize=256)
 def _derivative_function(topology: _Topology, i: int) -> tuple[Any, bool]:
     """Derivative of the stacked matrices by parameter i as a function of all, and whether it is constant."""
-    q, stacked, _ = _expression(topology)
+    import casadi
+
+    q, stacked = _expression(topology)
     vector = casadi.vec(stacked)
     jacobian = casadi.jacobian(vector, q[i])
     return casadi.Function("derivative", [q], [jacobian]), bool(casadi.is_linear(vector, q[i]))
-
-
-def _split(stacked: Any) -> _Matrices:
-    dense = np.asarray(casadi.DM(stacked).full(), dtype=np.float64)
-    n = dense.shape[0]
-    return _Matrices(*(_frozen(dense[:, i * n : (i + 1) * n].copy()) for i in range(5)))
 
 
 @lru_cache(maxsize=256)

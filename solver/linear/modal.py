@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
 from solver.contacts.kernels.system import MODES, POLES
+from solver.jit import eigen
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import LinearModel
 from solver.matrices.normal_modes import UndampedModes, least_stiffness, undamped_modes
@@ -172,7 +172,7 @@ def _poles(undamped: UndampedModes, D: NDArray[Any]) -> tuple[Complex, Complex, 
     n = undamped.mu.size
     slow = np.diag(np.sqrt(undamped.mu))
     state = np.block([[-D, -slow], [slow, np.zeros((n, n))]])
-    values, w, v = linalg.eig(state, left=True, right=True)
+    values, w, v = eigen.two_sided(state)
     norm = np.einsum("nm,nm->m", w.conj(), v)
     if not np.all(np.abs(norm) > 0.0):
         return None
@@ -199,7 +199,7 @@ def _plain_poles(
     n = K.shape[0]
     inverse = np.linalg.inv(M)
     state = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K, -inverse @ C]])
-    values, y, x = linalg.eig(state, left=True, right=True)
+    values, y, x = eigen.two_sided(state)
     # Left eigenvectors of the first-order form carry those of the quadratic one in their lower half.
     x, y = x[:n], inverse.conj().T @ y[n:]
     norm = np.einsum("nm,nm->m", y.conj(), C @ x + 2.0 * (M @ x) * values)

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
+from solver.jit import eigen
 from solver.matrices.normal_modes import least_stiffness
 
 Real = NDArray[np.float64]
@@ -44,7 +44,7 @@ def loose_motions(K: NDArray[Any], L: NDArray[Any], kt: Real) -> Real:
     scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     across = np.outer(scale, scale)
     held = across * (K + contact) + _UNTOUCHED * np.eye(scale.size)
-    _, modes = linalg.eigh(across * K, held)
+    _, modes = eigen.pencil(across * K, held)
     modes = modes * scale[:, None]
     stiffness = np.einsum("im,ij,jm->m", modes, K, modes)
     against = np.einsum("im,ij,jm->m", modes, contact, modes)

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
+
+from solver.jit import eigen
 
 # Not that of `solver.jit.fourier`, which brings the compiled loops along: files of strangers are read
 # without.
@@ -61,10 +62,10 @@ def undamped_modes(K: NDArray[Any], M: NDArray[Any]) -> UndampedModes:
     """
     sigma = 0.0 if _definite(K) else SHIFT * float(np.max(np.abs(np.diag(K)) / np.diag(M).real, initial=0.0))
     try:
-        mu, psi = linalg.eigh(M, K + sigma * M if sigma else K)
+        mu, psi = eigen.pencil(M, K + sigma * M if sigma else K)
     except np.linalg.LinAlgError:
         # K has eigenvalues well below zero: the plain problem, mass-normalised.
-        values, phi = linalg.eigh(K, M)
+        values, phi = eigen.pencil(K, M)
         sigma = float(-2.0 * values[0] + SHIFT * np.abs(values).max()) or 1.0
         mu = 1.0 / (values + sigma)
         return UndampedModes(mu=mu, psi=phi * np.sqrt(mu), sigma=sigma)

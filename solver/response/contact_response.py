@@ -14,6 +14,7 @@ from solver.contacts.kernels.columns import CLOSED, DEFORMING, TOUCHING
 from solver.contacts.kernels.stick_slip_events import LIFTING, SEPARATED, SLIPPING, STUCK
 from solver.jit import fourier
 from solver.jit.fourier import Real
+from solver.results.base import Piece
 from solver.scene.scene import AnyContact, ElasticNormalContact, FrictionContact, PlanarContact
 
 
@@ -48,8 +49,8 @@ def state_of(code: int) -> ContactState:
 OPENS = (ContactState.SEPARATED, ContactState.LIFTING, ContactState.TOUCHING)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ContactResponse:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class ContactResponse(Piece):
     """The motion and force of one contact.
 
     Attributes

@@ -15,7 +15,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
 
 from solver.jit.fourier import Real
 from solver.linear.assembly import LinearModel
@@ -78,6 +77,8 @@ def keeps_sticking(
     count = max(128, math.ceil(2.0 * math.pi * fastest / _TURN))
     if count > _MOST_INSTANTS:
         return False
+    from scipy.linalg import expm  # most responses never come here, and it takes long to import
+
     rows = _rows(expm(2.0 * math.pi / count * generator), ports, count)
     over_a_period = expm(2.0 * math.pi * generator)
     tau = 2.0 * math.pi / count * np.arange(count, dtype=np.float64)

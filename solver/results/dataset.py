@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.errors import MissingExtraError
+from solver.results.base import Piece, Summary
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,8 +21,8 @@ ROW = "row"
 Attribute = str | float | int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Variable:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Variable(Piece):
     """An array with its dimensions.
 
     Attributes
@@ -48,8 +49,8 @@ class Variable:
         return {name: text for name, text in given.items() if text}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Dataset:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Dataset(Piece):
     """Named arrays of one result.
 
     Attributes
@@ -68,6 +69,15 @@ class Dataset:
     rows: tuple[str, ...]
     variables: Mapping[str, Variable]
     attributes: Mapping[str, Attribute] = field(default_factory=dict)
+
+    def summary(self) -> Summary:
+        """Every variable with its dimensions and its unit."""
+        pairs = []
+        for name, variable in self.variables.items():
+            sizes = zip(variable.dims, variable.values.shape, strict=True)
+            size = " x ".join(f"{dim} {length}" for dim, length in sizes) or "one value"
+            pairs.append((name, f"{size} [{variable.unit}]" if variable.unit else size))
+        return Summary(title=self.kind, pairs=tuple(pairs))
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """The values of a variable."""

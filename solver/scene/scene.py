@@ -68,6 +68,9 @@ __all__ = [
 ]
 
 
+_FEW = 6  # contacts that are named where a scene says what it is
+
+
 class Scene(Part):
     """A structure with friction contacts, how it is excited and what is observed. Frozen, SI units.
 
@@ -95,6 +98,19 @@ class Scene(Part):
     contacts: tuple[ContactOfAnyLaw, ...] = ()
     excitation: tuple[Excitation, ...]
     observe: Observe
+
+    def __repr__(self) -> str:
+        """Say in a line what it is; `to_dict` has all of it."""
+        names = ", ".join(contact.name for contact in self.contacts[:_FEW]) or "none"
+        if len(self.contacts) > _FEW:
+            names = f"{len(self.contacts)} of them"
+        low, high = self.observe.band
+        return (
+            f"<Scene {self.name}: {self.structure.kind}, {len(self.structure.dofs)} DOFs, contacts {names}, "
+            f"{self.observe.dof} observed from {low:g} to {high:g} Hz>"
+        )
+
+    __str__ = __repr__
 
     @field_validator("excitation", mode="before")
     @classmethod

@@ -234,7 +234,7 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
     if as_json:
         print_json(answer.model_dump(mode="json"))
         return
-    reports.BY_KIND[job.kind](answer.result)
+    reports.of_kind(job.kind)(answer.result)
     rows = [
         (
             sweep.id,

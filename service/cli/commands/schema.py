@@ -7,13 +7,19 @@ from typing import Annotated
 
 import typer
 
+from service.cli import completion
 from service.errors import InputError
 from service.rendering.tables.text import say
 
 
 def schema(
     what: Annotated[
-        str, typer.Argument(metavar="[scene|problem|job]", help="What the schema is of.")
+        str,
+        typer.Argument(
+            metavar="[scene|problem|job]",
+            help="What the schema is of.",
+            autocompletion=completion.words("scene", "problem", "job"),
+        ),
     ] = "scene",
 ) -> None:
     """Print the JSON Schema of scene files, design problems or jobs, for editors."""

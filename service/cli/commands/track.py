@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from service.cli import completion
 from service.cli.failures import FELL_SHORT
 from service.cli.options import inputs
 from service.cli.options import shared as options
@@ -16,8 +17,12 @@ from service.rendering.tables import track as track_reports
 from service.rendering.tables.text import print_json
 
 Followed = Annotated[
-    str, typer.Option("--parameter", metavar="PATH", help="What changes, for example shroud.N0.")
-]
+    str,
+    typer.Option(
+        "--parameter", metavar="PATH", help="What changes, for example shroud.N0.",
+        autocompletion=completion.paths,
+    ),
+]  # fmt: skip
 Start = Annotated[float, typer.Option("--from", metavar="A", parser=number, help="Start of the range.")]
 Stop = Annotated[float, typer.Option("--to", metavar="B", parser=number, help="End of the range.")]
 Checks = Annotated[

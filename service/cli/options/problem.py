@@ -14,6 +14,7 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
+from service.cli import completion
 from service.cli.options.inputs import number, whole_number
 
 FLAGS = "flags"
@@ -34,14 +35,16 @@ Variables = Annotated[
         "--variable", metavar="PATH LO HI",
         help="A parameter and its bounds, for example shroud.N0 20 3000; paths that share a value are "
         "separated by commas; repeatable. If left out, the normal load of the contact whose load varies.",
+        autocompletion=completion.paths,
     ),
 ]  # fmt: skip
 Scaling = Annotated[
     list[str] | None,
     typer.Option(
-        "--scaling", metavar="PATH=HOW", help="Scale a variable linear or logarithmic; by its bounds."
+        "--scaling", metavar="PATH=HOW", help="Scale a variable linear or logarithmic; by its bounds.",
+        autocompletion=completion.settings,
     ),
-]
+]  # fmt: skip
 Limit = Annotated[
     float | None,
     typer.Option(
@@ -85,25 +88,36 @@ MaxWork = Annotated[
 ]
 NeverSeparates = Annotated[
     list[str] | None,
-    typer.Option("--never-separates", metavar="CONTACT", help="A contact that must stay closed; repeatable."),
-]
+    typer.Option(
+        "--never-separates", metavar="CONTACT", help="A contact that must stay closed; repeatable.",
+        autocompletion=completion.contacts,
+    ),
+]  # fmt: skip
 Method = Annotated[
-    str | None, typer.Option("--method", metavar="M", help="auto, tracked, minimax or ipopt; auto.")
-]
+    str | None,
+    typer.Option(
+        "--method", metavar="M", help="auto, tracked, minimax or ipopt; auto.",
+        autocompletion=completion.words("auto", "tracked", "minimax", "ipopt"),
+    ),
+]  # fmt: skip
 Basins = Annotated[
     int | None,
     typer.Option("--basins", metavar="N", parser=whole_number, help="Local optima looked for; 2."),
 ]
 Start = Annotated[
     list[str] | None,
-    typer.Option("--start", metavar="PATH=VALUE", help="A design to start from; repeatable."),
-]
+    typer.Option(
+        "--start", metavar="PATH=VALUE", help="A design to start from; repeatable.",
+        autocompletion=completion.settings,
+    ),
+]  # fmt: skip
 Values = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="PATH=VALUE", help="Value of a parameter, for example shroud.N0=150; repeatable."
+        "--set", metavar="PATH=VALUE", help="Value of a parameter, for example shroud.N0=150; repeatable.",
+        autocompletion=completion.settings,
     ),
-]
+]  # fmt: skip
 Harmonics = Annotated[
     int | None,
     typer.Option("--harmonics", metavar="H", parser=whole_number, help="Highest harmonic kept; 11."),

@@ -6,23 +6,32 @@ from typing import Annotated
 
 import typer
 
+from service.cli import completion
 from service.cli.options.inputs import number, whole_number
 
+EFFECTS = ("even-harmonics", "every-contact", "every-sector", "whole-matrices")
+
 Scene = Annotated[
-    str, typer.Argument(metavar="SCENE", help="Name of a shipped scene, or a scene file (.toml, .json).")
-]
+    str,
+    typer.Argument(
+        metavar="SCENE", help="Name of a shipped scene, or a scene file (.toml, .json).",
+        autocompletion=completion.scenes,
+    ),
+]  # fmt: skip
 AnyScene = Annotated[
     str | None,
     typer.Argument(
-        metavar="SCENE", help="Name of a shipped scene, or a scene file; the one of the --problem file."
+        metavar="SCENE", help="Name of a shipped scene, or a scene file; the one of the --problem file.",
+        autocompletion=completion.scenes,
     ),
-]
+]  # fmt: skip
 Values = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="PATH=VALUE", help="Value of a parameter, for example shroud.N0=150; repeatable."
+        "--set", metavar="PATH=VALUE", help="Value of a parameter, for example shroud.N0=150; repeatable.",
+        autocompletion=completion.settings,
     ),
-]
+]  # fmt: skip
 Frequency = Annotated[
     float, typer.Option("--frequency", metavar="HZ", parser=number, help="Excitation frequency [Hz].")
 ]
@@ -56,11 +65,16 @@ Effects = Annotated[
         "--effects", metavar="auto|all|NAME,…",
         help="What to pay for though the scene does not call for it: even-harmonics, every-contact, "
         "every-sector, whole-matrices.",
+        autocompletion=completion.words("auto", "all", *EFFECTS),
     ),
 ]  # fmt: skip
 Parameter = Annotated[
-    str, typer.Option("--parameter", metavar="PATH", help="What is swept: frequency, shroud.N0, …")
-]
+    str,
+    typer.Option(
+        "--parameter", metavar="PATH", help="What is swept: frequency, shroud.N0, …",
+        autocompletion=completion.parameters,
+    ),
+]  # fmt: skip
 From = Annotated[
     float | None,
     typer.Option(

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from service.rendering.tables import campbell as campbell_reports
-from service.rendering.tables import design as design_reports
-from service.rendering.tables import mistuning
-from service.rendering.tables import robust as robust_reports
-from service.rendering.tables import track as track_reports
 from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
 from solver.results.notes import BAND_OPEN, FLAGS, between_points, flag_words
@@ -147,24 +143,28 @@ def march(found: Json) -> None:
 
 def design(found: Json) -> None:
     """A design, of what is known or in spite of what is not."""
+    from service.rendering.tables import design as design_reports
+    from service.rendering.tables import robust as robust_reports
+
     if "nominal" in found:
         robust_reports.robust(found)
     else:
         design_reports.design(found)
 
 
-BY_KIND: Mapping[str, Callable[[Json], None]] = {
-    "solve": solution,
-    "sweep": branch,
-    "design": design,
-    "pareto": design_reports.front,
-    "march": march,
-    "map": track_reports.response_map,
-    "peaks": track_reports.track,
-    "accuracy": accuracy,
-    "campbell": campbell_reports.diagram,
-    "mistuning": mistuning.report,
-}
+_HOMES = {
+    "solve": "results.solution", "sweep": "results.branch", "design": "results.design",
+    "pareto": "design.front", "march": "results.march", "map": "track.response_map",
+    "peaks": "track.track", "accuracy": "results.accuracy", "campbell": "campbell.diagram",
+    "mistuning": "mistuning.report",
+}  # fmt: skip
+
+
+def of_kind(kind: str) -> Callable[[Json], None]:
+    """What prints the result of a job of a kind, imported when it is asked for."""
+    module, _, function = _HOMES[kind].partition(".")
+    printed: Callable[[Json], None] = getattr(import_module(f"service.rendering.tables.{module}"), function)
+    return printed
 
 
 def _amplitudes(found: Json) -> Pairs:

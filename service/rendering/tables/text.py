@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 import sys
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -11,6 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 _PIPE_WIDTH = 120
+_BOLD, _DIM = "1", "2"
 
 
 def print_json(obj: Mapping[str, object]) -> None:
@@ -25,16 +29,15 @@ def say(text: str) -> None:
 
 def print_pairs(title: str, pairs: Iterable[tuple[str, str]]) -> None:
     """Print a heading and names with their values, one a line."""
-    from rich.table import Table
-
-    table = Table.grid(padding=(0, 2))
-    table.add_column(style="dim", no_wrap=True)
-    table.add_column(overflow="fold")
-    for name, value in pairs:
-        table.add_row(name, value)
-    console = _console()
-    console.print(title, style="bold")
-    console.print(table)
+    listed = list(pairs)
+    column = max((len(name) for name, _ in listed), default=0) + 2
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else _PIPE_WIDTH
+    say("\n".join(_styled(line, _BOLD) for line in textwrap.wrap(title, width) or [""]))
+    for name, value in listed:
+        first, *more = textwrap.wrap(value, max(width - column, 1), break_on_hyphens=False) or [""]
+        say(_styled(name.ljust(column), _DIM) + first)
+        for line in more:
+            say(" " * column + line)
 
 
 def print_table(
@@ -52,6 +55,12 @@ def print_table(
     console = _console()
     console.print(title, style="bold")
     console.print(table)
+
+
+def _styled(text: str, style: str) -> str:
+    """Text in a style, where somebody watches a terminal that has styles and wants them."""
+    plain = not sys.stdout.isatty() or "NO_COLOR" in os.environ or os.environ.get("TERM") == "dumb"
+    return text if plain else f"\x1b[{style}m{text}\x1b[0m"
 
 
 def _console() -> Console:

@@ -1,0 +1,86 @@
+"""Commands that are imported when they are called: `stickslip --help` reads a table, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A command in the table.
+
+    Attributes
+    ----------
+    name : str
+        As the user writes it.
+    home : str
+        Module of `service.cli` and function, ``"solver_commands.solve"``.
+    summary : str
+        The first line of the function's docstring, which `--help` shows.
+    keyed : bool
+        It talks to a service, and takes ``--key-file``.
+    """
+
+    name: str
+    home: str
+    summary: str
+    keyed: bool = False
+
+
+class Deferred(TyperCommand):
+    """Name and summary of a command whose module is not imported yet."""
+
+    def __init__(self, entry: Entry) -> None:
+        super().__init__(entry.name, help=entry.summary, rich_markup_mode=None)
+        self.entry = entry
+
+    def load(self) -> Any:
+        """Import the module and return the command with its arguments and options."""
+        module, _, function = self.entry.home.rpartition(".")
+        command = getattr(import_module(f"service.cli.{module}"), function)
+        if self.entry.keyed:
+            from service.cli.options.keyed import keyed
+
+            command = keyed(command)
+        # Typer makes a plain command of an application that has a single one.
+        alone = typer.Typer(add_completion=False, rich_markup_mode=None)
+        alone.command(self.entry.name)(command)
+        return typer.main.get_command(alone)
+
+
+class LazyGroup(TyperGroup):
+    """A group whose commands are loaded when they are looked up to be run or completed."""
+
+    def add(self, entries: Iterable[Entry]) -> None:
+        """Add commands, in the order in which help lists them."""
+        for entry in entries:
+            self.add_command(Deferred(entry))
+
+    def get_params(self, ctx: Any) -> Any:
+        """Return the options; flags that are not given are False: to look at None, Typer imports pydantic."""
+        options = super().get_params(ctx)
+        for option in options:
+            if getattr(option, "is_flag", False) and option.default is None:
+                option.default = False
+        return options
+
+    def resolve_command(self, ctx: Any, args: Any) -> Any:
+        """Return the name of the command asked for, the command, loaded, and the arguments left."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if isinstance(command, Deferred):
+            command = command.load()
+            self.add_command(command)
+        return name, command, rest
+
+
+def group(name: str, summary: str, entries: Sequence[Entry]) -> LazyGroup:
+    """Return a command that only has commands under it."""
+    made = LazyGroup(name=name, help=summary, no_args_is_help=True, rich_markup_mode=None)
+    made.add(entries)
+    return made

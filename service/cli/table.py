@@ -1,0 +1,97 @@
+"""Every command, in the order in which help lists them; a further one is a function and a line here."""
+
+from __future__ import annotations
+
+from service.cli.lazy import Entry
+
+COMMANDS = (
+    Entry("scenes", "commands.solver.scenes", "List the shipped scenes."),
+    Entry("plan", "commands.solver.plan", "Say which effects a scene calls for, and why."),
+    Entry("solve", "commands.solver.solve", "Compute one periodic response."),
+    Entry("sweep", "commands.solver.sweep", "Follow the response over a parameter."),
+    Entry("accuracy", "commands.solver.accuracy", "Measure what accuracy costs."),
+    Entry("design", "commands.design.design", "Find the best damper."),
+    Entry("pareto", "commands.design.pareto", "Find the front of peak against resonance band."),
+    Entry(
+        "sensitivities", "commands.sensitivities.sensitivities",
+        "Say what matters: per cent of the peaks and the band for one per cent of each parameter.",
+    ),
+    Entry("march", "commands.solver.march", "March in time until the motion repeats."),
+    Entry("demo", "commands.service.demo", "Run the main job end to end, with pictures."),
+    Entry("serve", "commands.service.serve", "Serve the REST API and work off its queue."),
+    Entry("worker", "commands.service.worker", "Work off a queue without HTTP."),
+    Entry("watch", "commands.jobs.watch", "Follow a job until it has ended.", keyed=True),
+    Entry(
+        "results", "commands.jobs.results", "Print what a job computed, or list the stored designs.",
+        keyed=True,
+    ),
+    Entry("peaks", "commands.track.peaks", "Track the highest peak over a parameter."),
+    Entry(
+        "map", "commands.track.response_map",
+        "Map the response over frequency and a parameter, with the ridge of its peaks.",
+    ),
+    Entry(
+        "campbell", "commands.campbell.campbell",
+        "Find the speeds at which orders of the running speed meet resonances.",
+    ),
+    Entry("mistuning", "commands.mistuning.mistuning", "Study disks whose blades are not quite equal."),
+    Entry(
+        "schema", "commands.schema.schema",
+        "Print the JSON Schema of scene files, design problems or jobs, for editors.",
+    ),
+    Entry("report", "commands.report.report", "Write the report of a design that the service computed."),
+    Entry("import", "commands.import_matrices.import_scene", "Make a scene of matrices or modes in files."),
+)  # fmt: skip
+
+SUBMITTED = (
+    Entry("design", "commands.jobs.design", "Submit a design.", keyed=True),
+    Entry("pareto", "commands.jobs.pareto", "Submit a front of peak against resonance band.", keyed=True),
+    Entry("sweep", "commands.jobs.sweep", "Submit a sweep.", keyed=True),
+    Entry("solve", "commands.jobs.solve", "Submit a single response.", keyed=True),
+    Entry("march", "commands.jobs.march", "Submit a time march.", keyed=True),
+    Entry(
+        "peaks", "commands.submit_studies.peaks", "Submit the tracking of the highest peak over a parameter.",
+        keyed=True,
+    ),
+    Entry(
+        "accuracy", "commands.submit_studies.accuracy", "Submit a study of what accuracy costs.", keyed=True
+    ),
+    Entry("campbell", "commands.submit_studies.campbell", "Submit a Campbell diagram.", keyed=True),
+    Entry(
+        "mistuning", "commands.submit_studies.mistuning", "Submit a study of mistuned disks.", keyed=True
+    ),
+    Entry(
+        "map", "commands.submit_studies.response_map",
+        "Submit a map of the response over frequency and a parameter.", keyed=True,
+    ),
+)  # fmt: skip
+
+DATABASE = (
+    Entry("upgrade", "commands.service.upgrade", "Bring a database to this version's revision."),
+    Entry("backup", "commands.database.backup", "Copy a database to a file, also while a service uses it."),
+    Entry(
+        "check", "commands.database.check", "Read a database from end to end and say what is wrong with it."
+    ),
+    Entry(
+        "prune", "commands.database.prune", "Delete old jobs with their results and sweeps, and old uploads."
+    ),
+)  # fmt: skip
+
+KEYS = (
+    Entry("create", "commands.keys.create", "Make a key and print it, this once."),
+    Entry(
+        "list", "commands.keys.show",
+        "List the keys, also those that work no more. What opens the door is not kept, and not shown.",
+    ),
+    Entry(
+        "rotate", "commands.keys.rotate",
+        "Give a key another secret and print it, this once; the old one ends within a second.",
+    ),
+    Entry("revoke", "commands.keys.revoke", "End a key, within a second in every service."),
+)  # fmt: skip
+
+GROUPS = (
+    ("submit", "Hand a job to a running service.", SUBMITTED),
+    ("db", "Look after the database.", DATABASE),
+    ("keys", "Make and end keys to the service.", KEYS),
+)

@@ -1,0 +1,65 @@
+"""Starting quickly: what a process imports before it does what it was asked for, and what it leaves out."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+from importlib import import_module
+
+import pytest
+
+from service.cli.lazy import Deferred, Entry
+from service.cli.table import COMMANDS, GROUPS
+
+SERVICE = {"fastapi", "sqlalchemy", "alembic", "httpx", "uvicorn", "pydantic_settings", "prometheus_client"}
+PICTURES = {"matplotlib", "pandas", "xarray", "pyarrow"}
+DESIGN = {"cvxpy", "clarabel", "casadi"}
+NUMBERS = {"numpy", "scipy", "numba", "llvmlite", "pydantic"}
+
+
+def loaded_by(*arguments: str) -> set[str]:
+    """The modules of a process at the end of a command."""
+    code = (
+        f"import sys; from service.cli import main; status = main({list(arguments)!r}); "
+        "sys.stderr.write(' '.join(sys.modules)); sys.exit(status)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return set(done.stderr.split())
+
+
+@pytest.mark.parametrize("words", ["--help", "--version", "submit --help", "db --help", "keys --help"])
+def test_help_loads_no_command(words: str) -> None:
+    loaded = loaded_by(*words.split())
+    assert loaded & (SERVICE | PICTURES | DESIGN | NUMBERS | {"rich"}) == set()
+    assert [name for name in loaded if name.endswith("_commands") or name.endswith("_command")] == []
+
+
+def test_help_of_a_command_loads_no_numbers() -> None:
+    assert loaded_by("solve", "--help") & (SERVICE | PICTURES | DESIGN | NUMBERS) == set()
+
+
+@pytest.mark.parametrize("scene", ["two-dof --frequency 1", "bladed-disk --frequency 755"])
+def test_solve_loads_what_it_computes_with(scene: str) -> None:
+    loaded = loaded_by("solve", *scene.split())
+    assert "numba" in loaded
+    assert loaded & (SERVICE | PICTURES | DESIGN | {"rich", "scipy.linalg", "scipy.sparse"}) == set()
+    # Numba's tables of what can be compiled: machine code that is cached needs none of them.
+    assert "numba.np.linalg" not in loaded
+    assert "solver.continuation.kernels.pseudo_arclength" not in loaded
+
+
+ENTRIES = [*COMMANDS, *(entry for _, _, entries in GROUPS for entry in entries)]
+
+
+@pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: f"{entry.home}")
+def test_the_table_says_what_the_commands_say(entry: Entry) -> None:
+    """The summary in the list of commands is the first line of the command's own help."""
+    module, _, function = entry.home.partition(".")
+    text = inspect.getdoc(getattr(import_module(f"service.cli.{module}"), function))
+    assert text is not None
+    assert entry.summary == text.splitlines()[0]
+    loaded = Deferred(entry).load()
+    assert loaded.name == entry.name
+    assert ("key_file" in {parameter.name for parameter in loaded.params}) == entry.keyed
