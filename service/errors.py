@@ -51,6 +51,16 @@ class InvalidRequestError(ServiceError):
         super().__init__("; ".join(issue.message for issue in self.issues))
 
 
+class UnknownKindError(ServiceError):
+    """A stored job of a kind that this service was started without."""
+
+    def __init__(self, kind: str) -> None:
+        super().__init__(
+            f"this service has no kind {kind!r}: name its module in `kinds` (STICKSLIP_KINDS) of every "
+            "service and worker of the database, and submit the job again"
+        )
+
+
 class MalformedBodyError(ServiceError):
     """A request body that is not JSON."""
 

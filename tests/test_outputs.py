@@ -11,7 +11,8 @@ import pytest
 import optim
 import solver
 from service.cli import main
-from service.rendering.plots import NothingToDrawError, result_figure
+from service.jobs.kind_view import NothingToDrawError
+from service.rendering.plots import result_figure
 
 COMMANDS = {
     "solve": "two-dof --frequency 1.2 --harmonics 3",

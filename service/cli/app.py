@@ -9,9 +9,9 @@ from typing import Annotated
 import typer
 
 from service.cli.failures import REPORTED, report
-from service.cli.lazy import LazyGroup, group
+from service.cli.lazy import DeferredGroup, LazyGroup, group
 from service.cli.options.inputs import join_words
-from service.cli.table import COMMANDS, GROUPS
+from service.cli.table import COMMANDS, GROUPS, SUBMIT
 
 _app = typer.Typer(
     cls=LazyGroup,
@@ -45,6 +45,7 @@ def command() -> LazyGroup:
     if not isinstance(root, LazyGroup):
         raise TypeError(f"typer made {type(root).__name__} of the application")
     root.add(COMMANDS)
+    root.add_command(DeferredGroup(SUBMIT))
     for name, summary, entries in GROUPS:
         root.add_command(group(name, summary, entries))
     return root

@@ -19,7 +19,7 @@ from service.client.embedded import EmbeddedService
 from service.db.models import JobState
 from service.errors import InputError
 from service.jobs.kinds import warm_up
-from service.rendering.stored_curves import response_of
+from service.jobs.stored_curves import response_of
 from service.rendering.tables import design as design_reports
 from service.rendering.tables.text import say
 from service.schemas.answers import JobAnswer, SweepDetail

@@ -20,7 +20,7 @@ class Entry:
     name : str
         As the user writes it.
     home : str
-        Module of `service.cli` and function, ``"solver_commands.solve"``.
+        Module of `service.cli` and function, ``"commands.solver.solve"``.
     summary : str
         The first line of the function's docstring, which `--help` shows.
     keyed : bool
@@ -32,6 +32,11 @@ class Entry:
     summary: str
     keyed: bool = False
 
+    def function(self) -> Any:
+        """Import the module and return what stands there."""
+        module, _, name = self.home.rpartition(".")
+        return getattr(import_module(f"service.cli.{module}"), name)
+
 
 class Deferred(TyperCommand):
     """Name and summary of a command whose module is not imported yet."""
@@ -42,8 +47,7 @@ class Deferred(TyperCommand):
 
     def load(self) -> Any:
         """Import the module and return the command with its arguments and options."""
-        module, _, function = self.entry.home.rpartition(".")
-        command = getattr(import_module(f"service.cli.{module}"), function)
+        command = self.entry.function()
         if self.entry.keyed:
             from service.cli.options.keyed import keyed
 
@@ -52,6 +56,17 @@ class Deferred(TyperCommand):
         alone = typer.Typer(add_completion=False, rich_markup_mode=None)
         alone.command(self.entry.name)(command)
         return typer.main.get_command(alone)
+
+
+class DeferredGroup(Deferred):
+    """Name and summary of a group whose class is not imported yet; its entry names the class."""
+
+    def load(self) -> Any:
+        """Import the module and return the group."""
+        made = self.entry.function()
+        return made(
+            name=self.entry.name, help=self.entry.summary, no_args_is_help=True, rich_markup_mode=None
+        )
 
 
 class LazyGroup(TyperGroup):

@@ -43,28 +43,7 @@ COMMANDS = (
     Entry("import", "commands.import_matrices.import_scene", "Make a scene of matrices or modes in files."),
 )  # fmt: skip
 
-SUBMITTED = (
-    Entry("design", "commands.jobs.design", "Submit a design.", keyed=True),
-    Entry("pareto", "commands.jobs.pareto", "Submit a front of peak against resonance band.", keyed=True),
-    Entry("sweep", "commands.jobs.sweep", "Submit a sweep.", keyed=True),
-    Entry("solve", "commands.jobs.solve", "Submit a single response.", keyed=True),
-    Entry("march", "commands.jobs.march", "Submit a time march.", keyed=True),
-    Entry(
-        "peaks", "commands.submit_studies.peaks", "Submit the tracking of the highest peak over a parameter.",
-        keyed=True,
-    ),
-    Entry(
-        "accuracy", "commands.submit_studies.accuracy", "Submit a study of what accuracy costs.", keyed=True
-    ),
-    Entry("campbell", "commands.submit_studies.campbell", "Submit a Campbell diagram.", keyed=True),
-    Entry(
-        "mistuning", "commands.submit_studies.mistuning", "Submit a study of mistuned disks.", keyed=True
-    ),
-    Entry(
-        "map", "commands.submit_studies.response_map",
-        "Submit a map of the response over frequency and a parameter.", keyed=True,
-    ),
-)  # fmt: skip
+SUBMIT = Entry("submit", "commands.submit.SubmitGroup", "Hand a job to a running service.")
 
 DATABASE = (
     Entry("upgrade", "commands.service.upgrade", "Bring a database to this version's revision."),
@@ -91,7 +70,6 @@ KEYS = (
 )  # fmt: skip
 
 GROUPS = (
-    ("submit", "Hand a job to a running service.", SUBMITTED),
     ("db", "Look after the database.", DATABASE),
     ("keys", "Make and end keys to the service.", KEYS),
 )

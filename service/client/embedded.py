@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Self
 
-from service.jobs.kinds import SHIPPED
 from service.jobs.registry import OnProgress, Registry
 from service.jobs.validation import validated
 from service.queue.core import Service
@@ -33,7 +32,7 @@ class EmbeddedService:
     settings : Settings, optional
         Its settings; from the environment if not given.
     registry : Registry, optional
-        The kinds of job; those shipped if not given.
+        The kinds of job; those shipped and those of the setting `kinds` if not given.
 
     Raises
     ------
@@ -41,7 +40,7 @@ class EmbeddedService:
         On entering, if another service has the database file.
     """
 
-    def __init__(self, settings: Settings | None = None, registry: Registry = SHIPPED) -> None:
+    def __init__(self, settings: Settings | None = None, registry: Registry | None = None) -> None:
         self._service = Service(settings or load_settings(), registry)
 
     def __enter__(self) -> Self:

@@ -21,6 +21,7 @@ from service.http.routes import (
     events,
     health,
     jobs,
+    kinds,
     matrices,
     metrics,
     page,
@@ -33,7 +34,6 @@ from service.http.routes import (
     uploads,
 )
 from service.http.security_headers import Seal
-from service.jobs.kinds import SHIPPED
 from service.jobs.registry import Registry
 from service.queue.core import SOLVER_VERSION, Service
 from service.schemas import problems
@@ -44,7 +44,7 @@ log = logging.getLogger("stickslip.service")
 _DESCRIPTION = "Designs friction dampers: jobs, their results, and every frequency response computed."
 
 
-def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -> FastAPI:
+def create_app(settings: Settings | None = None, registry: Registry | None = None) -> FastAPI:
     """The application of one service; its lifespan starts and stops database, queue and workers.
 
     Parameters
@@ -52,7 +52,7 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
     settings : Settings, optional
         Its settings; from the environment if not given.
     registry : Registry, optional
-        The kinds of job; those shipped if not given.
+        The kinds of job; those shipped and those of the setting `kinds` if not given.
     """
     service = Service(settings or load_settings(), registry)
 
@@ -86,12 +86,13 @@ def create_app(settings: Settings | None = None, registry: Registry = SHIPPED) -
     problems.install(app)
     app.add_middleware(Seal, settings=service.settings)
     events.install(app)
+    app.include_router(jobs.submissions(service.registry))
     for module in (
-        jobs, events, designs, sweeps, scene_text, scenes, uploads, matrices, plan, previews, health, metrics,
-        reference, page,
+        jobs, kinds, events, designs, sweeps, scene_text, scenes, uploads, matrices, plan, previews, health,
+        metrics, reference, page,
     ):  # fmt: skip
         app.include_router(module.router)
-    openapi.install(app, registry)
+    openapi.install(app, service.registry)
     return app
 
 

@@ -1,15 +1,22 @@
-"""What the routes share: reading bodies strictly, waiting without holding a thread, the host check."""
+"""What the routes share: reading bodies strictly, waiting without holding a thread, the host check.
+
+A body is a type that FastAPI describes and checks; it is read here all the same, where limits of size and
+time hold and JSON has no loopholes (`TypedRoute`).
+"""
 
 from __future__ import annotations
 
 import asyncio
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Coroutine, Mapping
 from typing import Annotated, Any
 
-from fastapi import Depends, Request, Response
+from fastapi import Body, Depends, Request, Response
+from fastapi.exceptions import RequestValidationError
+from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.auth.callers import KEYLESS, Caller
@@ -22,6 +29,7 @@ from service.errors import (
 )
 from service.http.bodies import whole
 from service.jobs import strict_json
+from service.jobs.validation import issues_of
 from service.queue.core import Service
 from service.queue.subscriptions import Event
 from service.rendering.representations import JSON, LIST_MEDIA, chosen, csv_of_items
@@ -72,6 +80,71 @@ async def json_body(request: Request) -> dict[str, Any]:
 
 
 JsonBody = Annotated[dict[str, Any], Depends(json_body)]
+
+Handler = Callable[[Request], Coroutine[Any, Any, Response]]
+
+
+class _ReadRequest(Request):
+    """A request whose body was read before; FastAPI gets the value."""
+
+    def __init__(self, request: Request, value: dict[str, Any]) -> None:
+        super().__init__(request.scope, request.receive)
+        self._value = value
+        kept = [(name, text) for name, text in request.headers.raw if name != b"content-type"]
+        # Other media types of JSON were let through; FastAPI need not know them.
+        self._typed = Headers(raw=[*kept, (b"content-type", b"application/json")])
+
+    @property
+    def headers(self) -> Headers:
+        """Those that came, with one media type for every kind of JSON."""
+        return self._typed
+
+    async def body(self) -> bytes:
+        """Something, so that `json` is asked."""
+        return b"{}"
+
+    async def json(self) -> dict[str, Any]:
+        """The value."""
+        return self._value
+
+
+class TypedRoute(APIRoute):
+    """A route whose body is a model: read strictly, refused with everything that is wrong with it."""
+
+    def get_route_handler(self) -> Handler:
+        """FastAPI's own handler behind the strict reading of the body."""
+        handle, field = super().get_route_handler(), self.body_field
+        if field is None:
+            return handle
+        of_kinds = getattr(field.field_info, "discriminator", None) is not None
+
+        async def read_and_handle(request: Request) -> Response:
+            value = await json_body(request)
+            try:
+                return await handle(_ReadRequest(request, value))
+            except RequestValidationError as error:
+                # The place of an error begins with "body" and, of several kinds, with the name of the kind.
+                found = [{**one, "loc": one["loc"][1:]} for one in error.errors()]
+                known = [{**one, "loc": one["loc"][1:]} if of_kinds else one for one in found]
+                raise InvalidRequestError(issues_of(known)) from error
+
+        return read_and_handle
+
+
+def takes_body(
+    endpoint: Callable[..., Any], model: Any, examples: Mapping[str, Any], by: str | None = None
+) -> None:
+    """Give an endpoint the type of its parameter `body`, where that is not known before a service is.
+
+    Parameters
+    ----------
+    endpoint : of a `TypedRoute`.
+    model : the type of the body.
+    examples : of it, by name, for the description of the API.
+    by : the key that tells several models apart.
+    """
+    told = Body(openapi_examples=dict(examples), discriminator=by)
+    endpoint.__annotations__["body"] = Annotated[model, told]
 
 
 def preferred_wait(headers: Mapping[str, str], longest: float) -> float | None:

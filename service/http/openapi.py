@@ -1,4 +1,4 @@
-"""The description of the API: what FastAPI gathers, and the bodies that the routes check themselves."""
+"""The description of the API: what FastAPI gathers, made whole where a body is no model of ours."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ from fastapi import FastAPI
 from pydantic import BaseModel
 
 from service.http import error_examples
-from service.http.routes.plan import PlanRequest
-from service.http.routes.scene_text import ReadRequest, TextRequest
 from service.http.routes.uploads import UPLOAD_MEDIA
-from service.jobs.kinds.previews import PREVIEWS
 from service.jobs.registry import Registry
 from solver.scene.scene import Scene, load_scene
 
 _REFERENCE = "#/components/schemas/{model}"
+# Bodies whose schema stands in the operation itself.
+_ITSELF = ("/v1/jobs", "/v1/designs", "/v1/previews", "/v1/plan", "/v1/scenes/read", "/v1/scenes/text")
 _FILE: dict[str, Any] = {"type": "string", "contentMediaType": "application/octet-stream"}
 _MATRIX = {
     "MatrixMarket": {"value": "%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 1 1.0\n2 2 2.0\n"}
@@ -62,31 +61,53 @@ def install(app: FastAPI, registry: Registry) -> None:
 
 def _complete(description: dict[str, Any], registry: Registry) -> None:
     schemas = description.setdefault("components", {}).setdefault("schemas", {})
-    kinds = {kind.name: _with_kind(_schema(kind.request, schemas), kind.name) for kind in registry}
-    previews = {kind.name: _with_kind(_schema(kind.request, schemas), kind.name) for kind in PREVIEWS}
-    named = {"/v1/jobs": kinds, "/v1/previews": previews}
-    bodies: dict[str, dict[str, Any]] = {
-        "/v1/jobs": {"oneOf": list(kinds.values())},
-        "/v1/plan": _schema(PlanRequest, schemas),
-        "/v1/scenes": {**_schema(Scene, schemas), "examples": [load_scene("two-dof").to_dict()]},
-        "/v1/scenes/read": _schema(ReadRequest, schemas),
-        "/v1/scenes/text": _schema(TextRequest, schemas),
-        "/v1/previews": {"oneOf": list(previews.values())},
+    paths = description["paths"]
+    scene = {**_schema(Scene, schemas), "examples": [load_scene("two-dof").to_dict()]}
+    named = {"scenes": {"value": scene["examples"][0]}}
+    paths["/v1/scenes"]["post"]["requestBody"] = {
+        "required": True,
+        "content": {"application/json": {"schema": scene, "examples": named}},
     }
-    if "design" in kinds:
-        bodies["/v1/designs"] = _schema(registry["design"].request, schemas)
-    for path, schema in bodies.items():
-        content = {"application/json": {"schema": schema, "examples": _examples(path, schema, named)}}
-        description["paths"][path]["post"]["requestBody"] = {"required": True, "content": content}
-    description["paths"]["/v1/uploads"]["post"]["requestBody"] = {
+    paths["/v1/uploads"]["post"]["requestBody"] = {
         "required": True,
         "content": {form: {"schema": _FILE, "examples": _MATRIX} for form in UPLOAD_MEDIA},
     }
+    for path in _ITSELF:
+        _in_place(paths[path]["post"]["requestBody"]["content"]["application/json"], schemas)
+    _results(schemas, registry)
     description["components"]["securitySchemes"] = {"key": _KEY}
     # Either of them: whether a key is needed is a setting.
     description["security"] = [{"key": []}, {}]
     error_examples.describe(description, _PROBLEM)
     _use_known_patterns(description)
+
+
+def _in_place(content: dict[str, Any], schemas: dict[str, Any]) -> None:
+    """Put the schema of a body where FastAPI refers to it, so that what a kind takes is read in one place."""
+
+    def found(schema: dict[str, Any]) -> dict[str, Any]:
+        return schemas.pop(schema["$ref"].rpartition("/")[2]) if "$ref" in schema else schema
+
+    schema = content["schema"]
+    several = [found(one) for one in schema.get("oneOf", ())]
+    content["schema"] = {"oneOf": several} if several else found(schema)
+
+
+def _results(schemas: dict[str, Any], registry: Registry) -> None:
+    """The results of the kinds that say how theirs look; others are objects."""
+    known = {kind.name: kind.result for kind in registry if kind.result is not None}
+    for name, model in known.items():
+        schemas[result_name(name)] = _schema(model, schemas)
+    if known:
+        refs = [{"$ref": _REFERENCE.format(model=result_name(name))} for name in known]
+        for answer in ("ResultsAnswer", "FinishedJob"):
+            held = schemas[answer]["properties"]["result"]
+            held["anyOf"] = [*refs, *held.get("anyOf", [{"type": "object"}])]
+
+
+def result_name(kind: str) -> str:
+    """What the description calls the result of a kind."""
+    return "".join(part.capitalize() for part in kind.split("-")) + "Result"
 
 
 def _use_known_patterns(item: Any) -> None:
@@ -101,30 +122,8 @@ def _use_known_patterns(item: Any) -> None:
             _use_known_patterns(inner)
 
 
-def _examples(
-    path: str, schema: dict[str, Any], kinds: dict[str, dict[str, dict[str, Any]]]
-) -> dict[str, Any]:
-    """Examples by name: those of every kind of job or preview, or those of the one body."""
-    named = kinds.get(path, {path.rpartition("/")[2]: schema})
-    return {
-        f"{name} {number}" if number > 1 else name: {"value": example}
-        for name, one in named.items()
-        for number, example in enumerate(one.get("examples", ()), 1)
-    }
-
-
 def _schema(model: type[BaseModel], schemas: dict[str, Any]) -> dict[str, Any]:
     """The schema of a model; the models it refers to go to `schemas`."""
     schema = model.model_json_schema(by_alias=True, ref_template=_REFERENCE)
     schemas.update(schema.pop("$defs", {}))
     return schema
-
-
-def _with_kind(schema: dict[str, Any], name: str) -> dict[str, Any]:
-    examples = [{"kind": name, **example} for example in schema.get("examples", ())]
-    return {
-        **schema,
-        **({"examples": examples} if examples else {}),
-        "properties": {"kind": {"const": name}, **schema["properties"]},
-        "required": ["kind", *schema.get("required", [])],
-    }

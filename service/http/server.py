@@ -17,7 +17,6 @@ from service.errors import ConfigurationError
 from service.http.app import create_app
 from service.http.gc_freeze import spare_modules
 from service.http.header_timeout import patient
-from service.jobs.kinds import SHIPPED
 from service.jobs.registry import Registry
 from service.queue.core import Service
 from service.settings import logs
@@ -41,7 +40,7 @@ class _Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def serve(settings: Settings, registry: Registry = SHIPPED) -> None:
+def serve(settings: Settings, registry: Registry | None = None) -> None:
     """Serve HTTP until SIGINT or SIGTERM; jobs that run then go back to the queue.
 
     Raises
@@ -67,7 +66,7 @@ def serve(settings: Settings, registry: Registry = SHIPPED) -> None:
         listener.close()
 
 
-def work(settings: Settings, registry: Registry = SHIPPED, *, until_empty: bool = False) -> None:
+def work(settings: Settings, registry: Registry | None = None, *, until_empty: bool = False) -> None:
     """Run the queue and its workers without HTTP until SIGINT or SIGTERM.
 
     On PostgreSQL this adds workers to the services that run, from any machine. On SQLite one process owns

@@ -19,7 +19,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from service.jobs.parts import PartOutput, Parts
-from service.jobs.registry import JobOutput, Pace, Piece, Progress, ShouldStop, StoredArray
+from service.jobs.registry import JobOutput, Pace, Piece, Progress, Run, ShouldStop, StoredArray
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -152,6 +152,19 @@ class Checkpoints:
             self._send(Kept(tuple(self._waiting), self._anew))
             self._waiting, self._anew = [], False
         self._next = time.monotonic() + self._pace.checkpoint_seconds
+
+
+@dataclass(frozen=True, slots=True)
+class FromTheStart:
+    """A run that keeps nothing."""
+
+    run: Run
+
+    def __call__(
+        self, spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, _checkpoints: Checkpoints
+    ) -> JobOutput:
+        """Compute."""
+        return self.run(spec, progress, should_stop)
 
 
 @dataclass(frozen=True, slots=True)

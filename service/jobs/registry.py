@@ -1,13 +1,14 @@
 """What a kind of job is: a request model, a resolution of the request, a function that computes.
 
-A new kind is one module in `service.jobs.kinds` and one entry in its registry; queue, database, HTTP and
-command know kinds only through this contract. A kind whose work can be divided says so by a
-`service.jobs.parts.Parts`.
+A new kind is one module in `service.jobs.kinds` and one entry in its registry, or a module elsewhere that the
+setting `kinds` names; queue, database, HTTP, command and documentation know kinds only through this contract.
+A kind whose work can be divided says so by a `service.jobs.parts.Parts`.
 """
 
 from __future__ import annotations
 
 import enum
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.errors import InvalidRequestError
+from service.jobs.kind_view import KindView
 from service.jobs.strict_json import JsonText, pointer
 from solver.errors import Issue
 
@@ -146,8 +148,8 @@ class Pace:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SweepRecord:
-    """One branch as it is stored; the fields are the columns people filter by."""
+class SweepValues:
+    """What is stored of a branch beside its arrays: the columns people filter by."""
 
     scene_name: str
     scene_hash: str
@@ -169,6 +171,12 @@ class SweepRecord:
     status: str
     error_estimate: float | None = None
     peaks_known: bool | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepRecord(SweepValues):
+    """A branch to be stored."""
+
     contacts: tuple[ContactValues, ...] = ()
     arrays: Mapping[str, StoredArray] = field(default_factory=dict)
 
@@ -184,8 +192,8 @@ class VariableValues:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DesignRecord:
-    """A design as it is stored; the fields are the columns people filter by."""
+class DesignValues:
+    """What is stored of a design beside its variables: the columns people filter by."""
 
     scene_name: str
     scene_hash: str
@@ -203,6 +211,12 @@ class DesignRecord:
     evaluations: int
     work: float | None
     seconds: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignRecord(DesignValues):
+    """A design to be stored."""
+
     variables: tuple[VariableValues, ...] = ()
 
 
@@ -264,6 +278,8 @@ RunOn = Callable[[Mapping[str, Any], Progress, ShouldStop, "Checkpoints"], JobOu
 WarmUp = Callable[[], None]
 Resolve = Callable[[Any, SceneSource], Resolved]
 
+_NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobKind:
@@ -272,13 +288,14 @@ class JobKind:
     Attributes
     ----------
     name : str
-        As in ``"kind": …`` of a request.
+        As in ``"kind": …`` of a request: small letters, digits and hyphens, at most 32.
     summary : str
         One line for people.
     request : type of JobRequest
-        Validates what was asked.
+        Validates what was asked; its docstring and the `examples` of its schema are those of the API.
     resolve : callable
-        From request to spec; raises InvalidRequestError. Runs in the service.
+        From request to spec; raises InvalidRequestError for what does not fit or is too large. Runs in the
+        service.
     run : callable
         From spec to output; raises SolverError for what is wrong for good. Runs in a worker.
     parts : Parts or None
@@ -287,6 +304,15 @@ class JobKind:
     run_on : callable or None
         `run` with a fourth argument, `service.jobs.checkpoints.Checkpoints`: keeps what it has, and goes on
         from what an earlier attempt kept. Divided kinds need none: their parts are kept.
+    result : type of BaseModel or None
+        The schema of the result; None for any JSON object.
+    view : KindView
+        What people see of it.
+
+    Raises
+    ------
+    ValueError
+        If the name cannot be one.
     """
 
     name: str
@@ -296,6 +322,15 @@ class JobKind:
     run: Run
     parts: Parts | None = None
     run_on: RunOn | None = None
+    result: type[BaseModel] | None = None
+    view: KindView = field(default_factory=KindView)
+
+    def __post_init__(self) -> None:
+        if not _NAME.fullmatch(self.name):
+            raise ValueError(
+                f"`name` must be small letters, digits and hyphens, 1 to 32 from a letter on, "
+                f"got {self.name!r}"
+            )
 
 
 def no_warm_up() -> None:
@@ -323,6 +358,12 @@ class Registry:
     def __iter__(self) -> Iterator[JobKind]:
         return iter(self._kinds.values())
 
+    def __len__(self) -> int:
+        return len(self._kinds)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._kinds
+
     def get(self, name: object) -> JobKind:
         """The kind of this name.
 
@@ -345,25 +386,10 @@ class Registry:
         return {kind.name: _run_on(kind) for kind in self}
 
 
-@dataclass(frozen=True, slots=True)
-class _FromTheStart:
-    """A run that keeps nothing."""
-
-    run: Run
-
-    def __call__(
-        self, spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop, _checkpoints: Checkpoints
-    ) -> JobOutput:
-        """Compute."""
-        return self.run(spec, progress, should_stop)
-
-
 def _run_on(kind: JobKind) -> RunOn:
+    # Imported here: what keeps the work of a kind knows jobs.
+    from service.jobs.checkpoints import FromTheStart, RunParts
+
     if kind.run_on is not None:
         return kind.run_on
-    if kind.parts is None:
-        return _FromTheStart(kind.run)
-    # Imported here: what divided kinds are made of knows jobs.
-    from service.jobs.checkpoints import RunParts
-
-    return RunParts(kind.parts)
+    return FromTheStart(kind.run) if kind.parts is None else RunParts(kind.parts)

@@ -49,6 +49,8 @@ def issues_of(errors: Sequence[Any]) -> list[Issue]:
 def _issue(error: Mapping[str, Any]) -> Issue:
     location = [part for part in error["loc"] if part != "[key]"]
     kind = error["type"]
+    if kind in ("union_tag_not_found", "union_tag_invalid"):
+        return _unknown_tag(error, location)
     key = str(location[-1]) if location else "body"
     message = _MESSAGES.get(kind) or str(error["msg"]).removeprefix("Value error, ")
     if message.startswith("Input should be "):
@@ -58,6 +60,17 @@ def _issue(error: Mapping[str, Any]) -> Issue:
         if kind not in ("missing", "extra_forbidden"):
             message += f", got {_short(error.get('input'))}"
     return Issue(pointer=pointer(*location), message=message)
+
+
+def _unknown_tag(error: Mapping[str, Any], location: Sequence[object]) -> Issue:
+    """The key that tells the members of a union apart is missing, or names none of them."""
+    context = error["ctx"]
+    key = str(context["discriminator"]).strip("'")
+    message = f"`{key}` is missing"
+    if error["type"] == "union_tag_invalid":
+        known = str(context["expected_tags"]).replace("'", "")
+        message = f"`{key}` must be one of {known}, got {_short(error['input'][key])}"
+    return Issue(pointer=pointer(*location, key), message=message)
 
 
 def _short(value: object) -> str:

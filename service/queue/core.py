@@ -31,9 +31,10 @@ from service.db.repositories import (
 )
 from service.db.repositories.keys import KeyRepository
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
-from service.jobs.kinds import SHIPPED
+from service.jobs.kinds.registry.bodies import KIND
+from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.kinds.sizes import work_limited
-from service.jobs.registry import JobRequest, OnProgress, Registry
+from service.jobs.registry import JobKind, JobRequest, OnProgress, Registry
 from service.jobs.strict_json import digest
 from service.jobs.validation import validated
 from service.queue.queue import JobQueue
@@ -78,15 +79,17 @@ class Service:
     ----------
     settings : Settings
         Its settings.
-    registry : Registry
-        The kinds of job it runs.
+    registry : Registry, optional
+        The kinds of job it runs; those shipped and those of the setting `kinds` if not given.
     now : callable, optional
         Its clock (see `JobRepository`).
     """
 
-    def __init__(self, settings: Settings, registry: Registry = SHIPPED, now: Clock | None = None) -> None:
+    def __init__(
+        self, settings: Settings, registry: Registry | None = None, now: Clock | None = None
+    ) -> None:
         self.settings = settings
-        self.registry = registry
+        self.registry = registry_of(settings.kinds) if registry is None else registry
         self.database = Database(settings.database, settings.database_connections)
         self.jobs = JobRepository(self.database, now)
         self.sweeps = SweepRepository(self.database)
@@ -96,7 +99,7 @@ class Service:
         self.scenes = SceneStore(SceneRepository(self.database), self.uploads)
         self.waiters = Waiters()
         self.previews = Previews(settings.preview_seconds)
-        self.queue = JobQueue(self.jobs, executor_of(settings, registry), settings, self.waiters)
+        self.queue = JobQueue(self.jobs, executor_of(settings, self.registry), settings, self.waiters)
         self.retention = Retention(self.database, settings, self.jobs.now)
         self._notices = None if self.database.exclusive else self._make_notices()
         self.stopping = threading.Event()
@@ -175,10 +178,21 @@ class Service:
         IdempotencyError, QueueFullError, TooManyRequestsError
             See `JobRepository.submit`.
         """
-        if "kind" not in body:
+        if KIND not in body:
             raise InvalidRequestError([Issue(pointer="/kind", message="`kind` is missing")])
-        kind = self.registry.get(body["kind"])
-        request = validated(kind.request, {key: value for key, value in body.items() if key != "kind"})
+        kind = self.registry.get(body[KIND])
+        request = validated(kind.request, {key: value for key, value in body.items() if key != KIND})
+        return self.accept(kind, request, body, idempotency_key, caller)
+
+    def accept(
+        self,
+        kind: JobKind,
+        request: JobRequest,
+        body: Mapping[str, Any],
+        idempotency_key: str | None = None,
+        caller: Caller = KEYLESS,
+    ) -> tuple[JobRow, bool]:
+        """As `submit`, of a body that was checked: `request` is what it says, without its kind."""
         seconds = self._seconds_limit(request, caller)
         with work_limited(caller.limits.work):
             resolved = kind.resolve(request, self.scenes.of(caller))

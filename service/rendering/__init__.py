@@ -1,1 +1,1 @@
-"""Stored results as pictures, reports and files."""
+"""What people see of jobs: tables of words, pictures and the rows of the documentation."""

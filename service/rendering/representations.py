@@ -66,7 +66,7 @@ def sweep_body(
 
 def sweep_picture(row: SweepRow, suffix: str, repository: SweepRepository) -> bytes:
     """The curve of a stored sweep as `svg` or `png`; its peak is marked, its band shaded."""
-    from service.rendering.stored_curves import response_of
+    from service.jobs.stored_curves import response_of
     from solver.views.plots import style
     from solver.views.plots.responses import response_figure
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, Self
 
@@ -20,45 +20,10 @@ from service.queue.scene_store import KnownScene
 if TYPE_CHECKING:
     from service.queue.core import Results
 
-_SAME = (
-    *(
-        "id",
-        "owner",
-        "scene_hash",
-        "parameter",
-        "frequency_hz",
-        "excitation_amplitude",
-        "harmonics",
-        "points",
-    ),
-    *(
-        "limit",
-        "band_hz",
-        "error_estimate",
-        "peaks_known",
-        "newton_iterations",
-        "rejected_steps",
-        "seconds",
-        "completed",
-        "status",
-        "created",
-    ),
-)
-_SAME_OF_DESIGNS = (
-    *(
-        "owner",
-        "scene_hash",
-        "method",
-        "robust",
-        "reached",
-        "feasible",
-        "status",
-        "objective",
-        "limit",
-        "band_hz",
-    ),
-    *("harmonics", "evaluations", "work", "seconds", "created"),
-)
+
+# What an answer has under the name of its column; a peak stands there with its place.
+_OF_SWEEPS = frozenset(one.name for one in fields(SweepRow)) - {"peak"}
+_OF_DESIGNS = frozenset(one.name for one in fields(DesignRow)) - {"peak"}
 
 
 class Answer(BaseModel):
@@ -192,7 +157,7 @@ class SweepAnswer(Answer):
         if row.peak is not None and row.peak_at is not None:
             peak = Peak(value=row.peak, at=row.peak_at)
         return {
-            **{name: getattr(row, name) for name in _SAME},
+            **{name: getattr(row, name) for name in cls.model_fields if name in _OF_SWEEPS},
             "job": row.job_id,
             "scene": row.scene_name,
             "from_": row.from_value,
@@ -296,7 +261,7 @@ class DesignAnswer(Answer):
         if row.peak is not None and row.peak_at is not None:
             peak = Peak(value=row.peak, at=row.peak_at)
         return {
-            **{name: getattr(row, name) for name in _SAME_OF_DESIGNS},
+            **{name: getattr(row, name) for name in cls.model_fields if name in _OF_DESIGNS},
             "id": row.job_id,
             "scene": row.scene_name,
             "peak": peak,

@@ -45,13 +45,12 @@ def _scene_of_a_file(scene: dict[str, Any]) -> dict[str, Any]:
 
 def _job() -> dict[str, Any]:
     """Of the body of ``POST /v1/jobs``."""
-    from service.jobs.kinds import SHIPPED
+    from service.jobs.kinds.registry.bodies import body_model
+    from service.settings.kinds import registry_here
 
     kinds, definitions = [], {}
-    for kind in SHIPPED:
-        schema = plain(kind.request.model_json_schema())
+    for kind in registry_here():
+        schema = plain(body_model(kind.name, kind.request).model_json_schema())
         definitions.update(schema.pop("$defs", {}))
-        properties = {"kind": {"const": kind.name, "description": "Kind of the job."}, **schema["properties"]}
-        required = ["kind", *schema.get("required", [])]
-        kinds.append({**schema, "title": kind.name, "properties": properties, "required": required})
+        kinds.append({**schema, "title": kind.name})
     return {"$schema": DIALECT, "title": "stickslip job", "oneOf": kinds, "$defs": definitions}

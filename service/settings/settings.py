@@ -111,6 +111,11 @@ class Settings(BaseSettings):
         "by a name of its own; all when bound to another address.",
     )
 
+    kinds: tuple[str, ...] = Field(
+        default=(),
+        description='Further kinds of job, `["module:NAME", …]`: modules that are imported, by the service '
+        "and by its workers (CONTRIBUTING.md).",
+    )
     executor: Literal["local", "dask"] = Field(
         default="local", description="Where jobs are computed: local processes, or workers of a Dask cluster."
     )

@@ -20,6 +20,7 @@ from typing import Any
 from distributed import Future, KilledWorker, Security
 
 from service.db.repositories import Attempt
+from service.errors import UnknownKindError
 from service.jobs.registry import JobKind, Pace, Registry
 from service.workers.base import ExecutorStatus, Failed, Lost, Outcome, Sink, Stopped
 from service.workers.cluster import Cluster, answer_of
@@ -142,6 +143,8 @@ class DaskExecutor:
         """Divide an attempt and send what there is room for."""
         attempt = work.attempt
         try:
+            if attempt.kind not in self._registry:
+                raise UnknownKindError(attempt.kind)
             work.divide(self._registry[attempt.kind].parts, self._sink, self._pace)
         except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
             self._end(work, Failed(failure_of(_task(attempt), error)))

@@ -23,6 +23,7 @@ from types import FrameType
 from typing import Any
 
 from optim.errors import DesignError
+from service.errors import UnknownKindError
 from service.jobs import strict_json
 from service.jobs.checkpoints import Checkpoints, Kept
 from service.jobs.registry import FailureKind, JobFailure, JobOutput, Pace, Piece, Point, RunOn, WarmUp
@@ -214,6 +215,8 @@ def _compute(
 ) -> Done:
     """Run one task; every error becomes an answer, the process lives on."""
     try:
+        if task.kind not in runs:
+            raise UnknownKindError(task.kind)
         output = checked(runs[task.kind](task.spec, progress, stop, kept))
     except MemoryError as error:
         return Done(retry=f"the worker ran out of memory ({error})")
@@ -237,7 +240,7 @@ def failure_of(task: Task, error: Exception) -> JobFailure:
     """A deterministic error, as the job keeps it."""
     if isinstance(error, SceneError):
         return JobFailure(kind=FailureKind.SCENE, detail=str(error), issues=error.issues)
-    if isinstance(error, SettingError | DesignError):
+    if isinstance(error, SettingError | DesignError | UnknownKindError):
         return JobFailure(kind=FailureKind.SETTING, detail=str(error))
     if isinstance(error, SolverError):
         return JobFailure(kind=FailureKind.GOAL, detail=str(error))

@@ -1,1 +1,1 @@
-"""The commands, one module a group."""
+"""Commands that are made of what is registered, not written one by one."""

@@ -1,123 +1,30 @@
-"""The commands that talk to a running service: submit, watch, results."""
+"""The commands that talk to a running service: watch, results, and what every submission does."""
 
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from service.cli.commands import stored_designs
-from service.cli.failures import BAD_INPUT, FELL_SHORT, option_name
+from service.cli.failures import BAD_INPUT, FELL_SHORT
 from service.cli.options import inputs, problem_inputs
 from service.cli.options import shared as options
 from service.cli.options.keyed import given_key
-from service.cli.options.problem import NOT_OF_A_FRONT, ProblemFlags, takes_problem
 from service.cli.options.scene_files import scene_to_submit, uploaded
 from service.cli.progress import bar
 from service.errors import InputError
 from service.rendering.tables import results as reports
-from service.rendering.tables.text import print_json, print_table, say
+from service.rendering.tables.text import print_json, print_pairs, print_table, say
 
 if TYPE_CHECKING:
     from service.client.client import Client
     from service.schemas.answers import JobAnswer, ResultsAnswer
 
 _INPUT_FAILURES = ("scene", "setting")
-
-
-@takes_problem
-def design(
-    flags: ProblemFlags,
-    name: options.AnyScene = None,
-    wait: options.Wait = False,
-    as_json: options.Json = False,
-    url: options.Url = options.DEFAULT_URL,
-) -> None:
-    """Submit a design.
-
-    The problem is described by options, by a file, or by both.
-    """
-    from service.jobs.kinds.design import DesignRequest
-
-    told = problem_inputs.description(name, flags, "design")
-    problem_inputs.checked(told, DesignRequest)
-    body = {"kind": "design", **problem_inputs.body_to_submit(told)}
-    hand_in(url, body, wait=wait, as_json=as_json)
-
-
-@partial(takes_problem, without=NOT_OF_A_FRONT)
-def pareto(
-    flags: ProblemFlags,
-    name: options.AnyScene = None,
-    points: options.Points = None,
-    wait: options.Wait = False,
-    as_json: options.Json = False,
-    url: options.Url = options.DEFAULT_URL,
-) -> None:
-    """Submit a front of peak against resonance band."""
-    from service.jobs.kinds.pareto import ParetoRequest
-
-    told = problem_inputs.description(name, flags, "pareto", points=("--points", points))
-    problem_inputs.checked(told, ParetoRequest)
-    body = {"kind": "pareto", **problem_inputs.body_to_submit(told)}
-    hand_in(url, body, wait=wait, as_json=as_json)
-
-
-def sweep(
-    name: options.Scene,
-    parameter: options.Parameter = "frequency",
-    start: options.From = None,
-    stop: options.To = None,
-    frequency: options.FixedFrequency = None,
-    values: options.Values = None,
-    limit: options.Limit = None,
-    harmonics: options.Harmonics = 11,
-    wait: options.Wait = False,
-    as_json: options.Json = False,
-    url: options.Url = options.DEFAULT_URL,
-) -> None:
-    """Submit a sweep."""
-    body = body_of("sweep", name, values, harmonics=harmonics, limit=limit, frequency_hz=frequency, to=stop)
-    body["parameter"] = parameter
-    if start is not None:
-        body["from"] = start
-    hand_in(url, body, wait=wait, as_json=as_json)
-
-
-def solve(
-    name: options.Scene,
-    frequency: options.Frequency,
-    values: options.Values = None,
-    harmonics: options.Harmonics = 11,
-    wait: options.Wait = False,
-    as_json: options.Json = False,
-    url: options.Url = options.DEFAULT_URL,
-) -> None:
-    """Submit a single response."""
-    body = body_of("solve", name, values, harmonics=harmonics, frequency_hz=frequency)
-    hand_in(url, body, wait=wait, as_json=as_json)
-
-
-def march(
-    name: options.Scene,
-    frequency: options.Frequency,
-    values: options.Values = None,
-    steps: options.Steps = None,
-    max_periods: options.MaxPeriods = 20_000,
-    wait: options.Wait = False,
-    as_json: options.Json = False,
-    url: options.Url = options.DEFAULT_URL,
-) -> None:
-    """Submit a time march."""
-    body = body_of(
-        "march", name, values, frequency_hz=frequency, steps_per_period=steps, max_periods=max_periods
-    )
-    hand_in(url, body, wait=wait, as_json=as_json)
 
 
 def watch(job: options.Job, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL) -> None:
@@ -179,16 +86,9 @@ def results(
     _end(ended)
 
 
-def body_of(kind: str, name: str, values: list[str] | None, **fields: Any) -> dict[str, Any]:
-    """The body of ``POST /v1/jobs``; a scene file goes with it, a name is looked up by the service."""
-    scene: Any = name
-    if name.endswith(problem_inputs.SCENE_FILES):
-        scene = scene_to_submit(name)
-    given = {key: value for key, value in fields.items() if value is not None}
-    for key, value in given.items():
-        if isinstance(value, float) and not math.isfinite(value):
-            raise InputError(f"`{option_name(key)}` must be a finite number, got {value!r}")
-    return {"kind": kind, "scene": scene, "set": inputs.settings(values), **given}
+def scene_of(name: str) -> Any:
+    """The scene for a body: a scene file goes with it, a name is looked up by the service."""
+    return scene_to_submit(name) if name.endswith(problem_inputs.SCENE_FILES) else name
 
 
 def hand_in(url: str, body: Mapping[str, Any], *, wait: bool, as_json: bool) -> None:
@@ -234,7 +134,7 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
     if as_json:
         print_json(answer.model_dump(mode="json"))
         return
-    reports.of_kind(job.kind)(answer.result)
+    _print(job.kind, answer.result)
     rows = [
         (
             sweep.id,
@@ -248,12 +148,26 @@ def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:
         print_table("Stored sweeps", ("id", "parameter", "points", "peak [m]"), rows, right="23")
 
 
+def _print(kind: str, result: Mapping[str, Any]) -> None:
+    """Print a result: as the local command does, as its kind says, or by its keys."""
+    if reports.knows(kind):
+        reports.of_kind(kind)(result)
+        return
+    from service.rendering.plain import told
+    from service.settings.kinds import registry_here
+
+    view = told(kind, result, registry_here())
+    print_pairs(view.title, view.pairs)
+
+
 def _draw(client: Client, kind: str, answer: ResultsAnswer, picture: Path) -> None:
-    from service.rendering.plots import NothingToDrawError, result_figure
+    from service.jobs.kind_view import NothingToDrawError
+    from service.rendering.plots import result_figure
+    from service.settings.kinds import registry_here
     from solver.views.plots.saving import save
 
     try:
-        page = result_figure(kind, answer.result, answer.sweeps, client.sweep)
+        page = result_figure(kind, answer.result, answer.sweeps, client.sweep, registry_here())
     except NothingToDrawError as error:
         raise InputError(f"`--plot`: job {answer.job} has no picture: {error}") from error
     save(page, picture)

@@ -52,8 +52,11 @@ def age(text: str) -> float:
 
 def join_words(arguments: Sequence[str]) -> list[str]:
     """Make one argument of the words that follow ``--variable``, ``--forbidden`` and ``--speeds``."""
-    command = arguments[1:2] if arguments[:1] == ["submit"] else arguments[:1]
-    if not command or command[0] not in _WITH_WORDS:
+    submitted = arguments[:1] == ["submit"]
+    command = arguments[1:2] if submitted else arguments[:1]
+    if not command or not _WORDS.keys() & set(arguments):
+        return list(arguments)
+    if command[0] not in _WITH_WORDS and not (submitted and _is_problem(command[0])):
         return list(arguments)
     joined: list[str] = []
     waiting, first = 0, False
@@ -72,6 +75,15 @@ def join_words(arguments: Sequence[str]) -> list[str]:
         first = False
         waiting -= 1
     return joined
+
+
+def _is_problem(kind: str) -> bool:
+    """Whether jobs of this kind are design problems."""
+    from service.jobs.kinds.problem import ProblemRequest
+    from service.settings.kinds import registry_here
+
+    registry = registry_here()
+    return kind in registry and issubclass(registry[kind].request, ProblemRequest)
 
 
 def bounds(texts: Sequence[str] | None) -> dict[str, tuple[float, float]] | None:

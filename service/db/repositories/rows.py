@@ -7,7 +7,7 @@ from datetime import datetime
 from typing import Any
 
 from service.db.models import NOBODY, JobState
-from service.jobs.registry import Piece
+from service.jobs.registry import DesignValues, Piece, SweepValues
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,56 +110,20 @@ class SceneRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SweepRow:
+class SweepRow(SweepValues):
     """A stored sweep without its arrays and contacts."""
 
     id: str
     job_id: str
     position: int
     owner: str
-    scene_name: str
-    scene_hash: str
-    parameter: str
-    from_value: float
-    to_value: float
-    frequency_hz: float | None
-    excitation_amplitude: float | None
-    harmonics: int
-    points: int
-    peak: float | None
-    peak_at: float | None
-    limit: float | None
-    band_hz: float | None
-    error_estimate: float | None
-    peaks_known: bool | None
-    newton_iterations: int
-    rejected_steps: int
-    seconds: float
-    completed: bool
-    status: str
     created: datetime
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DesignRow:
+class DesignRow(DesignValues):
     """A stored design without its variables."""
 
     job_id: str
     owner: str
-    scene_name: str
-    scene_hash: str
-    method: str
-    robust: bool
-    reached: bool
-    feasible: bool
-    status: str
-    objective: float | None
-    peak: float | None
-    peak_at: float | None
-    limit: float | None
-    band_hz: float | None
-    harmonics: int
-    evaluations: int
-    work: float | None
-    seconds: float
     created: datetime

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Any
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
@@ -13,28 +14,45 @@ from starlette.concurrency import run_in_threadpool
 from service.auth.callers import Caller
 from service.db.models import JobState
 from service.db.repositories import JobRow
-from service.errors import InvalidRequestError
 from service.http.dependencies import (
     CallerDependency,
-    JsonBody,
     ServiceDependency,
+    TypedRoute,
     idempotency_key,
     listing,
     preferred_wait,
+    takes_body,
     wait_for_end,
 )
 from service.http.routes.described import LISTED
+from service.jobs.kinds.registry.bodies import (
+    DESIGN,
+    KIND,
+    any_body,
+    design_body,
+    examples,
+    examples_of,
+    request_of,
+)
+from service.jobs.registry import JobRequest, Registry
 from service.queue import cursors
 from service.queue.core import Service
 from service.schemas.answers import FinishedJob, JobAnswer, JobPage, JobScene, ResultsAnswer, SweepAnswer
-from solver.errors import Issue
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 
 _STOP_MARGIN_SECONDS = 1.0
-_SUBMIT_ANSWERS: dict[int | str, dict[str, Any]] = {
-    200: {"model": FinishedJob, "description": "The job has ended: `Prefer: wait=N`, or a stored result."},
-    202: {"model": JobAnswer, "description": "The job was accepted, `Location` is where it is."},
+_SUBMITTED: dict[str, Any] = {
+    "methods": ["POST"],
+    "status_code": 202,
+    "response_model": None,
+    "responses": {
+        200: {
+            "model": FinishedJob,
+            "description": "The job has ended: `Prefer: wait=N`, or a stored result.",
+        },
+        202: {"model": JobAnswer, "description": "The job was accepted, `Location` is where it is."},
+    },
 }
 
 
@@ -48,25 +66,6 @@ class JobQuery(BaseModel):
     scene: str | None = Field(default=None, max_length=200)
     limit: int = Field(default=100, ge=1, le=10_000)
     cursor: str | None = Field(default=None, max_length=500)
-
-
-@router.post("/jobs", status_code=202, responses=_SUBMIT_ANSWERS, response_model=None)
-async def submit(
-    request: Request, body: JsonBody, service: ServiceDependency, caller: CallerDependency
-) -> Response:
-    """Accept a job. With `Prefer: wait=N` the answer waits up to N seconds for its end."""
-    return await _submit(request, service, caller, body)
-
-
-@router.post("/designs", status_code=202, responses=_SUBMIT_ANSWERS, response_model=None)
-async def submit_design(
-    request: Request, body: JsonBody, service: ServiceDependency, caller: CallerDependency
-) -> Response:
-    """Accept a design: a job of the kind `design`."""
-    if body.get("kind", "design") != "design":
-        message = f"`kind` must be design here or be left out, got {body['kind']!r}"
-        raise InvalidRequestError([Issue(pointer="/kind", message=message)])
-    return await _submit(request, service, caller, {**body, "kind": "design"})
 
 
 @router.get("/jobs", response_model=JobPage, responses=LISTED)
@@ -127,14 +126,67 @@ def results(job_id: str, service: ServiceDependency, caller: CallerDependency) -
     return ResultsAnswer.of(service.results(job_id, caller), service.sweeps)
 
 
-async def _submit(request: Request, service: Service, caller: Caller, body: dict[str, Any]) -> Response:
-    key = idempotency_key(request.headers)
-    seconds = preferred_wait(request.headers, service.settings.max_wait_seconds)
-    row, _ = await run_in_threadpool(service.submit, body, key, caller)
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What the headers of a submission ask for: its idempotency key, and the seconds to wait for the end."""
+
+    key: str | None
+    seconds: float | None
+
+
+def asked(request: Request, service: ServiceDependency) -> Asked:
+    """Read the headers of a submission; `idempotency_key` lists the errors."""
+    return Asked(
+        key=idempotency_key(request.headers),
+        seconds=preferred_wait(request.headers, service.settings.max_wait_seconds),
+    )
+
+
+AskedDependency = Annotated[Asked, Depends(asked)]
+
+
+def submissions(registry: Registry) -> APIRouter:
+    """The routes that take jobs; their bodies are those of the kinds there are."""
+
+    async def submit(
+        request: Request,
+        body: JobRequest,
+        service: ServiceDependency,
+        caller: CallerDependency,
+        asked: AskedDependency,
+    ) -> Response:
+        """Accept a job. With `Prefer: wait=N` the answer waits up to N seconds for its end."""
+        raw = await request.json()
+        return await _submit(service, caller, asked, raw, body)
+
+    async def submit_design(
+        request: Request,
+        body: JobRequest,
+        service: ServiceDependency,
+        caller: CallerDependency,
+        asked: AskedDependency,
+    ) -> Response:
+        """Accept a design: a job of the kind `design`."""
+        raw = await request.json()
+        return await _submit(service, caller, asked, {**raw, KIND: DESIGN}, body)
+
+    taking = APIRouter(prefix="/v1", tags=["jobs"], route_class=TypedRoute)
+    takes_body(submit, any_body(registry), examples(registry), by=KIND if len(registry) > 1 else None)
+    taking.add_api_route("/jobs", submit, **_SUBMITTED)
+    takes_body(submit_design, design_body(registry), examples_of(registry, DESIGN, called="designs"))
+    taking.add_api_route("/designs", submit_design, **_SUBMITTED)
+    return taking
+
+
+async def _submit(
+    service: Service, caller: Caller, asked: Asked, raw: dict[str, Any], body: JobRequest
+) -> Response:
+    kind = service.registry.get(raw[KIND])
+    row, _ = await run_in_threadpool(service.accept, kind, request_of(kind, body), raw, asked.key, caller)
     headers = {"Location": f"/v1/jobs/{row.id}"}
-    if seconds is not None:
-        row = await wait_for_end(service, row.id, seconds, caller)
-        headers["Preference-Applied"] = f"wait={seconds:g}"
+    if asked.seconds is not None:
+        row = await wait_for_end(service, row.id, asked.seconds, caller)
+        headers["Preference-Applied"] = f"wait={asked.seconds:g}"
     if not row.state.finished:
         return JSONResponse(_answer(service, row).model_dump(mode="json"), 202, headers)
     finished = await run_in_threadpool(_finished, service, row)

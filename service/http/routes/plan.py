@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Body
 from pydantic import ConfigDict
 
 import solver
-from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
+from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute
 from service.jobs.kinds.scenes import HarmonicRequest, resolve_scene
-from service.jobs.validation import validated
 from service.schemas.answers import Answer
 
 _EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "set": {"shroud.N0": 150}}
 
-router = APIRouter(prefix="/v1/plan", tags=["scenes"])
+router = APIRouter(prefix="/v1/plan", tags=["scenes"], route_class=TypedRoute)
 
 
 class PlanRequest(HarmonicRequest):
     """A scene to be looked at."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [{"scene": "bladed-disk", "set": {"shroud.N0": 150}}]}
-    )
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+
+
+PlanBody = Annotated[PlanRequest, Body(openapi_examples={"plan": {"value": _EXAMPLE}})]
 
 
 class EffectAnswer(Answer):
@@ -47,8 +47,7 @@ class PlanAnswer(Answer):
 
 
 @router.post("")
-def plan(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> PlanAnswer:
+def plan(body: PlanBody, service: ServiceDependency, caller: CallerDependency) -> PlanAnswer:
     """The effects this scene calls for and those left out, each with the reason; sizes and cost."""
-    request = validated(PlanRequest, body)
-    scene = resolve_scene(request, service.scenes.of(caller))
-    return PlanAnswer.model_validate(solver.plan(scene, harmonics=request.harmonics).to_json())
+    scene = resolve_scene(body, service.scenes.of(caller))
+    return PlanAnswer.model_validate(solver.plan(scene, harmonics=body.harmonics).to_json())

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.auth.callers import Caller
-from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
+from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute, takes_body
+from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
+from service.jobs.kinds.registry.bodies import KIND, any_body, examples, request_of
 from service.jobs.kinds.sizes import work_limited
-from service.jobs.registry import Resolved
-from service.jobs.validation import validated
+from service.jobs.registry import JobKind, Resolved
 from service.queue.core import Service
 from service.schemas.preview_answers import LimitsPreview, PointPreview, SweepPreview
 
-router = APIRouter(prefix="/v1/previews", tags=["previews"])
+router = APIRouter(prefix="/v1/previews", tags=["previews"], route_class=TypedRoute)
 
 
-@router.post("", response_model=SweepPreview | LimitsPreview | PointPreview)
-async def preview(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> Response:
+async def preview(
+    body: PreviewRequest, service: ServiceDependency, caller: CallerDependency, request: Request
+) -> Response:
     """Compute `sweep`, `limits` or `point` within seconds. Nothing is stored, and sizes are limited.
 
     Of a disk that is solved whole fewer harmonics are kept than asked for: the answer says how many. The
@@ -27,16 +27,19 @@ async def preview(body: JsonBody, service: ServiceDependency, caller: CallerDepe
 
     Of several previews with the same `client` only the newest is computed: the others are answered 409.
     """
-    kind = service.previews.registry.get(body.get("kind"))
-    client = body.get("client") or ""
-    resolved = await run_in_threadpool(_resolved, service, caller, kind.name, body)
-    asking = f"{caller.owner} {client}" if client else ""
+    kind = service.previews.registry[(await request.json())[KIND]]
+    resolved = await run_in_threadpool(_resolved, service, caller, kind, body)
+    asking = f"{caller.owner} {body.client}" if body.client else ""
     answer = await service.previews.compute(kind.name, resolved.spec, asking)
     return Response(answer, media_type="application/json", headers={"Cache-Control": "no-store"})
 
 
-def _resolved(service: Service, caller: Caller, name: str, body: dict[str, Any]) -> Resolved:
-    kind = service.previews.registry[name]
-    request = validated(kind.request, {key: value for key, value in body.items() if key != "kind"})
+takes_body(preview, any_body(PREVIEWS), examples(PREVIEWS), by=KIND)
+router.add_api_route(
+    "", preview, methods=["POST"], response_model=SweepPreview | LimitsPreview | PointPreview
+)
+
+
+def _resolved(service: Service, caller: Caller, kind: JobKind, body: PreviewRequest) -> Resolved:
     with work_limited(caller.limits.work):
-        return kind.resolve(request, service.scenes.of(caller))
+        return kind.resolve(request_of(kind, body), service.scenes.of(caller))

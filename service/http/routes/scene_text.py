@@ -4,31 +4,28 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Body, Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
 
-from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
+from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute
 from service.http.routes.described import TEXT, media
 from service.jobs.kinds.scenes import SceneRequest, resolve_scene
 from service.jobs.registry import SceneSource
-from service.jobs.validation import validated
 from service.schemas.scene_text import issues_of_scene, read_text
 from solver.scene.toml import toml_text
 
-router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
+router = APIRouter(prefix="/v1/scenes", tags=["scenes"], route_class=TypedRoute)
 
-_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "set": {"damper.N0": 80}, "comments": ["as set"]}
+_FILE: dict[str, Any] = {"text": 'name = "half a scene"', "form": "toml"}
+_SCENE: dict[str, Any] = {"scene": "two-dof", "set": {"damper.N0": 80}, "comments": ["as set"]}
 MOST_CHARACTERS = 4_000_000
 
 
 class ReadRequest(BaseModel):
     """The text of a scene file."""
 
-    model_config = ConfigDict(
-        extra="forbid", frozen=True,
-        json_schema_extra={"examples": [{"text": 'name = "half a scene"', "form": "toml"}]},
-    )  # fmt: skip
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra={"examples": [_FILE]})
 
     text: str = Field(max_length=MOST_CHARACTERS)
     form: Literal["toml", "json"] = "toml"
@@ -37,13 +34,13 @@ class ReadRequest(BaseModel):
 class TextRequest(SceneRequest):
     """A scene with its values set, and what to say above it."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [{"scene": "two-dof", "set": {"damper.N0": 80}, "comments": ["as set"]}]
-        }
-    )
+    model_config = ConfigDict(json_schema_extra={"examples": [_SCENE]})
 
     comments: list[Annotated[str, Field(max_length=2000)]] = Field(default=[], max_length=50)
+
+
+ReadBody = Annotated[ReadRequest, Body(openapi_examples={"read": {"value": _FILE}})]
+TextBody = Annotated[TextRequest, Body(openapi_examples={"text": {"value": _SCENE}})]
 
 
 class SceneIssue(BaseModel):
@@ -61,18 +58,16 @@ class SceneRead(BaseModel):
 
 
 @router.post("/read")
-async def read(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> SceneRead:
+async def read(body: ReadBody, service: ServiceDependency, caller: CallerDependency) -> SceneRead:
     """Read the text of a scene file and list everything that is wrong with it; nothing is stored."""
-    request = validated(ReadRequest, body)
-    return await run_in_threadpool(_read, request, service.scenes.of(caller))
+    return await run_in_threadpool(_read, body, service.scenes.of(caller))
 
 
 @router.post("/text", response_class=Response, responses={200: media({"application/toml": TEXT})})
-async def text(body: JsonBody, service: ServiceDependency, caller: CallerDependency) -> Response:
+async def text(body: TextBody, service: ServiceDependency, caller: CallerDependency) -> Response:
     """The TOML of a scene with its values set: the file that reproduces what was computed."""
-    request = validated(TextRequest, body)
-    scene = await run_in_threadpool(resolve_scene, request, service.scenes.of(caller))
-    return Response(toml_text(scene.to_dict(), tuple(request.comments)), media_type="application/toml")
+    scene = await run_in_threadpool(resolve_scene, body, service.scenes.of(caller))
+    return Response(toml_text(scene.to_dict(), tuple(body.comments)), media_type="application/toml")
 
 
 def _read(request: ReadRequest, source: SceneSource) -> SceneRead:

@@ -25,4 +25,18 @@ def warm_up() -> None:
     optim.design(scene, harmonics=3)
 
 
-SHIPPED = Registry([SWEEP, MAP, PEAKS, DESIGN, PARETO, SOLVE, MARCH, ACCURACY, CAMPBELL, MISTUNING], warm_up)
+SHIPPED = Registry(
+    [
+        SWEEP,
+        MAP,
+        PEAKS,
+        DESIGN,
+        PARETO,
+        SOLVE,
+        MARCH,
+        ACCURACY,
+        CAMPBELL,
+        MISTUNING,
+    ],
+    warm_up,
+)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
 import solver
+from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
 from service.jobs.kinds.records import sweep_records
+from service.jobs.kinds.registry.results import Amplitude, EndedResult, Table
 from service.jobs.kinds.scenes import (
     FrequencyHz,
     Harmonics,
@@ -23,6 +25,10 @@ from service.jobs.kinds.scenes import (
 from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
 from service.jobs.strict_json import pointer
 from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2, "harmonics": [1, 3, 7], "samples": [64]}
 _MOST_WAYS = 30
@@ -60,6 +66,17 @@ class AccuracyRequest(SceneRequest):
     repeats: Annotated[int, Field(strict=True, ge=1, le=1000)] | None = Field(
         default=None, description="Of each timing; 15."
     )
+
+
+class AccuracyResult(EndedResult):
+    """Error and time of every way to compute one point."""
+
+    scene: str
+    frequency_hz: float
+    reference: float | None
+    reference_harmonics: int
+    reference_error: Amplitude
+    rows: list[Table]
 
 
 def resolve(request: AccuracyRequest, source: SceneSource) -> Resolved:
@@ -104,10 +121,27 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     )
 
 
+def draw(result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
+    """Error against time."""
+    from solver.views.plots.accuracy import accuracy_figure
+
+    if not result["rows"]:
+        raise NothingToDrawError("it has no rows")
+    return accuracy_figure(result)
+
+
 ACCURACY = JobKind(
     name="accuracy",
     summary="What accuracy costs: error against time of one point.",
     request=AccuracyRequest,
     resolve=resolve,
     run=run,
+    result=AccuracyResult,
+    view=KindView(
+        result="error against time ([accuracy](accuracy.md))",
+        sweeps="the one that found the peak",
+        keys="`frequency_hz`, `harmonics` and `samples` (lists of what is tried), `repeats`",
+        flags={"frequency_hz": "--frequency"},
+        draw=draw,
+    ),
 )

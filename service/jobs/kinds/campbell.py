@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
 import optim
 from optim.errors import DesignError
+from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
 from service.jobs.kinds.problem import Pair, Ranges
 from service.jobs.kinds.records import sweep_records
+from service.jobs.kinds.registry.results import Amplitude, EndedResult, Table
 from service.jobs.kinds.scenes import (
     HarmonicRequest,
     PositiveNumber,
@@ -24,6 +27,11 @@ from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneS
 from service.jobs.strict_json import pointer
 from solver.errors import Issue
 from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solver.views.plots.curves import Response
 
 _EXAMPLE: dict[str, Any] = {
     "scene": "bladed-disk",
@@ -65,6 +73,18 @@ class CampbellRequest(HarmonicRequest):
         default=None,
         description="Frequencies looked at [Hz]; the scene's band and those of the running speeds.",
     )
+
+
+class CampbellResult(EndedResult):
+    """Crossings of every order with the peaks of its response, and speeds above the limit."""
+
+    scene: str
+    speeds_rpm: list[list[float]]
+    limit: Amplitude
+    clear: bool | None = Field(description="Whether no running speed is above the limit.")
+    orders: list[Table]
+    n_harmonics: int
+    seconds: float
 
 
 def resolve(request: CampbellRequest, source: SceneSource) -> Resolved:
@@ -120,10 +140,34 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     )
 
 
+def draw(result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
+    """Each order with the stored response whose highest peak is its own."""
+    from optim.views.plots.campbell import campbell_figure
+    from service.jobs.stored_curves import response_of
+
+    curves = [response_of(read(sweep.id)) for sweep in sweeps if sweep.points]
+    if not curves:
+        raise NothingToDrawError("it stored no sweep to draw")
+
+    def distance(curve: Response, order: Json) -> float:
+        heights = [float(peak["value"]) for peak in order["peaks"]] or [math.nan]
+        return abs(float(curve.amplitude.max()) - max(heights))
+
+    chosen = [min(curves, key=lambda curve: distance(curve, order)) for order in result["orders"]]
+    return campbell_figure(result, chosen)
+
+
 CAMPBELL = JobKind(
     name="campbell",
     summary="Where orders of a running speed meet the resonances of a scene.",
     request=CampbellRequest,
     resolve=resolve,
     run=run,
+    result=CampbellResult,
+    view=KindView(
+        result="crossings and speeds above the limit ([Campbell diagrams](campbell.md))",
+        sweeps="one an order; one for all without sectors",
+        flags={"speeds_rpm": "--speeds", "orders": "--order", "band_hz": "--band"},
+        draw=draw,
+    ),
 )

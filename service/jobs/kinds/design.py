@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, RootModel
 
 import optim
+from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
 from service.jobs.kinds.problem import ProblemRequest, Weight, arguments, default_variables, problem_of
 from service.jobs.kinds.problem_check import problem_issues, uncertainty_issues
 from service.jobs.kinds.records import design_record, robust_record, sweep_record
+from service.jobs.kinds.registry.results import Amplitude, PeakAt, ReachedResult, Table
 from service.jobs.kinds.scenes import FrequencyHz, refusal, require, resolve_scene, resolved
 from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kinds.uncertain import Uncertain
@@ -18,6 +20,10 @@ from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneS
 from service.jobs.strict_json import pointer
 from solver.errors import Issue
 from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 UNCERTAIN = "uncertain"
 _NOT_ROBUST = ("basins",)
@@ -89,6 +95,69 @@ class DesignRequest(ProblemRequest):
     )
 
 
+class OptimumResult(ReachedResult):
+    """The best design of what is known: its values, its responses, and what holds it."""
+
+    scene: str
+    method: str
+    optimum: dict[str, float]
+    peak: PeakAt | None
+    peaks: list[Table]
+    band_hz: float | None
+    limit: Amplitude
+    bands: list[Table]
+    objective: float | None
+    rows: list[Table]
+    held_by: Table | None
+    error_estimate: Amplitude
+    errors: list[Table]
+    warnings: list[Any]
+    plateau: Table
+    chosen_by: str | None
+    checked: list[Any]
+    looked_at: list[Any]
+    evaluations: int
+    newton_iterations: int
+    tried: list[Table]
+    basins: list[Table]
+    seconds: float
+    work: float | None
+    active: list[str]
+    optimality: float | None
+    multipliers: list[float | None]
+    conditions: Table | None
+    broken: list[Table]
+
+
+class RobustResult(ReachedResult):
+    """The best design in spite of what is not known, beside the best of what is."""
+
+    scene: str
+    aim: str
+    quantile: float | None
+    uncertain: Table
+    optimum: dict[str, float]
+    nominal: Table | None
+    robust: Table | None
+    objective: float | None
+    gain: float | None
+    cuts: list[Table]
+    gap: float | None
+    inner_look: bool | None
+    optimality: float | None
+    violation: float | None
+    unknown: Any
+    designs: int
+    responses: int
+    seconds: float
+    nominal_status: str
+    warnings: list[Any]
+
+
+class DesignResult(RootModel[OptimumResult | RobustResult]):
+    """A design; with `uncertain` a robust one."""
+
+
 def resolve(request: DesignRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check the problem, fill in the variables."""
     scene = resolve_scene(request, source)
@@ -151,10 +220,30 @@ def _run_robust(
     )
 
 
+def draw(result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
+    """The response of the optimum; of a robust design both optima over the uncertainty."""
+    if "nominal" not in result:
+        from service.jobs.drawing import best_sweep_figure
+
+        return best_sweep_figure(result, sweeps, read)
+    from optim.views.plots.designs import robust_figure
+
+    if result["nominal"] is None:
+        raise NothingToDrawError("no design was found")
+    return robust_figure(result)
+
+
 DESIGN = JobKind(
     name="design",
     summary="The best damper of a scene.",
     request=DesignRequest,
     resolve=resolve,
     run=run,
+    result=DesignResult,
+    view=KindView(
+        result="the optimum and what holds it",
+        sweeps="every response computed",
+        keys="those of [a design problem](design.md)",
+        draw=draw,
+    ),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
@@ -10,8 +10,11 @@ from pydantic import ConfigDict, Field
 import solver
 from service.jobs import strict_json
 from service.jobs.arrays import decode, encode
+from service.jobs.kind_view import Json, KindView, ReadSweep, StoredSweep
+from service.jobs.kinds.peaks import PeaksResult
 from service.jobs.kinds.ranges import RangeRequest, law_issues, range_issues
 from service.jobs.kinds.records import packed, sweep_records, unpacked
+from service.jobs.kinds.registry.results import Curve, EndedResult
 from service.jobs.kinds.scenes import refusal, require, resolve_scene, resolved
 from service.jobs.kinds.sizes import MOST_POINTS, balance_issues
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
@@ -20,6 +23,8 @@ from solver.errors import Issue
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from solver.studies.response_map import MapGrid
 
 _EXAMPLE: dict[str, Any] = {
@@ -54,6 +59,23 @@ class MapRequest(RangeRequest):
         default=True, strict=True,
         description="Track the peaks too; false is faster, and for contacts of every law.",
     )  # fmt: skip
+
+
+class MapResult(EndedResult):
+    """The response on the grid, a row for each value of the parameter; null where it was not found."""
+
+    scene: str
+    parameter: Curve
+    parameter_path: str
+    unit: str
+    frequency: Curve
+    amplitude: list[Curve]
+    half_peak_to_peak: list[Curve]
+    ridge: PeaksResult | None
+    n_harmonics: int
+    newton_iterations: int
+    largest_residual: float | None
+    seconds: float
 
 
 def resolve(request: MapRequest, source: SceneSource) -> Resolved:
@@ -164,6 +186,13 @@ def _ridge(spec: Mapping[str, Any], progress: OnProgress, should_stop: ShouldSto
     return PartOutput(result={"ridge": strict_json.finite(track.to_json()), "sweeps": sweeps}, arrays=arrays)
 
 
+def draw(result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
+    """The map with its ridge."""
+    from service.jobs.drawing import map_of
+
+    return map_of(result)
+
+
 _PARTS = Parts(split=split, run_part=run_part, join=join)
 MAP = JobKind(
     name="map",
@@ -172,4 +201,10 @@ MAP = JobKind(
     resolve=resolve,
     run=_PARTS.run,
     parts=_PARTS,
+    result=MapResult,
+    view=KindView(
+        result="the amplitude on the grid, the ridge of its peaks",
+        sweeps="those that look for peaks",
+        draw=draw,
+    ),
 )

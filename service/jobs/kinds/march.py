@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
 import solver
+from service.jobs.kind_view import Json, KindView, ReadSweep, StoredSweep
 from service.jobs.kinds.periods import history_of
+from service.jobs.kinds.registry.results import Amplitude, KindResult, Table
 from service.jobs.kinds.scenes import FrequencyHz, SceneRequest, require, resolve_scene, resolved
 from service.jobs.kinds.sizes import march_issues
 from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
 from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 SAMPLES = 512
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2}
@@ -52,6 +58,21 @@ class MarchRequest(SceneRequest):
     )
 
 
+class MarchResult(KindResult):
+    """The motion a time march settled to."""
+
+    max_abs: Amplitude
+    half_peak_to_peak: Amplitude
+    mean: Amplitude
+    harmonics: list[float | None] | None = Field(description="Amplitudes of the harmonics from 0 on [m].")
+    periods: int
+    steps_per_period: int
+    error_estimate: float | None = Field(description="Relative to the largest displacement.")
+    status: str
+    seconds: float
+    history: Table | None = Field(default=None, description="The last period, where it was asked for.")
+
+
 def resolve(request: MarchRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check the size."""
     scene = resolve_scene(request, source)
@@ -83,10 +104,23 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     return JobOutput(result=result, shortfall=None if marched.converged else marched.status.value)
 
 
+def draw(result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
+    """The harmonics of the last period."""
+    from service.jobs.drawing import harmonics_of
+
+    return harmonics_of(result)
+
+
 MARCH = JobKind(
     name="march",
     summary="Time marching, the independent referee.",
     request=MarchRequest,
     resolve=resolve,
     run=run,
+    result=MarchResult,
+    view=KindView(
+        result="amplitude and periods marched",
+        flags={"frequency_hz": "--frequency", "steps_per_period": "--steps"},
+        draw=draw,
+    ),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,8 +13,10 @@ from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
 
 import solver
 from service.jobs.arrays import decode, encode
+from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
 from service.jobs.kinds.problem import Name
 from service.jobs.kinds.records import packed, sweep_records, unpacked
+from service.jobs.kinds.registry.results import EndedResult, Table
 from service.jobs.kinds.scenes import FrequencyHz, HarmonicRequest, refusal, require, resolve_scene, resolved
 from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, annulus_issues, size_issues, whole_disk_dofs
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
@@ -24,6 +26,8 @@ from solver.errors import Issue, SceneError, SettingError
 from solver.scene.scene import CyclicStructure, Scene
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from solver import BladePeaks
 
 _EXAMPLE: dict[str, Any] = {
@@ -100,6 +104,23 @@ class MistuningRequest(HarmonicRequest):
         default=None, alias="from", description="Lowest frequency [Hz]; the scene's band."
     )
     to: FrequencyHz | None = Field(default=None, description="Highest frequency [Hz]; the scene's band.")
+
+
+class MistuningResult(EndedResult):
+    """The peaks of every blade of every disk, and how much higher they are than the tuned disk's."""
+
+    scene: str
+    dof: str
+    of: list[str]
+    spread: float
+    tuned: Table
+    samples: list[Table]
+    mean: float | None = Field(description="Of the magnification.")
+    deviation: float | None
+    quantiles: list[Table]
+    worst: Table | None
+    n_harmonics: int
+    seconds: float
 
 
 def resolve(request: MistuningRequest, source: SceneSource) -> Resolved:
@@ -254,6 +275,15 @@ def _peaks(part: PartOutput) -> list[BladePeaks]:
     ]  # fmt: skip
 
 
+def draw(result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
+    """The magnification over the disks, and the worst of them."""
+    from solver.views.plots.disks import mistuning_figure
+
+    if result["worst"] is None:
+        raise NothingToDrawError("the peaks of no disk are known")
+    return mistuning_figure(result)
+
+
 _PARTS = Parts(split=split, run_part=run_part, join=join)
 MISTUNING = JobKind(
     name="mistuning",
@@ -262,4 +292,10 @@ MISTUNING = JobKind(
     resolve=resolve,
     run=_PARTS.run,
     parts=_PARTS,
+    result=MistuningResult,
+    view=KindView(
+        result="the magnification over many disks and the worst of them ([disks](disks.md))",
+        sweeps="the tuned disk's, and that of the worst blade",
+        draw=draw,
+    ),
 )

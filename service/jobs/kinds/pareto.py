@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
 import optim
+from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
 from service.jobs.kinds.problem import ProblemRequest, arguments, default_variables, problem_of
 from service.jobs.kinds.problem_check import problem_issues
 from service.jobs.kinds.records import sweep_record
+from service.jobs.kinds.registry.results import Amplitude, ReachedResult, Table
 from service.jobs.kinds.scenes import require, resolve_scene, resolved
 from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
 from solver.errors import Issue
 from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 _EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "variables": {"shroud.N0": [20, 3000]}, "limit": 8e-5}
 
@@ -39,6 +45,21 @@ class ParetoRequest(ProblemRequest):
 def pareto_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
     """Everything wrong with the arguments of a front."""
     return problem_issues(scene, {key: value for key, value in given.items() if key != "points"})
+
+
+class ParetoResult(ReachedResult):
+    """The front: designs of which none has both a lower peak and a narrower band than another."""
+
+    scene: str
+    dof: str
+    limit: Amplitude
+    points: list[Table]
+    knee: int | None = Field(description="Number of the point where the front bends most.")
+    dominated: list[Table]
+    missed: list[Table]
+    ends: list[Table]
+    evaluations: int
+    seconds: float
 
 
 def resolve(request: ParetoRequest, source: SceneSource) -> Resolved:
@@ -67,10 +88,26 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     )
 
 
+def draw(result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
+    """The front."""
+    from optim.views.plots.pareto import pareto_figure
+
+    if not result["points"]:
+        raise NothingToDrawError("its front has no point")
+    return pareto_figure(result)
+
+
 PARETO = JobKind(
     name="pareto",
     summary="The front of peak against resonance band.",
     request=ParetoRequest,
     resolve=resolve,
     run=run,
+    result=ParetoResult,
+    view=KindView(
+        result="the front of peak against band ([trade-offs](trade-offs.md))",
+        sweeps="those of its points",
+        keys="those of a design problem, `points`",
+        draw=draw,
+    ),
 )

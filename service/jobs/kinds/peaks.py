@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field
 
 import solver
+from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
 from service.jobs.kinds.ranges import RangeRequest, law_issues, range_issues
 from service.jobs.kinds.records import sweep_records
+from service.jobs.kinds.registry.results import Curve, EndedResult, Table
 from service.jobs.kinds.scenes import require, resolve_scene, resolved
 from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
 from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 _EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "parameter": "shroud.N0", "from": 20, "to": 3000}
 
@@ -32,6 +38,25 @@ class PeaksRequest(RangeRequest):
     checks: Annotated[int, Field(strict=True, ge=0, le=200)] = Field(
         default=3, description="Sweeps between the ends that look for peaks nothing has followed."
     )
+
+
+class PeaksResult(EndedResult):
+    """The highest peak over the parameter, what competes with it, and where it is least."""
+
+    scene: str
+    parameter: Curve
+    parameter_path: str
+    unit: str
+    peak: Curve
+    frequency: Curve
+    slope: Curve
+    optimum: Table
+    exchanges: list[Table]
+    competing: list[Table]
+    peaks_open: list[Any]
+    n_harmonics: int
+    sweeps: int
+    seconds: float
 
 
 def resolve(request: PeaksRequest, source: SceneSource) -> Resolved:
@@ -72,10 +97,26 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     )
 
 
+def draw(result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
+    """The highest peak over the parameter."""
+    from service.jobs.drawing import track_of
+    from solver.views.plots.tracks import track_figure
+
+    if not result["parameter"]:
+        raise NothingToDrawError("no peak was tracked")
+    return track_figure(track_of(result), dof="x")
+
+
 PEAKS = JobKind(
     name="peaks",
     summary="The highest peak over a parameter, and where it is least.",
     request=PeaksRequest,
     resolve=resolve,
     run=run,
+    result=PeaksResult,
+    view=KindView(
+        result="the highest peak over the parameter, where it is least ([peaks](peaks.md))",
+        sweeps="those that look for peaks",
+        draw=draw,
+    ),
 )

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ConfigDict, Field
 
 import solver
+from service.jobs.kind_view import Json, KindView, ReadSweep, StoredSweep
+from service.jobs.kinds.registry.results import Amplitude, KindResult
 from service.jobs.kinds.scenes import FrequencyHz, HarmonicRequest, require, resolve_scene, resolved
 from service.jobs.kinds.sizes import balance_issues
 from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
 from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2, "set": {"damper.N0": 80}}
 
@@ -22,6 +28,29 @@ class SolveRequest(HarmonicRequest):
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
 
     frequency_hz: FrequencyHz = Field(description="Excitation frequency [Hz].")
+
+
+class SolveResult(KindResult):
+    """One periodic response."""
+
+    scene: str
+    frequency_hz: float
+    converged: bool
+    status: str
+    max_abs: Amplitude
+    half_peak_to_peak: Amplitude
+    mean: Amplitude
+    harmonics: list[float] | None = Field(description="Amplitudes of the harmonics from 0 on [m].")
+    flags: list[str]
+    contacts: dict[str, str] = Field(description="What each contact does during the period.")
+    residual: float | None
+    error_estimate: Amplitude
+    n_harmonics: int
+    newton_iterations: int
+    seconds: float
+    mean_range: list[float | None] | None = Field(
+        default=None, description="Means that any history can leave [m], if the mean depends on it."
+    )
 
 
 def resolve(request: SolveRequest, source: SceneSource) -> Resolved:
@@ -41,10 +70,23 @@ def run(spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) 
     )
 
 
+def draw(result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
+    """The harmonics of the response."""
+    from service.jobs.drawing import harmonics_of
+
+    return harmonics_of(result)
+
+
 SOLVE = JobKind(
     name="solve",
     summary="The periodic response at one frequency.",
     request=SolveRequest,
     resolve=resolve,
     run=run,
+    result=SolveResult,
+    view=KindView(
+        result="the response at one frequency",
+        flags={"frequency_hz": "--frequency"},
+        draw=draw,
+    ),
 )

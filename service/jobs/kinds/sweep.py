@@ -10,7 +10,9 @@ from pydantic import ConfigDict, Field
 
 import solver
 from service.jobs.checkpoints import Checkpoints
+from service.jobs.kind_view import KindView
 from service.jobs.kinds.records import sweep_record
+from service.jobs.kinds.registry.results import Amplitude, Curve, EndedResult, PeakAt, Table
 from service.jobs.kinds.scenes import (
     FrequencyHz,
     HarmonicRequest,
@@ -75,6 +77,35 @@ class SweepRequest(HarmonicRequest):
     limit: PositiveNumber | None = Field(
         default=None, description="Amplitude [m] above which the resonance band is measured."
     )
+
+
+class SweepResult(EndedResult):
+    """A branch: its points, its peaks and its resonance band."""
+
+    scene: str
+    parameter: Curve
+    parameter_path: str
+    unit: str
+    amplitude: Curve
+    half_peak_to_peak: Curve
+    mean: Curve
+    peak: PeakAt | None
+    peaks: list[PeakAt]
+    band_hz: float | None
+    band_limit: Amplitude
+    band_intervals_hz: list[list[float]] | None
+    band_known: bool | None
+    peak_certificate: Table
+    points: int
+    n_harmonics: int
+    error_estimate: Amplitude
+    newton_iterations: int
+    rejected_steps: int
+    folds: int
+    mean_undetermined: bool
+    largest_residual: float | None
+    seconds: float
+    flags: list[str]
 
 
 def resolve(request: SweepRequest, source: SceneSource) -> Resolved:
@@ -201,4 +232,10 @@ SWEEP = JobKind(
     resolve=resolve,
     run=run,
     run_on=run_on,
+    result=SweepResult,
+    view=KindView(
+        result="peaks, band, folds",
+        sweeps="the branch",
+        flags={"frequency_hz": "--frequency"},
+    ),
 )

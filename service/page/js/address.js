@@ -1,6 +1,9 @@
 // What is seen, in the address: a reload goes on, and a link shows another the same.
 
-const JOBS = ["sweep", "design", "map", "pareto", "accuracy", "campbell", "march"];
+// Every other word is the name of a kind of job, with the id of its job.
+const WORDS = ["scene", "contact", "set", "harmonics", "at", "range", "compare"];
+const KIND = /^[a-z][a-z0-9-]{0,31}$/;
+const ID = /^[0-9a-f-]{36}$/;
 
 export const state = {
   scene: "",
@@ -22,11 +25,10 @@ export function read() {
   state.at = positive(words.get("at"));
   const range = (words.get("range") ?? "").split(":").map(Number);
   state.range = range.length === 2 && range.every((end) => end > 0) ? range : null;
-  state.compare = (words.get("compare") ?? "").split(",").filter((id) => /^[0-9a-f-]{36}$/.test(id));
+  state.compare = (words.get("compare") ?? "").split(",").filter((id) => ID.test(id));
   state.jobs = {};
-  for (const kind of JOBS) {
-    const id = words.get(kind);
-    if (id && /^[0-9a-f-]{36}$/.test(id)) state.jobs[kind] = id;
+  for (const [kind, id] of words) {
+    if (!WORDS.includes(kind) && KIND.test(kind) && ID.test(id)) state.jobs[kind] = id;
   }
 }
 
@@ -39,7 +41,7 @@ export function write() {
   if (state.range) words.set("range", state.range.join(":"));
   if (state.harmonics !== 11) words.set("harmonics", state.harmonics);
   if (state.at !== null) words.set("at", Number(state.at.toPrecision(9)));
-  for (const kind of JOBS) if (state.jobs[kind]) words.set(kind, state.jobs[kind]);
+  for (const [kind, id] of Object.entries(state.jobs)) words.set(kind, id);
   if (state.compare.length) words.set("compare", state.compare.join(","));
   const text = words.toString().replaceAll("%3A", ":").replaceAll("%2C", ",");
   const address = `${location.pathname}${text ? `?${text}` : ""}`;

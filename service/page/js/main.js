@@ -14,6 +14,7 @@ import { mapView, startMap } from "./map.js";
 import { openMatrices } from "./matrices.js";
 import { SCENES } from "./matrix_files.js";
 import { startNotices } from "./notices.js";
+import { offerOthers, startOthers } from "./others.js";
 import { referee, startPoint } from "./point.js";
 import { startResponse, sweepView } from "./response.js";
 import { asked, current, defaultRange, frictionContacts, listScenes, loadScene, shownScene, variable } from "./scenes.js";
@@ -21,9 +22,9 @@ import { contactTable, drawStructure } from "./structure.js";
 import { accuracyView, campbellBody, campbellView, startStudies } from "./studies.js";
 import { startTheme } from "./theme.js";
 import { saveToml } from "./toml.js";
+import { VIEWS } from "./views.js";
 
 const FIRST = "bladed-disk";
-const VIEWS = { sweep: sweepView, design: designView, map: mapView, pareto: frontView, accuracy: accuracyView, campbell: campbellView };
 let states = { states: null, at: null };
 let studies = 0;
 
@@ -51,7 +52,7 @@ async function open() {
   states = { states: null, at: null };
   drawScene();
   tell("scene");
-  for (const [kind, view] of Object.entries(VIEWS)) resume(kind, view);
+  for (const [kind, view] of Object.entries(VIEWS)) if (view) resume(kind, view);
 }
 
 function fillDesign(names) {
@@ -76,7 +77,7 @@ function drawScene() {
 }
 
 async function change(name) {
-  for (const kind of [...Object.keys(VIEWS), "march"]) forget(kind);
+  for (const kind of new Set([...Object.keys(VIEWS), ...Object.keys(state.jobs)])) forget(kind);
   Object.assign(state, { scene: name, set: {}, contact: "", range: null, at: null, jobs: {} });
   studies += 1;
   say("study-status", "");
@@ -186,6 +187,7 @@ async function begin() {
   try {
     await patiently(scenes);
     await patiently(open);
+    await patiently(offerOthers);
     await openLibrary();
   } catch (error) {
     failed(error);
@@ -207,6 +209,7 @@ function start() {
   startPoint();
   startFront();
   startStudies();
+  startOthers();
   startLibrary();
   controls();
   on("states", (found) => {

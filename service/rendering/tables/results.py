@@ -160,6 +160,11 @@ _HOMES = {
 }  # fmt: skip
 
 
+def knows(kind: str) -> bool:
+    """Whether results of a kind are printed as the local command prints them."""
+    return kind in _HOMES
+
+
 def of_kind(kind: str) -> Callable[[Json], None]:
     """What prints the result of a job of a kind, imported when it is asked for."""
     module, _, function = _HOMES[kind].partition(".")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from service.schemas.answers import SweepDetail
+from service.jobs.kind_view import StoredCurve
 from solver.views.plots.curves import Response, above, with_peak
 
 
-def response_of(sweep: SweepDetail) -> Response:
+def response_of(sweep: StoredCurve) -> Response:
     """The curve of a stored sweep with at least one point; its band is that of the polyline."""
     peak = None if sweep.peak is None else (sweep.peak.at, sweep.peak.value)
     values = np.asarray(sweep.arrays["parameter"], dtype=np.float64)

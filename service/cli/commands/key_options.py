@@ -1,0 +1,191 @@
+"""From the keys of a request to options of the command: those of the local command, or made of the schema."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, get_args, get_origin
+
+import typer
+from typer.models import OptionInfo
+
+from service.cli.options import inputs
+from service.cli.options import shared as options
+from service.cli.options.inputs import number, whole_number
+from service.errors import InputError
+from service.jobs.registry import JobKind
+
+SCENE = "scene"
+Schema = Mapping[str, Any]
+Command = Callable[..., None]
+
+_TAKEN = ("--wait", "--json", "--url", "--key-file", "--help")
+_SCALARS: dict[str, tuple[Any, Callable[[str], Any] | None, str]] = {
+    "number": (float, number, "X"),
+    "integer": (int, whole_number, "N"),
+    "string": (str, None, "TEXT"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class KeyOption:
+    """An option that stands for a key of a body.
+
+    Attributes
+    ----------
+    key : str
+        Of the body.
+    flag : str
+        As it is written, with its hyphens.
+    parameter : inspect.Parameter
+        Of the command.
+    schema : mapping
+        JSON schema of the key, without null.
+    """
+
+    key: str
+    flag: str
+    parameter: inspect.Parameter
+    schema: Schema
+
+    def in_body(self, given: Any) -> Any:
+        """What stands in the body for what was given; None if the key is to be left out.
+
+        Raises
+        ------
+        InputError
+            It cannot be read, or is not finite.
+        """
+        if given is None or given == [] or given == self.parameter.default:
+            return None
+        for one in given if isinstance(given, (list, tuple)) else (given,):
+            if isinstance(one, float) and not math.isfinite(one):
+                raise InputError(f"`{self.flag}` must be a finite number, got {one!r}")
+        kind = self.schema.get("type")
+        if kind == "boolean":
+            return given is not self.flag.startswith("--no-")
+        if isinstance(given, tuple):
+            return list(given) if _is_pair(self.schema) else [list(given)]
+        if kind == "object" and isinstance(given, list):
+            return inputs.settings(given)
+        return self._read(given) if isinstance(given, str) and kind in (None, "array", "object") else given
+
+    def _read(self, text: str) -> Any:
+        try:
+            return json.loads(text)
+        except ValueError as error:
+            raise InputError(f"`{self.flag}` takes JSON, got {text!r}: {error}") from error
+
+
+def key_options(kind: JobKind, local: Command | None) -> list[KeyOption]:
+    """An option for every key of a kind but its scene, those of the local command first.
+
+    Parameters
+    ----------
+    kind : what is submitted.
+    local : the command that computes the same here, if there is one; its options are reused.
+    """
+    described = kind.request.model_json_schema()
+    needed = described.get("required", ())
+    known = {} if local is None else options_of(local)
+    found = []
+    for key, whole in described["properties"].items():
+        if key != SCENE:
+            schema = _without_null(whole)
+            flag = _flag(kind, key, schema)
+            mine = known.get(flag) or _made(flag, schema, whole, needed=key in needed)
+            name = f"key_{key}"
+            parameter = mine.replace(name=name, kind=inspect.Parameter.KEYWORD_ONLY)
+            found.append(KeyOption(key, flag, parameter, schema))
+    order = [*known, *(one.flag for one in found)]
+    return sorted(found, key=lambda one: order.index(one.flag))
+
+
+def options_of(command: Command) -> dict[str, inspect.Parameter]:
+    """The options of a command by how they are written."""
+    parameters = inspect.signature(command, eval_str=True).parameters.values()
+    return {flag: parameter for parameter in parameters for flag in flags_of(parameter.annotation)}
+
+
+def flags_of(annotation: Any) -> list[str]:
+    """How an annotated option is written; empty for an argument."""
+    found = []
+    for told in get_args(annotation)[1:]:
+        if isinstance(told, OptionInfo):
+            # Without a default before them, Typer keeps the first of the names in its place.
+            found += [told.default, *(told.param_decls or ())]
+    return [flag for flag in found if isinstance(flag, str) and flag.startswith("--")]
+
+
+def _flag(kind: JobKind, key: str, schema: Schema) -> str:
+    """How the option of a key is written."""
+    word = key.replace("_", "-")
+    if schema.get("type") == "boolean" and schema.get("default") is True:
+        word = f"no-{word}"
+    flag = kind.view.flags.get(key, f"--{word}")
+    return f"{flag}-key" if flag in _TAKEN else flag
+
+
+def _made(flag: str, schema: Schema, whole: Schema, *, needed: bool) -> inspect.Parameter:
+    """An option of the schema of its key."""
+    if flag == "--set":
+        return _parameter(options.Values, None)
+    kind, default = schema.get("type"), whole.get("default")
+    words = whole.get("description", "")
+    if kind == "boolean":
+        return _parameter(Annotated[bool, typer.Option(flag, help=words)], False)
+    type_, parser, metavar = _read_as(schema)
+    if get_origin(type_) is list and kind == "array":
+        words = f"{words} Repeatable."
+    told = typer.Option(flag, metavar=metavar, parser=parser, help=words)
+    if needed:
+        return _parameter(Annotated[type_, told], inspect.Parameter.empty)
+    return _parameter(
+        Annotated[type_ | None, told], default if isinstance(default, (int, float, str)) else None
+    )
+
+
+def _read_as(schema: Schema) -> tuple[Any, Callable[[str], Any] | None, str]:
+    """Type, parser and metavariable of an option."""
+    kind = schema.get("type")
+    if _is_pair(schema):
+        return tuple[float, float], None, "LO HI"
+    if kind in _SCALARS:
+        type_, parser, metavar = _SCALARS[kind]
+        return type_, parser, "|".join(map(str, schema.get("enum", ()))) or metavar
+    if kind == "array" and schema["items"].get("type") in _SCALARS:
+        one, parser, metavar = _read_as(schema["items"])
+        several: Any = list.__class_getitem__(one)
+        return several, parser, metavar
+    if kind == "object" and _of_numbers(schema):
+        return list[str], None, "NAME=VALUE"
+    return str, None, "JSON"
+
+
+def _parameter(annotation: Any, default: Any) -> inspect.Parameter:
+    return inspect.Parameter("key", inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def _without_null(schema: Schema) -> Schema:
+    """The schema of what a key may hold beside null; of several the list, else nothing that is known."""
+    choices = [one for one in schema.get("anyOf", ()) if one.get("type") != "null"]
+    if not choices:
+        return schema
+    listed = [one for one in choices if one.get("type") == "array"]
+    return choices[0] if len(choices) == 1 else (listed[0] if len(listed) == 1 and len(choices) == 2 else {})
+
+
+def _is_pair(schema: Schema) -> bool:
+    """Whether it is a list of two numbers."""
+    two = schema.get("minItems") == schema.get("maxItems") == 2
+    return schema.get("type") == "array" and two and schema["items"].get("type") == "number"
+
+
+def _of_numbers(schema: Schema) -> bool:
+    """Whether it is a table of names with a number each."""
+    named: list[Any] = list(schema.get("patternProperties", {}).values())
+    each = schema.get("additionalProperties") or next(iter(named), None)
+    return isinstance(each, Mapping) and each.get("type") == "number"

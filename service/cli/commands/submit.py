@@ -1,0 +1,157 @@
+"""`stickslip submit KIND` for every kind there is: options of its local command, and of its other keys."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Container, Sequence
+from typing import TYPE_CHECKING, Any, get_type_hints
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from service.cli.commands.jobs import hand_in, scene_of
+from service.cli.commands.key_options import (
+    SCENE,
+    Command,
+    KeyOption,
+    flags_of,
+    key_options,
+    options_of,
+)
+from service.cli.options import problem_inputs
+from service.cli.options import shared as options
+from service.cli.options.keyed import keyed
+from service.cli.options.problem import FLAGS, ProblemFlags, takes_problem
+from service.cli.options.problem_inputs import OPTIONS
+from service.cli.table import COMMANDS
+from service.jobs.registry import JobKind, Registry
+
+if TYPE_CHECKING:
+    from service.jobs.kinds.problem import ProblemRequest
+
+_OF_ALL = ("fresh", "priority", "max_seconds")
+
+
+class SubmitGroup(TyperGroup):
+    """The group `submit`: a command for every kind of job there is, made when it is asked for."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """The names of the kinds."""
+        self._fill()
+        return super().list_commands(ctx)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Name and summary of a kind; None if there is none of this name."""
+        self._fill()
+        return super().get_command(ctx, cmd_name)
+
+    def resolve_command(self, ctx: Any, args: Any) -> Any:
+        """The name of the kind asked for, its command, and the arguments left."""
+        name, _, rest = super().resolve_command(ctx, args)
+        return name, None if name is None else command_of(_registry()[name]), rest
+
+    def _fill(self) -> None:
+        if not self.commands:
+            for kind in _registry():
+                self.add_command(TyperCommand(kind.name, help=kind.summary, rich_markup_mode=None))
+
+
+def command_of(kind: JobKind) -> Any:
+    """The command that submits a job of a kind."""
+    alone = typer.Typer(add_completion=False, rich_markup_mode=None)
+    take = keyed(submission(kind, _local(kind.name)))
+    alone.command(kind.name, help=f"{kind.summary}\n\nSubmitted as a job.")(take)
+    return typer.main.get_command(alone)
+
+
+def _registry() -> Registry:
+    # Loaded here: `stickslip --help` needs no kinds.
+    from service.settings.kinds import registry_here
+
+    return registry_here()
+
+
+def _local(name: str) -> Command | None:
+    """The command that computes here what a kind computes on a service, if there is one."""
+    return next((entry.function() for entry in COMMANDS if entry.name == name), None)
+
+
+def submission(kind: JobKind, local: Command | None) -> Command:
+    """The function of a command that submits a job of a kind.
+
+    Parameters
+    ----------
+    kind : what is submitted.
+    local : the command that computes the same here; its options are reused.
+    """
+    from service.jobs.kinds.problem import ProblemRequest
+
+    made = key_options(kind, local)
+    if issubclass(kind.request, ProblemRequest):
+        known = None if local is None else options_of(local)
+        own = [one for one in made if _beside_a_problem(one, ProblemRequest.model_fields, known)]
+        return _of_a_problem(kind, kind.request, own)
+
+    def submit(
+        name: str | None = None, wait: bool = False, as_json: bool = False, url: str = "", **given: Any
+    ) -> None:
+        body = {one.key: one.in_body(given[one.parameter.name]) for one in made}
+        scene = {} if name is None else {SCENE: scene_of(name)}
+        told = {key: value for key, value in body.items() if value is not None}
+        hand_in(url, {"kind": kind.name, **scene, **told}, wait=wait, as_json=as_json)
+
+    about_scene = [_keyword("name", options.Scene)] if SCENE in kind.request.model_fields else []
+    return _with_options(submit, [*about_scene, *(one.parameter for one in made)])
+
+
+def _beside_a_problem(option: KeyOption, of_problems: Container[str], known: Container[str] | None) -> bool:
+    """Whether an option stands beside those of every problem; further keys are for the problem file."""
+    if option.key in _OF_ALL:
+        return True
+    return option.key not in of_problems and (known is None or option.flag in known)
+
+
+def _of_a_problem(kind: JobKind, model: type[ProblemRequest], own: Sequence[KeyOption]) -> Command:
+    """As `submission`, of a design problem: described by options, by a file, or by both."""
+    keys = {OPTIONS[key] for key in kind.request.model_fields if key in OPTIONS}
+    hints = get_type_hints(ProblemFlags, include_extras=True)
+    foreign = [name for name in hints if name != "problem" and not keys.intersection(flags_of(hints[name]))]
+    beside = [one for one in own if one.flag not in keys]
+
+    def submit(
+        flags: ProblemFlags,
+        name: str | None = None,
+        wait: bool = False,
+        as_json: bool = False,
+        url: str = "",
+        **given: Any,
+    ) -> None:
+        further = {one.key: (one.flag, one.in_body(given[one.parameter.name])) for one in beside}
+        told = problem_inputs.description(name, flags, kind.name, **further)
+        problem_inputs.checked(told, model)
+        body = {"kind": kind.name, **problem_inputs.body_to_submit(told)}
+        hand_in(url, body, wait=wait, as_json=as_json)
+
+    parameters = [
+        _keyword(FLAGS, ProblemFlags),
+        _keyword("name", options.AnyScene, None),
+        *(one.parameter for one in beside),
+    ]
+    return takes_problem(_with_options(submit, parameters), without=foreign)
+
+
+def _with_options(command: Command, parameters: Sequence[inspect.Parameter]) -> Command:
+    """The command with these parameters, and those that every submission has."""
+    ending = [
+        _keyword("wait", options.Wait, False),
+        _keyword("as_json", options.Json, False),
+        _keyword("url", options.Url, options.DEFAULT_URL),
+    ]
+    listed = [*parameters, *ending]
+    command.__signature__ = inspect.Signature(listed)  # type: ignore[attr-defined]
+    command.__annotations__ = {one.name: one.annotation for one in listed}
+    return command
+
+
+def _keyword(name: str, annotation: Any, default: Any = inspect.Parameter.empty) -> inspect.Parameter:
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)

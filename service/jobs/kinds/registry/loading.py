@@ -1,0 +1,69 @@
+"""Kinds of job that come from elsewhere: from the modules that the setting `kinds` names.
+
+Only the settings name modules, which whoever runs the service writes; a request never does. Nothing is
+looked for: a package that happens to be installed adds no kind by itself.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Iterable
+
+from service.errors import ConfigurationError
+from service.jobs.kinds import SHIPPED
+from service.jobs.registry import JobKind, Registry
+
+_ENTRY = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
+
+
+def registry_of(entries: Iterable[str], base: Registry = SHIPPED) -> Registry:
+    """The kinds that come with the service and those of `entries`.
+
+    Parameters
+    ----------
+    entries : iterable of str
+        ``module:NAME`` each: a `JobKind`, or a sequence of them, at the top level of a module that can be
+        imported.
+    base : Registry
+        The kinds there are without them.
+
+    Raises
+    ------
+    ConfigurationError
+        An entry is none, cannot be imported, is no kind, or has a name that is taken.
+    """
+    kinds: dict[str, str] = {kind.name: "the service itself" for kind in base}
+    found: list[JobKind] = []
+    for entry in entries:
+        for kind in _kinds_of(entry):
+            if kind.name in kinds:
+                raise ConfigurationError(
+                    f"`kinds` (STICKSLIP_KINDS): {entry!r} has a kind {kind.name!r}, a name that "
+                    f"{kinds[kind.name]} has: call it something else"
+                )
+            kinds[kind.name] = entry
+            found.append(kind)
+    return base.extended(*found) if found else base
+
+
+def _kinds_of(entry: str) -> list[JobKind]:
+    if not _ENTRY.fullmatch(entry):
+        raise ConfigurationError(
+            f"`kinds` (STICKSLIP_KINDS) must list module:NAME, for example mypackage.kinds:FATIGUE, "
+            f"got {entry!r}"
+        )
+    module, _, name = entry.partition(":")
+    try:
+        value = getattr(importlib.import_module(module), name)
+    except Exception as error:
+        raise ConfigurationError(
+            f"`kinds` (STICKSLIP_KINDS): {entry!r} cannot be imported: {type(error).__name__}: {error}"
+        ) from error
+    listed = [value] if isinstance(value, JobKind) else value
+    if not isinstance(listed, (list, tuple)) or not all(isinstance(one, JobKind) for one in listed):
+        raise ConfigurationError(
+            f"`kinds` (STICKSLIP_KINDS): {entry!r} must be a JobKind or a list of them, got "
+            f"{type(value).__name__}"
+        )
+    return list(listed)

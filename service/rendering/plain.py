@@ -1,0 +1,38 @@
+"""A result of which nothing else is known, for people: its numbers and words by their keys."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from service.jobs.kind_view import Json, Told
+from service.jobs.registry import Registry
+
+_FEW = 6
+
+
+def told(kind: str, result: Json, registry: Registry) -> Told:
+    """What is printed of a result: as its kind says, or by its keys."""
+    tell = registry[kind].view.tell if kind in registry else None
+    return tell(result) if tell is not None else Told(title=kind, pairs=list(_pairs(result, "")))
+
+
+def _pairs(table: Json, before: str) -> Iterator[tuple[str, str]]:
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _pairs(value, f"{before}{key}.")
+        else:
+            yield before + key, _shown(value)
+
+
+def _shown(value: Any) -> str:
+    """A value in a few words."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        return "" if value is None else str(value)
+    scalars = not any(isinstance(one, (Mapping, list)) for one in value)
+    few = scalars and len(value) <= _FEW
+    return ", ".join(map(_shown, value)) if few else f"{len(value)} values"

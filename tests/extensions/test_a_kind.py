@@ -1,0 +1,414 @@
+"""A kind of job that lives in this file: registered by a setting, it works everywhere.
+
+Nothing of the package knows it. `stickslip serve` runs in a process of its own, its workers in others; they
+find the kind by the setting `kinds`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import socket
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import httpx
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+from launch import COMMAND
+from pydantic import BaseModel, ConfigDict, Field
+
+import optim
+import solver
+from service.cli import main
+from service.client.client import Client
+from service.client.embedded import EmbeddedService
+from service.db.models import JobState
+from service.errors import ConfigurationError, InvalidRequestError, ServiceProblem
+from service.http.app import create_app
+from service.jobs.kind_view import KindView, Told
+from service.jobs.kinds import SHIPPED
+from service.jobs.kinds.records import sweep_record
+from service.jobs.kinds.registry.loading import registry_of
+from service.jobs.kinds.registry.table import kinds_table, with_tables
+from service.jobs.kinds.scenes import FrequencyHz, HarmonicRequest, require, resolve_scene, resolved
+from service.jobs.kinds.sizes import balance_issues
+from service.jobs.parts import Part, PartOutput, Parts
+from service.jobs.registry import (
+    JobKind,
+    JobOutput,
+    OnProgress,
+    Resolved,
+    SceneSource,
+    ShouldStop,
+    SweepRecord,
+)
+from service.queue.core import Service
+from service.settings.settings import load_settings
+from solver.scene.scene import Scene
+
+ROOT = Path(__file__).parents[2]
+ENTRY = "test_a_kind:DISTORTION"
+BODY: dict[str, Any] = {"scene": "two-dof", "frequencies_hz": [0.9, 1.2], "harmonics": 5}
+MOST = 50
+
+# The kind ------------------------------------------------------------------------------------------------
+
+
+class DistortionRequest(HarmonicRequest):
+    """How much of a response is not in its first harmonic."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [BODY]})
+
+    frequencies_hz: Annotated[list[FrequencyHz], Field(min_length=1, max_length=MOST)] = Field(
+        description="Excitation frequencies [Hz]."
+    )
+    sweep: bool = Field(default=True, strict=True, description="Store the response between them too.")
+
+
+class DistortionResult(BaseModel):
+    """The distortion at each frequency."""
+
+    frequency_hz: list[float]
+    distortion: list[float]
+    worst: float
+
+
+def resolve(request: DistortionRequest, source: SceneSource) -> Resolved:
+    scene = resolve_scene(request, source)
+    require(balance_issues("/frequencies_hz", scene, request.harmonics, len(request.frequencies_hz)))
+    return resolved(
+        scene, frequencies_hz=request.frequencies_hz, sweep=request.sweep, harmonics=request.harmonics
+    )
+
+
+def split(spec: Mapping[str, Any]) -> list[Part]:
+    return [Part(spec={"frequency_hz": frequency}) for frequency in spec["frequencies_hz"]]
+
+
+def run_part(
+    spec: Mapping[str, Any], part: Mapping[str, Any], progress: OnProgress, _should_stop: ShouldStop
+) -> PartOutput:
+    found = distortion(Scene.from_dict(spec["scene"]), part["frequency_hz"], spec["harmonics"])
+    progress(1.0, 1)
+    return PartOutput(result={"value": found, "process": os.getpid()}, points=1)
+
+
+def distortion(scene: Scene, frequency_hz: float, harmonics: int) -> float:
+    heights = solver.solve(scene, frequency_hz=frequency_hz, harmonics=harmonics).to_json()["harmonics"]
+    return float(np.linalg.norm(heights[2:]) / np.linalg.norm(heights[1:]))
+
+
+def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutput:
+    values = [output.result["value"] for output in outputs.values()]
+    ends = (min(spec["frequencies_hz"]), max(spec["frequencies_hz"]))
+    sweeps: tuple[SweepRecord, ...] = ()
+    if spec["sweep"] and ends[0] < ends[1]:
+        scene = Scene.from_dict(spec["scene"])
+        sweeps = (
+            sweep_record(solver.sweep(scene, start=ends[0], stop=ends[1], harmonics=spec["harmonics"])),
+        )
+    result = {"frequency_hz": spec["frequencies_hz"], "distortion": values, "worst": max(values)}
+    return JobOutput(result=result, sweeps=sweeps)
+
+
+def tell(result: Mapping[str, Any]) -> Told:
+    found = zip(result["frequency_hz"], result["distortion"], strict=True)
+    pairs = [(f"{frequency:g} Hz", f"{100.0 * value:.3f} %") for frequency, value in found]
+    return Told(title="Distortion", pairs=pairs)
+
+
+def draw(result: Mapping[str, Any], _sweeps: object, _read: object) -> Any:
+    from matplotlib.figure import Figure
+
+    page = Figure()
+    page.subplots().plot(result["frequency_hz"], result["distortion"])
+    return page
+
+
+PARTS = Parts(split=split, run_part=run_part, join=join)
+DISTORTION = JobKind(
+    name="distortion",
+    summary="How much of a response is not in its first harmonic.",
+    request=DistortionRequest,
+    resolve=resolve,
+    run=PARTS.run,
+    parts=PARTS,
+    result=DistortionResult,
+    view=KindView(
+        result="the share of the higher harmonics",
+        sweeps="the one between the frequencies",
+        flags={"frequencies_hz": "--frequency"},
+        tell=tell,
+        draw=draw,
+    ),
+)
+
+# The tests -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A service with the kind, as whoever runs it starts it: by its environment."""
+    folder = tmp_path_factory.mktemp("kind")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    paths = [str(ROOT), str(ROOT / "tests"), str(Path(__file__).parent)]
+    environment = {**os.environ, "STICKSLIP_KINDS": json.dumps([ENTRY]), "PYTHONPATH": os.pathsep.join(paths)}
+    words = ("serve", "--port", str(port), "--database", f"sqlite:///{folder}/jobs.db", "--workers", "1")
+    with (folder / "log").open("w") as log:
+        process = subprocess.Popen([*COMMAND, *words], stderr=log, stdout=log, env=environment)
+        try:
+            address = f"http://127.0.0.1:{port}"
+            until(lambda: ready(address, process))
+            yield address
+        finally:
+            process.terminate()
+            status = process.wait(timeout=30)
+    assert status == 0, (folder / "log").read_text()
+
+
+def until(condition: Callable[[], bool], seconds: float = 120.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it did not come true"
+        time.sleep(0.05)
+
+
+def ready(address: str, process: subprocess.Popen[bytes]) -> bool:
+    assert process.poll() is None, "the service ended"
+    try:
+        return httpx.get(f"{address}/health/ready").status_code == 200
+    except httpx.TransportError:
+        return False
+
+
+@pytest.fixture
+def registered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command and the tests of this process know the kind as the service does."""
+    monkeypatch.setenv("STICKSLIP_KINDS", json.dumps([ENTRY]))
+
+
+def wanted(*frequencies: float) -> list[float]:
+    scene = solver.load_scene("two-dof")
+    return [distortion(scene, frequency, 5) for frequency in frequencies]
+
+
+def test_rest_computes_stores_and_lists_it(url: str) -> None:
+    with httpx.Client(base_url=url, timeout=60.0) as http:
+        answer = http.post("/v1/jobs", json={"kind": "distortion", **BODY}, headers={"Prefer": "wait=60"})
+        assert answer.status_code == 200, answer.text
+        job = answer.json()
+        assert job["result"]["distortion"] == pytest.approx(wanted(0.9, 1.2), rel=1e-9)
+        assert [one["id"] for one in http.get("/v1/jobs?kind=distortion").json()["items"]] == [job["id"]]
+        [stored] = http.get(f"/v1/sweeps?job={job['id']}").json()["items"]
+        assert (stored["from"], stored["to"], stored["harmonics"]) == (0.9, 1.2, 5)
+        again = http.post("/v1/jobs", json={"kind": "distortion", **BODY}).json()
+        assert again["result_of"] == job["id"]
+
+
+@pytest.mark.parametrize(
+    ("change", "pointer", "words"),
+    [
+        ({"frequencies_hz": [1.0, -2.0]}, "/frequencies_hz/1", ["greater than 0", "-2.0"]),
+        ({"frequencies_hz": []}, "/frequencies_hz", ["at least 1"]),
+        ({"frequencies_hz": None}, "/frequencies_hz", ["list", "None"]),
+        ({"sweep": "yes"}, "/sweep", ["true or false", "'yes'"]),
+        ({"colour": 1}, "/colour", ["known key"]),
+        ({"scene": "none"}, "/scene", ["'none'"]),
+        ({"kind": "distorsion"}, "/kind", ["distortion", "'distorsion'"]),
+    ],
+)
+def test_a_refusal_names_field_value_and_what_is_right(
+    url: str, change: dict[str, Any], pointer: str, words: list[str]
+) -> None:
+    answer = httpx.post(f"{url}/v1/jobs", json={"kind": "distortion", **BODY, **change})
+    assert answer.status_code == 422
+    [error] = answer.json()["errors"]
+    assert error["pointer"] == pointer
+    assert [word for word in words if word not in error["detail"]] == []
+
+
+def test_the_client_submits_follows_and_reads_it(url: str) -> None:
+    with Client(url) as client:
+        job = client.submit({"kind": "distortion", **BODY, "frequencies_hz": [1.1], "fresh": True})
+        assert client.wait(job.id).status is JobState.SUCCESSFUL
+        assert client.results(job.id).result["worst"] == pytest.approx(wanted(1.1)[0], rel=1e-9)
+        with pytest.raises(ServiceProblem, match="frequencies_hz"):
+            client.submit({"kind": "distortion", "scene": "two-dof"})
+
+
+@pytest.mark.usefixtures("registered")
+def test_the_command_submits_prints_and_draws_it(
+    url: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("STICKSLIP_URL", url)
+    words = "submit distortion two-dof --frequency 0.9 --frequency 1.2 --set damper.N0=80 --harmonics 5"
+    words += " --no-sweep"
+    assert main([*words.split(), "--wait"]) == 0
+    scene = solver.load_scene("two-dof").with_values({"damper.N0": 80.0})
+    shown = capsys.readouterr().out
+    assert "Distortion" in shown
+    assert f"{100.0 * distortion(scene, 1.2, 5):.3f} %" in shown
+    assert main([*words.split(), "--fresh", "--json"]) == 0
+    job = json.loads(capsys.readouterr().out)
+    assert job["request"]["fresh"] is True
+    assert job["request"]["sweep"] is False
+    assert job["result_of"] is None
+    assert main(["watch", job["id"]]) == 0
+    assert main(["results", job["id"], "--plot", str(tmp_path / "one.png")]) == 0
+    assert (tmp_path / "one.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["submit", "distortion", "two-dof", "--frequency", "inf"]) == 2
+    assert "--frequency" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("registered")
+def test_the_command_says_what_it_takes(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["submit", "--help"]) == 0
+    assert f"distortion  {DISTORTION.summary}" in capsys.readouterr().out
+    assert main(["submit", "distortion", "--help"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    for words in (
+        "--frequency X Excitation frequencies [Hz]. Repeatable. [required]",
+        "--no-sweep",
+        "--wait",
+    ):
+        assert words in shown
+    assert main(["schema", "job"]) == 0
+    kinds = json.loads(capsys.readouterr().out)["oneOf"]
+    assert "distortion" in [kind["properties"]["kind"]["const"] for kind in kinds]
+
+
+def test_the_command_prints_what_it_does_not_know(
+    url: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A client of a service with kinds that its own machine has not."""
+    with Client(url) as client:
+        job = client.wait(client.submit({"kind": "distortion", **BODY}).id)
+    monkeypatch.setenv("STICKSLIP_URL", url)
+    assert main(["results", job.id]) == 0
+    shown = capsys.readouterr().out
+    assert re.search(rf"worst\s+{max(wanted(0.9, 1.2)):.6g}", shown)
+
+
+def test_the_description_of_the_api_has_body_and_result(url: str) -> None:
+    with httpx.Client(base_url=url, timeout=60.0) as http:
+        described = http.get("/openapi.json").json()
+        content = described["paths"]["/v1/jobs"]["post"]["requestBody"]["content"]["application/json"]
+        [mine] = [
+            one for one in content["schema"]["oneOf"] if one["properties"]["kind"]["const"] == "distortion"
+        ]
+        assert mine["properties"]["frequencies_hz"]["maxItems"] == MOST
+        assert mine["required"] == ["kind", "scene", "frequencies_hz"]
+        assert content["examples"]["distortion"]["value"] == {"kind": "distortion", **BODY}
+        result = described["components"]["schemas"]["DistortionResult"]
+        assert set(result["properties"]) == {"frequency_hz", "distortion", "worst"}
+        choices = described["components"]["schemas"]["ResultsAnswer"]["properties"]["result"]["anyOf"]
+        assert {"$ref": "#/components/schemas/DistortionResult"} in choices
+        assert http.get("/docs").text.count("distortion") > 1
+
+
+def test_every_kind_is_listed_with_its_schemas(url: str) -> None:
+    kinds = {one["name"]: one for one in httpx.get(f"{url}/v1/kinds").json()["items"]}
+    assert list(kinds) == [*(kind.name for kind in SHIPPED), "distortion"]
+    mine = kinds["distortion"]
+    assert mine["summary"] == DISTORTION.summary
+    assert mine["body"]["properties"]["kind"]["const"] == "distortion"
+    assert set(mine["result"]["properties"]) == {"frequency_hz", "distortion", "worst"}
+    for kind in kinds.values():
+        for example in kind["body"]["examples"]:
+            Draft202012Validator(kind["body"]).validate(example)
+
+
+def test_the_check_of_the_documentation_sees_it() -> None:
+    registry = registry_of([ENTRY])
+    page = (ROOT / "docs" / "jobs.md").read_text("utf-8")
+    assert with_tables(page, SHIPPED) == page
+    longer = with_tables(page, registry)
+    row = (
+        "| `distortion` | **`frequencies_hz`**, `sweep` | the share of the higher harmonics | the one between"
+    )
+    assert row in longer
+    assert "| `map`, `mistuning`, `distortion` | computes the parts that are missing" in longer
+
+
+def test_an_embedded_service_has_it_and_one_without_it_keeps_what_was_stored(tmp_path: Path) -> None:
+    database = {"database": f"sqlite:///{tmp_path}/jobs.db", "workers": 1}
+    with EmbeddedService(load_settings(**database, kinds=(ENTRY,))) as service:
+        job = service.submit("distortion", BODY)
+        assert service.wait(job).status is JobState.SUCCESSFUL
+        known = service.results(job).result
+    with EmbeddedService(load_settings(**database)) as service:
+        assert service.results(job).result == known
+        assert service.job(job).kind == "distortion"
+        with pytest.raises(InvalidRequestError, match="`kind` must be one of sweep"):
+            service.submit("distortion", BODY)
+
+
+def test_a_service_without_the_kind_fails_its_jobs_and_says_why(tmp_path: Path) -> None:
+    database = {"database": f"sqlite:///{tmp_path}/jobs.db", "workers": 1}
+    waiting = Service(load_settings(**database, kinds=(ENTRY,)))
+    waiting.open()
+    row, _ = waiting.submit({"kind": "distortion", **BODY})
+    waiting.database.close()
+    with EmbeddedService(load_settings(**database)) as service:
+        ended = service.wait(row.id, timeout=60.0)
+    assert ended.status is JobState.FAILED
+    assert ended.error is not None
+    assert "STICKSLIP_KINDS" in ended.error["detail"]
+
+
+NOT_A_KIND = {"name": "none"}
+TAKEN = [JobKind(name="sweep", summary="", request=DistortionRequest, resolve=resolve, run=PARTS.run)]
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ("no_such_module:KIND", ["no_such_module", "cannot be imported"]),
+        ("test_a_kind:MISSING", ["MISSING"]),
+        ("test_a_kind:NOT_A_KIND", ["JobKind", "dict"]),
+        ("test_a_kind:TAKEN", ["'sweep'", "the service itself"]),
+        ("test_a_kind", ["module:NAME", "'test_a_kind'"]),
+        ("os.system('true'):x", ["module:NAME"]),
+    ],
+)
+def test_a_wrong_entry_is_refused_when_the_service_starts(
+    entry: str, words: list[str], tmp_path: Path
+) -> None:
+    settings = load_settings(database=f"sqlite:///{tmp_path}/jobs.db", kinds=(entry,))
+    with pytest.raises(ConfigurationError) as refused:
+        create_app(settings)
+    assert [word for word in words if word not in str(refused.value)] == []
+
+
+def test_the_recipe_works_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The file that CONTRIBUTING.md has for a kind, and the row of the table it promises."""
+    recipe = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    [code] = re.findall(r"^```python\n(.*?)^```$", recipe, re.DOTALL | re.MULTILINE)
+    (tmp_path / "a_recipe.py").write_text(code, "utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    kinds = ("a_recipe:SENSITIVITIES",)
+    [row] = re.findall(r"^\+(\| `sensitivities` .*)$", recipe, re.MULTILINE)
+    assert row in kinds_table(registry_of(kinds)).splitlines()
+    settings = load_settings(database=f"sqlite:///{tmp_path}/jobs.db", workers=1, kinds=kinds)
+    with EmbeddedService(settings) as service:
+        [example] = registry_of(kinds)["sensitivities"].request.model_json_schema()["examples"]
+        job = service.wait(service.submit("sensitivities", example))
+        answer = service.results(job.id)
+    assert job.status is JobState.SUCCESSFUL, job.error
+    wanted = optim.sensitivities(solver.load_scene("two-dof"), harmonics=5).to_json()
+    assert answer.result["rows"] == wanted["rows"]
+    assert [sweep.peak.value for sweep in answer.sweeps if sweep.peak] == [answer.result["peaks"][0]["value"]]
+
+
+@pytest.mark.parametrize("name", ["", "Sweep", "a b", "1st", "x" * 33])
+def test_a_kind_has_a_name_that_fits(name: str) -> None:
+    with pytest.raises(ValueError, match="small letters"):
+        JobKind(name=name, summary="", request=DistortionRequest, resolve=resolve, run=PARTS.run)

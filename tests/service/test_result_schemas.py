@@ -1,0 +1,74 @@
+"""Every kind says what its result is: what it computes has these keys and no others."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pytest
+
+import solver
+from service.jobs.kinds import SHIPPED
+from service.jobs.registry import Point
+from service.jobs.validation import validated
+
+TWO = {"scene": "two-dof", "harmonics": 3}
+OVER = {**TWO, "parameter": "damper.N0", "from": 60, "to": 90}
+MARCH = {"scene": "two-dof", "frequency_hz": 1.2}
+BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
+    "solve": ("solve", {**TWO, "frequency_hz": 1.2}),
+    "sweep": ("sweep", TWO),
+    "map": ("map", {**OVER, "steps": 3, "frequencies": 5}),
+    "map without a ridge": ("map", {**OVER, "steps": 3, "frequencies": 5, "ridge": False}),
+    "peaks": ("peaks", {**OVER, "checks": 1}),
+    "campbell": ("campbell", {**TWO, "speeds_rpm": [[60, 100]]}),
+    "mistuning": (
+        "mistuning",
+        {"scene": "bladed-disk", "of": "tip", "samples": 2, "harmonics": 1, "from": 740, "to": 780},
+    ),
+    "design": ("design", TWO),
+    "a design that misses its goal": ("design", {**TWO, "limit": 1.0, "max_band_hz": 1e-6}),
+    "robust design": ("design", {**TWO, "uncertain": {"damper.mu": [0.28, 0.32]}, "samples": 3}),
+    "pareto": ("pareto", {**TWO, "points": 3, "limit": 2.0}),
+    "accuracy": (
+        "accuracy",
+        {"scene": "two-dof", "frequency_hz": 1.2, "harmonics": [1, 3], "samples": [16], "repeats": 1},
+    ),
+    "march": ("march", {**MARCH, "history": True}),
+    "a march that does not settle": ("march", {**MARCH, "max_periods": 1}),
+}
+SOMETIMES = {"mean_range", "history"}
+
+
+class Shipped:
+    """The shipped scenes, without a database."""
+
+    def scene_body(self, name: str) -> Mapping[str, object] | None:
+        return solver.load_scene(name).to_dict() if name in solver.shipped_scenes() else None
+
+    def with_uploads(self, body: Mapping[str, object]) -> Mapping[str, object]:
+        return body
+
+
+class Silent:
+    def __call__(self, fraction: float, points: int) -> None: ...
+
+    def found(self, points: Sequence[Point]) -> None: ...
+
+
+@pytest.mark.parametrize("case", BODIES)
+def test_a_result_is_what_its_schema_says(case: str) -> None:
+    name, body = BODIES[case]
+    kind = SHIPPED[name]
+    assert kind.result is not None
+    spec = kind.resolve(validated(kind.request, body), Shipped()).spec
+    result = json.loads(json.dumps(kind.run(spec, Silent(), lambda: False).result))
+    checked = kind.result.model_validate(result)
+    told = getattr(checked, "root", checked)
+    assert set(result) - set(type(told).model_fields) == set(), "keys without a schema"
+    assert set(type(told).model_fields) - set(result) <= SOMETIMES, "keys that are not there"
+
+
+def test_every_kind_is_among_them() -> None:
+    assert {name for name, _ in BODIES.values()} == {kind.name for kind in SHIPPED}
