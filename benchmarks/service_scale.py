@@ -30,7 +30,7 @@ from service.db.models import Job, JobResult, JobState
 from service.db.repositories import Attempt
 from service.jobs.checkpoints import Checkpoints
 from service.jobs.kinds import SHIPPED
-from service.jobs.registry import JobOutput
+from service.jobs.outputs import JobOutput
 from service.queue.core import Service
 from service.queue.queue import JobQueue
 from service.settings.settings import load_settings

@@ -28,8 +28,9 @@ if TYPE_CHECKING:
     from solver.response.wear import ContactWear, Measured, WearSensitivity, contact_wear
     from solver.response.wear_nonsmooth import worst_slopes
     from solver.response.worst_wear import Measure, WorstWear, worst_friction_work, worst_wear
-    from solver.results.base import Shown, Summary, progress_bar
+    from solver.results.base import Shown, progress_bar
     from solver.results.dataset import Dataset, Variable
+    from solver.results.told import Summary
     from solver.scene.annulus import Extent, annulus, sectors_needed
     from solver.scene.scene import Scene, load_scene, shipped_scenes
     from solver.sensitivity.gradient import Gradient, Sensitivities

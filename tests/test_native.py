@@ -14,8 +14,9 @@ from matplotlib.figure import Figure
 
 import optim
 import solver
-from solver.results.base import Piece, Shown, Told
+from solver.results.base import Shown
 from solver.results.dataset import Dataset
+from solver.results.told import Piece, Told
 from solver.views.io import SUFFIXES
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from solver.continuation.certificate import unsettled
 from solver.results import units
-from solver.results.base import Summary
+from solver.results.told import Summary
 from solver.views.summary import Pairs, made
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.errors import DatabaseError
-from service.jobs.registry import StoredArray
+from service.jobs.outputs import StoredArray
 
 
 def encode(array: NDArray[Any]) -> StoredArray:

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from service.jobs.outputs import JobOutput, Pace, Piece, Progress, Run, ShouldStop, StoredArray
 from service.jobs.parts import PartOutput, Parts
-from service.jobs.registry import JobOutput, Pace, Piece, Progress, Run, ShouldStop, StoredArray
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

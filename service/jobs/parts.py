@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from service.jobs.registry import JobOutput, OnProgress, ShouldStop, StoredArray
+from service.jobs.outputs import JobOutput, OnProgress, ShouldStop, StoredArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -34,7 +34,8 @@ from service.errors import ConflictError, InvalidRequestError, JobFailedError, N
 from service.jobs.kinds.registry.bodies import KIND
 from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.kinds.sizes import work_limited
-from service.jobs.registry import JobKind, JobRequest, OnProgress, Registry
+from service.jobs.outputs import OnProgress
+from service.jobs.registry import JobKind, JobRequest, Registry
 from service.jobs.strict_json import digest
 from service.jobs.validation import validated
 from service.queue.queue import JobQueue

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 from service.db.repositories import Attempt, JobRepository
-from service.jobs.registry import FailureKind, JobFailure, JobOutput, Piece, Point
+from service.jobs.outputs import FailureKind, JobFailure, JobOutput, Piece, Point
 from service.queue.subscriptions import Waiters
 from service.settings import logs
 from service.settings.settings import Settings

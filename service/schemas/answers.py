@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from service.db.models import JobState
 from service.db.repositories import DesignRepository, DesignRow, JobRow, SweepRepository, SweepRow
 from service.jobs.arrays import decode
-from service.jobs.registry import ContactValues, VariableValues
+from service.jobs.outputs import ContactValues, VariableValues
 from service.queue.scene_store import KnownScene
 
 if TYPE_CHECKING:

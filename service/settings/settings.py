@@ -14,7 +14,7 @@ from sqlalchemy.exc import ArgumentError
 from service.db.engine import CONNECTIONS
 from service.db.postgresql import DRIVER
 from service.errors import ConfigurationError
-from service.jobs.registry import Pace
+from service.jobs.outputs import Pace
 
 _LOOPBACK_NAMES = ("localhost",)
 

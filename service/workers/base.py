@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from service.db.repositories import Attempt
-from service.jobs.registry import JobFailure, JobOutput, Piece, Point
+from service.jobs.outputs import JobFailure, JobOutput, Piece, Point
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,8 @@ from ctypes import Array
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
-from service.jobs.registry import Pace, RunOn, WarmUp
+from service.jobs.outputs import Pace
+from service.jobs.registry import RunOn, WarmUp
 from service.workers.worker import THREAD_LIMITS, Orders, main
 
 _environment_lock = threading.Lock()

@@ -21,7 +21,8 @@ from distributed import Future, KilledWorker, Security
 
 from service.db.repositories import Attempt
 from service.errors import UnknownKindError
-from service.jobs.registry import JobKind, Pace, Registry
+from service.jobs.outputs import Pace
+from service.jobs.registry import JobKind, Registry
 from service.workers.base import ExecutorStatus, Failed, Lost, Outcome, Sink, Stopped
 from service.workers.cluster import Cluster, answer_of
 from service.workers.tasks import Answer, Order

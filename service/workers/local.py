@@ -7,7 +7,8 @@ import time
 from collections.abc import Mapping
 
 from service.db.repositories import Attempt
-from service.jobs.registry import Pace, RunOn, WarmUp
+from service.jobs.outputs import Pace
+from service.jobs.registry import RunOn, WarmUp
 from service.workers.base import ExecutorStatus, Sink, Stopped
 from service.workers.slot import Slot
 

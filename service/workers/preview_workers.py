@@ -18,7 +18,8 @@ from service.db.repositories import Attempt
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, PreviewError, QueueFullError
 from service.jobs.ids import new_id
 from service.jobs.kinds.previews import PREVIEWS
-from service.jobs.registry import FailureKind, Pace, Piece, Point, Registry
+from service.jobs.outputs import FailureKind, Pace, Piece, Point
+from service.jobs.registry import Registry
 from service.workers.base import Failed, Finished, Lost, Outcome
 from service.workers.local import LocalExecutor
 from solver.errors import Issue

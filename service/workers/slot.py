@@ -17,7 +17,8 @@ from typing import Protocol
 
 from service.db.repositories import Attempt
 from service.jobs.checkpoints import Kept
-from service.jobs.registry import Pace, RunOn, WarmUp
+from service.jobs.outputs import Pace
+from service.jobs.registry import RunOn, WarmUp
 from service.workers.base import Failed, Finished, Lost, Outcome, Sink, Stopped
 from service.workers.child import Child, death
 from service.workers.worker import Done, Ready, Reply, Task

@@ -19,8 +19,9 @@ from typing import Any
 from distributed import Status, Worker, get_worker
 
 from service.jobs.checkpoints import Checkpoints, Kept
+from service.jobs.outputs import JobFailure, JobOutput, Pace, Piece
 from service.jobs.parts import PartOutput, RunPart
-from service.jobs.registry import JobFailure, JobOutput, Pace, Piece, RunOn, WarmUp
+from service.jobs.registry import RunOn, WarmUp
 from service.workers.worker import THREAD_LIMITS, Report, Task, Throttle, checked, failure_of
 
 TOPIC = "stickslip"

@@ -11,8 +11,8 @@ from distributed import Future
 
 from service.db.repositories import Attempt
 from service.jobs.checkpoints import Checkpoints, Kept, keep_part, known_parts
+from service.jobs.outputs import JobOutput, OnProgress, Pace
 from service.jobs.parts import Account, Part, PartOutput, Parts, final_one
-from service.jobs.registry import JobOutput, OnProgress, Pace
 from service.workers.base import Finished, Outcome, Sink
 from service.workers.worker import Report, Throttle, checked
 

@@ -26,7 +26,8 @@ from optim.errors import DesignError
 from service.errors import UnknownKindError
 from service.jobs import strict_json
 from service.jobs.checkpoints import Checkpoints, Kept
-from service.jobs.registry import FailureKind, JobFailure, JobOutput, Pace, Piece, Point, RunOn, WarmUp
+from service.jobs.outputs import FailureKind, JobFailure, JobOutput, Pace, Piece, Point
+from service.jobs.registry import RunOn, WarmUp
 from service.settings import logs
 from solver.errors import SceneError, SettingError, SolverError
 

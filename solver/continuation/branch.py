@@ -15,7 +15,8 @@ from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN, RESIDUAL, S
 from solver.continuation.certificate import PeakCertificate
 from solver.continuation.kernels.state import FINISHED, LEFT_RANGE, NO_START, STALLED
 from solver.jit.fourier import Integer, Real
-from solver.results.base import Drawn, Piece
+from solver.results.base import Drawn
+from solver.results.told import Piece
 from solver.results.views import Views, on_demand
 
 if TYPE_CHECKING:

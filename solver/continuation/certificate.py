@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from solver.results.base import Piece
+from solver.results.told import Piece
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

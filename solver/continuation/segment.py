@@ -20,7 +20,7 @@ from solver.continuation.kernels.state import COUNT, ITERATIONS, Control, P, Wal
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.linear.kernels.receptance import receptance
-from solver.results.base import Piece
+from solver.results.told import Piece
 
 _ENDINGS = tuple(BranchStatus)
 _NUMBERS = 12

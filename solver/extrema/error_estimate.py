@@ -23,7 +23,7 @@ from solver.contacts.kernels.system import (
 from solver.continuation.branch import Branch
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
-from solver.results.base import Piece
+from solver.results.told import Piece
 from solver.scene.harmonics import MULTIPLES, is_fast
 
 # Harmonics looked at beyond those kept, for a solution with H of them: H + max(H, 8).

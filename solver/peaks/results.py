@@ -12,7 +12,8 @@ from solver.continuation.branch import Branch
 from solver.continuation.certificate import unsettled
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.results.base import Drawn, Piece, Shown
+from solver.results.base import Drawn, Shown
+from solver.results.told import Piece
 from solver.results.views import Views
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from solver.contacts.kernels.columns import CLOSED, DEFORMING, TOUCHING
 from solver.contacts.kernels.stick_slip_events import LIFTING, SEPARATED, SLIPPING, STUCK
 from solver.jit import fourier
 from solver.jit.fourier import Real
-from solver.results.base import Piece
+from solver.results.told import Piece
 from solver.scene.scene import AnyContact, ElasticNormalContact, FrictionContact, PlanarContact
 
 

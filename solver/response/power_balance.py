@@ -14,7 +14,7 @@ from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.response.solve import Solution
 from solver.response.time_history import coordinates, matrices
-from solver.results.base import Piece
+from solver.results.told import Piece
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

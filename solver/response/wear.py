@@ -28,7 +28,7 @@ from solver.linear.contact_table import DEFAULT_SAMPLES
 from solver.linear.kernels.receptance import receptance
 from solver.response.solve import Solution
 from solver.response.wear_measures import Change, Cycle, friction_work, least_load, slip_travel
-from solver.results.base import Piece
+from solver.results.told import Piece
 from solver.scene.validation import listing
 
 

@@ -32,7 +32,7 @@ from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
 from solver.response.wear import contact_index
 from solver.response.wear_measures import Change, Cycle, friction_work, least_load, slip_travel
-from solver.results.base import Piece
+from solver.results.told import Piece
 
 # Maxima below this share of the highest cannot lead within one step of an optimiser.
 COMPETES = 0.6

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.errors import MissingExtraError
-from solver.results.base import Piece, Summary
+from solver.results.told import Piece, Summary
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from solver.errors import SettingError
-from solver.results.base import Piece
+from solver.results.told import Piece
 from solver.scene.scene import (
     AnyContact,
     ContactOfAnyLaw,

@@ -27,7 +27,7 @@ from solver.contacts.kernels.laws import law_force
 from solver.contacts.kernels.system import KT, MU, N0, N1, PHASE, evaluation_by_value
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real, cosine_position
-from solver.results.base import Piece
+from solver.results.told import Piece
 from solver.sensitivity.hessian import (
     Adjoint,
     AmplitudeHessian,

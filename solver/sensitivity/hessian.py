@@ -23,7 +23,7 @@ from solver.balance.contact_hessian import ContactForces, second_forces, second_
 from solver.balance.dynamic_stiffness import WholeMotion, times, times_transposed
 from solver.contacts.kernels.system import KT, MU
 from solver.jit.fourier import Complex, Integer, Real
-from solver.results.base import Piece
+from solver.results.told import Piece
 
 STATIONARY = 1e-10  # largest share of a peak's height that a solution may lie below it
 

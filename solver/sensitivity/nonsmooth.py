@@ -23,7 +23,7 @@ import numpy as np
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Peak
 from solver.jit.fourier import Real
-from solver.results.base import Piece
+from solver.results.told import Piece
 from solver.sensitivity.gradient import Gradient, Sensitivities
 
 SMOOTH = 1e-6  # slope da/dω · ω/a below which a peak is a smooth maximum

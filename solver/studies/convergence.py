@@ -20,7 +20,8 @@ from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.extrema.error_estimate import truncation_error
 from solver.jit.fourier import Real
-from solver.results.base import Drawn, Piece
+from solver.results.base import Drawn
+from solver.results.told import Piece
 from solver.results.views import Views
 from solver.scene.harmonics import kept_harmonics
 from solver.scene.scene import Scene

@@ -18,7 +18,8 @@ import numpy as np
 from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.results.base import Drawn, Piece
+from solver.results.base import Drawn
+from solver.results.told import Piece
 from solver.results.views import Views
 from solver.scene.parts import Mistuning
 from solver.scene.scene import CyclicStructure, Scene

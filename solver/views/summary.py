@@ -9,8 +9,8 @@ import numpy as np
 
 from solver.continuation.branch import BranchStatus
 from solver.results import units
-from solver.results.base import Summary
 from solver.results.notes import BAND_OPEN, between_points, flag_words
+from solver.results.told import Summary
 
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch

@@ -38,16 +38,9 @@ from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.kinds.registry.table import kinds_table, with_tables
 from service.jobs.kinds.scenes import FrequencyHz, HarmonicRequest, require, resolve_scene, resolved
 from service.jobs.kinds.sizes import balance_issues
+from service.jobs.outputs import JobOutput, OnProgress, ShouldStop, SweepRecord
 from service.jobs.parts import Part, PartOutput, Parts
-from service.jobs.registry import (
-    JobKind,
-    JobOutput,
-    OnProgress,
-    Resolved,
-    SceneSource,
-    ShouldStop,
-    SweepRecord,
-)
+from service.jobs.registry import JobKind, Resolved, SceneSource
 from service.queue.core import Service
 from service.settings.settings import load_settings
 from solver.scene.scene import Scene

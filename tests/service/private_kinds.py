@@ -16,17 +16,8 @@ from service.jobs.arrays import encode
 from service.jobs.checkpoints import Checkpoints, RunParts
 from service.jobs.kinds import sweep
 from service.jobs.kinds.map import MAP
-from service.jobs.registry import (
-    ContactValues,
-    JobKind,
-    JobOutput,
-    JobRequest,
-    Progress,
-    Registry,
-    Resolved,
-    ShouldStop,
-    SweepRecord,
-)
+from service.jobs.outputs import ContactValues, JobOutput, Progress, ShouldStop, SweepRecord
+from service.jobs.registry import JobKind, JobRequest, Registry, Resolved
 from solver.errors import Issue, SceneError, SettingError
 
 

@@ -27,8 +27,8 @@ from service.db.repositories import Attempt, JobRepository, NewJob
 from service.jobs.arrays import decode
 from service.jobs.checkpoints import Checkpoints, Kept, UnusableError, packed, unpacked
 from service.jobs.kinds import SHIPPED
+from service.jobs.outputs import FailureKind, JobFailure, JobOutput, Pace, Piece, ShouldStop
 from service.jobs.parts import PartStoppedError
-from service.jobs.registry import FailureKind, JobFailure, JobOutput, Pace, Piece, ShouldStop
 from service.queue.core import Service
 
 DISK = solver.annulus(solver.load_scene("bladed-disk")).to_dict()

@@ -27,7 +27,7 @@ from service.db.repositories import Attempt, JobRepository, SceneRepository
 from service.errors import DatabaseError, DatabaseInUseError, WrongRevisionError
 from service.jobs.arrays import decode, encode
 from service.jobs.ids import new_id
-from service.jobs.registry import FailureKind, JobFailure, JobOutput, StoredArray
+from service.jobs.outputs import FailureKind, JobFailure, JobOutput, StoredArray
 from service.queue.core import Service
 
 

@@ -29,7 +29,7 @@ from service.db.repositories.designs import insert_design
 from service.errors import InvalidRequestError
 from service.jobs.ids import new_id
 from service.jobs.kinds.records import design_record
-from service.jobs.registry import DesignRecord, VariableValues
+from service.jobs.outputs import DesignRecord, VariableValues
 from service.jobs.validation import validated
 from service.schemas.answers import DesignDetail
 from service.schemas.design_queries import DesignQuery, design_page

@@ -14,7 +14,7 @@ from private_kinds import PRIVATE, IterationRequest, as_it_is
 from service_helpers import pids, until
 
 from service.db.repositories import Attempt
-from service.jobs.registry import Piece, Point
+from service.jobs.outputs import Piece, Point
 from service.settings.settings import load_settings
 from service.workers.base import Finished, Lost, Outcome, Stopped
 from service.workers.local import LocalExecutor

@@ -16,7 +16,7 @@ from service.db.engine import Database
 from service.db.models import Job, JobState, Scene
 from service.db.repositories import JobRepository
 from service.errors import QueueFullError
-from service.jobs.registry import JobOutput
+from service.jobs.outputs import JobOutput
 
 
 def scene(connection: Connection, name: str) -> str:

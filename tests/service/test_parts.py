@@ -14,8 +14,9 @@ import pytest
 import solver
 from service.jobs.arrays import decode
 from service.jobs.kinds import SHIPPED
+from service.jobs.outputs import JobOutput
 from service.jobs.parts import Account, Part, PartOutput, Parts, PartStoppedError, final_one
-from service.jobs.registry import JobKind, JobOutput
+from service.jobs.registry import JobKind
 
 DISK: dict[str, Any] = dict(solver.load_scene("bladed-disk").to_dict())
 DISK["structure"] = {**DISK["structure"], "sectors": 3}

@@ -27,7 +27,7 @@ from service.db.engine import Database
 from service.db.models import Job, JobState
 from service.db.repositories import JobRepository, NewJob
 from service.errors import DatabaseError, DatabaseInUseError, ServiceProblem
-from service.jobs.registry import JobOutput
+from service.jobs.outputs import JobOutput
 from service.queue.core import Service
 from service.queue.health import check
 

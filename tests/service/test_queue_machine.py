@@ -31,7 +31,7 @@ from service.db.engine import Database
 from service.db.models import Job, JobResult, JobState
 from service.db.repositories import Attempt, JobRepository, NewJob, job_statements
 from service.errors import IdempotencyError, QueueFullError
-from service.jobs.registry import FailureKind, JobFailure, JobOutput
+from service.jobs.outputs import FailureKind, JobFailure, JobOutput
 
 LEASE = timedelta(seconds=60)
 ROOM = 4

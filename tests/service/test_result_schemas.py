@@ -10,7 +10,7 @@ import pytest
 
 import solver
 from service.jobs.kinds import SHIPPED
-from service.jobs.registry import Point
+from service.jobs.outputs import Point
 from service.jobs.validation import validated
 
 TWO = {"scene": "two-dof", "harmonics": 3}

@@ -23,7 +23,7 @@ from service.db.repositories import JobRepository, UploadRepository
 from service.db.repositories.retention import Pruned, RetentionRepository
 from service.errors import DatabaseError
 from service.jobs.arrays import encode
-from service.jobs.registry import DesignRecord, JobOutput, SweepRecord
+from service.jobs.outputs import DesignRecord, JobOutput, SweepRecord
 from service.queue.pruning import prune_database
 from service.queue.retention import prune, prune_uploads
 

@@ -24,7 +24,7 @@ from service.db.models import Job, JobResult, JobState
 from service.db.repositories.designs import insert_design
 from service.http.routes import page
 from service.jobs.ids import new_id
-from service.jobs.registry import DesignRecord
+from service.jobs.outputs import DesignRecord
 from solver.scene.scene import load_scene
 
 ROLES = ("none", "wrong", "another", "revoked", "expired", "read", "submit", "admin")

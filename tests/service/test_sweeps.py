@@ -18,7 +18,7 @@ from service.db.repositories import JobRepository, NewJob, SweepRepository
 from service.db.repositories.sweeps import insert_sweeps
 from service.errors import InvalidRequestError
 from service.jobs.arrays import encode
-from service.jobs.registry import ContactValues, JobOutput, SweepRecord
+from service.jobs.outputs import ContactValues, JobOutput, SweepRecord
 from service.jobs.validation import validated
 from service.schemas.answers import SweepDetail
 from service.schemas.sweep_queries import SweepQuery, sweep_page

@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, Connection, bindparam, case, delete, inser
 from service.db.engine import Database
 from service.db.models import Checkpoint, Job
 from service.db.repositories.rows import Attempt
-from service.jobs.registry import Piece
+from service.jobs.outputs import Piece
 
 # Built once: it goes with the end of every job.
 _DROP = delete(Checkpoint).where(Checkpoint.job_id == bindparam("job"))

@@ -22,7 +22,7 @@ from service.db.repositories.pagination import (
     within,
 )
 from service.db.repositories.rows import DesignRow
-from service.jobs.registry import DesignRecord, VariableValues
+from service.jobs.outputs import DesignRecord, VariableValues
 
 __all__ = ["DESIGN_SORTS", "DesignFilter", "DesignRepository", "DesignRow", "insert_design"]
 

@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, Engine, Select, and_, exists, func, select, text
 
 from service.db.models import Job, JobResult, JobState, Sweep, SweepArray
-from service.jobs.registry import StoredArray
+from service.jobs.outputs import StoredArray
 
 # A job that ends as `successful` wrote its result with the same transaction, unless it repeats another's.
 # One that failed may have kept what it computed short of its goal.

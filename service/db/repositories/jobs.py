@@ -29,7 +29,7 @@ from service.db.repositories.rows import Attempt, JobRow, NewJob, Recovered
 from service.db.repositories.sweeps import insert_sweeps
 from service.errors import IdempotencyError
 from service.jobs.ids import new_id
-from service.jobs.registry import JobFailure, JobOutput, Piece
+from service.jobs.outputs import JobFailure, JobOutput, Piece
 
 __all__ = ["Attempt", "JobRepository", "JobRow", "NewJob", "Recovered"]
 

@@ -11,7 +11,7 @@ from sqlalchemy import ColumnElement, Connection, select, update
 from service.db.models import Job, JobState
 from service.db.repositories.checkpoints import as_far_as_kept, drop_checkpoint
 from service.db.repositories.rows import Recovered
-from service.jobs.registry import FailureKind, JobFailure
+from service.jobs.outputs import FailureKind, JobFailure
 
 FREE: dict[str, Any] = {"lease_owner": None, "lease_until": None}
 

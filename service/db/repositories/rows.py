@@ -7,7 +7,7 @@ from datetime import datetime
 from typing import Any
 
 from service.db.models import NOBODY, JobState
-from service.jobs.registry import DesignValues, Piece, SweepValues
+from service.jobs.outputs import DesignValues, Piece, SweepValues
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,7 +23,7 @@ from service.db.repositories.pagination import (
 )
 from service.db.repositories.rows import SweepRow
 from service.jobs.ids import new_id
-from service.jobs.registry import ContactValues, StoredArray, SweepRecord
+from service.jobs.outputs import ContactValues, StoredArray, SweepRecord
 
 __all__ = ["SWEEP_SORTS", "SweepFilter", "SweepRepository", "SweepRow", "insert_sweeps"]
 

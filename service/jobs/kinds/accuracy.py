@@ -22,7 +22,8 @@ from service.jobs.kinds.scenes import (
     resolve_scene,
     resolved,
 )
-from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from service.jobs.outputs import JobOutput, Progress, ShouldStop
+from service.jobs.registry import JobKind, Resolved, SceneSource
 from service.jobs.strict_json import pointer
 from solver.scene.scene import Scene
 

@@ -16,7 +16,8 @@ from service.jobs.kinds.registry.results import Amplitude, PeakAt, ReachedResult
 from service.jobs.kinds.scenes import FrequencyHz, refusal, require, resolve_scene, resolved
 from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kinds.uncertain import Uncertain
-from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from service.jobs.outputs import JobOutput, Progress, ShouldStop
+from service.jobs.registry import JobKind, Resolved, SceneSource
 from service.jobs.strict_json import pointer
 from solver.errors import Issue
 from solver.scene.scene import Scene

@@ -17,8 +17,9 @@ from service.jobs.kinds.records import packed, sweep_records, unpacked
 from service.jobs.kinds.registry.results import Curve, EndedResult
 from service.jobs.kinds.scenes import refusal, require, resolve_scene, resolved
 from service.jobs.kinds.sizes import MOST_POINTS, balance_issues
+from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
-from service.jobs.registry import JobKind, JobOutput, OnProgress, Resolved, SceneSource, ShouldStop
+from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue
 from solver.scene.scene import Scene
 

@@ -13,7 +13,8 @@ from service.jobs.kinds.periods import history_of
 from service.jobs.kinds.registry.results import Amplitude, KindResult, Table
 from service.jobs.kinds.scenes import FrequencyHz, SceneRequest, require, resolve_scene, resolved
 from service.jobs.kinds.sizes import march_issues
-from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from service.jobs.outputs import JobOutput, Progress, ShouldStop
+from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

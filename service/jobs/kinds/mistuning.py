@@ -19,8 +19,9 @@ from service.jobs.kinds.records import packed, sweep_records, unpacked
 from service.jobs.kinds.registry.results import EndedResult, Table
 from service.jobs.kinds.scenes import FrequencyHz, HarmonicRequest, refusal, require, resolve_scene, resolved
 from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, annulus_issues, size_issues, whole_disk_dofs
+from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
-from service.jobs.registry import JobKind, JobOutput, OnProgress, Resolved, SceneSource, ShouldStop
+from service.jobs.registry import JobKind, Resolved, SceneSource
 from service.jobs.strict_json import pointer
 from solver.errors import Issue, SceneError, SettingError
 from solver.scene.scene import CyclicStructure, Scene

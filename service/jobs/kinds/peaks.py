@@ -14,7 +14,8 @@ from service.jobs.kinds.records import sweep_records
 from service.jobs.kinds.registry.results import Curve, EndedResult, Table
 from service.jobs.kinds.scenes import require, resolve_scene, resolved
 from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
-from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from service.jobs.outputs import JobOutput, Progress, ShouldStop
+from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -28,16 +28,8 @@ from service.jobs.kinds.sizes import (
     dofs_solved,
 )
 from service.jobs.linear_limits import linear_limit
-from service.jobs.registry import (
-    JobKind,
-    JobOutput,
-    Point,
-    Progress,
-    Registry,
-    Resolved,
-    SceneSource,
-    ShouldStop,
-)
+from service.jobs.outputs import JobOutput, Point, Progress, ShouldStop
+from service.jobs.registry import JobKind, Registry, Resolved, SceneSource
 from solver.errors import Issue
 from solver.scene.scene import Scene
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from service.jobs.arrays import encode
-from service.jobs.registry import ContactValues, DesignRecord, StoredArray, SweepRecord, VariableValues
+from service.jobs.outputs import ContactValues, DesignRecord, StoredArray, SweepRecord, VariableValues
 from service.jobs.strict_json import digest
 from solver.scene.scene import AnyContact, FrictionContact, Scene
 

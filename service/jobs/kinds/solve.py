@@ -12,7 +12,8 @@ from service.jobs.kind_view import Json, KindView, ReadSweep, StoredSweep
 from service.jobs.kinds.registry.results import Amplitude, KindResult
 from service.jobs.kinds.scenes import FrequencyHz, HarmonicRequest, require, resolve_scene, resolved
 from service.jobs.kinds.sizes import balance_issues
-from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from service.jobs.outputs import JobOutput, Progress, ShouldStop
+from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

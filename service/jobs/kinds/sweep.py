@@ -26,7 +26,8 @@ from service.jobs.kinds.scenes import (
     resolved,
 )
 from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
-from service.jobs.registry import JobKind, JobOutput, Progress, Resolved, SceneSource, ShouldStop
+from service.jobs.outputs import JobOutput, Progress, ShouldStop
+from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, SettingError
 from solver.scene.scene import Scene
 
