@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -46,6 +47,7 @@ def design(
     basins: int = 2,
     on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
+    **limits: Any,
 ) -> DesignResult:
     """Choose parameters within bounds so that the highest peak over the scene's band is least.
 
@@ -57,7 +59,8 @@ def design(
     scaling : variable to ``linear`` or ``logarithmic``; by the bounds if left out.
     cases : the responses that count, see `optim.problem.cases.read_cases`; the scene as it is if left out.
     limit : amplitude [m] above which the resonance band is measured; half power of the peak if left out.
-    weights : of ``peak`` [1/m] and ``band`` [1/Hz] in what is minimised; the peak alone if left out.
+    weights : of ``peak`` [1/m], ``band`` [1/Hz] and further criteria in what is minimised; the peak alone if
+        left out.
     max_peak : largest amplitude allowed [m].
     max_band_hz : largest width of the resonance band allowed [Hz].
     forbidden_hz : ranges [Hz] in which the amplitude must stay below `limit`.
@@ -70,6 +73,7 @@ def design(
     basins : how many local optima are looked for.
     on_progress : called with (share done, evaluations so far).
     should_stop : asked between responses and within them.
+    limits : keys of further criteria (`optim.criteria.registry`).
 
     Returns
     -------
@@ -84,7 +88,7 @@ def design(
         scene, variables=variables, scaling=scaling, cases=cases, limit=limit, weights=weights,
         max_peak=max_peak, max_band_hz=max_band_hz, forbidden_hz=forbidden_hz, speeds_rpm=speeds_rpm,
         max_friction_work=max_friction_work, contact_states=contact_states, harmonics=harmonics, start=start,
-        method=method, basins=basins,
+        method=method, basins=basins, **limits,
     )  # fmt: skip
     return solve_problem(problem, on_progress=on_progress, should_stop=should_stop)
 

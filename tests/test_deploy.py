@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from service.settings.settings import Settings, load_settings
-from service.settings.table import with_table
 
 ROOT = Path(__file__).resolve().parent.parent
 DEPLOY = ROOT / "deploy"
@@ -19,11 +18,6 @@ UNIT = (DEPLOY / "stickslip.service").read_text(encoding="utf-8")
 DOCKERFILE = (DEPLOY / "Dockerfile").read_text(encoding="utf-8")
 OPERATIONS = ROOT / "docs" / "operations.md"
 VARIABLE = re.compile(r"STICKSLIP_[A-Z_]+")
-
-
-def test_the_table_of_settings_is_up_to_date() -> None:
-    text = OPERATIONS.read_text(encoding="utf-8")
-    assert text == with_table(text), "run: python -m service.settings.table docs/operations.md"
 
 
 @pytest.mark.parametrize("path", [*sorted(DEPLOY.iterdir()), OPERATIONS], ids=lambda path: path.name)

@@ -10,8 +10,13 @@ import numpy as np
 import pytest
 
 import solver
+from optim.criteria.band import BAND
 from optim.criteria.evaluation import evaluate
-from optim.criteria.rows import Evaluation, Quantity, Row, nearest
+from optim.criteria.forbidden import FORBIDDEN
+from optim.criteria.friction_work import FRICTION_WORK
+from optim.criteria.peak import PEAK
+from optim.criteria.rows import Evaluation, Row, nearest
+from optim.criteria.separation import SEPARATION
 from optim.problem.problem import Problem, pose
 
 DISK_OPTIMUM = 185.46090223680778
@@ -100,10 +105,10 @@ def difference(
 def test_gradients_equal_differences_of_the_whole_solve(name: str) -> None:
     point, problem = POINTS[name], problem_of(POINTS[name])
     rows = evaluated(name).rows
-    wanted = {Quantity.PEAK, Quantity.BAND}
-    wanted |= {Quantity.FORBIDDEN} if point.forbidden else set()
-    wanted |= {Quantity.FRICTION_WORK} if point.work else set()
-    wanted |= {Quantity.SEPARATION} if point.never_separates else set()
+    wanted = {PEAK, BAND}
+    wanted |= {FORBIDDEN} if point.forbidden else set()
+    wanted |= {FRICTION_WORK} if point.work else set()
+    wanted |= {SEPARATION} if point.never_separates else set()
     assert wanted == {row.quantity for row in rows}
     for row in rows:
         for i, path in enumerate(point.values):

@@ -10,8 +10,9 @@ import pytest
 from fe_files import abaqus_input, ansys_mapping, coordinate, dmig, hbmat, op4_binary, op4_text
 
 from solver.matrices.files import MatrixFileError, array_names, read_labelled, read_matrix
-from solver.matrices.labels import Label, label, read_labels
+from solver.matrices.labels import label, read_labels
 from solver.matrices.load_set import in_si, read_set
+from solver.matrices.readers.label import Label
 from solver.matrices.readers.numbers_in_text import FormatError
 
 A = np.array(

@@ -24,7 +24,7 @@ from random_designs import (
 
 import optim
 import solver
-from optim.criteria.rows import Quantity
+from optim.criteria.peak import PEAK
 from optim.methods.multistart import corners, places
 from optim.methods.surrogate import Taylor, promising
 from optim.results.design import DesignResult, DesignStatus
@@ -170,7 +170,7 @@ def check_robust(asked: dict[str, Any]) -> RobustResult:
     worst = 0.0
     for xi in itertools.product(np.linspace(-1.0, 1.0, 7), repeat=n):
         there = outcome(found.problem, found.optimum, found.uncertain.scenario(xi), gradients=False)
-        row = there.highest(Quantity.PEAK)
+        row = there.highest(PEAK)
         worst = max(worst, 0.0 if row is None else row.value)
     assert worst <= found.robust.worst_peak * (1.0 + 1e-4)
     if found.status is RobustStatus.OPTIMAL:

@@ -13,7 +13,8 @@ import pytest
 
 import optim
 import solver
-from optim.criteria.rows import Quantity, Row
+from optim.criteria.peak import PEAK
+from optim.criteria.rows import Row
 from optim.problem.problem import pose
 from optim.problem.uncertainty_input import read_uncertain
 from optim.problem.uncertainty_set import Scenario, Shape
@@ -91,7 +92,7 @@ def test_the_worst_of_an_ellipsoid_lies_on_its_edge() -> None:
     problem = pose(TWO, variables=N0)
     over = read_uncertain(TWO, problem.variables, {"half_axes": half_axes, "relative": True})
     values = {"damper.N0": 105.0}
-    aspect = Aspect(quantity=Quantity.PEAK, limited=False)
+    aspect = Aspect(quantity=PEAK, limited=False)
     found = pessimise(lambda scenario: outcome(problem, values, scenario), over, aspect, ())
     around = [
         peak_at({"damper.N0": 105.0, "damper.kt": 30.0 * (1 + 0.2 * x), "damper.mu": 0.3 * (1 + 0.3 * y)})
@@ -171,7 +172,7 @@ def difference(f: Callable[[float], float], h: float) -> float:
 
 def made_up(value: float, slope: np.ndarray, scenario: Scenario) -> Outcome:
     row = Row(
-        quantity=Quantity.PEAK, case="a", what="peak", value=value, gradient=np.zeros(1), at_hz=1.0,
+        quantity=PEAK, case="a", what="peak", value=value, gradient=np.zeros(1), at_hz=1.0,
         weight=1.0, bound=None,
     )  # fmt: skip
     return Outcome(scenario=scenario, rows=(row,), by_delta=slope[None, :], responses=1)
@@ -193,7 +194,7 @@ def test_a_worst_case_inside_the_set_is_found(shape: Shape) -> None:
         off = place - top
         return made_up(5.0 - float(curved @ off**2), -2.0 * curved * off, scenario)
 
-    found = pessimise(hill, over, Aspect(quantity=Quantity.PEAK, limited=False), ())
+    found = pessimise(hill, over, Aspect(quantity=PEAK, limited=False), ())
     assert found.value == pytest.approx(5.0, rel=1e-9)
     assert [delta for _, delta in found.worst.scenario.settings] == pytest.approx(top, rel=1e-4)
 
@@ -207,7 +208,7 @@ def test_a_scenario_without_response_is_never_a_value() -> None:
         return made_up(1.0, np.ones(1), scenario)
 
     with pytest.raises(UnknownScenarioError, match=r"damper\.mu = 0\.4"):
-        pessimise(broken, over, Aspect(quantity=Quantity.PEAK, limited=False), ())
+        pessimise(broken, over, Aspect(quantity=PEAK, limited=False), ())
 
 
 def test_a_limit_is_kept_in_every_scenario() -> None:
@@ -332,7 +333,7 @@ def test_the_worst_blade_of_a_mistuned_disk_counts() -> None:
     written = solver.mistuned(scene, of="tip", values=values)
     blades = solver.blade_peaks(written, dof="tip", harmonics=3)
     for sector in range(3):
-        mine = [r.value for r in found.rows if r.quantity is Quantity.PEAK and f"tip@{sector}" in r.case]
+        mine = [r.value for r in found.rows if r.quantity is PEAK and f"tip@{sector}" in r.case]
         assert max(mine) == pytest.approx(blades.value[sector], rel=1e-9)
 
 

@@ -1,1 +1,1 @@
-"""What a design is judged by, with gradients."""
+"""What a design is judged by: one criterion a file, put into one registry (`optim.criteria.registry`)."""

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from optim.criteria.contact_criteria import contact_rows
-from optim.criteria.response_gradients import Sensitivity
-from optim.criteria.rows import Evaluation, Quantity, Response, Row
+from optim.criteria.criterion import Criterion
+from optim.criteria.judged import Judged
+from optim.criteria.registry import criteria
+from optim.criteria.rows import Evaluation, Response, Row
 from optim.problem.cases import Case
 from optim.problem.problem import Problem
-from optim.problem.variables import Real, by_variables, by_variables_twice, parameter_values
+from optim.problem.variables import parameter_values
 from optim.problem.watch import ShouldStop
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.branches.observation import observing
 from solver.branches.sweep import sweep
-from solver.continuation.branch import Branch, Peak
-from solver.extrema.extrema import HALF_POWER
-from solver.scene.scene import FrictionContact, Scene
-
-# Peaks below this share of the highest are not handed to the optimiser: within one step they cannot lead.
-COMPETES = 0.6
+from solver.continuation.branch import Branch
+from solver.scene.scene import Scene
 
 
 def evaluate(
@@ -62,25 +56,59 @@ def _case(
     here = case.scene.with_values(parameter_values(problem.variables, values))
     effects = effects_of(problem, here)
     judge = Judge(problem=problem, case=case, gradients=gradients)
-    ranges = ((None, None), *problem.limits.forbidden_hz.get(case.name, ()))
     responses: list[Response] = []
     rows: list[Row] = []
-    for i, (low, high) in enumerate(ranges):
+    for i, over in enumerate(ranges_of(problem, case)):
         if known:
             branch = observing(known[i], here.observe.dof, limit=problem.limit, effects=effects)
         else:
             branch = sweep(
-                here, start=low, stop=high, harmonics=problem.harmonics, limit=problem.limit, effects=effects,
-                should_stop=should_stop,
+                here, start=over.low, stop=over.high, harmonics=problem.harmonics, limit=problem.limit,
+                effects=effects, should_stop=should_stop,
             )  # fmt: skip
         responses.append(Response(case=case.name, branch=branch))
-        rows += judge.response(branch) if low is None or high is None else judge.forbidden(branch, low, high)
+        rows += judge.rows(branch, over)
     return responses, rows
 
 
 def effects_of(problem: Problem, scene: Scene) -> Effects:
     """Return what has to be computed for the slopes: those by a load's variation need the even harmonics."""
     return Effects(even_harmonics=even_harmonics_reason(scene, problem.paths) is not None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Range:
+    """Frequencies [Hz] of a response that is judged.
+
+    Attributes
+    ----------
+    low, high : float or None
+        Its ends; None for the band.
+    criteria : tuple of Criterion
+        What it is judged by.
+    """
+
+    low: float | None
+    high: float | None
+    criteria: tuple[Criterion, ...]
+
+
+def ranges_of(problem: Problem, case: Case) -> tuple[Range, ...]:
+    """Return what responses a case needs: that over the band first, then those beyond it."""
+    every, limits = criteria(), problem.limits
+    of_band = [
+        one
+        for one in every
+        if one.ranges is None
+        and (one.always or problem.weights.get(one, 0.0) > 0.0 or limits.of(one) is not None)
+    ]
+    beyond = [
+        Range(low=low, high=high, criteria=(one,))
+        for one in every
+        if one.ranges is not None and limits.of(one) is not None
+        for low, high in one.ranges(limits.of(one), case)
+    ]
+    return (Range(low=None, high=None, criteria=tuple(of_band)), *beyond)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,78 +125,17 @@ class Judge:
     case: Case
     gradients: bool
 
-    def _sensitivity(self, branch: Branch) -> Sensitivity | None:
-        return Sensitivity(branch.balance, self.problem.paths) if self.gradients else None
-
-    def _nothing(self) -> Real:
-        return np.full(len(self.problem.variables), np.nan)
-
-    def response(self, branch: Branch) -> list[Row]:
-        """Return the rows of the response over the band: peaks and the resonance band."""
+    def rows(self, branch: Branch, over: Range) -> list[Row]:
+        """Return the rows of a response over a range; none unless it covers it and has a peak."""
         if not branch.completed or not branch.peaks:
             return []
-        sensitivity, limits = self._sensitivity(branch), self.problem.limits
-        weight = self.problem.weights[Quantity.PEAK] * self.case.weight
-        rows = self._maxima(branch, sensitivity, Quantity.PEAK, "peak", weight, limits.peak)
-        if branch.band is not None:
-            slope = self._nothing()
-            if sensitivity is not None:
-                fixed = self.problem.limit is not None
-                dlimit = np.zeros(len(self.problem.paths))
-                if not fixed:
-                    dlimit = HALF_POWER * sensitivity.peak(branch.peaks[0])
-                slope = by_variables(self.problem.variables, sensitivity.band(branch.band.edges, dlimit))
-            rows.append(
-                Row(
-                    quantity=Quantity.BAND, case=self.case.name,
-                    what=f"band above {branch.band.limit:.6g} m", value=branch.band.width, gradient=slope,
-                    at_hz=math.nan, weight=self.problem.weights[Quantity.BAND], bound=limits.band_hz,
-                    second=self._band_second(branch, sensitivity),
-                )
-            )  # fmt: skip
-        return rows + contact_rows(self.problem, self.case, branch, gradients=self.gradients)
-
-    def forbidden(self, branch: Branch, low: float, high: float) -> list[Row]:
-        """Return the rows of a response over a forbidden range."""
-        if not branch.completed:
-            return []
-        what = f"amplitude from {low:g} to {high:g} Hz, highest"
-        return self._maxima(
-            branch, self._sensitivity(branch), Quantity.FORBIDDEN, what, 0.0, self.problem.limit
-        )
-
-    def _maxima(
-        self, branch: Branch, sensitivity: Sensitivity | None, quantity: Quantity, what: str, weight: float,
-        bound: float | None,
-    ) -> list[Row]:  # fmt: skip
-        """Return a row for every local maximum that competes."""
-        competing = [peak for peak in branch.peaks if peak.value >= COMPETES * branch.peaks[0].value]
-        return [
-            Row(
-                quantity=quantity, case=self.case.name, what=f"{what} at {peak.at:.6g} Hz", value=peak.value,
-                gradient=self._nothing()
-                if sensitivity is None
-                else by_variables(self.problem.variables, sensitivity.peak(peak)),
-                at_hz=peak.at, weight=weight, bound=bound, second=self._peak_second(peak, sensitivity),
-            )
-            for peak in competing
-        ]  # fmt: skip
-
-    def _peak_second(self, peak: Peak, sensitivity: Sensitivity | None) -> Callable[[], Real] | None:
-        if sensitivity is None or not sensitivity.has_second:
-            return None
-        return lambda: by_variables_twice(self.problem.variables, sensitivity.peak_second(peak))
-
-    def _band_second(self, branch: Branch, sensitivity: Sensitivity | None) -> Callable[[], Real] | None:
-        if sensitivity is None or branch.band is None or not sensitivity.has_second:
-            return None
-        edges, highest = branch.band.edges, None if self.problem.limit is not None else branch.peaks[0]
-        return lambda: by_variables_twice(self.problem.variables, sensitivity.band_second(edges, highest))
+        hertz = None if over.low is None or over.high is None else (over.low, over.high)
+        judged = Judged(
+            problem=self.problem, case=self.case, branch=branch, gradients=self.gradients, hertz=hertz
+        )  # fmt: skip
+        return [row for criterion in over.criteria for row in criterion.rows(judged)]
 
 
-def natural_scales(problem: Problem) -> dict[Quantity, float]:
-    """Return what an excess over a bound of 0 is relative to: for separation the scene's normal loads."""
-    loads = [c.N0 for c in problem.scene.contacts if isinstance(c, FrictionContact) and c.N0 > 0.0]
-    scales = dict.fromkeys(Quantity, 1.0)
-    scales[Quantity.SEPARATION] = max(loads, default=1.0)
-    return scales
+def natural_scales(problem: Problem) -> dict[Criterion, float]:
+    """Return what an excess over a bound of 0 is relative to, of every criterion in order."""
+    return {criterion: criterion.scale(problem.scene) for criterion in criteria()}

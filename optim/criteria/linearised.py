@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from optim.criteria.rows import Evaluation, Quantity, Row
+from optim.criteria.criterion import Criterion
+from optim.criteria.rows import Evaluation, Row
 from optim.problem.variables import Real, Variable, scaled, slopes
 
 PENALTY = 1e4  # the largest exact penalty on the largest relative excess over a bound
@@ -106,7 +107,7 @@ class Model:
 
 
 def model_of(
-    evaluation: Evaluation, variables: Sequence[Variable], scale: float, scales: Mapping[Quantity, float]
+    evaluation: Evaluation, variables: Sequence[Variable], scale: float, scales: Mapping[Criterion, float]
 ) -> Model:
     """Return the model of a good evaluation.
 
@@ -115,12 +116,12 @@ def model_of(
     evaluation : the design.
     variables : their scaling.
     scale : the objective of the design that counts as 1.
-    scales : what an excess over a bound of 0 is relative to.
+    scales : what an excess over a bound of 0 is relative to, of every criterion in order.
     """
     by_z, n = slopes(variables, evaluation.values), len(variables)
     rows = tuple(row for row in evaluation.rows if row.weight > 0.0)
     limited = tuple(row for row in evaluation.rows if row.bound is not None)
-    groups = list(Quantity)
+    groups = list(scales)
     units = [row.unit_of(scales[row.quantity]) for row in limited]
     return Model(
         z=scaled(variables, evaluation.values), rows=rows,

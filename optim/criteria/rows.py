@@ -9,26 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
 
+from optim.criteria.band import BAND
+from optim.criteria.criterion import Criterion
+from optim.criteria.peak import PEAK
 from optim.problem.variables import Real
 from solver.continuation.branch import Branch
-
-
-class Quantity(Enum):
-    """What a row measures; the value is the word users read."""
-
-    PEAK = "peak"
-    BAND = "band"
-    FORBIDDEN = "amplitude in a forbidden range"
-    FRICTION_WORK = "friction work"
-    SEPARATION = "separation"
-
-
-UNITS = {
-    Quantity.PEAK: "m", Quantity.BAND: "Hz", Quantity.FORBIDDEN: "m", Quantity.FRICTION_WORK: "J",
-    Quantity.SEPARATION: "N",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,14 +23,14 @@ class Row:
 
     Attributes
     ----------
-    quantity : Quantity
+    quantity : Criterion
         What it measures.
     case : str
         Name of the load case.
     what : str
         In words, for example ``peak at 753.28 Hz``.
     value : float
-        In the unit of `UNITS`.
+        In the unit of its criterion; the negative where larger is better.
     gradient : (n_variables,) array
         By each variable, per unit of it; NaN where it does not exist.
     at_hz : float
@@ -58,7 +44,7 @@ class Row:
         not exist; None where the solver has none.
     """
 
-    quantity: Quantity
+    quantity: Criterion
     case: str
     what: str
     value: float
@@ -110,25 +96,25 @@ class Evaluation:
         """Whether every number is known."""
         return bool(self.rows) and all(math.isfinite(row.value) for row in self.rows)
 
-    def of(self, quantity: Quantity) -> tuple[Row, ...]:
+    def of(self, quantity: Criterion) -> tuple[Row, ...]:
         """Return the rows of one quantity, largest first."""
         return tuple(sorted((r for r in self.rows if r.quantity is quantity), key=lambda row: -row.value))
 
     @property
     def peaks(self) -> tuple[Row, ...]:
         """The peaks that compete, highest first."""
-        return self.of(Quantity.PEAK)
+        return self.of(PEAK)
 
     @property
     def band(self) -> Row | None:
         """The widest resonance band."""
-        return next(iter(self.of(Quantity.BAND)), None)
+        return next(iter(self.of(BAND)), None)
 
     @property
     def objective(self) -> float:
         """What is minimised: for each quantity the largest weighted row, summed."""
         total = 0.0
-        for quantity in Quantity:
+        for quantity in dict.fromkeys(row.quantity for row in self.rows):
             weighted = [row.weight * row.value for row in self.of(quantity) if row.weight > 0.0]
             total += max(weighted, default=0.0)
         return total if self.rows else math.inf
@@ -138,7 +124,7 @@ class Evaluation:
         """The response of the first case."""
         return self.responses[0].branch
 
-    def violation(self, scales: Mapping[Quantity, float]) -> float:
+    def violation(self, scales: Mapping[Criterion, float]) -> float:
         """Return the largest relative excess over a bound; −inf without bounds."""
         return max((row.excess(scales[row.quantity]) for row in self.rows), default=math.inf)
 

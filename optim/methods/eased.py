@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from optim.criteria.rows import Quantity
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.peak_tracking import Tracked, tracked_optimum
 from optim.problem.problem import Limits, Method, Problem
 from optim.results.design import DesignStatus
 
-NO_LIMITS = Limits(peak=None, band_hz=None, forbidden_hz={}, friction_work={}, in_contact=())
+NO_LIMITS = Limits()
 MOST_CASES = 4
 
 
@@ -52,7 +51,7 @@ class Eased:
 
 def _cases(problem: Problem) -> list[Problem]:
     """Return the plain problems of the single cases that can be tracked."""
-    if problem.weights[Quantity.BAND] > 0.0:
+    if not problem.peak_alone:
         return []
     plain = [
         replace(problem, cases=(case,), limits=NO_LIMITS, start=None, limit=None) for case in problem.cases

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from optim.criteria.evaluation import Judge, effects_of, evaluate
-from optim.criteria.rows import Evaluation, Quantity, Response
+from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
+from optim.criteria.peak import PEAK
+from optim.criteria.rows import Evaluation, Response
 from optim.problem.problem import Problem
 from optim.problem.watch import OnProgress, ShouldStop
 from optim.results.basins import Basin
@@ -73,7 +74,7 @@ def tracked_optimum(
     basins = tuple(
         Basin(
             values={variable.name: basin.at}, peak=basin.peak,
-            objective=basin.peak * problem.weights[Quantity.PEAK] * case.weight, settled=basin.solved,
+            objective=basin.peak * problem.weights[PEAK] * case.weight, settled=basin.solved,
             proven=basin.proven,
             feasible=True,
         )
@@ -97,6 +98,7 @@ def _evaluation(problem: Problem, found: LeastPeak) -> Evaluation | None:
         return None
     if problem.limit is not None:
         return evaluate(problem, {variable.name: found.at})
-    rows = Judge(problem=problem, case=case, gradients=True).response(found.branch)
+    judge = Judge(problem=problem, case=case, gradients=True)
+    rows = judge.rows(found.branch, ranges_of(problem, case)[0])
     response = Response(case=case.name, branch=found.branch)
     return Evaluation(values={variable.name: found.at}, responses=(response,), rows=tuple(rows))

@@ -13,7 +13,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from optim.criteria.evaluation import evaluate, natural_scales
-from optim.criteria.rows import Evaluation, Quantity, Row
+from optim.criteria.peak import PEAK
+from optim.criteria.rows import Evaluation, Row
 from optim.methods.evaluator import StoppedError
 from optim.methods.kkt import KEPT
 from optim.problem.problem import Problem
@@ -30,7 +31,7 @@ PRECISE = 1e-7  # scaled, to which its least place is known
 BROAD = 1e-5  # scaled width from which the next criterion is level too
 
 Along = Callable[[float], Evaluation]
-Criterion = Callable[[Evaluation], float | None]
+TieBreak = Callable[[Evaluation], float | None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,7 +139,7 @@ class _Level:
         z = variable.inside(here.values[variable.name]) + side
         if not 0.0 <= z <= 1.0:
             return False
-        if row.quantity is not Quantity.PEAK:
+        if row.quantity is not PEAK:
             return True
         case = next(case for case in self._problem.cases if case.name == row.case)
         values = {**here.values, variable.name: variable.outside(z)}
@@ -180,7 +181,7 @@ class _Level:
             return None
         self._found[variable.name, z] = low, high
         held = _holding(here)[0]
-        criteria: dict[str, Criterion] = {
+        criteria: dict[str, TieBreak] = {
             "the next highest peak": lambda there: _next_peak(self._problem, there, held),
             "the resonance band": lambda there: None if there.band is None else there.band.value,
         }
@@ -195,7 +196,7 @@ class _Level:
         return along(low), f"the least {variable.name}"
 
 
-def _at_most(criterion: Criterion, enough: float) -> Callable[[Evaluation], bool]:
+def _at_most(criterion: TieBreak, enough: float) -> Callable[[Evaluation], bool]:
     """Return whether a criterion is no larger than what counts as its least."""
 
     def kept(there: Evaluation) -> bool:
@@ -229,7 +230,7 @@ def _ends(
     return ends[0], ends[1]
 
 
-def _least(along: Along, criterion: Criterion, low: float, high: float) -> tuple[float, float] | None:
+def _least(along: Along, criterion: TieBreak, low: float, high: float) -> tuple[float, float] | None:
     """Return where a criterion is least and what counts as that; None where it is not known or level."""
     places = np.linspace(low, high, PLACES)
     values = [criterion(along(float(z))) for z in places]
@@ -250,7 +251,7 @@ def _least(along: Along, criterion: Criterion, low: float, high: float) -> tuple
 def _holding(here: Evaluation) -> list[Row]:
     """Return the rows that hold what is minimised, the highest first."""
     held: list[Row] = []
-    for quantity in (Quantity.PEAK, Quantity.BAND):
+    for quantity in dict.fromkeys(row.quantity for row in here.rows):
         rows = [row for row in here.of(quantity) if row.weight > 0.0]
         top = max((row.weight * row.value for row in rows), default=0.0)
         held += [row for row in rows if row.weight * row.value >= top * (1.0 - LEVEL)]

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
-from optim.criteria.rows import Quantity
+from optim.criteria.band import BAND
+from optim.criteria.criterion import Asked, Criterion, Ranges
+from optim.criteria.forbidden import FORBIDDEN
+from optim.criteria.peak import PEAK
+from optim.criteria.registry import by_weight, criteria, weight_words
 from optim.errors import DesignError
-from optim.problem.cases import Case, number_pair, positive, read_cases
+from optim.problem.cases import Case, positive, read_cases
 from optim.problem.variables import Variable, check_variables
 from solver.balance.balance import check_harmonics
-from solver.scene.scene import Contact, FrictionContact, Scene
+from solver.scene.scene import Contact, Scene
 
-Ranges = tuple[tuple[float, float], ...]
 MOST_BASINS = 20
-NEVER_SEPARATES = "never-separates"
 
 
 class Method(Enum):
@@ -34,29 +37,42 @@ class Limits:
 
     Attributes
     ----------
-    peak : float or None
-        Largest amplitude over the band of any case [m].
-    band_hz : float or None
-        Widest resonance band of any case [Hz].
-    forbidden_hz : mapping of case name to ranges
-        Frequencies [Hz] in which the amplitude must not exceed the limit that defines the band.
-    friction_work : mapping of contact to float
-        Largest friction work in a cycle at any frequency of the band [J].
-    in_contact : tuple of str
-        Contacts that must never separate.
+    read : mapping of Criterion to object
+        What the keys of each criterion that is limited came to.
     """
 
-    peak: float | None
-    band_hz: float | None
-    forbidden_hz: Mapping[str, Ranges]
-    friction_work: Mapping[str, float]
-    in_contact: tuple[str, ...]
+    read: Mapping[Criterion, Any] = field(default_factory=dict)
+
+    def of(self, criterion: Criterion) -> Any:
+        """Return what the keys of a criterion came to; None if none was given."""
+        return self.read.get(criterion)
+
+    def including(self, criterion: Criterion, read: object) -> Limits:
+        """Return the limits with another one of a criterion."""
+        return Limits(read={**self.read, criterion: read})
 
     @property
     def any(self) -> bool:
         """Whether there is a limit at all."""
-        given = (self.forbidden_hz, self.friction_work, self.in_contact)
-        return self.peak is not None or self.band_hz is not None or any(given)
+        return bool(self.read)
+
+    @property
+    def peak(self) -> float | None:
+        """Largest amplitude over the band of any case [m]."""
+        found: float | None = self.of(PEAK)
+        return found
+
+    @property
+    def band_hz(self) -> float | None:
+        """Widest resonance band of any case [Hz]."""
+        found: float | None = self.of(BAND)
+        return found
+
+    @property
+    def forbidden_hz(self) -> Mapping[str, Ranges]:
+        """Frequencies [Hz] by case in which the amplitude must not exceed the limit that defines the band."""
+        found: Mapping[str, Ranges] = self.of(FORBIDDEN) or {}
+        return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,8 +89,8 @@ class Problem:
         The responses it is judged by.
     limit : float or None
         Amplitude [m] above which the resonance band is measured; half power of the highest peak if None.
-    weights : mapping of Quantity to float
-        What is minimised: the largest peak [m] and the widest band [Hz], each times its weight, summed.
+    weights : mapping of Criterion to float
+        What is minimised: of each the largest value times its weight, summed.
     limits : Limits
         What must be kept.
     harmonics : int
@@ -91,7 +107,7 @@ class Problem:
     variables: tuple[Variable, ...]
     cases: tuple[Case, ...]
     limit: float | None
-    weights: Mapping[Quantity, float]
+    weights: Mapping[Criterion, float]
     limits: Limits
     harmonics: int
     start: Mapping[str, float] | None
@@ -106,7 +122,12 @@ class Problem:
     @property
     def plain(self) -> bool:
         """Whether it asks for nothing but the least peak of one case."""
-        return len(self.cases) == 1 and not self.limits.any and self.weights[Quantity.BAND] == 0.0
+        return len(self.cases) == 1 and not self.limits.any and self.peak_alone
+
+    @property
+    def peak_alone(self) -> bool:
+        """Whether nothing but the peak is minimised."""
+        return not any(weight > 0.0 for one, weight in self.weights.items() if one is not PEAK)
 
     @property
     def why_not_tracked(self) -> str | None:
@@ -129,39 +150,34 @@ def pose(
     cases: Sequence[Mapping[str, object]] | None = None,
     limit: float | None = None,
     weights: Mapping[str, float] | None = None,
-    max_peak: float | None = None,
-    max_band_hz: float | None = None,
-    forbidden_hz: Sequence[Sequence[float]] | None = None,
-    speeds_rpm: Sequence[Sequence[float]] | None = None,
-    max_friction_work: Mapping[str, float] | float | None = None,
-    contact_states: Mapping[str, str] | None = None,
     harmonics: int = 11,
     start: Mapping[str, float] | None = None,
     method: str | Method = Method.AUTO,
     basins: int = 2,
+    **limits: object,
 ) -> Problem:
     """Check a design problem and put it together; the arguments are those of `optim.design`.
+
+    Parameters
+    ----------
+    limits : keys of the criteria.
 
     Raises
     ------
     SettingError, SceneError, DesignError
         What is wrong: the argument, the value, and what would be right.
+    TypeError
+        An argument that is no key of a criterion.
     """
     chosen = check_variables(scene, variables, scaling)
     read = read_cases(scene, cases)
-    for name, value in (("limit", limit), ("max_peak", max_peak), ("max_band_hz", max_band_hz)):
-        if value is not None:
-            positive(name, value)
-    limits = Limits(
-        peak=max_peak, band_hz=max_band_hz, forbidden_hz=_forbidden(read, forbidden_hz, speeds_rpm),
-        friction_work=_friction_work(scene, max_friction_work), in_contact=_in_contact(scene, contact_states),
-    )  # fmt: skip
-    if limits.forbidden_hz and limit is None:
-        raise DesignError("limit", None, "must be given with forbidden ranges: the amplitude allowed there")
+    if limit is not None:
+        positive("limit", limit)
+    kept = _limits(scene, read, limit, limits)
     if isinstance(basins, bool) or not isinstance(basins, int) or not 1 <= basins <= MOST_BASINS:
         raise DesignError("basins", basins, f"must be a whole number from 1 to {MOST_BASINS}")
     problem = Problem(
-        scene=scene, variables=chosen, cases=read, limit=limit, weights=_weights(weights), limits=limits,
+        scene=scene, variables=chosen, cases=read, limit=limit, weights=_weights(weights), limits=kept,
         harmonics=check_harmonics(harmonics), start=_start(chosen, start), method=_method(method),
         basins=basins,
     )  # fmt: skip
@@ -170,79 +186,42 @@ def pose(
     return problem
 
 
-def _weights(weights: Mapping[str, float] | None) -> dict[Quantity, float]:
-    """Return the weights of peak and band; the peak alone without any."""
+def _weights(weights: Mapping[str, float] | None) -> dict[Criterion, float]:
+    """Return the weights of everything that can be minimised; the peak alone without any."""
+    found = {one: 0.0 for one in criteria() if one.weight}
     if weights is None:
-        return {Quantity.PEAK: 1.0, Quantity.BAND: 0.0}
+        return {**found, PEAK: 1.0}
     if not isinstance(weights, Mapping):
         raise DesignError("weights", weights, 'must be a table such as {"peak": 1.0, "band": 0.0}')
-    found = {Quantity.PEAK: 0.0, Quantity.BAND: 0.0}
     for name, value in weights.items():
-        quantity = next((q for q in found if q.value == name), None)
-        if quantity is None:
-            raise DesignError(f"weights.{name}", value, "is not known; `peak` and `band` can be minimised")
+        criterion = by_weight(name)
+        if criterion is None:
+            *others, last = (f"`{word}`" for word in weight_words())
+            known = f"{', '.join(others)} and {last}"
+            raise DesignError(f"weights.{name}", value, f"is not known; {known} can be minimised")
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not number or not math.isfinite(value) or value < 0.0:
             raise DesignError(f"weights.{name}", value, "must be a number >= 0")
-        found[quantity] = float(value)
+        found[criterion] = float(value)
     if not any(found.values()):
         raise DesignError("weights", dict(weights), "must have at least one number > 0")
     return found
 
 
-def _forbidden(
-    cases: tuple[Case, ...], forbidden_hz: object, speeds_rpm: object
-) -> dict[str, Ranges]:  # fmt: skip
-    """Return the forbidden frequencies of every case: those given, and those of the speeds by its order."""
-    hertz, speeds = _ranges("forbidden_hz", forbidden_hz), _ranges("speeds_rpm", speeds_rpm)
-    found = {}
-    for case in cases:
-        ranges = hertz + tuple((low * case.order / 60.0, high * case.order / 60.0) for low, high in speeds)
-        if ranges:
-            found[case.name] = ranges
-    return found
-
-
-def _ranges(name: str, ranges: object) -> Ranges:
-    if ranges is None:
-        return ()
-    if not isinstance(ranges, Sequence) or isinstance(ranges, str) or not ranges:
-        raise DesignError(name, ranges, "must be a list of ranges, [[low, high], …]")
-    found = tuple(number_pair(f"{name}[{i}]", pair) for i, pair in enumerate(ranges))
-    for i, (low, high) in enumerate(found):
-        if not 0.0 < low < high:
-            raise DesignError(f"{name}[{i}]", [low, high], "must have 0 < low < high")
-    return found
-
-
-def _friction_work(scene: Scene, limits: object) -> dict[str, float]:
-    """Return the limit of every contact named; a single number is that of every friction contact."""
-    if limits is None:
-        return {}
-    names = [contact.name for contact in scene.contacts]
-    if not isinstance(limits, Mapping):
-        rubbing = [contact.name for contact in scene.contacts if isinstance(contact, FrictionContact)]
-        return dict.fromkeys(rubbing, positive("max_friction_work", limits))
-    for name in limits:
-        if name not in names:
-            raise DesignError("max_friction_work", name, f"must name contacts: {', '.join(names)}")
-    return {name: positive(f"max_friction_work.{name}", value) for name, value in limits.items()}
-
-
-def _in_contact(scene: Scene, states: object) -> tuple[str, ...]:
-    if states is None:
-        return ()
-    if not isinstance(states, Mapping):
-        raise DesignError(
-            "contact_states", states, f'must be a table such as {{"damper": "{NEVER_SEPARATES}"}}'
-        )
-    names = [contact.name for contact in scene.contacts if isinstance(contact, FrictionContact)]
-    for name, state in states.items():
-        if name not in names:
-            raise DesignError("contact_states", name, f"must name friction contacts: {', '.join(names)}")
-        if state != NEVER_SEPARATES:
-            raise DesignError(f"contact_states.{name}", state, f"must be {NEVER_SEPARATES}")
-    return tuple(states)
+def _limits(
+    scene: Scene, cases: tuple[Case, ...], limit: float | None, given: Mapping[str, object]
+) -> Limits:  # fmt: skip
+    """Return what the keys of the criteria come to."""
+    known = {key.name for one in criteria() for key in one.keys}
+    unknown = next((name for name in given if name not in known), None)
+    if unknown is not None:
+        raise TypeError(f"there is no argument {unknown!r}; limits are {', '.join(sorted(known))}")
+    read: dict[Criterion, Any] = {}
+    for one in criteria():
+        values = {key.name: given[key.name] for key in one.keys if given.get(key.name) is not None}
+        if values:
+            read[one] = one.read(Asked(scene=scene, cases=cases, limit=limit, values=values))
+    return Limits(read=read)
 
 
 def _start(variables: tuple[Variable, ...], start: Mapping[str, float] | None) -> dict[str, float] | None:

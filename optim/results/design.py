@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
 
+from optim.criteria.band import BAND
 from optim.criteria.linearised import Conditions
-from optim.criteria.rows import UNITS, Evaluation, Quantity, Row
+from optim.criteria.peak import PEAK
+from optim.criteria.rows import Evaluation, Row
 from optim.problem.problem import Method, Problem
 from optim.results.basins import Basin, Checked
 from optim.results.doubts import doubts_of
@@ -155,10 +157,10 @@ class DesignResult(Drawn):
 
     @property
     def held_by(self) -> Row | None:
-        """The row that holds what is minimised: the highest weighted peak, or else the widest band."""
+        """The row that holds what is minimised: the highest weighted peak, or else of another criterion."""
         if self.evaluation is None:
             return None
-        for quantity in (Quantity.PEAK, Quantity.BAND):
+        for quantity in self.problem.weights:
             rows = [row for row in self.evaluation.of(quantity) if row.weight > 0.0]
             if rows:
                 return max(rows, key=lambda row: row.weight * row.value)
@@ -190,6 +192,14 @@ class DesignResult(Drawn):
         return None if band is None else band.value
 
     @property
+    def further(self) -> tuple[Row, ...]:
+        """The largest row of each criterion that is minimised besides peak and band."""
+        weights = self.problem.weights
+        others = [one for one, weight in weights.items() if weight > 0.0 and one not in (PEAK, BAND)]
+        rows = () if self.evaluation is None else (self.evaluation.of(one)[:1] for one in others)
+        return tuple(row for found in rows for row in found)
+
+    @property
     def limit(self) -> float | None:
         """Amplitude at which the band is measured [m]."""
         if self.evaluation is None or self.evaluation.band is None:
@@ -207,7 +217,7 @@ class DesignResult(Drawn):
         """Of the active peaks; they sum to 1."""
         if self.conditions is None:
             return ()
-        return tuple(x for row, x in self.conditions.rows if row.quantity is Quantity.PEAK and x > 1e-6)
+        return tuple(x for row, x in self.conditions.rows if row.quantity is PEAK and x > 1e-6)
 
     @property
     def active(self) -> tuple[str, ...]:
@@ -302,21 +312,13 @@ def at_limit(row: Row) -> bool:
 
 def limit_words(row: Row) -> str:
     """Return the limit of a row in words."""
-    words = {
-        Quantity.PEAK: "peak limit",
-        Quantity.BAND: "band limit",
-        Quantity.FORBIDDEN: "limit in a forbidden range",
-        Quantity.FRICTION_WORK: "friction work limit",
-        Quantity.SEPARATION: "separation limit",
-    }
-    where = "" if row.quantity in (Quantity.BAND, Quantity.PEAK) else f" ({row.what})"
-    return f"{words[row.quantity]} of {row.bound:g} {UNITS[row.quantity]}{where}"
+    return row.quantity.limit_words(row)
 
 
 def _highest(evaluation: Evaluation) -> list[Row]:
     """Return the rows that are equally high, of every quantity that is minimised."""
     found: list[Row] = []
-    for quantity in Quantity:
+    for quantity in dict.fromkeys(row.quantity for row in evaluation.rows):
         rows = [row for row in evaluation.of(quantity) if row.weight > 0.0]
         top = max((row.weight * row.value for row in rows), default=0.0)
         found += [row for row in rows if row.weight * row.value >= top * (1.0 - SAME_HEIGHT)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from optim.criteria.linearised import Conditions
-from optim.criteria.rows import UNITS, Evaluation, Row
+from optim.criteria.rows import Evaluation, Row
 from optim.results.basins import Basin, Checked
 from solver.continuation.branch import Branch
 
@@ -28,8 +28,9 @@ def bands_json(evaluation: Evaluation) -> list[dict[str, object]]:
 def row_json(row: Row) -> dict[str, object]:
     """Return a row."""
     return {
-        "quantity": row.quantity.value, "case": row.case, "what": row.what, "value": row.value,
-        "unit": UNITS[row.quantity], "at": number(row.at_hz), "bound": row.bound, "weight": row.weight,
+        "quantity": row.quantity.name, "case": row.case, "what": row.what, "value": row.value,
+        "unit": row.quantity.unit, "at": number(row.at_hz), "bound": row.bound, "weight": row.weight,
+        "smaller_is_better": row.quantity.smaller_is_better,
     }  # fmt: skip
 
 
@@ -72,7 +73,7 @@ def conditions_json(found: Conditions) -> dict[str, object]:
         "residual": number(found.residual),
         "violation": found.violation,
         "rows": [
-            {"what": row.what, "case": row.case, "quantity": row.quantity.value, "multiplier": x}
+            {"what": row.what, "case": row.case, "quantity": row.quantity.name, "multiplier": x}
             for row, x in found.rows
         ],
         "bounds": [{"variable": name, "side": side, "multiplier": x} for name, side, x in found.bounds],

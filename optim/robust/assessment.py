@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from optim.criteria.rows import Quantity, Row
+from optim.criteria.band import BAND
+from optim.criteria.peak import PEAK
+from optim.criteria.rows import Row
 from optim.methods.kkt import KEPT
 from optim.problem.uncertainty_set import Scenario
 from optim.robust.result import Side, Spread
@@ -31,9 +33,9 @@ def side_of(
     """
     nominal = search.outcome(values, Scenario(), gradients=False)
     samples = [search.outcome(values, scenario, gradients=False) for scenario in drawn]
-    peaks = [found.highest(Quantity.PEAK) if found.good else None for found in samples]
+    peaks = [found.highest(PEAK) if found.good else None for found in samples]
     worst, unknown = _worst(search, values, samples, known)
-    peak, band = nominal.highest(Quantity.PEAK), nominal.highest(Quantity.BAND)
+    peak, band = nominal.highest(PEAK), nominal.highest(BAND)
     return Side(
         values=dict(values), peak=math.nan if peak is None else peak.value,
         at_hz=math.nan if peak is None else peak.at_hz, band_hz=math.nan if band is None else band.value,
@@ -46,7 +48,7 @@ def _worst(
     search: RobustSearch, values: Mapping[str, float], samples: Sequence[Outcome], known: Sequence[Scenario]
 ) -> tuple[Outcome | None, Scenario | None]:
     """Return the design in the scenario of the highest peak; or None and the scenario that is not known."""
-    aspect = Aspect(quantity=Quantity.PEAK, limited=False, plain=True)
+    aspect = Aspect(quantity=PEAK, limited=False, plain=True)
     ranked = sorted((o for o in samples if o.good), key=lambda found: -aspect.worst(found.rows))
     besides = [found.scenario for found in ranked[:CHECKED]]
     try:

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from optim.criteria.rows import Evaluation, Quantity
+from optim.criteria.peak import PEAK
+from optim.criteria.rows import Evaluation
 from optim.methods.kkt import Local, is_flat
 from optim.methods.multistart import coarse
 from optim.problem.uncertainty_set import Scenario
@@ -60,7 +61,7 @@ class Progress:
         """Add a scenario to the master problem unless it is there."""
         if found.scenario in self.scenarios:
             return False
-        row = found.highest(Quantity.PEAK)
+        row = found.highest(PEAK)
         self.scenarios.append(found.scenario)
         self.exceeded.append(exceeds)
         self.peaks.append(math.nan if row is None else row.value)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from optim.criteria.linearised import Conditions
-from optim.criteria.rows import Quantity
+from optim.criteria.peak import PEAK
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet
 from optim.results.design import DesignResult
@@ -135,7 +135,7 @@ class Side:
     @property
     def worst_peak(self) -> float:
         """Highest peak over the uncertainty [m]; NaN if it is not known."""
-        row = None if self.worst is None else self.worst.highest(Quantity.PEAK)
+        row = None if self.worst is None else self.worst.highest(PEAK)
         return math.nan if row is None else row.value
 
     @property
@@ -145,7 +145,7 @@ class Side:
 
     def to_json(self, quantile: float) -> dict[str, object]:
         """Return it as one JSON object."""
-        row = None if self.worst is None else self.worst.highest(Quantity.PEAK)
+        row = None if self.worst is None else self.worst.highest(PEAK)
         worst = None
         if self.worst is not None and row is not None:
             worst = {"peak": row.value, "at": row.at_hz, "scenario": self.worst.scenario.to_json()}

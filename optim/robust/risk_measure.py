@@ -21,8 +21,9 @@ from enum import Enum
 
 import numpy as np
 
+from optim.criteria.criterion import Criterion
 from optim.criteria.linearised import PENALTY, Model, model_of
-from optim.criteria.rows import Evaluation, Quantity
+from optim.criteria.rows import Evaluation
 from optim.problem.variables import Variable
 from optim.robust.scenarios import number_of
 
@@ -35,7 +36,7 @@ class Aim(Enum):
     QUANTILE = "quantile"
 
 
-Scales = Mapping[Quantity, float]
+Scales = Mapping[Criterion, float]
 
 
 def aim_model(
@@ -52,7 +53,7 @@ def aim_model(
         numbers = np.array([number_of(row) for row in model.rows], dtype=np.float64)
         return replace(
             model, heights=model.heights / count, slopes=model.slopes / count, unit=model.unit * count,
-            groups=numbers * len(Quantity) + model.groups,
+            groups=numbers * len(scales) + model.groups,
         )  # fmt: skip
 
     def order_statistic(evaluation: Evaluation) -> Model:

@@ -16,8 +16,9 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
-from optim.criteria.rows import Quantity
+from optim.criteria.peak import PEAK
 from optim.errors import DesignError
 from optim.methods.evaluator import StoppedError
 from optim.problem.problem import Method, pose
@@ -62,6 +63,7 @@ def robust_design(
     basins: int = 2,
     on_progress: Callable[[float, int], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    **limits: Any,
 ) -> RobustResult:
     """Choose parameters so that the peak is least over an uncertainty, and compare with the nominal optimum.
 
@@ -96,7 +98,7 @@ def robust_design(
         scene, variables=variables, scaling=scaling, cases=cases, limit=limit, weights=weights,
         max_peak=max_peak, max_band_hz=max_band_hz, forbidden_hz=forbidden_hz, speeds_rpm=speeds_rpm,
         max_friction_work=max_friction_work, contact_states=contact_states, harmonics=harmonics, start=start,
-        method=method, basins=basins,
+        method=method, basins=basins, **limits,
     )  # fmt: skip
     over = read_uncertain(scene, problem.variables, uncertain)
     search = RobustSearch(problem, over, _aim(aim), _quantile(quantile), on_progress, should_stop)
@@ -184,10 +186,10 @@ def _honest(search: RobustSearch, state: _State, status: RobustStatus) -> Robust
     best, side = state.progress.best, state.sides["robust"]
     if search.aim is not Aim.WORST_CASE or best is None or side.worst is None:
         return status
-    plain = Aspect(quantity=Quantity.PEAK, limited=False, plain=True)
+    plain = Aspect(quantity=PEAK, limited=False, plain=True)
     known = plain.worst(best.evaluation.rows)
     excess = side.worst_peak / known - 1.0 if known > 0.0 else 0.0
-    weighted = search.problem.weights[Quantity.PEAK] > 0.0 and len(search.problem.cases) == 1
+    weighted = search.problem.weights[PEAK] > 0.0 and len(search.problem.cases) == 1
     if weighted and excess > CLOSED:
         state.progress.gap = max(state.progress.gap, excess)
         return RobustStatus.NOT_CLOSED if status is RobustStatus.OPTIMAL else status

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from optim.criteria.evaluation import Judge, effects_of, evaluate
-from optim.criteria.rows import Evaluation, Quantity, Row
+from optim.criteria.criterion import Criterion
+from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
+from optim.criteria.rows import Evaluation, Row
 from optim.problem.cases import Case
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Coordinate, Scenario
@@ -46,7 +47,7 @@ class Outcome:
         """Whether every number is known."""
         return bool(self.rows) and all(np.isfinite(row.value) for row in self.rows)
 
-    def highest(self, quantity: Quantity) -> Row | None:
+    def highest(self, quantity: Criterion) -> Row | None:
         """Return the largest row of a quantity."""
         return max((r for r in self.rows if r.quantity is quantity), key=lambda r: r.value, default=None)
 
@@ -168,12 +169,12 @@ def _of_all_blades(
     here = case.scene.with_values(values)
     effects = effects_of(problem, here)
     sectors, dof = here.structure.sectors, here.observe.dof  # type: ignore[union-attr]
-    ranges = ((None, None), *problem.limits.forbidden_hz.get(case.name, ()))
+    ranges = ranges_of(problem, case)
     rows: list[Row] = []
-    for low, high in ranges:
+    for over in ranges:
         branch = sweep(
-            here, start=low, stop=high, harmonics=problem.harmonics, limit=problem.limit, effects=effects,
-            should_stop=should_stop,
+            here, start=over.low, stop=over.high, harmonics=problem.harmonics, limit=problem.limit,
+            effects=effects, should_stop=should_stop,
         )  # fmt: skip
         if not branch.completed:
             return [], len(ranges)
@@ -181,9 +182,7 @@ def _of_all_blades(
             name = f"{case.name}, {dof}@{j}"
             seen = branch if j == 0 else observing(branch, f"{dof}@{j}", limit=problem.limit, effects=effects)
             judge = Judge(problem=problem, case=replace(case, name=name), gradients=gradients)
-            found = judge.response(seen) if low is None or high is None else judge.forbidden(seen, low, high)
-            blades = (Quantity.PEAK, Quantity.BAND, Quantity.FORBIDDEN)
-            rows += [row for row in found if j == 0 or row.quantity in blades]
+            rows += [row for row in judge.rows(seen, over) if j == 0 or row.quantity.each_blade]
     return rows, len(ranges)
 
 

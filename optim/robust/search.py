@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from optim.criteria.evaluation import natural_scales
 from optim.criteria.linearised import Model
-from optim.criteria.rows import Evaluation, Quantity
+from optim.criteria.rows import Evaluation
 from optim.methods.evaluator import StoppedError
 from optim.methods.kkt import Local
 from optim.methods.minimax import REMEMBERED, minimax_search
@@ -128,12 +128,6 @@ class RobustSearch:
 
     def aspects(self) -> tuple[Aspect, ...]:
         """Return every number whose worst case counts: what is minimised first, then what is limited."""
-        limits = self.problem.limits
-        limited = {
-            Quantity.PEAK: limits.peak is not None, Quantity.BAND: limits.band_hz is not None,
-            Quantity.FORBIDDEN: bool(limits.forbidden_hz), Quantity.FRICTION_WORK: bool(limits.friction_work),
-            Quantity.SEPARATION: bool(limits.in_contact),
-        }  # fmt: skip
         minimised = [
             Aspect(quantity=quantity, limited=False)
             for quantity, weight in self.problem.weights.items()
@@ -141,5 +135,5 @@ class RobustSearch:
         ]
         return (
             *minimised,
-            *(Aspect(quantity=q, limited=True, unit=self.scales[q]) for q, given in limited.items() if given),
+            *(Aspect(quantity=q, limited=True, unit=self.scales[q]) for q in self.problem.limits.read),
         )

@@ -19,7 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from optim.criteria.rows import Quantity, Row
+from optim.criteria.criterion import Criterion
+from optim.criteria.rows import Row
 from optim.methods.multistart import places
 from optim.methods.surrogate import Taylor, candidates, promising
 from optim.problem.uncertainty_set import Disk, Scenario, Shape, UncertainSet
@@ -55,7 +56,7 @@ class Aspect:
 
     Attributes
     ----------
-    quantity : Quantity
+    quantity : Criterion
         Of which rows.
     limited : bool
         Their excess over the bounds; otherwise their weighted value.
@@ -65,7 +66,7 @@ class Aspect:
         The value itself, without weight.
     """
 
-    quantity: Quantity
+    quantity: Criterion
     limited: bool
     unit: float = 1.0
     plain: bool = False

@@ -13,12 +13,15 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
 
+from optim.criteria.band import BAND
 from optim.criteria.linearised import ACTIVE, Model, bounds_held
-from optim.criteria.rows import Evaluation, Quantity
+from optim.criteria.peak import PEAK
+from optim.criteria.rows import Evaluation
 from optim.errors import DesignError
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.kkt import Local
@@ -57,6 +60,7 @@ def pareto_front(
     method: str | Method = Method.AUTO,
     on_progress: Callable[[float, int], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    **limits: Any,
 ) -> ParetoResult:
     """Return the designs of which none has both a lower peak and a narrower band than another.
 
@@ -85,7 +89,7 @@ def pareto_front(
     problem = pose(
         scene, variables=variables, scaling=scaling, cases=cases, limit=limit, max_peak=max_peak,
         forbidden_hz=forbidden_hz, speeds_rpm=speeds_rpm, max_friction_work=max_friction_work,
-        contact_states=contact_states, harmonics=harmonics, start=start, method=method,
+        contact_states=contact_states, harmonics=harmonics, start=start, method=method, **limits,
     )  # fmt: skip
     if isinstance(points, bool) or not isinstance(points, int) or points < FEWEST:
         raise DesignError("points", points, f"must be a whole number >= {FEWEST}")
@@ -117,7 +121,7 @@ class _Front:
 
     def run(self) -> ParetoStatus:
         """Find both ends, then points between."""
-        narrow = replace(self.problem, weights={Quantity.PEAK: 0.0, Quantity.BAND: 1.0})
+        narrow = replace(self.problem, weights={PEAK: 0.0, BAND: 1.0})
         for problem in (self.problem, narrow):
             end = solve_problem(problem, on_progress=self._report, should_stop=self._should_stop)
             self.ends.append(end)
@@ -160,7 +164,7 @@ class _Front:
         weights = {case.name: case.weight for case in self.problem.cases}
         for evaluation in history:
             rows = tuple(
-                replace(row, weight=weights[row.case] if row.quantity is Quantity.PEAK else 0.0)
+                replace(row, weight=weights[row.case] if row.quantity is PEAK else 0.0)
                 for row in evaluation.rows
             )
             if evaluation.good and all(np.all(np.isfinite(row.gradient)) for row in rows):
@@ -188,7 +192,7 @@ class _Front:
 
     def _add(self, one: ParetoPoint, other: ParetoPoint, width: float) -> None:
         """Search the least peak with the band at most so wide."""
-        limited = replace(self.problem, limits=replace(self.problem.limits, band_hz=width))
+        limited = replace(self.problem, limits=self.problem.limits.including(BAND, width))
         search = Search(limited, self._report, self._should_stop, MOST_EVALUATIONS)
         rebound = [_at_limit(evaluation, width) for evaluation in self._pool]
         search.keep(_at_limit(self.ends[0].evaluation or rebound[0], width))
@@ -233,7 +237,7 @@ def _used(method: Method) -> Method:
 
 def _at_limit(evaluation: Evaluation, width: float) -> Evaluation:
     """Return an evaluation judged by another limit on the band."""
-    rows = [replace(row, bound=width) if row.quantity is Quantity.BAND else row for row in evaluation.rows]
+    rows = [replace(row, bound=width) if row.quantity is BAND else row for row in evaluation.rows]
     return replace(evaluation, rows=tuple(rows))
 
 
@@ -245,7 +249,7 @@ def steepest(model: Model, variables: Sequence[Variable]) -> float:
     section 4.3).
     """
     near = model.heights >= model.heights.max() * (1.0 - ACTIVE)
-    band = [row.quantity is Quantity.BAND for row in model.limited]
+    band = [row.quantity is BAND for row in model.limited]
     held = [unit for _, _, unit in bounds_held(model.z, variables)]
     columns = np.vstack([model.slopes[near], model.excess_slopes[band], *held]).T
     count, limits = int(near.sum()), int(sum(band))
@@ -264,7 +268,7 @@ def steepest(model: Model, variables: Sequence[Variable]) -> float:
 
 def _slope(search: Search, local: Local, width: float) -> float:
     """Return d peak / d band along the front [m/Hz] from the multipliers of the limit on the band."""
-    found = [x for row, x in local.conditions.rows if row.quantity is Quantity.BAND]
+    found = [x for row, x in local.conditions.rows if row.quantity is BAND]
     if not local.settled:
         return math.nan
     return -sum(found) * search.model(local.evaluation).unit / width

@@ -34,6 +34,7 @@ def of_design(result: DesignResult) -> Summary:
     pairs += [("warning", words) for words in result.warnings]
     if result.band_hz is not None and result.limit is not None:
         pairs.append(("band", f"{result.band_hz:.4g} Hz above {units.length(result.limit)}"))
+    pairs += [(row.quantity.name, f"{row.value:.4g} {row.quantity.unit}") for row in result.further]
     if result.active:
         pairs.append(("held by", "; ".join(result.active)))
     pairs.append(("responses", str(result.evaluations)))

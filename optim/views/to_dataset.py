@@ -37,6 +37,10 @@ def design_dataset(result: DesignResult) -> Dataset:
         "objective": column("design", np.array([one.objective for one in tried]), "", "what is minimised"),
         "optimum": column("design", np.array([one is result.evaluation for one in tried], dtype=bool)),
     }
+    for row in result.further:
+        values = [next((found.value for found in one.of(row.quantity)), math.nan) for one in tried]
+        name, unit = row.quantity.name, row.quantity.unit
+        variables[name.replace(" ", "_")] = column("design", np.array(values), unit, f"largest {name}")
     notes = attributes(
         result.status.value, result.problem.scene, method=result.method.value,
         active="; ".join(result.active), limit=result.limit,

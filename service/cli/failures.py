@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 
+from optim.criteria.registry import limit_keys
 from optim.errors import DesignError
 from service import errors
 from solver.errors import Issue, SceneError, SettingError, SolverError
@@ -27,7 +28,6 @@ _OPTIONS = {
     "steps": "--steps",
     "frequencies": "--frequencies",
     "limit": "--limit",
-    "max_band_hz": "--max-band",
     "variables": "--variable",
     "speeds_rpm": "--speeds",
     "orders": "--order",
@@ -49,7 +49,9 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 def option_name(name: str) -> str:
     """The option that sets an argument of the Python interface."""
     # One of several values of a repeatable option has its number behind the name.
-    return _OPTIONS.get(name.partition("[")[0], name)
+    plain = name.partition("[")[0]
+    of_keys = (key.flag for key in limit_keys() if key.name == plain)
+    return _OPTIONS.get(plain) or next(of_keys, name)
 
 
 class ShortfallError(Exception):

@@ -8,7 +8,7 @@ from fastapi import FastAPI
 from pydantic import BaseModel
 
 from service.http import error_examples
-from service.http.routes.uploads import UPLOAD_MEDIA
+from service.http.routes.uploads import upload_media
 from service.jobs.registry import Registry
 from solver.scene.scene import Scene, load_scene
 
@@ -70,7 +70,7 @@ def _complete(description: dict[str, Any], registry: Registry) -> None:
     }
     paths["/v1/uploads"]["post"]["requestBody"] = {
         "required": True,
-        "content": {form: {"schema": _FILE, "examples": _MATRIX} for form in UPLOAD_MEDIA},
+        "content": {form: {"schema": _FILE, "examples": _MATRIX} for form in upload_media()},
     }
     for path in _ITSELF:
         _in_place(paths[path]["post"]["requestBody"]["content"]["application/json"], schemas)

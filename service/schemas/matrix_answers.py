@@ -9,6 +9,22 @@ from pydantic import Field
 from service.schemas.answers import Answer
 
 
+class FormatAnswer(Answer):
+    """A format of files that can be uploaded."""
+
+    name: str
+    suffixes: list[str] = Field(description="What the names of its files end in.")
+    word: str = Field(description="Of `?format=`.")
+    gives: list[str] = Field(description="Any of matrix, matrices (one or several), modes, labels.")
+    help: str = Field(description="What the files hold and which program writes them.")
+
+
+class FormatsAnswer(Answer):
+    """The formats that can be uploaded."""
+
+    items: list[FormatAnswer]
+
+
 class MatrixAnswer(Answer):
     """A matrix that was read."""
 

@@ -168,11 +168,11 @@ def _answer(task: str, argument: Any) -> dict[str, Any]:
 
 def _describe(name: str) -> list[dict[str, Any]]:
     from solver.matrices.files import array_names, read_matrix, read_modes
-    from solver.matrices.labels import LABEL_SUFFIXES
     from solver.matrices.load_set import labels_of
+    from solver.matrices.readers import registry
 
     file = Path(name)
-    if file.suffix.lower() in LABEL_SUFFIXES:
+    if file.suffix.lower() in registry.label_suffixes():
         return [{"name": "mapping", "rows": len(labels_of(file)), "columns": 1, "entries": None}]
     names = array_names(file)
     if "modes" in names:

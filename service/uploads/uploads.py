@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 import tempfile
 import threading
 from collections import OrderedDict
@@ -26,69 +25,34 @@ _KEPT = 4
 _LARGEST_STRUCTURE = 16 * 1024 * 1024
 
 
-class UploadFormat(enum.StrEnum):
-    """The formats that can be uploaded; the value is a suffix of such files."""
-
-    NPZ = "npz"
-    NPY = "npy"
-    MAT = "mat"
-    MTX = "mtx"
-    OUTPUT4 = "op4"
-    DMIG = "pch"
-    CALCULIX = "sti"
-    ANSYS_LABELS = "mapping"
-    CALCULIX_LABELS = "dof"
-    HARWELL_BOEING = "hb"
-
-
-MEDIA = {
-    "application/x-npz": UploadFormat.NPZ,
-    "application/x-npy": UploadFormat.NPY,
-    "application/x-matlab-data": UploadFormat.MAT,
-    "text/x-matrix-market": UploadFormat.MTX,
-    "application/x-matrix-market": UploadFormat.MTX,
-    "application/x-harwell-boeing": UploadFormat.HARWELL_BOEING,
-}
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arrived:
     """A file that came in and was not looked at yet."""
 
     path: Path
     name: str
-    format: UploadFormat
+    format: str
     size: int
     sha256: str
 
 
-def format_of(asked: UploadFormat | None, name: str, content_type: str) -> UploadFormat:
-    """The format that was asked for, that of the suffix of the name, or of the content type.
+def format_of(asked: str | None, name: str, content_type: str) -> str:
+    """The word of the format that was asked for, that of the ending of the name, or of the content type.
 
     Raises
     ------
     InvalidRequestError
-        If none of them says it.
+        If none of them says it, or no reader has the word.
     """
-    from solver.matrices.files import HARWELL_BOEING
-    from solver.matrices.readers.calculix import CALCULIX
-    from solver.matrices.readers.dmig import DMIG
+    # Loaded here: a service that only lists does not need SciPy.
+    from solver.matrices.readers import registry
 
-    if asked is not None:
-        return asked
-    suffix = Path(name).suffix.lower()
-    if suffix in HARWELL_BOEING:
-        return UploadFormat.HARWELL_BOEING
-    if suffix in DMIG:
-        return UploadFormat.DMIG
-    if suffix in CALCULIX:
-        return UploadFormat.CALCULIX
-    by_suffix = {f".{known.value}": known for known in UploadFormat}
-    found = by_suffix.get(suffix) or MEDIA.get(content_type)
-    if found is not None:
+    known = registry.words()
+    found = registry.word_of(name, content_type) if asked is None else asked
+    if found in known:
         return found
-    known = ", ".join(UploadFormat)
-    message = f"`format` must be one of {known}: neither the name {name!r} nor the content type says it"
+    reason = f"got {asked!r}" if asked else f"neither the name {name!r} nor the content type says it"
+    message = f"`format` must be one of {', '.join(known)}: {reason}"
     raise InvalidRequestError([Issue(pointer="/format", message=message)], source="query")
 
 
@@ -111,7 +75,7 @@ class Uploads:
         """
         found = contents(arrived.path, self._seconds)
         row, added = self.repository.add(
-            owner=caller.owner, name=arrived.name, format=arrived.format.value, size=arrived.size,
+            owner=caller.owner, name=arrived.name, format=arrived.format, size=arrived.size,
             sha256=arrived.sha256, data=arrived.path.read_bytes(),
         )  # fmt: skip
         return row, found, added
@@ -257,20 +221,18 @@ def file_names(rows: Mapping[str, UploadRow]) -> dict[str, str]:
     owners: dict[str, str] = {}
     names = {}
     for key, row in rows.items():
-        name = file_name(row.name, UploadFormat(row.format))
+        name = file_name(row.name, row.format)
         if owners.setdefault(name, row.id) != row.id:
             name = f"{key}-{name}"
         names[key] = name
     return names
 
 
-def file_name(name: str, form: UploadFormat) -> str:
-    """The name an upload came with, with a suffix of its format."""
-    try:
-        fits = format_of(None, name, "") is form
-    except InvalidRequestError:
-        fits = False
-    return name if fits else f"{name}.{form.value}"
+def file_name(name: str, form: str) -> str:
+    """The name an upload came with, with an ending of its format."""
+    from solver.matrices.readers import registry
+
+    return name if registry.word_of(name, "") == form else f"{name}.{form}"
 
 
 def _digest(structure: Mapping[str, Any], rows: Mapping[str, UploadRow]) -> str:

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from solver.matrices.files import MatrixFileError, array_names
-from solver.matrices.labels import LABEL_SUFFIXES
+from solver.matrices.readers import registry
+from solver.matrices.readers.reader import ROLES
 
-ROLES = ("M", "K", "C")
 MODES, MAPPING = "modes", "mapping"
-_BY_SUFFIX = {".mas": "M", ".sti": "K"}
 _WORDS = {
     "M": ("M", "MASS", "MASSE"),
     "K": ("K", "STIF", "STIFF", "STIFFNESS"),
@@ -33,7 +32,8 @@ def sorted_files(files: Sequence[Path], mapping: Path | None = None) -> dict[str
     MatrixFileError
         Too many files, none, or a single one without M and K.
     """
-    labels = [path for path in files if path.suffix.lower() in LABEL_SUFFIXES]
+    naming = registry.label_suffixes()
+    labels = [path for path in files if path.suffix.lower() in naming]
     matrices = [path for path in files if path not in labels]
     rows = [*labels, *([] if mapping is None else [mapping])]
     if len(rows) > 1:
@@ -54,8 +54,9 @@ def _assigned(files: Sequence[Path]) -> dict[str, Path]:
 
 
 def _role(path: Path) -> str | None:
-    if path.suffix.lower() in _BY_SUFFIX:
-        return _BY_SUFFIX[path.suffix.lower()]
+    told = registry.role_of_suffix(path.suffix.lower())
+    if told is not None:
+        return told
     words = [word.upper() for word in reversed(re.findall("[A-Za-z]+", path.stem))]
     roles = (role for word in words for role, known in _WORDS.items() if word in known)
     return next(roles, None)

@@ -1,8 +1,7 @@
 """Which node and component each row of a matrix is: labels such as ``1203.UX``, from files and in texts.
 
-Ansys writes them with HBMAT (``…,,,YES`` gives ``name.mapping``: a heading, then equation, node and DOF a
-line), CalculiX beside the stored matrices (``name.dof``: ``node.direction`` a line). Abaqus and Nastran
-(DMIG) have them in the lines of the matrix.
+Ansys and CalculiX write them in files of their own (``name.mapping``, ``name.dof``), which have readers;
+Abaqus and Nastran (DMIG) have them in the lines of the matrix.
 """
 
 from __future__ import annotations
@@ -10,12 +9,12 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
-from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines
+from solver.matrices.readers import registry
+from solver.matrices.readers.label import COMPONENTS, Label
+from solver.matrices.readers.numbers_in_text import LARGEST, FormatError
 
-COMPONENTS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
-LABEL_SUFFIXES = (".mapping", ".dof")
+_OF_ONES_OWN = ".dof"
 _ALIASES = {
     **{str(i): name for i, name in enumerate(COMPONENTS, start=1)},
     **{f"T{i}": name for i, name in enumerate(COMPONENTS[:3], start=1)},
@@ -24,27 +23,6 @@ _ALIASES = {
     **{axis: f"U{axis}" for axis in "XYZ"},
 }
 _TEXT = re.compile(r"(-?\d{1,10})\.([A-Za-z]{1,4}\d?|\d{1,2})")
-
-
-class Label(NamedTuple):
-    """A node and a component of its motion: ``UX`` to ``ROTZ``, or what the file calls it."""
-
-    node: int
-    component: str
-
-    def __str__(self) -> str:
-        return f"{self.node}.{self.component}"
-
-    @property
-    def rotation(self) -> bool:
-        """Whether it is an angle."""
-        return self.component in COMPONENTS[3:]
-
-    @property
-    def place(self) -> tuple[int, int, str]:
-        """What labels are sorted by: node, then UX to ROTZ, then the rest."""
-        known = self.component in COMPONENTS
-        return self.node, COMPONENTS.index(self.component) if known else len(COMPONENTS), self.component
 
 
 def component(text: str) -> str:
@@ -60,7 +38,7 @@ def label(text: str) -> Label | None:
 
 
 def read_labels(path: Path) -> tuple[Label, ...]:
-    """Read the labels of all rows from a ``.mapping`` file of Ansys or a ``.dof`` file of CalculiX.
+    """Read the labels of all rows from a file that names them; one of an unknown ending as `.dof`.
 
     Raises
     ------
@@ -69,10 +47,22 @@ def read_labels(path: Path) -> tuple[Label, ...]:
     OSError
         The file cannot be read.
     """
-    lines = ascii_lines(path, "a file of DOF labels")
-    labels = _of_ansys(lines) if path.suffix.lower() == ".mapping" else _of_calculix(lines)
+    suffix = path.suffix.lower()
+    suffix = suffix if suffix in registry.label_suffixes() else _OF_ONES_OWN
+    read = next(one.labels for one in registry.readers() if one.labels is not None and suffix in one.suffixes)
+    return read(path)
+
+
+def distinct(labels: Sequence[Label], n_lines: int) -> tuple[Label, ...]:
+    """The labels of all rows, each of them one row's.
+
+    Raises
+    ------
+    FormatError
+        There are none in the `n_lines` of the file, or two rows have the same.
+    """
     if not labels:
-        raise FormatError(f"line {len(lines) + 1} is missing: the file names no row")
+        raise FormatError(f"line {n_lines + 1} is missing: the file names no row")
     seen: dict[Label, int] = {}
     for row, found in enumerate(labels):
         if seen.setdefault(found, row) != row:
@@ -80,34 +70,14 @@ def read_labels(path: Path) -> tuple[Label, ...]:
     return tuple(labels)
 
 
-def _of_ansys(lines: Sequence[str]) -> list[Label]:
-    labels: list[Label] = []
-    for number, line in enumerate(lines, start=1):
-        words = line.split()
-        if not words or (not labels and words[0].upper().startswith("MATRIX")):
-            continue
-        whole = all(re.fullmatch(r"-?\d{1,10}", word) for word in words[:2])
-        if len(words) != 3 or not whole:
-            raise FormatError(f"line {number} must hold equation, node and DOF, got {line.strip()[:80]!r}")
-        if int(words[0]) != len(labels) + 1:
-            raise FormatError(f"line {number} must be equation {len(labels) + 1}, got {words[0]}")
-        labels.append(Label(_node(words[1], number), component(words[2])))
-    return labels
+def node_number(text: str, line: int) -> int:
+    """The number of a node in a line.
 
-
-def _of_calculix(lines: Sequence[str]) -> list[Label]:
-    labels = []
-    for number, line in enumerate(lines, start=1):
-        if not line.strip():
-            continue
-        found = label(line)
-        if found is None:
-            raise FormatError(f"line {number} must hold node.direction, got {line.strip()[:80]!r}")
-        labels.append(Label(_node(str(found.node), number), found.component))
-    return labels
-
-
-def _node(text: str, line: int) -> int:
+    Raises
+    ------
+    FormatError
+        It is too large.
+    """
     if abs(int(text)) > LARGEST:
         raise FormatError(f"line {line}: a node number may be {LARGEST}, got {text}")
     return int(text)
@@ -115,7 +85,7 @@ def _node(text: str, line: int) -> int:
 
 def labels_beside(path: Path) -> Path | None:
     """The file of labels that stands beside a matrix under the same name, if there is one."""
-    for suffix in LABEL_SUFFIXES:
+    for suffix in registry.label_suffixes():
         for name in (path.with_suffix(suffix), path.with_suffix(suffix.upper())):
             if name.is_file():
                 return name

@@ -10,9 +10,11 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
 from solver.matrices.files import MatrixFileError, read_labelled
-from solver.matrices.labels import Label, labels_beside, read_labels
 from solver.matrices.labels import label as parsed
+from solver.matrices.labels import labels_beside, read_labels
+from solver.matrices.readers.label import Label
 from solver.matrices.readers.numbers_in_text import FormatError
+from solver.matrices.readers.registry import label_suffixes
 from solver.matrices.readers.triplets import Labelled
 
 # Forces over displacements, and moments over angles, in the units of the files: what they are in N/m and
@@ -51,7 +53,7 @@ class MatrixSet:
         if self.labels is None:
             return (
                 f"is {given[:40]!r}, but the files do not tell the nodes of their rows: give the row, or a "
-                "file of labels (name.mapping of Ansys, name.dof of CalculiX) beside the matrices"
+                f"file of labels ({', '.join(f'name{s}' for s in label_suffixes())}) beside the matrices"
             )
         wanted = parsed(given)
         if wanted is None:
@@ -67,7 +69,7 @@ def read_set(paths: Mapping[str, Path], mapping: Path | None = None) -> MatrixSe
     """Read the matrices of a structure.
 
     Rows that files label (Abaqus, DMIG) are brought together by their labels; a file of labels, given or
-    found beside a matrix under its name (.mapping of Ansys, .dof of CalculiX), names the rows as they stand.
+    found beside a matrix under its name, names the rows as they stand.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 MOST_DOFS = 2000
 MOST_MODES = 2000
 _ENTRY_KEYS = ("size", "rows", "columns", "values")
-_MODES_KEYS = ("omega2", "frequencies_hz", "modes", "damping_ratio")
+MODES_KEYS = ("omega2", "frequencies_hz", "modes", "damping_ratio")
 _SPARSE_BELOW = 0.3  # share of entries that are not zero below which a matrix is written entry by entry
 _INLINE = "must be given inline here, as rows or as a table of entries: files are read by load_scene only"
 
@@ -200,10 +200,10 @@ class Modes:
             raise ValueError(f"`modes` {_INLINE}, got the path {data[:80]!r}")
         if not isinstance(data, dict):
             raise ValueError(f"`modes` must be a table, got {type(data).__name__}")
-        unknown = [str(key) for key in data if key not in _MODES_KEYS]
+        unknown = [str(key) for key in data if key not in MODES_KEYS]
         if unknown:
             raise ValueError(
-                f"`{unknown[0][:80]}` is not a key of modes; known keys: {', '.join(_MODES_KEYS)}"
+                f"`{unknown[0][:80]}` is not a key of modes; known keys: {', '.join(MODES_KEYS)}"
             )
         if ("omega2" in data) == ("frequencies_hz" in data) or "modes" not in data:
             raise ValueError(

@@ -13,6 +13,8 @@ from matrix_cases import beam
 from page_site import Site, Watch
 from test_page import visit
 
+from solver.matrices.readers.registry import readers
+
 expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
 
@@ -56,6 +58,8 @@ def test_matrices_become_a_scene_and_its_response(profile: Profile, site: Site) 
     page = visit(context, site)
     page.get_by_role("button", name="Matrices…").press("Enter")
     expect(page.locator("#matrix-choose")).to_be_focused()
+    endings = [suffix for reader in readers() for suffix in reader.suffixes]
+    expect(page.locator("#matrix-input")).to_have_attribute("accept", ",".join(endings))
     damaged = hbmat(K).replace("D+", "X+", 1)
     page.evaluate(DROP, ["#start", "blade K.matrix", damaged])
     expect(page.locator("#matrix-files .message")).to_contain_text("line 163, column 1")

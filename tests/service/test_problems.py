@@ -12,6 +12,7 @@ from service_helpers import is_problem, job_ids
 
 import optim
 import solver
+from optim.criteria import registry
 from optim.problem.problem import Method, pose
 from service.errors import InvalidRequestError
 from service.jobs.kinds.design import DesignRequest, resolve
@@ -44,6 +45,8 @@ EVERY_KEY: dict[str, Any] = {
     "method": "minimax",
     "basins": 3,
 }
+# `limits` are the keys of criteria that the signature does not name.
+NO_KEYS = {"scene", "on_progress", "should_stop", "limits"}
 
 
 class Shipped:
@@ -62,7 +65,7 @@ def pointers(change: dict[str, Any]) -> list[str]:
 
 
 def test_every_key_of_the_design_layer_is_one_of_the_body_and_arrives() -> None:
-    keys = set(pose.__kwdefaults__)
+    keys = set(pose.__kwdefaults__) | {key.name for key in registry.limit_keys()}
     assert keys == set(EVERY_KEY) - {"scene", "set"}, "a key of the design layer that the service lacks"
     assert keys <= set(DesignRequest.model_fields)
     assert DesignRequest.model_json_schema()["examples"]
@@ -178,7 +181,7 @@ def test_a_scene_without_friction_has_nothing_to_choose_by_itself() -> None:
 
 
 def test_a_front_has_the_keys_of_a_design_but_its_own() -> None:
-    theirs = set(inspect.signature(optim.pareto_front).parameters) - {"scene", "on_progress", "should_stop"}
+    theirs = set(inspect.signature(optim.pareto_front).parameters) - NO_KEYS
     keys = set(ParetoRequest.model_fields)
     assert theirs == keys - {"scene", "set", "fresh", "priority", "max_seconds"}
     body = {**EVERY_KEY, "points": 5}
@@ -240,7 +243,7 @@ def test_what_is_wrong_with_an_uncertainty(change: dict[str, Any], where: list[s
 
 
 def test_every_argument_of_a_robust_design_is_a_key() -> None:
-    keys = set(inspect.signature(optim.robust_design).parameters) - {"scene", "on_progress", "should_stop"}
+    keys = set(inspect.signature(optim.robust_design).parameters) - NO_KEYS
     assert keys <= set(DesignRequest.model_fields)
 
 

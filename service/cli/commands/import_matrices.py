@@ -31,7 +31,7 @@ Files = Annotated[
     typer.Argument(
         metavar="FILES",
         help="M K [C], in this order or named so; or one file with M, K, C or modes; and maybe a file that "
-        "names the rows (.mapping, .dof).",
+        "names the rows.",
     ),
 ]
 Out = Annotated[str, typer.Option("--out", metavar="SCENE.toml", help="The scene to write.")]
@@ -87,7 +87,23 @@ Units = Annotated[
 ]
 Mapping = Annotated[
     str | None,
-    typer.Option("--mapping", metavar="F", help="Names the rows: .mapping of Ansys, .dof of CalculiX."),
+    typer.Option("--mapping", metavar="F", help="A file that names the rows."),
+]
+
+
+def _print_formats(wanted: bool) -> None:
+    if wanted:
+        from solver.matrices.readers.registry import readers
+
+        print_pairs("Files", [(", ".join(one.suffixes), one.help.replace("`", "")) for one in readers()])
+        raise typer.Exit
+
+
+Formats = Annotated[
+    bool,
+    typer.Option(
+        "--formats", callback=_print_formats, is_eager=True, help="Print the formats that can be read."
+    ),
 ]
 
 
@@ -106,6 +122,7 @@ def import_scene(
     reduced: ReducedFile = None,
     units: Units = "SI",
     mapping: Mapping = None,
+    _formats: Formats = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Make a scene of matrices or modes in files.

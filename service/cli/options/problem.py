@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, get_type_hints
 
 import typer
 
+from optim.criteria.criterion import Form, Key
+from optim.criteria.registry import limit_keys, weight_words
 from service.cli import completion
 from service.cli.options.inputs import number, whole_number
 
@@ -24,9 +26,8 @@ File = Annotated[
     typer.Option(
         "--problem", metavar="FILE",
         help="The problem in a file (.toml, .json), with the keys of the REST body: scene, set, variables, "
-        "scaling, cases, limit, weights, max_peak, max_band_hz, forbidden_hz, speeds_rpm, max_friction_work, "
-        "contact_states, harmonics, start, method, basins, uncertain, points. An option beside it replaces "
-        "the key it stands for.",
+        f"scaling, cases, limit, weights, {', '.join(key.name for key in limit_keys())}, harmonics, start, "
+        "method, basins, uncertain, points. An option beside it replaces the key it stands for.",
     ),
 ]  # fmt: skip
 Variables = Annotated[
@@ -54,43 +55,9 @@ Limit = Annotated[
 ]  # fmt: skip
 Weights = Annotated[
     list[str] | None,
-    typer.Option("--weight", metavar="peak=W|band=W", help="What is minimised; the peak alone if left out."),
-]
-MaxPeak = Annotated[
-    float | None,
-    typer.Option("--max-peak", metavar="A", parser=number, help="Largest amplitude allowed [m]."),
-]
-MaxBand = Annotated[
-    float | None,
-    typer.Option("--max-band", metavar="HZ", parser=number, help="Widest resonance band allowed [Hz]."),
-]
-Forbidden = Annotated[
-    list[str] | None,
     typer.Option(
-        "--forbidden", metavar="LO HI",
-        help="Frequencies [Hz] at which the amplitude stays below --limit; repeatable.",
-    ),
-]  # fmt: skip
-Speeds = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--speeds", metavar="LO HI",
-        help="Running speeds [1/min]: forbidden frequencies by the engine order; repeatable.",
-    ),
-]  # fmt: skip
-MaxWork = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--max-work",
-        metavar="J|CONTACT=J",
-        help="Largest friction work in a cycle [J]; repeatable by contact.",
-    ),
-]
-NeverSeparates = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--never-separates", metavar="CONTACT", help="A contact that must stay closed; repeatable.",
-        autocompletion=completion.contacts,
+        "--weight", metavar="|".join(f"{word}=W" for word in weight_words()),
+        help="What is minimised; the peak alone if left out.",
     ),
 ]  # fmt: skip
 Method = Annotated[
@@ -126,44 +93,49 @@ Harmonics = Annotated[
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProblemFlags:
-    """What was given on the command line of a design problem, as it was written."""
+    """What was given on the command line of a design problem, as it was written; `limits` by their keys."""
 
     problem: File = None
     variables: Variables = None
     scaling: Scaling = None
     limit: Limit = None
     weights: Weights = None
-    max_peak: MaxPeak = None
-    max_band: MaxBand = None
-    forbidden: Forbidden = None
-    speeds: Speeds = None
-    max_work: MaxWork = None
-    never_separates: NeverSeparates = None
     start: Start = None
     method: Method = None
     basins: Basins = None
     values: Values = None
     harmonics: Harmonics = None
+    limits: Mapping[str, Any] = field(default_factory=dict)
 
 
 Command = Callable[..., None]
-NOT_OF_A_FRONT = ("weights", "max_band", "basins")
+NOT_OF_A_FRONT = ("weights", "basins", *(key.name for key in limit_keys(of_fronts=False)))
+_LIMITS = "limits"
+
+
+def _option(key: Key) -> Any:
+    """The option of a key of a criterion."""
+    words = key.option_help or key.help
+    if key.form is Form.NUMBER:
+        return Annotated[float | None, typer.Option(key.flag, metavar=key.metavar, parser=number, help=words)]
+    return Annotated[list[str] | None, typer.Option(key.flag, metavar=key.metavar, help=words)]
 
 
 def takes_problem(command: Command, without: Sequence[str] = ()) -> Command:
     """Give a command the options of a design problem (but those `without`) in place of its `flags`."""
     hints = get_type_hints(ProblemFlags, include_extras=True)
+    own = {one.name: hints[one.name] for one in fields(ProblemFlags) if one.name not in (*without, _LIMITS)}
+    limits = {key.name: _option(key) for key in limit_keys() if key.name not in without}
     options = [
-        inspect.Parameter(
-            field.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=hints[field.name]
-        )
-        for field in fields(ProblemFlags)
-        if field.name not in without
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=hint)
+        for name, hint in {**own, **limits}.items()
     ]
 
     @functools.wraps(command)
     def wrapped(**given: Any) -> None:
-        flags = ProblemFlags(**{option.name: given.pop(option.name) for option in options})
+        flags = ProblemFlags(
+            **{name: given.pop(name) for name in own}, limits={name: given.pop(name) for name in limits}
+        )  # fmt: skip
         command(**given, **{FLAGS: flags})
 
     parameters: list[inspect.Parameter] = []

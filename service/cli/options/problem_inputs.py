@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from optim.criteria.criterion import Form, Key
+from optim.criteria.registry import limit_keys
 from service.cli.options import inputs
 from service.cli.options.problem import ProblemFlags
 from service.cli.options.scene_files import scene_to_submit
@@ -22,7 +24,6 @@ if TYPE_CHECKING:
 IssuesOf = Callable[["Scene", Mapping[str, Any]], list[Issue]]
 
 SCENE_FILES = (".toml", ".json")
-NEVER_SEPARATES = "never-separates"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,10 +62,8 @@ class Description:
 
 OPTIONS = {
     "variables": "--variable", "scaling": "--scaling", "limit": "--limit", "weights": "--weight",
-    "max_peak": "--max-peak", "max_band_hz": "--max-band", "forbidden_hz": "--forbidden",
-    "speeds_rpm": "--speeds", "max_friction_work": "--max-work", "contact_states": "--never-separates",
-    "start": "--start", "method": "--method", "basins": "--basins",
-    "set": "--set", "harmonics": "--harmonics", "scene": "SCENE",
+    **{key.name: key.flag for key in limit_keys()}, "start": "--start", "method": "--method",
+    "basins": "--basins", "set": "--set", "harmonics": "--harmonics", "scene": "SCENE",
 }  # fmt: skip
 
 
@@ -189,12 +188,7 @@ def _of_flags(flags: ProblemFlags) -> dict[str, Any]:
         "scaling": _table("--scaling", flags.scaling, "shroud.N0=logarithmic"),
         "limit": flags.limit,
         "weights": _numbers("--weight", flags.weights, "peak=1"),
-        "max_peak": flags.max_peak,
-        "max_band_hz": flags.max_band,
-        "forbidden_hz": _ranges("--forbidden", flags.forbidden, "520 560"),
-        "speeds_rpm": _ranges("--speeds", flags.speeds, "2900 3100"),
-        "max_friction_work": _work(flags.max_work),
-        "contact_states": dict.fromkeys(flags.never_separates or (), NEVER_SEPARATES) or None,
+        **{key.name: _of_key(key, flags.limits.get(key.name)) for key in limit_keys()},
         "start": _numbers("--start", flags.start, "shroud.N0=150"),
         "method": flags.method,
         "basins": flags.basins,
@@ -237,13 +231,17 @@ def _ranges(option: str, texts: Sequence[str] | None, example: str) -> list[list
     return found
 
 
-def _work(texts: Sequence[str] | None) -> float | dict[str, float] | None:
-    """One limit for all, or one by contact."""
-    if not texts:
-        return None
-    if len(texts) == 1 and "=" not in texts[0]:
-        return inputs.part("--max-work", texts[0], texts[0])
-    return _numbers("--max-work", texts, "0.02 or shroud=0.02")
+def _of_key(key: Key, given: Any) -> Any:
+    """The value of a key of a criterion, from the option as it was written."""
+    if key.form is Form.NUMBER or not given:
+        return given
+    if key.form is Form.RANGES:
+        return _ranges(key.flag, given, key.example)
+    if key.form is Form.NAMES:
+        return dict.fromkeys(given, key.word)
+    if len(given) == 1 and "=" not in given[0]:
+        return inputs.part(key.flag, given[0], given[0])
+    return _numbers(key.flag, given, key.example)
 
 
 def _read(file: Path, kind: str) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 from service.errors import InvalidRequestError
 from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
 from service.jobs.validation import validated
-from service.schemas.matrix_answers import MatricesAnswer
+from service.schemas.matrix_answers import FormatAnswer, FormatsAnswer, MatricesAnswer
 from solver.errors import Issue
 
 router = APIRouter(prefix="/v1/matrices", tags=["uploads"])
@@ -65,6 +65,23 @@ class MatricesRequest(_Strict):
     contacts: list[ContactPlace] = Field(default=[], max_length=100)
     excitation: OfDof | None = Field(default=None, description="Where the force acts.")
     observe: OfDof | None = Field(default=None, description="What is observed; where the force acts if null.")
+
+
+@router.get("/formats")
+def formats() -> FormatsAnswer:
+    """The formats that can be uploaded."""
+    # Loaded here: a service that only lists does not need SciPy.
+    from solver.matrices.readers.registry import readers
+
+    return FormatsAnswer(
+        items=[
+            FormatAnswer(
+                name=reader.name, suffixes=list(reader.suffixes), word=reader.word, gives=list(reader.gives),
+                help=reader.help.replace("`", ""),
+            )
+            for reader in readers()
+        ]
+    )  # fmt: skip
 
 
 @router.post("")

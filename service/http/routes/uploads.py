@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
+from pydantic_core import CoreSchema
 from starlette.concurrency import run_in_threadpool
 
 from service.http.bodies import saved
@@ -16,9 +17,21 @@ from service.http.dependencies import CallerDependency, ServiceDependency, listi
 from service.http.routes.described import LISTED
 from service.queue import cursors
 from service.schemas.upload_answers import NewUpload, UploadAnswer, UploadedArray, UploadPage
-from service.uploads.uploads import MEDIA, Arrived, UploadFormat, file_name, format_of
+from service.uploads.uploads import Arrived, file_name, format_of
 
 router = APIRouter(prefix="/v1/uploads", tags=["uploads"])
+
+
+class _Words:
+    """The words of the formats in the description of the API, as the readers say them when it is made."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        from solver.matrices.readers import registry
+
+        return {**handler(schema), "enum": list(registry.words())}
+
 
 FileName = Annotated[
     str,
@@ -27,6 +40,11 @@ FileName = Annotated[
         pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.\- ]*$",
         description="Name to show, whose suffix may tell the format; never a path.",
     ),
+]
+
+Format = Annotated[
+    Annotated[str, Field(max_length=100), _Words()] | None,
+    Query(alias="format", description="In place of the suffix of `name`."),
 ]
 
 
@@ -50,9 +68,7 @@ async def upload(
     service: ServiceDependency,
     caller: CallerDependency,
     name: FileName = "matrices",
-    form: Annotated[
-        UploadFormat | None, Query(alias="format", description="In place of the suffix of `name`.")
-    ] = None,
+    form: Format = None,
 ) -> Response:
     """Store a file of a matrix, several matrices or modes: the body is the file.
 
@@ -102,4 +118,8 @@ def delete_upload(upload_id: str, service: ServiceDependency, caller: CallerDepe
     service.uploads.delete(upload_id, caller)
 
 
-UPLOAD_MEDIA = (*MEDIA, "application/octet-stream")
+def upload_media() -> tuple[str, ...]:
+    """Content types of an upload: those of the readers, and that of any file."""
+    from solver.matrices.readers import registry
+
+    return (*registry.media(), "application/octet-stream")

@@ -8,12 +8,20 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import ConfigDict, Field, RootModel
 
 import optim
+from optim.criteria.registry import criteria, limit_keys, weight_words
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.problem import ProblemRequest, Weight, arguments, default_variables, problem_of
+from service.jobs.kinds.problem import (
+    ProblemRequest,
+    Weight,
+    arguments,
+    default_variables,
+    problem_of,
+    with_keys,
+)
 from service.jobs.kinds.problem_check import problem_issues, uncertainty_issues
 from service.jobs.kinds.records import design_record, robust_record, sweep_record
 from service.jobs.kinds.registry.results import Amplitude, PeakAt, ReachedResult, Table
-from service.jobs.kinds.scenes import FrequencyHz, refusal, require, resolve_scene, resolved
+from service.jobs.kinds.scenes import refusal, require, resolve_scene, resolved
 from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kinds.uncertain import Uncertain
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
@@ -28,6 +36,7 @@ if TYPE_CHECKING:
 
 UNCERTAIN = "uncertain"
 _NOT_ROBUST = ("basins",)
+MINIMISED = [f"{one.weight} [1/{one.unit}]" for one in criteria() if one.weight]
 ROBUST = (UNCERTAIN, "aim", "quantile", "samples", "seed")
 
 
@@ -43,15 +52,13 @@ _EXAMPLE: dict[str, Any] = {
 }
 
 
-class DesignRequest(ProblemRequest):
+class _DesignRequest(ProblemRequest):
     """A design problem, in the words of `optim.design`, or with `uncertain` of `optim.robust_design`.
 
     Attributes
     ----------
     weights : dict or None
-        Of ``peak`` [1/m] and ``band`` [1/Hz] in what is minimised.
-    max_band_hz : float or None
-        Largest width of the resonance band allowed [Hz].
+        Of criteria in what is minimised, by their words.
     basins : int or None
         How many local optima are looked for.
     uncertain : dict, list or None
@@ -66,14 +73,6 @@ class DesignRequest(ProblemRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
 
-    weights: dict[Literal["peak", "band"], Weight] | None = Field(
-        default=None,
-        description="What is minimised: peak [1/m] and band [1/Hz], each times its weight; the peak alone.",
-        examples=[{"peak": 1, "band": 1e-6}],
-    )
-    max_band_hz: FrequencyHz | None = Field(
-        default=None, description="Largest width of the resonance band allowed [Hz]."
-    )
     basins: Annotated[int, Field(strict=True, ge=1, le=20)] | None = Field(
         default=None, description="How many local optima are looked for; 2."
     )
@@ -94,6 +93,21 @@ class DesignRequest(ProblemRequest):
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] | None = Field(
         default=None, description="Of the random numbers; 0."
     )
+
+
+Words = Literal[weight_words()]  # type: ignore[valid-type]
+DesignRequest = with_keys(
+    _DesignRequest,
+    limit_keys(),
+    weights=(
+        dict[Words, Weight] | None,  # type: ignore[valid-type]
+        Field(
+            default=None,
+            description=f"What is minimised: {', '.join(MINIMISED)}, each times its weight; the peak alone.",
+            examples=[{"peak": 1, "band": 1e-6}],
+        ),
+    ),
+)
 
 
 class OptimumResult(ReachedResult):
@@ -159,7 +173,7 @@ class DesignResult(RootModel[OptimumResult | RobustResult]):
     """A design; with `uncertain` a robust one."""
 
 
-def resolve(request: DesignRequest, source: SceneSource) -> Resolved:
+def resolve(request: _DesignRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check the problem, fill in the variables."""
     scene = resolve_scene(request, source)
     given = arguments(request)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 import optim
+from optim.criteria.registry import limit_keys
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.problem import ProblemRequest, arguments, default_variables, problem_of
+from service.jobs.kinds.problem import ProblemRequest, arguments, default_variables, problem_of, with_keys
 from service.jobs.kinds.problem_check import problem_issues
 from service.jobs.kinds.records import sweep_record
 from service.jobs.kinds.registry.results import Amplitude, ReachedResult, Table
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 _EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "variables": {"shroud.N0": [20, 3000]}, "limit": 8e-5}
 
 
-class ParetoRequest(ProblemRequest):
+class _ParetoRequest(ProblemRequest):
     """A design problem without a limit on the band and weights: those are the front's own.
 
     Attributes
@@ -41,6 +42,9 @@ class ParetoRequest(ProblemRequest):
     points: Annotated[int, Field(strict=True, ge=3, le=200)] | None = Field(
         default=None, description="Points of the front looked for, both ends included; 9."
     )
+
+
+ParetoRequest = with_keys(_ParetoRequest, limit_keys(of_fronts=True))
 
 
 def pareto_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
@@ -63,7 +67,7 @@ class ParetoResult(ReachedResult):
     seconds: float
 
 
-def resolve(request: ParetoRequest, source: SceneSource) -> Resolved:
+def resolve(request: _ParetoRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check the problem, fill in the variables."""
     scene = resolve_scene(request, source)
     given = arguments(request)

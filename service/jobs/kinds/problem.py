@@ -6,23 +6,21 @@ piece by piece, so that everything wrong with it is told at once, each with the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Literal, Optional, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, create_model
 
-from service.jobs.kinds.scenes import (
-    LARGEST,
-    HarmonicRequest,
-    Number,
-    ParameterPath,
-    PositiveNumber,
-)
+from optim.criteria.criterion import Key
+from optim.criteria.json_types import LARGEST, Number, PositiveNumber
+from optim.criteria.json_types import Name as Name
+from optim.criteria.json_types import Pair as Pair
+from optim.criteria.json_types import Ranges as Ranges
+from service.jobs.kinds.scenes import HarmonicRequest, ParameterPath
 from solver.scene.scene import Scene
 
 MAX_VARIABLES = 50
 MAX_CASES = 50
-MAX_RANGES = 200
 VARIABLE_LENGTH = 500
 
 _PATH = r"[A-Za-z0-9_@-]+(\.[A-Za-z0-9_@-]+)?"
@@ -40,35 +38,12 @@ def _observed(value: object) -> object:
     raise ValueError("must be the name of a DOF, or a list of them")
 
 
-def _work(value: object) -> object:
-    """A number, or a table of them; the design layer looks at the numbers."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if number or (isinstance(value, dict) and 1 <= len(value) <= 1000):
-        return value
-    raise ValueError("must be a number > 0 [J], or a table of contacts with one each")
-
-
 VariableName = Annotated[str, Field(max_length=VARIABLE_LENGTH, pattern=rf"^{_PATH}(\s*,\s*{_PATH})*$")]
-Name = Annotated[str, Field(strict=True, min_length=1, max_length=200)]
-Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
-Ranges = Annotated[list[Pair], Field(min_length=1, max_length=MAX_RANGES)]
 Weight = Annotated[float, Field(strict=True, ge=0.0, le=LARGEST)]
 Observed = Annotated[
     Any,
     BeforeValidator(_observed),
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
-]
-FrictionWork = Annotated[
-    Any,
-    BeforeValidator(_work),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number", "exclusiveMinimum": 0},
-                {"type": "object", "additionalProperties": {"type": "number", "exclusiveMinimum": 0}},
-            ]
-        }
-    ),
 ]
 
 
@@ -115,6 +90,8 @@ class CaseRequest(BaseModel):
 class ProblemRequest(HarmonicRequest):
     """What the design problems of all kinds have in common, in the words of `optim.design`.
 
+    The keys of limits are those of the criteria: see `with_keys`.
+
     Attributes
     ----------
     variables : dict or None
@@ -125,19 +102,14 @@ class ProblemRequest(HarmonicRequest):
         The responses that count.
     limit : float or None
         Amplitude [m] above which the resonance band is measured.
-    max_peak : float or None
-        Largest amplitude allowed [m].
-    forbidden_hz, speeds_rpm : list or None
-        Ranges of frequency [Hz] and of running speed [1/min] in which the amplitude stays below `limit`.
-    max_friction_work : float, dict or None
-        Largest friction work in a cycle [J], of every contact or by contact.
-    contact_states : dict or None
-        Contact to ``never-separates``.
     start : dict or None
         A design to start from, variable to value.
     method : str
         ``auto``, ``tracked``, ``minimax`` or ``ipopt``.
     """
+
+    # Built when it is first used: most programs only need models of other kinds, and those with all keys.
+    model_config = ConfigDict(defer_build=True)
 
     variables: Annotated[dict[VariableName, Pair], Field(min_length=1, max_length=MAX_VARIABLES)] | None = (
         Field(
@@ -159,31 +131,36 @@ class ProblemRequest(HarmonicRequest):
         default=None,
         description="Amplitude [m] above which the resonance band is measured; half power of the peak.",
     )
-    max_peak: PositiveNumber | None = Field(default=None, description="Largest amplitude allowed [m].")
-    forbidden_hz: Ranges | None = Field(
-        default=None,
-        description="Ranges [Hz] in which the amplitude stays below `limit`.",
-        examples=[[[520, 560]]],
-    )
-    speeds_rpm: Ranges | None = Field(
-        default=None,
-        description="Ranges of running speed [1/min]; times the order of each case they are forbidden too.",
-        examples=[[[2900, 3100]]],
-    )
-    max_friction_work: FrictionWork | None = Field(
-        default=None,
-        description="Largest friction work in a cycle [J], of every friction contact or by contact (wear).",
-        examples=[0.02, {"shroud": 0.02}],
-    )
-    contact_states: dict[Name, Literal["never-separates"]] | None = Field(
-        default=None, max_length=1000, description="What a contact must never do.",
-        examples=[{"shroud": "never-separates"}],
-    )  # fmt: skip
     start: dict[VariableName, Number] | None = Field(
         default=None, max_length=MAX_VARIABLES, description="A design to start from, variable to value."
     )
     method: Literal["auto", "tracked", "minimax", "ipopt"] = Field(
         default="auto", description="How the optimum is searched."
+    )
+
+
+Problem = TypeVar("Problem", bound=ProblemRequest)
+
+
+def with_keys(model: type[Problem], keys: Iterable[Key], **further: Any) -> type[Problem]:
+    """A model of a problem with the keys of criteria, and fields of its own.
+
+    Parameters
+    ----------
+    model : without them.
+    keys : of its limits.
+    further : name to (type, `Field`).
+    """
+    limits: dict[str, Any] = {
+        key.name: (
+            Optional[key.annotation],  # noqa: UP045 - a type that is known when this runs
+            Field(default=None, description=key.help, examples=list(key.examples) or None),
+        )
+        for key in keys
+    }
+    name = model.__name__.removeprefix("_")
+    return create_model(
+        name, __base__=model, __module__=model.__module__, __doc__=model.__doc__, **limits, **further
     )
 
 

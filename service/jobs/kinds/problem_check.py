@@ -7,14 +7,13 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
+from optim.criteria.registry import limit_keys
 from optim.errors import DesignError
 from service.jobs.strict_json import pointer
 from solver.errors import Issue, SceneError, SettingError
 from solver.scene.scene import Scene
 
 _REFUSALS = (DesignError, SettingError, SceneError)
-# Refused without a limit, whatever they are; which limit does not matter to them.
-_NEED_LIMIT = ("forbidden_hz", "speeds_rpm")
 _NEED_VARIABLES = ("scaling", "start")
 
 
@@ -72,10 +71,12 @@ def _key_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
     variables = {"variables": given["variables"]} if sound and "variables" in given else {}
     for index, case in enumerate(given.get("cases", ())):
         issues += _refused(partial(read_cases, scene, [case]), partial(_in_case, index=index, case=case))
+    # Refused without a limit, whatever they are; which limit does not matter to them.
+    need_limit = {key.name for key in limit_keys() if key.needs_limit}
     for key, value in given.items():
         if key in ("variables", "cases") or (key in _NEED_VARIABLES and not sound):
             continue
-        alone = variables | {key: value} | ({"limit": 1.0} if key in _NEED_LIMIT else {})
+        alone = variables | {key: value} | ({"limit": 1.0} if key in need_limit else {})
         found = _refused(partial(pose, scene, **alone), partial(_issues, given=given))
         issues += [issue for issue in found if issue.pointer.split("/")[1] == key]
     return issues

@@ -140,8 +140,8 @@ def robust_record(result: RobustResult) -> DesignRecord:
     problem, side = result.problem, result.robust
     worst = None if side is None or side.worst is None else side.worst
     rows = () if worst is None else worst.rows
-    peak = max((r for r in rows if r.quantity.value == "peak"), key=lambda row: row.value, default=None)
-    bands = [row.value for row in rows if row.quantity.value == "band"]
+    peak = max((r for r in rows if r.quantity.name == "peak"), key=lambda row: row.value, default=None)
+    bands = [row.value for row in rows if row.quantity.name == "band"]
     return DesignRecord(
         scene_name=problem.scene.name,
         scene_hash=digest(problem.scene.to_dict()),

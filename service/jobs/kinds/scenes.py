@@ -9,6 +9,10 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
+from optim.criteria.json_types import LARGEST as LARGEST
+from optim.criteria.json_types import FrequencyHz as FrequencyHz
+from optim.criteria.json_types import Number as Number
+from optim.criteria.json_types import PositiveNumber as PositiveNumber
 from service.errors import InvalidRequestError
 from service.jobs.registry import JobRequest, Resolved, SceneSource
 from service.jobs.strict_json import digest, pointer
@@ -16,7 +20,6 @@ from solver.errors import Issue, SceneError, SettingError
 from solver.scene.scene import Scene, load_scene, shipped_scenes
 
 MAX_HARMONICS = 200
-LARGEST = 1e15
 UPLOAD = "upload:"
 """What stands before the id of an upload where a scene file names a file."""
 
@@ -36,9 +39,6 @@ SceneReference = Annotated[
     BeforeValidator(_scene_reference),
     WithJsonSchema({"anyOf": [{"type": "string", "pattern": _SCENE_NAME.pattern}, {"type": "object"}]}),
 ]
-Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST)]
-PositiveNumber = Annotated[float, Field(strict=True, gt=0.0, le=LARGEST)]
-FrequencyHz = Annotated[float, Field(strict=True, gt=0.0, le=1e9)]
 Harmonics = Annotated[int, Field(strict=True, ge=1, le=MAX_HARMONICS)]
 ParameterPath = Annotated[str, Field(max_length=210, pattern=_PATH_PATTERN)]
 

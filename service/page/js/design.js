@@ -36,6 +36,7 @@ export const designView = {
         ...(typeof result.error_estimate === "number" ? [["estimated error", length(result.error_estimate)]] : []),
         ...(result.warnings ?? []).map((words) => ["warning", el("span", { class: "bad" }, words)]),
         ["resonance band", result.band_hz === null ? "–" : `${number(result.band_hz)} Hz above ${length(result.limit)}`],
+        ...furtherOf(result).map(({ quantity: name, value, unit, what }) => [name, `${unit === "m" ? length(value) : `${number(value)} ${unit}`}: ${what}`]),
         ["held by", `${(result.active ?? []).join(", ") || "nothing"}${heldIn(result)}`],
         ...(result.looked_at?.length ? [["looked at", `${result.looked_at.length} designs over the whole range`]] : []),
         ...(others.length ? [["other local optima", others.join("; ")]] : []),
@@ -46,6 +47,16 @@ export const designView = {
   },
   failed: (text) => say("design-status", text, true),
 };
+
+// The largest row of each criterion that is minimised besides peak and band.
+function furtherOf({ rows }) {
+  const largest = new Map();
+  for (const row of rows ?? []) {
+    const known = largest.get(row.quantity);
+    if (row.weight > 0 && !["peak", "band"].includes(row.quantity) && !(known && known.weight * known.value >= row.weight * row.value)) largest.set(row.quantity, row);
+  }
+  return [...largest.values()];
+}
 
 // Of several load cases, the one that holds the design.
 const heldIn = ({ held_by: held, peaks }) =>

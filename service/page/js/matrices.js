@@ -1,20 +1,14 @@
 // Matrices of a finite-element program become a scene: files in, what was read, what is needed, the editor.
 
-import { Problem, post } from "./api.js";
+import { Problem, post, request } from "./api.js";
 import { byId, el, facts, say, show } from "./dom.js";
 import { edit } from "./editor.js";
 import { on } from "./events.js";
 import { number } from "./format.js";
-import { SUFFIXES, matrixFiles } from "./matrix_files.js";
+import { matrixFiles } from "./matrix_files.js";
 import { matrixForm } from "./matrix_form.js";
 
-const FORMATS = [
-  ["Ansys", "HBMAT (ASCII): .matrix of stiffness and mass, with .mapping, which names the rows"],
-  ["Nastran", "OUTPUT4 (.op4) or DMIG (.pch, .bdf)"],
-  ["Abaqus", "*MATRIX OUTPUT (.mtx)"],
-  ["CalculiX", "*FREQUENCY, SOLVER=MATRIXSTORAGE: .sti, .mas and .dof"],
-  ["Others", "NumPy (.npz, .npy), MATLAB (.mat, -v7), MatrixMarket (.mtx), Harwell-Boeing (.rsa, .hb); modes in .npz or .mat"],
-];
+const MOST_SUFFIXES = 4;
 let files = null;
 let form = null;
 let turn = 0;
@@ -39,8 +33,20 @@ function close() {
   byId("open-matrices").focus();
 }
 
+// What can be read, as the service says.
+async function formats(input) {
+  try {
+    const { items } = await request("/v1/matrices/formats");
+    input.accept = items.flatMap(({ suffixes }) => suffixes).join();
+    show(byId("matrix-formats"), facts(items.map(({ name, suffixes, help }) => [name, `${help} (${suffixes.slice(0, MOST_SUFFIXES).join(", ")}${suffixes.length > MOST_SUFFIXES ? ", …" : ""})`])));
+  } catch (error) {
+    if (!(error instanceof Problem)) throw error;
+    show(byId("matrix-formats"), el("p", { class: "bad" }, error.message));
+  }
+}
+
 function build(panel) {
-  const input = el("input", { type: "file", id: "matrix-input", class: "unseen", multiple: true, accept: SUFFIXES, tabindex: -1, "aria-label": "Files of matrices" });
+  const input = el("input", { type: "file", id: "matrix-input", class: "unseen", multiple: true, tabindex: -1, "aria-label": "Files of matrices" });
   const list = el("ul", { class: "plain", id: "matrix-files" });
   const rest = el("form", { novalidate: true, id: "matrix-form", hidden: true });
   const fields = el("div");
@@ -52,12 +58,13 @@ function build(panel) {
     el("fieldset", { id: "matrix-drop" }, el("legend", {}, "Files of matrices"),
       el("div", { class: "row" }, el("button", { type: "button", id: "matrix-choose", onclick: () => input.click() }, "Choose files…"), input,
         el("span", {}, "or drop them here: mass and stiffness, and damping and the names of the rows if there are such.")),
-      el("details", {}, el("summary", {}, "Which files?"), facts(FORMATS)),
+      el("details", {}, el("summary", {}, "Which files?"), el("div", { id: "matrix-formats" })),
       list, el("p", { id: "matrix-status", class: "status", role: "status" }), el("div", { id: "matrix-report" })),
     rest, el("div", { class: "row" }, el("button", { type: "button", onclick: close }, "Close")));
   show(rest, fields, el("div", { class: "row" }, el("button", { type: "submit", class: "main-button" }, "Make the scene"), el("p", { id: "matrix-made", role: "status" })));
   files = matrixFiles(list, arrived);
   form = matrixForm(fields, { onUnits: () => arrived(false) });
+  formats(input);
   rest.addEventListener("submit", (event) => {
     event.preventDefault();
     make();

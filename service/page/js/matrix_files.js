@@ -4,7 +4,6 @@ import { Problem, request } from "./api.js";
 import { el, show } from "./dom.js";
 
 export const SCENES = /\.(toml|json)$/i;
-export const SUFFIXES = ".npz,.npy,.mat,.mtx,.matrix,.mapping,.dof,.sti,.mas,.op4,.pch,.dmig,.bdf,.rsa,.rua,.hb,.rb";
 const ROLES = { M: "the mass matrix M", K: "the stiffness matrix K", C: "the damping matrix C", mapping: "the names of the rows", modes: "modes", "": "not used" };
 const LONGEST_NAME = 200;
 

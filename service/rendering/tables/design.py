@@ -105,6 +105,8 @@ def _pairs(found: Json) -> Pairs:
     pairs += _errors(found)
     if found["band_hz"] is not None:
         pairs.append(("band", f"{units.number(found['band_hz'])} Hz above {units.length(found['limit'])}"))
+    for row in further(found):
+        pairs.append((row["quantity"], f"{amount(row['value'], row['unit'])}: {row['what']}"))
     if found["active"]:
         held = found.get("held_by")
         case = f" (of {held['case']})" if held and several else ""
@@ -122,6 +124,15 @@ def _pairs(found: Json) -> Pairs:
         effort += f", the work of {units.number(work, 3)}"
     by = f", method {found['method']}" if "method" in found else ""
     return [*pairs, ("effort", effort + by)]
+
+
+def further(found: Json) -> list[Json]:
+    """The largest row of each criterion that is minimised besides peak and band."""
+    rows = [row for row in found.get("rows", ()) if row["weight"] > 0.0]
+    largest: dict[str, Json] = {}
+    for row in sorted(rows, key=lambda row: row["weight"] * row["value"]):
+        largest[row["quantity"]] = row
+    return [row for name, row in largest.items() if name not in ("peak", "band")]
 
 
 def _plateau(found: Json) -> Pairs:
@@ -180,7 +191,8 @@ def _limits(found: Json) -> Table | None:
         holds = f"{amount(left, unit)} left" if left >= 0.0 else f"broken by {amount(-left, unit)}"
         what = f"{row['what']} ({row['case']})" if several else row["what"]
         asked, reached = f"≤ {amount(row['bound'], unit)}", amount(row["value"], unit)
-        if row["quantity"] == "separation":  # a row is kept from above: the least load has its sign turned
+        # A row is kept from above: where larger is better its sign is turned. Older results do not say it.
+        if not row.get("smaller_is_better", row["quantity"] != "separation"):
             what = what.removeprefix("-")
             asked, reached = f"≥ {amount(0.0 - row['bound'], unit)}", amount(0.0 - row["value"], unit)
         rows.append((what, asked, reached, holds))

@@ -9,24 +9,22 @@ holds has 1e36 on the diagonal of the stiffness; nodes below 0 are internal ones
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
-from solver.matrices.labels import Label, component
+from solver.matrices.labels import component
+from solver.matrices.readers.label import Label
 from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines, table, whole_numbers
+from solver.matrices.readers.reader import Reader
 from solver.matrices.readers.triplets import MOST_ROWS, Labelled, mirrored
 
 _HELD = 1e30  # diagonal entries from here on are the penalty of a boundary condition
 _LINE = "node, DOF, node, DOF and value (or row, column and value)"
 _COMMENT = "**"
 _HARWELL_BOEING = ("RSA", "RUA", "RRA", "PSA", "PUA")
-
-
-def is_matrix_market(start: bytes) -> bool:
-    """Whether a file that begins so is MatrixMarket, not a matrix of Abaqus."""
-    return start.startswith(b"%%")
 
 
 def read_abaqus(path: Path) -> Labelled:
@@ -97,3 +95,20 @@ def _places(
     labels = tuple(Label(int(key // width), component(str(key % width))) for key in known)
     rows, columns = places[: keys[0].size], places[keys[0].size :]
     return rows.astype(np.int64), columns.astype(np.int64), labels
+
+
+def _matrix(path: Path, _key: str) -> Any:
+    return read_abaqus(path)
+
+
+READERS = (
+    Reader(
+        name="Abaqus",
+        suffixes=(".mtx",),
+        word="mtx",
+        help="Abaqus, `*MATRIX OUTPUT` in the formats `MATRIX INPUT` (names the rows) and `COORDINATE`; told "
+        "from MatrixMarket by its first line. DOFs that a boundary condition holds (1e36 on the diagonal) "
+        "are left out.",
+        matrix=_matrix,
+    ),
+)

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from solver.matrices.labels import distinct, label, node_number
+from solver.matrices.readers.label import Label
 from solver.matrices.readers.numbers_in_text import FormatError, ascii_lines, table, whole_numbers
+from solver.matrices.readers.reader import Reader
 from solver.matrices.readers.triplets import MOST_ROWS, Labelled, mirrored
-
-CALCULIX = (".sti", ".mas")
 
 
 def read_calculix(path: Path) -> Labelled:
@@ -31,3 +32,37 @@ def read_calculix(path: Path) -> Labelled:
     if size > MOST_ROWS:
         raise FormatError(f"a matrix may have {MOST_ROWS} rows, got {size}")
     return Labelled(matrix=mirrored(rows, columns, data[:, 2], size))
+
+
+def _labels(path: Path) -> tuple[Label, ...]:
+    """``node.direction`` a line."""
+    lines = ascii_lines(path, "a file of DOF labels")
+    labels = []
+    for number, line in enumerate(lines, start=1):
+        if not line.strip():
+            continue
+        found = label(line)
+        if found is None:
+            raise FormatError(f"line {number} must hold node.direction, got {line.strip()[:80]!r}")
+        labels.append(Label(node_number(str(found.node), number), found.component))
+    return distinct(labels, len(lines))
+
+
+READERS = (
+    Reader(
+        name="CalculiX",
+        suffixes=(".sti", ".mas"),
+        word="sti",
+        help="CalculiX, `*FREQUENCY, SOLVER=MATRIXSTORAGE`: stiffness and mass; `name.dof` beside them names "
+        "the rows.",
+        matrix=lambda path, _key: read_calculix(path),
+        roles={".mas": "M", ".sti": "K"},
+    ),
+    Reader(
+        name="CalculiX labels",
+        suffixes=(".dof",),
+        word="dof",
+        help="CalculiX, or of your own: names the rows (`node.direction` a line).",
+        labels=_labels,
+    ),
+)

@@ -16,12 +16,13 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse import coo_array
 
-from solver.matrices.labels import Label, component
+from solver.matrices.labels import component
+from solver.matrices.readers.choosing import chosen_by_initials, named_by_role
+from solver.matrices.readers.label import Label
 from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines, fortran_real
 from solver.matrices.readers.output4_records import SQUARE, SYMMETRIC
+from solver.matrices.readers.reader import Reader
 from solver.matrices.readers.triplets import Labelled, mirrored
-
-DMIG = (".pch", ".dmig", ".bdf")
 
 
 @dataclass(slots=True)
@@ -153,3 +154,16 @@ def _number(text: str, line: int) -> float:
         return fortran_real(text.strip())
     except ValueError:
         raise FormatError(f"line {line}: {text.strip()!r} is not a number") from None
+
+
+READERS = (
+    Reader(
+        name="Nastran DMIG",
+        suffixes=(".pch", ".dmig", ".bdf"),
+        word="pch",
+        help="Nastran, `DMIG` entries in small, large or free fields, symmetric or square; other entries are "
+        "passed over. They name the rows.",
+        matrix=lambda path, key: chosen_by_initials(read_dmig(path), key, path),
+        names=lambda path: named_by_role(list(read_dmig(path))),
+    ),
+)

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
 from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines
+from solver.matrices.readers.reader import Reader
 
 _INTEGERS = re.compile(r"\(?\s*(\d*)\s*I\s*(\d+)(?:\.\d+)?\s*\)?")
 _REALS = re.compile(
@@ -288,3 +289,17 @@ def _check_structure(header: _Header, pointers: NDArray[np.int64], indices: NDAr
     if bad.size:
         line = first + header.pointer_lines + int(bad[0]) // header.indices.count + 1
         raise FormatError(f"line {line}: a row index must be from 1 to {header.rows}, got {indices[bad[0]]}")
+
+
+READERS = (
+    Reader(
+        name="Harwell-Boeing",
+        suffixes=(
+            ".hb", ".rb", ".rsa", ".rua", ".rra", ".psa", ".pua", ".rse", ".isa", ".iua", ".csa", ".cua",
+        ),
+        word="hb",
+        media=("application/x-harwell-boeing",),
+        help="Harwell-Boeing and Rutherford-Boeing, real assembled, symmetric or not.",
+        matrix=lambda path, _key: read_harwell_boeing(path),
+    ),
+)  # fmt: skip

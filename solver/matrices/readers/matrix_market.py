@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
 from solver.matrices.readers.numbers_in_text import LARGEST, FormatError, ascii_lines
+from solver.matrices.readers.reader import Reader
 
 _FIELDS = {"real": 1, "integer": 1, "complex": 2}
 _SYMMETRIES = ("general", "symmetric", "skew-symmetric", "hermitian")
@@ -138,3 +139,16 @@ def _whole(
         row, column = np.concatenate([row, column[off]]), np.concatenate([column, row[off]])
         values = np.concatenate([values, other])
     return coo_array((values, (row, column)), shape=shape)
+
+
+READERS = (
+    Reader(
+        name="MatrixMarket",
+        suffixes=(".mtx",),
+        word="mtx",
+        media=("text/x-matrix-market", "application/x-matrix-market"),
+        recognises=lambda start: start.startswith(b"%%"),
+        help="MatrixMarket, which begins with `%%`.",
+        matrix=lambda path, _key: read_matrix_market(path),
+    ),
+)

@@ -17,9 +17,11 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse import coo_array
 
+from solver.matrices.readers.choosing import chosen_by_initials, named_by_role
 from solver.matrices.readers.numbers_in_text import FormatError, ascii_lines, fortran_real
 from solver.matrices.readers.output4_binary import binary_order, read_binary
 from solver.matrices.readers.output4_records import Collector, Heading
+from solver.matrices.readers.reader import Reader
 
 _FORMAT = re.compile(r"\(?\s*(?:1P\s*,?)?\s*(\d+)\s*[EDF]\s*(\d+)\.\d+(?:E\d+)?\s*\)?")
 
@@ -136,3 +138,17 @@ class _Text:
                     where = f"line {self.at}, column {i * width + 1}"
                     raise FormatError(f"{where}: {text!r} is not a number") from None
         return np.array(values)
+
+
+READERS = (
+    Reader(
+        name="Nastran OUTPUT4",
+        suffixes=(".op4",),
+        word="op4",
+        recognises=lambda start: binary_order(start[:4]) is not None,
+        help="Nastran, `OUTPUT4` as text or binary, in either byte order, dense, sparse or `BIGMAT`: one "
+        "matrix, or `K…`, `M…` and `B…`.",
+        matrix=lambda path, key: chosen_by_initials(read_output4(path), key, path),
+        names=lambda path: named_by_role(list(read_output4(path))),
+    ),
+)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
-from solver.matrices.labels import Label
+from solver.matrices.readers.label import Label
 
 MOST_ROWS = 10_000_000
 

@@ -26,30 +26,36 @@ from solver.sensitivity.nonsmooth import peak_gradient
 
 
 class Sensitivity:
-    """Derivatives of the amplitude at points of a response by parameter paths, through the whole solve."""
+    """Derivatives of the amplitude at points of a response by parameter paths, through the whole solve.
+
+    Attributes
+    ----------
+    amplitudes : Sensitivities
+        Those of the amplitude at one frequency.
+    """
 
     def __init__(self, balance: Balance, paths: Sequence[str]) -> None:
-        self._slopes = Sensitivities(balance, paths)
+        self.amplitudes = Sensitivities(balance, paths)
         self._n = len(tuple(paths))
 
     @property
     def has_second(self) -> bool:
         """Whether the contacts' law has second derivatives here."""
         try:
-            check_laws(self._slopes.balance.scene)
+            check_laws(self.amplitudes.balance.scene)
         except SettingError:
             return False
         return True
 
     def peak(self, peak: Peak) -> Real:
         """Return d peak / dp, (n_paths,)."""
-        return peak_gradient(self._slopes, peak).gradient
+        return peak_gradient(self.amplitudes, peak).gradient
 
     def band(self, edges: Sequence[Edge], dlimit: Real) -> Real:
         """Return d width / dp [Hz per unit], (n_paths,), for a limit that changes by `dlimit`."""
         total = np.zeros(dlimit.shape)
         for edge in edges:
-            slopes = self._slopes.gradient(edge.solution, edge.at)
+            slopes = self.amplitudes.gradient(edge.solution, edge.at)
             if not math.isfinite(slopes.by_frequency) or slopes.by_frequency == 0.0:
                 return np.full(dlimit.shape, np.nan)
             if edge.corner:
@@ -61,7 +67,7 @@ class Sensitivity:
 
     def peak_second(self, peak: Peak) -> Real:
         """Return d² peak / dp², (n_paths, n_paths); NaN where it does not exist."""
-        found = self._slopes.hessian(peak.solution, peak.at)
+        found = self.amplitudes.hessian(peak.solution, peak.at)
         return found.of_peak().hessian if peak.interior else found.hessian
 
     def band_second(self, edges: Sequence[Edge], highest: Peak | None) -> Real:
@@ -77,6 +83,6 @@ class Sensitivity:
             dlimit, ddlimit = HALF_POWER * self.peak(highest), HALF_POWER * self.peak_second(highest)
         total = np.zeros((n, n))
         for edge in edges:
-            move = self._slopes.hessian(edge.solution, edge.at).of_edge(dlimit, ddlimit).hessian
+            move = self.amplitudes.hessian(edge.solution, edge.at).of_edge(dlimit, ddlimit).hessian
             total += -move if edge.opens else move
         return total

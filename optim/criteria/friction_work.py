@@ -1,0 +1,93 @@
+"""The friction work of a contact in a cycle, which wears it: its local maxima over the band.
+
+The worst over a response is a maximum over the frequency, so its gradient is the one at that frequency
+(envelope theorem), or that of a corner of the response.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BeforeValidator, WithJsonSchema
+
+from optim.criteria.criterion import Asked, Criterion, Form, Key
+
+if TYPE_CHECKING:
+    from optim.criteria.judged import Judged
+    from optim.criteria.rows import Row
+
+_KEY = "max_friction_work"
+
+
+def _rows(judged: Judged) -> list[Row]:
+    """A row for every local maximum that competes, of every contact that is limited."""
+    from optim.criteria.judged import of_sector
+    from solver.response.wear_nonsmooth import worst_slopes
+    from solver.response.worst_wear import Measure, worst_wear
+
+    bounds = judged.limit(FRICTION_WORK) or {}
+    return [
+        judged.row(
+            FRICTION_WORK, f"friction work of {contact.name} at {worst.at:.6g} Hz", worst.value,
+            None if judged.wear is None else worst_slopes(judged.wear, worst, contact.name).gradient,
+            at_hz=worst.at, bound=bounds[of_sector(contact)],
+        )
+        for contact in judged.contacts(bounds)
+        for worst in worst_wear(judged.branch, contact.name, Measure.FRICTION_WORK)
+    ]  # fmt: skip
+
+
+def _read(asked: Asked) -> Mapping[str, float]:
+    """The limit of every contact named; a single number is that of every friction contact."""
+    from optim.errors import DesignError
+    from optim.problem.cases import positive
+    from solver.scene.scene import FrictionContact
+
+    limits = asked.values[_KEY]
+    names = [contact.name for contact in asked.scene.contacts]
+    if not isinstance(limits, Mapping):
+        rubbing = [contact.name for contact in asked.scene.contacts if isinstance(contact, FrictionContact)]
+        return dict.fromkeys(rubbing, positive(_KEY, limits))
+    for name in limits:
+        if name not in names:
+            raise DesignError(_KEY, name, f"must name contacts: {', '.join(names)}")
+    return {name: positive(f"{_KEY}.{name}", value) for name, value in limits.items()}
+
+
+def _work(value: object) -> object:
+    """A number, or a table of them; `_read` looks at the numbers."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if number or (isinstance(value, dict) and 1 <= len(value) <= 1000):
+        return value
+    raise ValueError("must be a number > 0 [J], or a table of contacts with one each")
+
+
+FrictionWork = Annotated[
+    Any,
+    BeforeValidator(_work),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "exclusiveMinimum": 0},
+                {"type": "object", "additionalProperties": {"type": "number", "exclusiveMinimum": 0}},
+            ]
+        }
+    ),
+]
+
+FRICTION_WORK = CRITERION = Criterion(
+    name="friction work",
+    unit="J",
+    help="The [friction work](wear.md) of a contact in a cycle, at any frequency of the band.",
+    rows=_rows,
+    keys=(
+        Key(
+            name=_KEY, annotation=FrictionWork, form=Form.NUMBER_OR_TABLE, flag="--max-work",
+            metavar="J|CONTACT=J", example="0.02 or shroud=0.02", examples=(0.02, {"shroud": 0.02}),
+            help="Largest friction work in a cycle [J], of every friction contact or by contact (wear).",
+            option_help="Largest friction work in a cycle [J]; repeatable by contact.",
+        ),
+    ),
+    read=_read,
+)  # fmt: skip

@@ -1,0 +1,110 @@
+"""The least normal load of a contact in a cycle, which must not fall to 0 where it must not separate.
+
+Of a given load it is N0 − |N1| at every frequency; of one that moves with the parts the least over the band,
+a minimum over the frequency, whose gradient is the one at that frequency (envelope theorem).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field
+
+from optim.criteria.criterion import Asked, Criterion, Form, Key
+from optim.criteria.json_types import Name
+
+if TYPE_CHECKING:
+    from optim.criteria.judged import Judged
+    from optim.criteria.rows import Row
+    from solver.scene.scene import AnyContact, FrictionContact, Scene
+
+NEVER_SEPARATES = "never-separates"
+_KEY = "contact_states"
+
+
+def _rows(judged: Judged) -> list[Row]:
+    return [row for one in judged.contacts(judged.limit(SEPARATION) or ()) for row in _of(judged, one)]
+
+
+def _of(judged: Judged, contact: AnyContact) -> list[Row]:
+    import numpy as np
+
+    from solver.response.wear_nonsmooth import worst_slopes
+    from solver.response.worst_wear import Measure, worst_wear
+    from solver.scene.scene import ElasticNormalContact, FrictionContact
+
+    what = f"least load of {contact.name}"
+    if isinstance(contact, FrictionContact) and not isinstance(contact, ElasticNormalContact):
+        slope = None
+        if judged.gradients:
+            slope = np.array([_load_slope(contact, path) for path in judged.problem.paths])
+        return [judged.row(SEPARATION, what, contact.N0 - abs(contact.N1_value), slope, bound=0.0)]
+    least = Measure.LEAST_LOAD
+    return [
+        judged.row(
+            SEPARATION, f"{what} at {worst.at:.6g} Hz", worst.value,
+            None
+            if judged.wear is None
+            else worst_slopes(judged.wear, worst, contact.name, least).gradient,
+            at_hz=worst.at, bound=0.0,
+        )
+        for worst in worst_wear(judged.branch, contact.name, least)
+    ]  # fmt: skip
+
+
+def _load_slope(contact: FrictionContact, path: str) -> float:
+    """Return d(N0 − |N1|)/dp of a given load."""
+    owner, _, key = path.rpartition(".")
+    if owner not in (contact.name, contact.group):
+        return 0.0
+    sign = math.copysign(1.0, contact.N1_value)
+    by_key = {"N0": 1.0 - sign * (contact.N1_ratio or 0.0), "N1": -sign, "N1_ratio": -sign * contact.N0}
+    return by_key.get(key, 0.0)
+
+
+def _read(asked: Asked) -> tuple[str, ...]:
+    """The contacts that must never separate."""
+    from optim.errors import DesignError
+    from solver.scene.scene import FrictionContact
+
+    states = asked.values[_KEY]
+    if not isinstance(states, Mapping):
+        raise DesignError(_KEY, states, f'must be a table such as {{"damper": "{NEVER_SEPARATES}"}}')
+    names = [contact.name for contact in asked.scene.contacts if isinstance(contact, FrictionContact)]
+    for name, state in states.items():
+        if name not in names:
+            raise DesignError(_KEY, name, f"must name friction contacts: {', '.join(names)}")
+        if state != NEVER_SEPARATES:
+            raise DesignError(f"{_KEY}.{name}", state, f"must be {NEVER_SEPARATES}")
+    return tuple(states)
+
+
+def _load(scene: Scene) -> float:
+    """The largest normal load of the scene."""
+    from solver.scene.scene import FrictionContact
+
+    loads = [c.N0 for c in scene.contacts if isinstance(c, FrictionContact) and c.N0 > 0.0]
+    return max(loads, default=1.0)
+
+
+SEPARATION = CRITERION = Criterion(
+    name="separation",
+    unit="N",
+    help="The least normal load of a contact in a cycle, at any frequency of the band; rows have its "
+    "negative.",
+    rows=_rows,
+    smaller_is_better=False,
+    keys=(
+        Key(
+            name=_KEY, annotation=Annotated[dict[Name, Literal["never-separates"]], Field(max_length=1000)],
+            form=Form.NAMES, flag="--never-separates", metavar="CONTACT", word=NEVER_SEPARATES,
+            examples=({"shroud": NEVER_SEPARATES},),
+            help="What a contact must never do: contact to `never-separates`.",
+            option_help="A contact that must stay closed; repeatable.",
+        ),
+    ),
+    read=_read,
+    scale=_load,
+)  # fmt: skip

@@ -1,0 +1,42 @@
+"""Tables of the docs that follow from the code: ``python -m service.rendering.docs_tables`` brings them up to
+date.
+
+Each stands between two marks, ``<!-- NAME: begin -->`` and ``<!-- NAME: end -->``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from optim.criteria.table import criteria_table
+from service.settings.table import settings_table
+from solver.matrices.readers.table import formats_table
+
+TABLES: Mapping[str, Mapping[str, Callable[[], str]]] = {
+    "design.md": {"criteria": criteria_table},
+    "matrices.md": {"formats": formats_table},
+    "operations.md": {"settings": settings_table},
+}
+"""Page of docs/, name of the mark, table."""
+
+
+def with_tables(text: str, tables: Mapping[str, Callable[[], str]]) -> str:
+    """A page with its tables as they are now (ValueError if a mark is not there)."""
+    for name, table in tables.items():
+        begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+        before, rest = text.split(begin)
+        _, after = rest.split(end)
+        text = f"{before}{begin}\n\n{table()}\n{end}{after}"
+    return text
+
+
+def main() -> None:
+    """Bring the tables up to date."""
+    for name, tables in TABLES.items():
+        page = Path("docs") / name
+        page.write_text(with_tables(page.read_text(encoding="utf-8"), tables), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,56 @@
+"""Formats, criteria and the like from outside the package, named by the environment.
+
+``STICKSLIP_EXTENSIONS='["module:NAME", …]'`` names objects that every process imports, the command, the
+service and its workers alike; each registry takes those of its own kind.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from functools import cache
+from importlib import import_module
+from typing import TypeVar
+
+VARIABLE = "STICKSLIP_EXTENSIONS"
+T = TypeVar("T")
+
+
+class ExtensionError(ValueError):
+    """The variable does not name objects that can be imported."""
+
+
+def extensions(kind: type[T]) -> tuple[T, ...]:
+    """The objects of a class that the environment names, in order.
+
+    Raises
+    ------
+    ExtensionError
+        The variable is no list of ``module:NAME``, or there is no such module or name.
+    """
+    return tuple(one for one in _named(os.environ.get(VARIABLE, "")) if isinstance(one, kind))
+
+
+@cache
+def _named(text: str) -> tuple[object, ...]:
+    if not text.strip():
+        return ()
+    try:
+        names = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise ExtensionError(_refusal(text)) from error
+    if not isinstance(names, list) or not all(isinstance(name, str) and ":" in name for name in names):
+        raise ExtensionError(_refusal(text))
+    return tuple(_imported(name) for name in names)
+
+
+def _imported(name: str) -> object:
+    module, _, attribute = name.partition(":")
+    try:
+        return getattr(import_module(module), attribute)
+    except (ImportError, AttributeError) as error:
+        raise ExtensionError(f"`{VARIABLE}` names {name!r}, which cannot be imported: {error}") from error
+
+
+def _refusal(text: str) -> str:
+    return f'`{VARIABLE}` must be a list such as ["module:NAME"], got {text[:80]!r}'

@@ -1,0 +1,136 @@
+"""The registry of readers: which formats there are, and which of them a file has.
+
+To add a format, write a module with `READERS` and name it in `SHIPPED`; one from outside the package is named
+by `solver.extensions`, or registered for one process.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+
+from solver.extensions import extensions
+from solver.matrices.readers.reader import MatrixFileError, Reader
+
+SHIPPED = (
+    "solver.matrices.readers.numpy_files",
+    "solver.matrices.readers.matlab",
+    "solver.matrices.readers.matrix_market",
+    "solver.matrices.readers.harwell_boeing",
+    "solver.matrices.readers.ansys",
+    "solver.matrices.readers.abaqus",
+    "solver.matrices.readers.calculix",
+    "solver.matrices.readers.output4",
+    "solver.matrices.readers.dmig",
+)
+_START = 200
+_added: list[Reader] = []
+
+
+def readers() -> tuple[Reader, ...]:
+    """Every reader: those that come with the package, then those from outside."""
+    return (*_shipped(), *extensions(Reader), *_added)
+
+
+@cache
+def _shipped() -> tuple[Reader, ...]:
+    """Loaded on first use: what only lists endings elsewhere does not need SciPy."""
+    return tuple(reader for module in SHIPPED for reader in import_module(module).READERS)
+
+
+def register(reader: Reader) -> Reader:
+    """Add a reader in this process; what starts processes of its own, as the service does, needs extensions.
+
+    Raises
+    ------
+    ValueError
+        There is one of this name.
+    """
+    if any(other.name == reader.name for other in readers()):
+        raise ValueError(f"there is a reader of {reader.name!r} already")
+    _added.append(reader)
+    return reader
+
+
+def unregister(reader: Reader) -> None:
+    """Take back what `register` added."""
+    _added.remove(reader)
+
+
+def matrix_suffixes() -> tuple[str, ...]:
+    """Endings of files that hold matrices or modes."""
+    return _suffixes(lambda reader: reader.matrix is not None)
+
+
+def label_suffixes() -> tuple[str, ...]:
+    """Endings of files that name the rows."""
+    return _suffixes(lambda reader: reader.labels is not None)
+
+
+def modes_suffixes() -> tuple[str, ...]:
+    """Endings of files that may hold modes."""
+    return _suffixes(lambda reader: reader.modes is not None)
+
+
+def _suffixes(fits: Callable[[Reader], bool]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(suffix for reader in readers() if fits(reader) for suffix in reader.suffixes))
+
+
+def role_of_suffix(suffix: str) -> str | None:
+    """Which of M, K and C an ending tells; None where it tells none."""
+    return next((reader.roles[suffix] for reader in readers() if suffix in reader.roles), None)
+
+
+def words() -> tuple[str, ...]:
+    """The words of ``?format=``."""
+    return tuple(dict.fromkeys(reader.word for reader in readers()))
+
+
+def word_of(name: str, content_type: str) -> str | None:
+    """The word of the format that the ending of a name tells, or else a content type; None if neither."""
+    suffix = Path(name).suffix.lower()
+    by_suffix = (reader.word for reader in readers() if suffix in reader.suffixes)
+    by_media = (reader.word for reader in readers() if content_type in reader.media)
+    return next(by_suffix, None) or next(by_media, None)
+
+
+def media() -> tuple[str, ...]:
+    """Every content type that tells a format."""
+    return tuple(dict.fromkeys(one for reader in readers() for one in reader.media))
+
+
+def reader_of(path: Path) -> Reader:
+    """The reader of a file of matrices or modes.
+
+    Raises
+    ------
+    MatrixFileError
+        No reader has the ending; the message says which there are, and what the content looks like.
+    OSError
+        The file cannot be read.
+    """
+    suffix = path.suffix.lower()
+    fitting = [reader for reader in readers() if suffix in reader.suffixes and reader.matrix is not None]
+    if not fitting:
+        known = ", ".join(matrix_suffixes())
+        raise MatrixFileError(f"{str(path)!r} must end in {known}, got {suffix!r}{_looks_like(path)}")
+    if len(fitting) == 1:
+        return fitting[0]
+    with path.open("rb") as file:
+        start = file.read(_START)
+    sure = (reader for reader in fitting if reader.recognises is not None and reader.recognises(start))
+    # What none recognises is read by the one that recognises nothing, whose messages say what is missing.
+    return next(sure, None) or next((r for r in fitting if r.recognises is None), fitting[-1])
+
+
+def _looks_like(path: Path) -> str:
+    """What a file of an unknown ending seems to be, as the end of a sentence."""
+    try:
+        with path.open("rb") as file:
+            start = file.read(_START)
+    except OSError:
+        return ""
+    found = next((r for r in readers() if r.recognises is not None and r.recognises(start)), None)
+    return "" if found is None else f": it begins as {found.name}, so let it end in {found.suffixes[0]}"

@@ -1,0 +1,185 @@
+"""A criterion of this folder (`rms_amplitude`): named once, designs are minimised and limited by it.
+
+Its sum can be had from responses at single frequencies, without any of the design layer.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from launch import COMMAND, served
+from rms_amplitude import RMS, WEIGHTS, frequencies
+
+import optim
+import solver
+from optim.criteria.evaluation import evaluate
+from optim.criteria.registry import criteria, register, unregister
+from optim.criteria.table import criteria_table
+from optim.problem.problem import pose
+from service.client.client import Client
+from service.errors import ServiceProblem
+from service.rendering.docs_tables import TABLES
+from solver import extensions
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+HARMONICS = 3
+BOUNDS = {"damper.N0": (20.0, 400.0)}
+
+
+NAMED = {extensions.VARIABLE: json.dumps(["rms_amplitude:RMS"])}
+
+
+@pytest.fixture
+def named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In this process."""
+    monkeypatch.setenv(extensions.VARIABLE, NAMED[extensions.VARIABLE])
+
+
+def by_solutions(load: float) -> float:
+    """The same number from responses at single frequencies."""
+    scene = solver.load_scene("two-dof").with_values({"damper.N0": load})
+    a = [
+        solver.solve(scene, frequency_hz=hz, harmonics=HARMONICS).max_abs
+        for hz in frequencies(scene).tolist()
+    ]
+    return float(np.sqrt(0.5 * WEIGHTS @ np.square(a)))
+
+
+def environment() -> dict[str, str]:
+    paths = os.pathsep.join((str(ROOT), str(Path(__file__).parent)))
+    return {**os.environ, **NAMED, "PYTHONPATH": paths}
+
+
+def command(*arguments: str, cwd: Path) -> dict[str, Any]:
+    ended = subprocess.run(
+        [*COMMAND, *arguments], env=environment(), cwd=cwd, capture_output=True, text=True, check=False
+    )
+    assert ended.returncode in (0, 1), ended.stderr
+    found: dict[str, Any] = json.loads(ended.stdout)
+    return found
+
+
+@pytest.mark.usefixtures("named")
+def test_value_gradient_and_hessian_are_those_of_the_sum() -> None:
+    problem = pose(
+        solver.load_scene("two-dof"), variables=BOUNDS, weights={"rms": 1.0}, harmonics=HARMONICS
+    )  # fmt: skip
+    load, step = 130.0, 0.02
+    (row,) = evaluate(problem, {"damper.N0": load}).of(RMS)
+    below, above = by_solutions(load - step), by_solutions(load + step)
+    assert row.value == pytest.approx(by_solutions(load), rel=1e-9)
+    assert row.gradient[0] == pytest.approx((above - below) / (2.0 * step), rel=1e-6)
+    assert row.second is not None
+    slopes = [evaluate(problem, {"damper.N0": load + side}).of(RMS)[0].gradient[0] for side in (-step, step)]
+    assert row.second()[0, 0] == pytest.approx((slopes[1] - slopes[0]) / (2.0 * step), rel=1e-5)
+
+
+@pytest.mark.usefixtures("named")
+@pytest.mark.parametrize("method", ["minimax", "ipopt"])
+def test_it_is_minimised(method: str) -> None:
+    found = optim.design(
+        solver.load_scene("two-dof"), variables=BOUNDS, weights={"rms": 1.0}, harmonics=HARMONICS,
+        method=method,
+    )  # fmt: skip
+    assert found.reached, found.status
+    best = found.optimum["damper.N0"]
+    value = found.evaluation.of(RMS)[0].value
+    grid = [by_solutions(load) for load in np.geomspace(*BOUNDS["damper.N0"], 25)]
+    assert value == pytest.approx(by_solutions(best), rel=1e-9)
+    assert value <= min(grid)
+    assert value <= min(by_solutions(best * factor) for factor in (0.999, 1.001))
+    assert "rms amplitude" in str(found.summary())
+    assert "rms_amplitude" in found.to_dataset().variables
+    assert found.to_json()["held_by"]["quantity"] == "rms amplitude"
+
+
+@pytest.mark.usefixtures("named")
+def test_it_limits_the_least_peak() -> None:
+    scene = solver.load_scene("two-dof")
+    free = optim.design(scene, variables=BOUNDS, harmonics=HARMONICS)
+    least = optim.design(scene, variables=BOUNDS, harmonics=HARMONICS, weights={"rms": 1.0})
+    # Between what the least peak has and the least there is: both pull.
+    bound = 0.5 * (by_solutions(free.optimum["damper.N0"]) + by_solutions(least.optimum["damper.N0"]))
+    found = optim.design(scene, variables=BOUNDS, harmonics=HARMONICS, max_rms=bound)
+    assert found.reached, found.status
+    assert by_solutions(found.optimum["damper.N0"]) == pytest.approx(bound, rel=1e-4)
+    assert found.peak.value > free.peak.value
+    assert any(words.startswith("rms amplitude limit of") for words in found.active)
+
+
+@pytest.mark.usefixtures("named")
+def test_what_is_wrong_is_told() -> None:
+    scene = solver.load_scene("two-dof")
+    with pytest.raises(optim.DesignError, match=r"max_rms.*> 0"):
+        pose(scene, max_rms=-1.0)
+    with pytest.raises(optim.DesignError, match=r"`peak`, `band` and `rms` can be minimised"):
+        pose(scene, weights={"rsm": 1.0})
+    with pytest.raises(TypeError, match=r"max_rsm.*max_rms"):
+        pose(scene, max_rsm=1.0)
+
+
+def test_the_command_takes_its_options_and_key(tmp_path: Path) -> None:
+    options = ("--variable", "damper.N0", "20", "400", "--harmonics", "3", "--json")
+    minimised = command("design", "two-dof", *options, "--weight", "rms=1", cwd=tmp_path)
+    (row,) = (row for row in minimised["rows"] if row["quantity"] == "rms amplitude")
+    assert row["value"] == pytest.approx(by_solutions(minimised["optimum"]["damper.N0"]), rel=1e-9)
+    bound = 1.01 * row["value"]
+    (tmp_path / "problem.toml").write_text(f'scene = "two-dof"\nmax_rms = {bound!r}\n')
+    limited = command("design", "--problem", "problem.toml", *options, cwd=tmp_path)
+    by_option = command("design", "two-dof", "--max-rms", repr(bound), *options, cwd=tmp_path)
+    assert limited["optimum"] == by_option["optimum"]
+    assert by_solutions(limited["optimum"]["damper.N0"]) <= bound * (1.0 + 1e-6)
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
+    """A service in a process of its own, with a worker."""
+    with served(tmp_path_factory.mktemp("service"), environment()) as url, Client(url) as client:
+        yield client
+
+
+def test_the_service_computes_it(client: Client) -> None:
+    body = {
+        "kind": "design", "scene": "two-dof", "variables": {"damper.N0": [20, 400]}, "harmonics": 3,
+        "weights": {"rms": 1},
+    }  # fmt: skip
+    job = client.wait(client.submit(body).id)
+    assert job.status == "successful", job
+    found = client.results(job.id).result
+    (row,) = (row for row in found["rows"] if row["quantity"] == "rms amplitude")
+    assert row["value"] == pytest.approx(by_solutions(found["optimum"]["damper.N0"]), rel=1e-9)
+    assert (row["unit"], row["weight"], row["smaller_is_better"]) == ("m", 1.0, True)
+
+
+def test_the_service_refuses_and_describes_its_key(client: Client) -> None:
+    with pytest.raises(ServiceProblem) as refused:
+        client.submit({"kind": "design", "scene": "two-dof", "max_rms": 0})
+    assert [one["pointer"] for one in refused.value.problem["errors"]] == ["/max_rms"]
+
+
+def test_the_table_of_criteria_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "rms" not in criteria_table()
+    monkeypatch.setenv(extensions.VARIABLE, NAMED[extensions.VARIABLE])
+    (line,) = (line for line in TABLES["design.md"]["criteria"]().splitlines() if "rms" in line)
+    assert line == (
+        f"| **rms amplitude** [m]: {RMS.help} | `rms` [1/m] | "
+        "`max_rms`: Largest root of the mean square of the amplitude allowed [m]. `--max-rms A` |"
+    )
+
+
+def test_registered_for_one_process() -> None:
+    register(RMS)
+    try:
+        assert RMS in criteria()
+        with pytest.raises(ValueError, match="max_rms"):
+            register(RMS)
+    finally:
+        unregister(RMS)
+    assert RMS not in criteria()
