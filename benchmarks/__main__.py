@@ -28,6 +28,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         service_pruning,
         service_scale,
         start,
+        sweep_costs,
     )  # fmt: skip
 
     return {
@@ -47,6 +48,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "map": disk.disk_map,
         "beam": beam.beams,
         "savings": savings.savings,
+        "stages": sweep_costs.stages,
         "two-hundred": large.two_hundred_contacts,
         "reduction": reduction.reduction,
         "robustness": robustness.robustness,

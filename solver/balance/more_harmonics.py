@@ -12,9 +12,9 @@ from solver.balance.balance import Balance, build, with_harmonics
 from solver.contacts.kernels.system import System
 from solver.jit.fourier import Complex, Integer, Real
 from solver.jit.trig_polynomial import grid_size, grid_tables
-from solver.linear.assembly import linear_model
 from solver.linear.contact_table import enough_samples
 from solver.scene.harmonics import MULTIPLES, kept_harmonics, spread
+from solver.scene.parts import CyclicStructure
 
 
 def more_harmonics(balance: Balance, top: int, *, multiples: int = MULTIPLES) -> Balance:
@@ -77,10 +77,11 @@ def _extended(balance: Balance, ks: Integer) -> System | None:
 
     That is a nodal diameter not met so far, or a force with one of the further harmonics.
     """
-    model, system = linear_model(balance.scene), balance.system
-    if any(force.harmonic in ks and force.harmonic not in system.ks for force in model.forces):
+    scene, system = balance.scene, balance.system
+    if any(force.harmonic in ks and force.harmonic not in system.ks for force in scene.excitation):
         return None
-    known, wanted = ((each * model.engine_order) % model.sectors for each in (system.ks, ks))
+    sectors = scene.structure.sectors if isinstance(scene.structure, CyclicStructure) else 1
+    known, wanted = ((each * scene.engine_order) % sectors for each in (system.ks, ks))
     structures = {int(d): int(s) for d, s in zip(known, system.which, strict=True)}
     if any(int(d) not in structures for d in wanted):
         return None

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.balance.balance import Balance, fewer_harmonics
+from solver.balance.closed_loop_poles import ClosedLoop
 from solver.balance.kernels.jacobian import fill_jacobian
 from solver.balance.kernels.locate import slope_by_parameter
 from solver.balance.kernels.newton import from_stuck, ladder, newton
@@ -98,18 +99,25 @@ class PointMeasures:
 
 @dataclass(frozen=True, slots=True)
 class Workspace:
-    """A balance with the scratch arrays of the compiled loops; not for two threads at once."""
+    """A balance with the scratch arrays of the compiled loops; not for two threads at once.
+
+    Attributes
+    ----------
+    loop : what is known of its resonances over the frequency.
+    """
 
     balance: Balance
     system: System
     linear: Receptance
     point: Evaluation
+    loop: ClosedLoop
 
     @classmethod
-    def of(cls, balance: Balance) -> Workspace:
-        """Return a fresh workspace for a balance."""
+    def of(cls, balance: Balance, like: Workspace | None = None) -> Workspace:
+        """Return a fresh workspace for a balance; `like`: of the same scene with other harmonics."""
         system = by_reference(balance.system)
-        return cls(balance, system, new_receptance(system), new_evaluation(system))
+        loop = ClosedLoop(balance, None if like is None else like.loop)
+        return cls(balance, system, new_receptance(system), new_evaluation(system), loop)
 
     def solve(self, p: float, guess: Real | None = None) -> PointSolution:
         """Solve at λ = `p` (inside unit): from `guess` if given, else from nothing.

@@ -43,11 +43,11 @@ def too_stiff(workspace: Workspace, stretches: list[Stretch]) -> bool:
 
 def stands_still(points: Real, control: Control) -> bool:
     """Return whether many points are one but for rounding: a branch that ends within the tolerances."""
-    if len(points) < MANY:
+    near = NEAR * abs(control.stop - control.start)
+    if len(points) < MANY or abs(points[-1, -1] - points[0, -1]) > near or np.ptp(points[:, -1]) > near:
         return False
-    moved, size = np.ptp(points, axis=0), np.abs(points[:, :-1]).max(initial=0.0)
-    near = moved[-1] <= NEAR * abs(control.stop - control.start)
-    return bool(near and moved[:-1].max(initial=0.0) <= STILL * size)
+    moved, size = np.ptp(points[:, :-1], axis=0), np.abs(points[:, :-1]).max(initial=0.0)
+    return bool(moved.max(initial=0.0) <= STILL * size)
 
 
 def taken_up(

@@ -3,7 +3,7 @@
 With few harmonics the highest peak may be another one: where k ω meets a resonance and harmonic k was left
 out, the branch shows nothing of it. The contact forces that drive it are there, in closed form, beyond the
 harmonics kept. They are evaluated at some points of the branch and change little between these; every
-resonance of the structure with its contacts (`solver.extrema.closed_loop_poles`) that such a harmonic meets
+resonance of the structure with its contacts (`solver.balance.closed_loop_poles`) that such a harmonic meets
 is driven by them, and the motion it adds follows without a further solution. Where that, or several times
 that, would reach above the peak found, the response near it is followed with enough harmonics, and its peak
 counts.
@@ -18,19 +18,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.balance.balance import Balance
+from solver.balance.kernels.linearised_contacts import forces_at
 from solver.balance.kernels.output import MAX_ABS
-from solver.balance.kernels.residual import evaluate
 from solver.balance.more_harmonics import more_harmonics, pad
 from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import COULOMB
-from solver.contacts.kernels.system import DENSE, MODES, evaluation_by_value
-from solver.contacts.slopes import amplitudes, harmonic_stiffness
+from solver.contacts.kernels.system import DENSE, MODES
 from solver.continuation.branch import Peak
-from solver.extrema.closed_loop_poles import ClosedLoop
+from solver.extrema.driven import Way, may_exceed
 from solver.extrema.error_estimate import SAFETY, ErrorEstimator
+from solver.extrema.kernels.suspects import find_reaching
 from solver.extrema.nodes import Points
-from solver.jit.fourier import Complex, Real
+from solver.jit.fourier import Complex, Flags, Real
 from solver.scene.harmonics import spread
 
 # Follows a balance between two λ from a first guess; returns the highest peak there, None without a solution.
@@ -113,91 +113,105 @@ class _Look:
 
     def __init__(self, balance: Balance, larger: Workspace, points: Points) -> None:
         self._kept, self._larger, self._points = balance, larger, points
-        self._loop = ClosedLoop(larger.balance)
+        self._loop = larger.loop
         self._samples: list[_Sample] = []
         ks = larger.balance.system.ks
         self._beyond = np.flatnonzero(~np.isin(ks, balance.system.ks))
 
-    def _sample(self, points: Points, i: int) -> _Sample | None:
-        larger, row = self._larger, points.solutions[i]
-        u = pad(row[:-1], self._kept, larger.balance)
-        evaluate(larger.system, larger.linear, u, float(row[-1]), 0.0, larger.point)
-        point, system = evaluation_by_value(larger.point), larger.balance.system
-        if not (np.all(np.isfinite(point.F)) and np.all(np.isfinite(point.dF_dU))):
-            return None
-        F = point.F - system.shift[:, None] * u.reshape(point.F.shape)
-        return _Sample(
-            at=float(row[-1]), amplitude=float(points.measures[i, MAX_ABS]), u=u,
-            F=amplitudes(F, system), stiffness=harmonic_stiffness(system, point),
-        )  # fmt: skip
+    def _sampled(self) -> list[_Sample]:
+        """Return points all along the branch, without those where the contacts have no force."""
+        larger = self._larger
+        chosen = _chosen(self._points, _SAMPLES)
+        rows = self._wide_rows(chosen)
+        ks, nc = larger.balance.system.ks, larger.balance.n_ports
+        forces = np.empty((len(chosen), ks.size, nc), np.complex128)
+        stiffness = np.empty((len(chosen), ks.size, nc, nc), np.complex128)
+        forces_at(larger.system, larger.linear, larger.point, rows, forces, stiffness)
+        return [
+            _Sample(
+                at=float(rows[j, -1]), amplitude=float(self._points.measures[i, MAX_ABS]), u=rows[j, :-1],
+                F=forces[j], stiffness=stiffness[j],
+            )
+            for j, i in enumerate(chosen)
+            if np.all(np.isfinite(forces[j])) and np.all(np.isfinite(stiffness[j]))
+        ]  # fmt: skip
+
+    def _wide_rows(self, chosen: list[int]) -> Real:
+        """Return points of the branch with the harmonics of the larger balance, λ last."""
+        kept, rows = self._kept, self._points.solutions[chosen]
+        narrow = rows[:, :-1].reshape(len(chosen), kept.n_ports, -1)
+        wide = spread(narrow, kept.system.ks, self._larger.balance.system.ks)
+        return np.hstack([wide.reshape(len(chosen), -1), rows[:, -1:]])
 
     def above(self, reached: float) -> list[_Resonance]:
         """Return the resonances at which the amplitude would be above `reached`, the highest first."""
         suspects = self._suspects(reached)
         if not suspects:
             return []
-        chosen = _chosen(self._points, _SAMPLES)
-        self._samples = [s for i in chosen if (s := self._sample(self._points, i)) is not None]
+        self._samples = self._sampled()
         found = []
-        at = np.array([sample.at for sample in self._samples])
-        for i in suspects:
-            stiffness = np.array([sample.stiffness[i] for sample in self._samples])
-            poles = self._loop.of_harmonic(stiffness, int(i), at)
+        for i, may in zip(suspects, self._may_reach(suspects, reached), strict=True):
+            needed = np.append(may, False) | np.append(False, may)
+            if not needed.any():
+                continue
+            at = np.array([sample.at for sample in self._samples])
+            stiffness = np.array([sample.stiffness[i] for sample in self._samples])[needed]
+            poles = self._loop.of_harmonics(stiffness, np.full(len(stiffness), i), at[needed])
             order = np.argsort(poles.at, axis=1)
-            ahead = np.take_along_axis(poles.at, order, axis=1) - at[:, None]
-            widths = np.take_along_axis(poles.half_width, order, axis=1)
-            meets = (ahead[:-1] > 0.0) != (ahead[1:] > 0.0)
+            ahead = np.full((at.size, order.shape[1]), np.nan)
+            ahead[needed] = np.take_along_axis(poles.at, order, axis=1) - at[needed, None]
+            widths = np.full(ahead.shape, np.nan)
+            widths[needed] = np.take_along_axis(poles.half_width, order, axis=1)
+            meets = ((ahead[:-1] > 0.0) != (ahead[1:] > 0.0)) & may[:, None]
             for j, m in zip(*np.nonzero(meets), strict=True):
                 left, right = self._samples[j], self._samples[j + 1]
                 width = min(widths[j, m], widths[j + 1, m])
                 amplitude = max(left.amplitude, right.amplitude)
-                if amplitude + _FEEDBACK * self._bound(left, right, int(i), float(width)) <= reached:
+                if amplitude + _FEEDBACK * self._bound(left, right, i, float(width)) <= reached:
                     continue
-                one = self._met(left, right, int(i), int(m), ahead[j, m] / (ahead[j, m] - ahead[j + 1, m]))
+                one = self._met(left, right, i, int(m), ahead[j, m] / (ahead[j, m] - ahead[j + 1, m]))
                 if one.height + (_FEEDBACK - 1.0) * one.added > reached:
                     found.append(one)
         return sorted(found, key=lambda one: -(one.height + _FEEDBACK * one.added))
 
-    def _suspects(self, reached: float) -> list[int]:
-        """Return the numbers of the harmonics that may reach above `reached` at a resonance.
+    def _may_reach(self, suspects: list[int], reached: float) -> Flags:
+        """Return where the amplitude may be above `reached`: (suspects, ways from sample to sample).
 
-        Contacts that are springs between nothing and full stick move the m-th resonance at most from its
-        place with all contacts free to that with all stuck (Weyl's inequalities), and do not narrow it.
+        What is left out here is what `above` would leave out when it knew the motion.
         """
+        samples, count = self._samples, len(self._samples) - 1
+        if count < 1:
+            return np.zeros((len(suspects), 0), bool)
+        amplitude = np.array([sample.amplitude for sample in samples])
+        allowed = (reached - np.maximum(amplitude[:-1], amplitude[1:])) / _FEEDBACK
+        ends = np.stack([np.arange(count), np.arange(1, count + 1)], axis=1)
+        at = np.array([sample.at for sample in samples])[ends]
+        stiffness = np.array([sample.stiffness[suspects] for sample in samples])[ends]
+        forces = np.array([sample.F[suspects] for sample in samples])[ends]
+        nc, size = forces.shape[-1], len(suspects)
+        way = Way(
+            numbers=np.repeat(suspects, count), at=np.tile(at, (size, 1)),
+            stiffness=np.moveaxis(stiffness, 2, 0).reshape(size * count, 2, nc, nc),
+            forces=np.moveaxis(forces, 2, 0).reshape(size * count, 2, nc),
+        )  # fmt: skip
+        return may_exceed(self._loop.system, way, np.tile(allowed, size)).reshape(size, count)
+
+    def _suspects(self, reached: float) -> list[int]:
+        """Return the numbers of the harmonics that may reach above `reached` at a resonance."""
         system, points = self._loop.system, self._points
         if system.form == DENSE or not bool(np.all(system.laws == COULOMB)):
             return [int(i) for i in self._beyond]
-        chosen = _chosen(points, _FEW_SAMPLES)
-        F = self._forces(chosen)
-        at, amplitude = points.solutions[:, -1], points.measures[:, MAX_ABS]
-        low, high, suspects = float(at.min()), float(at.max()), []
-        for i in self._beyond:
-            k, s = float(system.ks[i]), int(system.which[i])
-            free, stuck = self._loop.free[s], self._loop.stuck[s]
-            begin, end = free.at / k, np.maximum(stuck.at, free.at) / k
-            width = np.minimum(free.half_width, stuck.half_width) / k
-            driven = float(np.linalg.norm(F[i] @ system.contact_duals[s], axis=1).max(initial=0.0))
-            seen = float(np.linalg.norm(system.observe_modes[s]))
-            for m in np.flatnonzero((begin <= high) & (end >= low)):
-                near = amplitude[(at >= begin[m] / _NEAR) & (at <= end[m] * _NEAR)]
-                slow = 2.0 * k * max(float(begin[m]), low) if system.form == MODES else 1.0
-                narrow = slow * k * float(width[m])
-                added = seen * driven / narrow if narrow > 0.0 else math.inf
-                if float(near.max(initial=float(amplitude.min()))) + _FEEDBACK * added > reached:
-                    suspects.append(int(i))
-                    break
-        return suspects
-
-    def _forces(self, chosen: list[int]) -> Complex:
-        """Return the contact forces (nk, P, nc) at points of the branch."""
-        larger, kept, rows = self._larger, self._kept, self._points.solutions[chosen]
-        narrow = rows[:, :-1].reshape(len(chosen), kept.n_ports, -1)
-        U = spread(narrow, kept.system.ks, larger.balance.system.ks)
-        forces = np.zeros_like(U)
-        for u, row, F in zip(U, rows, forces, strict=True):
-            evaluate(larger.system, larger.linear, u.reshape(-1), float(row[-1]), 0.0, larger.point)
-            F[:] = evaluation_by_value(larger.point).F
-        return amplitudes(np.nan_to_num(forces), larger.balance.system)
+        larger, nc = self._larger, self._larger.balance.n_ports
+        rows = self._wide_rows(_chosen(points, _FEW_SAMPLES))
+        forces = np.empty((len(rows), system.ks.size, nc), np.complex128)
+        nothing = np.empty((0, system.ks.size, nc, nc), np.complex128)
+        forces_at(larger.system, larger.linear, larger.point, rows, forces, nothing)
+        may = np.empty(self._beyond.size, bool)
+        find_reaching(
+            larger.system, *self._loop.range, points.solutions, points.measures[:, MAX_ABS], forces,
+            self._beyond, _NEAR, _FEEDBACK, reached, may,
+        )  # fmt: skip
+        return [int(i) for i in self._beyond[may]]
 
     def _bound(self, left: _Sample, right: _Sample, i: int, width: float) -> float:
         """Return what a resonance of some half width in ω can add at most [m]; infinite without modes."""
@@ -216,7 +230,7 @@ class _Look:
         for _ in range(_MEET):
             at = (1.0 - share) * left.at + share * right.at
             stiffness = (1.0 - share) * left.stiffness[i] + share * right.stiffness[i]
-            poles = self._loop.of_harmonic(stiffness[None], i, np.array([at]))
+            poles = self._loop.of_harmonics(stiffness[None], np.array([i]), np.array([at]))
             order = np.argsort(poles.at[0])
             pole, half_width = float(poles.at[0][order[m]]), float(poles.half_width[0][order[m]])
             moved = (pole - left.at) / (right.at - left.at) if right.at != left.at else share

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.balance.kernels.linearised_contacts import linearise_all
+from solver.balance.kernels.linearised_contacts import forces_at, linearise
 from solver.extrema.nodes import Node, NodeSolver
 from solver.jit.fourier import Complex, Integer, Real, cosine_position
 
@@ -40,35 +40,54 @@ class Springs:
 
 
 class LocalModel:
-    """Contacts linearised at nodes of a branch over the frequency, each once, and predictions between two."""
+    """Contacts linearised at nodes of a branch over the frequency, each once, and predictions between two.
+
+    Attributes
+    ----------
+    stiffness : (rows, nk, nc, nc) array
+        Of the contacts against small changes of each harmonic [N/m]; `rows` tells whose each is.
+    """
 
     def __init__(self, solver: NodeSolver) -> None:
         self._solver = solver
-        self._system = solver.workspace.balance.system
-        self._known: dict[int, tuple[Node, Springs | None]] = {}
+        balance = solver.workspace.balance
+        self._system = balance.system
+        nk, nc = balance.system.ks.size, balance.n_ports
+        self._rows: dict[int, tuple[Node, int]] = {}
+        self._springs: dict[int, tuple[Node, Springs]] = {}
+        self.stiffness = np.zeros((0, nk, nc, nc), np.complex128)
+
+    def rows(self, nodes: list[Node]) -> Integer:
+        """Return the rows of nodes in `stiffness`, -1 for a fold, where nothing is a function of λ."""
+        new = {id(node): node for node in nodes if id(node) not in self._rows}
+        chosen = [node for node in new.values() if node.tangent[-1] != 0.0]
+        self._rows |= {key: (node, -1) for key, node in new.items()}
+        if chosen:
+            first = len(self.stiffness)
+            self._rows |= {id(node): (node, first + row) for row, node in enumerate(chosen)}
+            stiffness = np.empty((len(chosen), *self.stiffness.shape[1:]), np.complex128)
+            workspace = self._solver.workspace
+            solutions = np.array([node.solution for node in chosen])
+            forces = np.empty(stiffness.shape[:3], np.complex128)
+            forces_at(workspace.system, workspace.linear, workspace.point, solutions, forces, stiffness)
+            self.stiffness = np.concatenate([self.stiffness, stiffness]) if first else stiffness
+        return np.array([self._rows[id(node)][1] for node in nodes], np.int64)
 
     def at(self, node: Node) -> Springs | None:
-        """Return the contacts at a node; None at a fold, where nothing is a function of λ."""
-        self.linearise([node])
-        return self._known[id(node)][1]
-
-    def linearise(self, nodes: list[Node]) -> None:
-        """Linearise the contacts at nodes where that is not done yet."""
-        new = {id(node): node for node in nodes if id(node) not in self._known}
-        chosen = [node for node in new.values() if node.tangent[-1] != 0.0]
-        self._known |= {key: (node, None) for key, node in new.items()}
-        if not chosen:
-            return
-        workspace = self._solver.workspace
-        nk, nc = workspace.balance.system.ks.size, workspace.balance.n_ports
-        motions = np.empty((len(chosen), 4, nk, nc), np.complex128)
-        stiffness = np.empty((len(chosen), nk, nc, nc), np.complex128)
-        linearise_all(
-            workspace.system, workspace.linear, workspace.point, np.array([node.solution for node in chosen]),
-            np.array([node.tangent for node in chosen]), motions, stiffness,
-        )  # fmt: skip
-        for node, parts, springs in zip(chosen, motions, stiffness, strict=True):
-            self._known[id(node)] = node, Springs(parts[0], parts[1], parts[2], parts[3], springs)
+        """Return the contacts at a node; None at a fold."""
+        if node.tangent[-1] == 0.0:
+            return None
+        if id(node) not in self._springs:
+            workspace, balance = self._solver.workspace, self._solver.workspace.balance
+            nk, nc = balance.system.ks.size, balance.n_ports
+            motions, stiffness = np.empty((4, nk, nc), np.complex128), np.empty((nk, nc, nc), np.complex128)
+            du = node.tangent[:-1] / node.tangent[-1]
+            linearise(
+                workspace.system, workspace.linear, workspace.point, node.solution[:-1], node.at, du, motions,
+                stiffness,
+            )  # fmt: skip
+            self._springs[id(node)] = node, Springs(motions[0], motions[1], motions[2], motions[3], stiffness)
+        return self._springs[id(node)][1]
 
     def adds(self, left: Node, right: Node, one: Resonance) -> tuple[float, float]:
         """Return what a resonance adds to what its neighbours suggest.
@@ -118,7 +137,8 @@ class LocalModel:
 
 
 def unknowns(amplitudes: Complex, ks: Integer) -> Real:
-    """Return the unknowns of complex amplitudes (nk, nc), the reverse of `amplitudes`."""
+    """Return the unknowns of complex amplitudes (nk, nc), as `solver.balance.kernels.linearised_contacts`
+    gives them."""
     turned = amplitudes.T
     skipped = 1 if ks[0] == 0 else 0
     real = np.zeros((turned.shape[0], 2 * len(ks) - skipped))

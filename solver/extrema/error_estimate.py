@@ -67,7 +67,7 @@ class ErrorEstimator:
         highest = balance.n_harmonics
         self._workspace = workspace
         self._top = highest + max(highest, _LEAST_BEYOND)
-        self._larger = Workspace.of(more_harmonics(balance, self._top, multiples=2 * MULTIPLES))
+        self._larger = Workspace.of(more_harmonics(balance, self._top, multiples=2 * MULTIPLES), workspace)
         beyond = linear_part(self._larger.balance, _TAIL * self._top)
         self._is_beyond = ~np.isin(beyond.ks, self._larger.balance.system.ks)
         self._beyond_ks = beyond.ks[self._is_beyond]

@@ -19,6 +19,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.balance.closed_loop_poles import ClosedLoop
 from solver.balance.kernels.locate import EDGE
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS, RESIDUAL
 from solver.balance.parameter import Kind
@@ -26,7 +27,6 @@ from solver.balance.workspace import Workspace
 from solver.continuation.branch import Band, Edge, Peak
 from solver.continuation.certificate import PeakCertificate, certified, uncertain
 from solver.continuation.folds import fold_between, motion_scales
-from solver.extrema.closed_loop_poles import ClosedLoop
 from solver.extrema.intervals import CURVES, highest_share, lowest_share, may_cross
 from solver.extrema.kernels.intervals import IS_BENT, WAVES, WORTH_POLISHING
 from solver.extrema.nodes import Node, NodeSolver, Points, nodes_of, points_of
@@ -102,7 +102,7 @@ class Survey:
     def _look_for_resonances(self) -> None:
         balance = self._workspace.balance
         if ClosedLoop.serves(balance) and len(self._nodes) > 1:
-            self._search = ResonanceSearch(self._solver, ClosedLoop(balance)).run(self._nodes)
+            self._search = ResonanceSearch(self._solver).run(self._nodes)
             self._nodes = self._search.nodes
 
     def _densify(self) -> None:

@@ -5,7 +5,7 @@ contact, blades in phase) leaves no trace in their motion, and one that is narro
 without a trace in either. But the structure is known exactly, and between two points the contacts change
 little: each harmonic of their forces is interpolated, their answer to a small change is the slope ĝ at the
 points, and every resonance of the structure with the springs ĝ is an eigenvalue
-(`solver.extrema.closed_loop_poles`). At each that is too narrow for the points around it the motion is
+(`solver.balance.closed_loop_poles`). At each that is too narrow for the points around it the motion is
 predicted, (I + A ĝ) δu = −r with the residual r of the interpolated motion; where the prediction matters the
 balance is solved, on a ladder of frequencies round the resonance, until the points are as dense as it is
 narrow.
@@ -19,12 +19,10 @@ from itertools import pairwise
 import numpy as np
 
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS
-from solver.contacts.kernels.columns import COULOMB
-from solver.contacts.slopes import amplitudes
-from solver.extrema.closed_loop_poles import ClosedLoop
 from solver.extrema.contact_springs import LocalModel, Resonance, unknowns
+from solver.extrema.kernels.suspects import find_suspects
 from solver.extrema.nodes import Node, NodeSolver
-from solver.jit.fourier import Complex, Real
+from solver.jit.fourier import Complex, Flags, Integer, Real
 
 # What a resonance adds to the amplitude, relative to what stands there, from which it is solved for. What
 # stands there counts as this share of the highest point at least.
@@ -68,11 +66,41 @@ class Search:
     unseen: float = 0.0
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Intervals:
+    """Intervals between neighbouring nodes of a branch: P of them, N nodes.
+
+    Attributes
+    ----------
+    begin : (P,) number of the node that each begins at.
+    solutions : (N, nt + 1) motions, λ last.
+    at : (N,) λ of the nodes [rad/s].
+    low, high, length : (P,) of each [rad/s].
+    """
+
+    nodes: list[Node]
+    begin: Integer
+    solutions: Real
+    at: Real
+    low: Real
+    high: Real
+    length: Real
+
+    @classmethod
+    def of(cls, nodes: list[Node], begin: Integer) -> _Intervals:
+        solutions = np.array([node.solution for node in nodes])
+        at = solutions[:, -1]
+        low, high = np.minimum(at[begin], at[begin + 1]), np.maximum(at[begin], at[begin + 1])
+        return cls(
+            nodes=nodes, begin=begin, solutions=solutions, at=at, low=low, high=high, length=high - low
+        )  # fmt: skip
+
+
 class ResonanceSearch:
     """Adds nodes to a branch over the frequency until no narrow resonance can stand between two of them."""
 
-    def __init__(self, solver: NodeSolver, loop: ClosedLoop) -> None:
-        self._solver, self._loop = solver, loop
+    def __init__(self, solver: NodeSolver) -> None:
+        self._solver, self._loop = solver, solver.workspace.loop
         self._model = LocalModel(solver)
         self._added = 0
 
@@ -82,10 +110,10 @@ class ResonanceSearch:
         fresh = {id(node) for node in nodes[:-1]}
         for _ in range(MOST_ROUNDS):
             top = max(node.measures[MAX_ABS] for node in found.nodes)
-            pairs = [(a, b) for a, b in pairwise(found.nodes) if id(a) in fresh]
-            if not pairs:
+            left_of = [j for j, node in enumerate(found.nodes[:-1]) if id(node) in fresh]
+            if not left_of:
                 break
-            wanted = self._wanted(pairs, top, found)
+            wanted = self._wanted(np.array(left_of), top, found)
             if not wanted:
                 break
             fresh = set()
@@ -97,167 +125,126 @@ class ResonanceSearch:
                 grown += inside
             found.nodes = [*grown, found.nodes[-1]]
         else:
-            found.left += [(a.at, "the search ended before it settled") for a, _ in pairs if id(a) in wanted]
+            unsettled = [found.nodes[j] for j in left_of if id(found.nodes[j]) in wanted]
+            found.left += [(node.at, "the search ended before it settled") for node in unsettled]
         return found
 
-    def _wanted(
-        self, pairs: list[tuple[Node, Node]], top: float, found: Search
-    ) -> dict[int, list[Resonance]]:
-        """Return the resonances that matter, by the node on the left of them."""
+    def _wanted(self, begin: Integer, top: float, found: Search) -> dict[int, list[Resonance]]:
+        """Return the resonances that matter in intervals, by the node on the left of them.
+
+        `begin` (P,) are the numbers of the nodes that the intervals begin at.
+        """
         wanted: dict[int, list[Resonance]] = {}
-        suspects = self._unsettled(pairs, self._suspects(pairs, top))
-        self._model.linearise([node for flagged in suspects.values() for j in flagged for node in pairs[j]])
-        for i, flagged in suspects.items():
-            for j, one in self._narrow(pairs, flagged, i):
-                left, right = pairs[j]
-                height, share = self._model.adds(left, right, one)
-                stands = max(left.measures[MAX_ABS], right.measures[MAX_ABS])
-                if share > MOVES or height > MATTERS * max(stands, OF_THE_TOP * top):
-                    wanted.setdefault(id(left), []).append(one)
-                else:
-                    found.unseen = max(found.unseen, stands + height)
+        rows = _Intervals.of(found.nodes, begin)
+        for j, one in self._narrow(rows, *self._unsettled(rows, *np.nonzero(self._suspects(rows, top)))):
+            left, right = found.nodes[begin[j]], found.nodes[begin[j] + 1]
+            height, share = self._model.adds(left, right, one)
+            stands = max(left.measures[MAX_ABS], right.measures[MAX_ABS])
+            if share > MOVES or height > MATTERS * max(stands, OF_THE_TOP * top):
+                wanted.setdefault(id(left), []).append(one)
+            else:
+                found.unseen = max(found.unseen, stands + height)
         return wanted
 
-    def _unsettled(
-        self, pairs: list[tuple[Node, Node]], suspects: dict[int, list[int]]
-    ) -> dict[int, list[int]]:
+    def _unsettled(self, rows: _Intervals, i: Integer, j: Integer) -> tuple[Integer, Integer]:
         """Return the suspects without the groups of neighbours at whose ends every resonance near is broad.
 
-        What contacts that slip take out of a resonance changes little from one point to the next.
+        What contacts that slip take out of a resonance changes little from one point to the next. The
+        suspects are harmonics number i in intervals j, in this order.
         """
-        groups = {i: _groups(flagged) for i, flagged in suspects.items()}
-        ends = [
-            node
-            for found in groups.values()
-            for group in found
-            for node in (pairs[group[0]][0], pairs[group[-1]][1])
-        ]
-        self._model.linearise(ends)
-        left: dict[int, list[int]] = {}
-        for i, found in groups.items():
-            narrow = self._are_narrow(pairs, found, i)
-            kept = [j for group, wanted in zip(found, narrow, strict=True) if wanted for j in group]
-            if kept:
-                left[i] = kept
-        return left
+        if not i.size:
+            return i, j
+        first = _group_starts(i, j)
+        group = np.cumsum(np.isin(np.arange(i.size), first)) - 1
+        last = np.append(first[1:], i.size) - 1
+        ends = np.stack([rows.begin[j[first]], rows.begin[j[last]] + 1], axis=1)
+        states = np.array([node.states for node in rows.nodes])
+        same = np.all(states[ends[:, 0]] == states[ends[:, 1]], axis=1)
+        linear = self._model.rows([rows.nodes[e] for e in ends.ravel()]).reshape(ends.shape)
+        known = (last - first + 1 == GROUP) & same & np.all(linear >= 0, axis=1)
+        narrow = np.ones(first.size, bool)
+        narrow[known] = self._are_narrow(
+            i[first[known]],
+            self._model.stiffness[linear[known], i[first[known], None]],
+            rows.at[ends[known]],
+            np.maximum.reduceat(rows.length[j], first)[known],
+        )
+        return i[narrow[group]], j[narrow[group]]
 
-    def _are_narrow(self, pairs: list[tuple[Node, Node]], groups: list[list[int]], i: int) -> list[bool]:
-        """Return whether a resonance near a group of intervals may be narrower than they are, of each."""
-        ends = [(pairs[group[0]][0], pairs[group[-1]][1]) for group in groups]
-        linear = [[self._model.at(node) for node in pair] for pair in ends]
-        known = [
-            len(group) == GROUP and np.array_equal(pair[0].states, pair[1].states) and None not in both
-            for group, pair, both in zip(groups, ends, linear, strict=True)
-        ]
-        rows = [j for j, one in enumerate(known) if one]
-        if not rows:
-            return [True] * len(groups)
-        stiffness = np.array([each.stiffness[i] for j in rows for each in linear[j] if each is not None])
-        at = np.array([[node.at for node in ends[j]] for j in rows])
+    def _are_narrow(self, i: Integer, stiffness: Complex, at: Real, longest: Real) -> Flags:
+        """Return whether a resonance near groups of intervals may be narrower than they are.
+
+        Parameters
+        ----------
+        i : (G,) numbers of the harmonics.
+        stiffness : (G, 2, nc, nc) of the contacts at the ends of each group.
+        at : (G, 2) the ends [rad/s].
+        longest : (G,) interval of each [rad/s].
+        """
         # Within 1.5 lengths of the middle is within twice the length of an end.
-        reach = np.repeat(2.0 * np.abs(at[:, 1] - at[:, 0]), 2)
-        ends_may = self._loop.may_meet(stiffness, i, at.reshape(-1), reach)
-        may = np.asarray(ends_may[0::2] | ends_may[1::2])
-        narrow = [True] * len(groups)
-        for j, one in zip(rows, may, strict=True):
-            narrow[j] = bool(one)
-        rows = [j for j, one in zip(rows, may, strict=True) if one]
-        if not rows:
+        span = np.abs(at[:, 1] - at[:, 0])
+        flat = stiffness.reshape(2 * len(i), *stiffness.shape[2:])
+        may = self._loop.may_meet(flat, np.repeat(i, 2), at.ravel(), np.repeat(2.0 * span, 2))
+        narrow: Flags = np.any(may.reshape(-1, 2), axis=1)
+        if not narrow.any():
             return narrow
-        stiffness, at = stiffness[np.repeat(may, 2)], at[may]
-        poles = self._loop.of_harmonic(stiffness, i, at.reshape(-1))
-        span = np.abs(at[:, 1] - at[:, 0])[:, None]
-        middle = at.mean(axis=1)[:, None]
-        poles_at, half_width = poles.at.reshape(len(rows), -1), poles.half_width.reshape(len(rows), -1)
-        longest = np.array([[max(abs(pairs[k][1].at - pairs[k][0].at) for k in groups[j])] for j in rows])
-        near = (np.abs(poles_at - middle) <= 1.5 * span) & (half_width * RESOLVED <= BROAD * longest)
-        for j, one in zip(rows, near.any(axis=1), strict=True):
-            narrow[j] = bool(one)
+        span, at, twice = span[narrow, None], at[narrow], np.repeat(narrow, 2)
+        poles = self._loop.of_harmonics(flat[twice], np.repeat(i[narrow], 2), at.ravel())
+        places, half_width = poles.at.reshape(len(at), -1), poles.half_width.reshape(len(at), -1)
+        near = np.abs(places - at.mean(axis=1)[:, None]) <= 1.5 * span
+        near &= half_width * RESOLVED <= BROAD * longest[narrow, None]
+        narrow[narrow] = near.any(axis=1)
         return narrow
 
-    def _narrow(
-        self, pairs: list[tuple[Node, Node]], flagged: list[int], i: int
-    ) -> list[tuple[int, Resonance]]:
-        """Return the resonances of harmonic number i in intervals too wide for them, with those."""
-        rows: dict[int, tuple[float, Complex]] = {}
-        reach: dict[int, float] = {}
-        for j in flagged:
-            for node in pairs[j]:
-                linear = self._model.at(node)
-                if linear is not None:
-                    rows[id(node)] = node.at, linear.stiffness[i]
-                    reach[id(node)] = max(reach.get(id(node), 0.0), abs(pairs[j][1].at - pairs[j][0].at))
-        if not rows:
+    def _narrow(self, rows: _Intervals, i: Integer, j: Integer) -> list[tuple[int, Resonance]]:
+        """Return the resonances of suspects in intervals too wide for them, with the interval's number."""
+        if not i.size:
             return []
-        ats, stiffness = (np.array(part) for part in zip(*rows.values(), strict=True))
-        may = self._loop.may_meet(stiffness, i, ats, np.array(list(reach.values())))
+        ends = np.stack([rows.begin[j], rows.begin[j] + 1], axis=1)
+        keys, entry = np.unique(i[:, None] * len(rows.nodes) + ends, return_inverse=True)
+        number, node = np.divmod(keys, len(rows.nodes))
+        entry = entry.reshape(ends.shape)
+        reach = np.zeros(keys.size)
+        np.maximum.at(reach, entry, rows.length[j][:, None])
+        linear = self._model.rows([rows.nodes[e] for e in node])
+        may = linear >= 0
+        stiffness = self._model.stiffness[linear[may], number[may]]
+        meets = self._loop.may_meet(stiffness, number[may], rows.at[node[may]], reach[may])
+        may[may] = meets
         if not may.any():
             return []
-        number = {
-            key: row for row, key in enumerate(key for key, here in zip(rows, may, strict=True) if here)
-        }
-        poles = self._loop.of_harmonic(stiffness[may], i, ats[may])
-        ends = [(j, number[id(node)]) for j in flagged for node in pairs[j] if id(node) in number]
-        where, chosen = (np.array(part) for part in zip(*ends, strict=True))
-        low, high = np.sort([(pairs[j][0].at, pairs[j][1].at) for j in where], axis=1).T[:, :, None]
-        at, half_width = poles.at[chosen], poles.half_width[chosen]
+        poles = self._loop.of_harmonics(stiffness[meets], number[may], rows.at[node[may]])
+        row = np.cumsum(may) - 1
+        chosen = may[entry].ravel()
+        at, half_width = (x[row[entry.ravel()[chosen]]] for x in (poles.at, poles.half_width))
+        suspect = np.repeat(np.arange(i.size), 2)[chosen]
+        low, high = (x[j[suspect], None] for x in (rows.low, rows.high))
         inside = (at > low) & (at < high) & (RESOLVED * half_width < high - low)
-        return [
-            (
-                int(where[row]),
-                Resonance(at=at[row, m], half_width=max(half_width[row, m], 1e-13 * at[row, m]), harmonic=i),
-            )
-            for row, m in np.argwhere(inside)
-        ]
+        found = []
+        for r, m in np.argwhere(inside):
+            width = max(half_width[r, m], 1e-13 * at[r, m])
+            one = Resonance(at=at[r, m], half_width=width, harmonic=int(i[suspect[r]]))
+            found.append((int(j[suspect[r]]), one))
+        return found
 
-    def _suspects(self, pairs: list[tuple[Node, Node]], top: float) -> dict[int, list[int]]:
-        """Return the intervals that may hold a resonance narrower than they are, by number of the harmonic.
+    def _suspects(self, rows: _Intervals, top: float) -> Flags:
+        """Return which intervals may hold a resonance narrower than they are, (nk, P).
 
         Contacts that are springs between nothing and full stick move the m-th resonance at most from its
         place with all contacts free to that with all stuck (Weyl's inequalities), and do not narrow it. Its
         flanks R/|ω − ω_m| reach to the ends of the interval, where they are h/|ω − ω_m| times as high as the
         top R/h: what is far lower there, at both ends, is low at the top too.
         """
-        system, found = self._loop.system, {}
-        ends = np.array([(a.at, b.at) for a, b in pairs])
-        low, high = ends.min(axis=1), ends.max(axis=1)
-        flanks = FLANKS * self._shares(pairs, top)
-        friction = bool(np.all(system.laws == COULOMB))
-        for i, k in enumerate(system.ks):
-            if k == 0:
-                continue
-            free, stuck = self._loop.free[int(system.which[i])], self._loop.stuck[int(system.which[i])]
-            begin, end = free.at / k, np.maximum(stuck.at, free.at) / k
-            if not friction:
-                begin, end = np.zeros_like(begin), np.full_like(end, np.inf)
-            width = np.minimum(free.half_width, stuck.half_width) / k
-            meets = (begin[None, :] <= high[:, None]) & (end[None, :] >= low[:, None])
-            narrow = (
-                np.maximum(RESOLVED, 1.0 / np.maximum(flanks[i], 1e-300))[:, None] * width
-                < (high - low)[:, None]
-            )
-            flagged = np.flatnonzero(np.any(meets & narrow, axis=1))
-            if flagged.size:
-                found[i] = flagged.tolist()
-        return found
-
-    def _shares(self, pairs: list[tuple[Node, Node]], top: float) -> Real:
-        """Return how large each harmonic is at the ends of intervals, relative to what matters, (nk, P)."""
-        n_ports = self._solver.workspace.balance.n_ports
-        observed = np.abs(
-            amplitudes(np.array([[node.observed for node in pair] for pair in pairs]), self._loop.system)
-        )
-        stands = np.array([[node.measures[MAX_ABS] for node in pair] for pair in pairs]).max(axis=1)
-        counts = MATTERS * np.maximum(stands, OF_THE_TOP * top)
-        shares: Real = observed.max(axis=2) / np.maximum(counts, 1e-300)
-        if n_ports:
-            rows = np.array([[node.solution[:-1] for node in pair] for pair in pairs])
-            moved = np.abs(amplitudes(rows.reshape(len(pairs), 2, n_ports, -1), self._loop.system)).max(
-                axis=2
-            )
-            whole = np.maximum(moved.max(axis=0), self._solver.least)
-            shares = np.maximum(shares, (moved / np.maximum(MOVES * whole, 1e-300)).max(axis=2))
-        return shares
+        workspace = self._solver.workspace
+        flags = np.empty((self._loop.system.ks.size, rows.begin.size), bool)
+        heights = np.array([node.measures[MAX_ABS] for node in rows.nodes])
+        find_suspects(
+            workspace.system, *self._loop.range, rows.solutions,
+            np.array([node.observed for node in rows.nodes]), rows.begin,
+            np.maximum(np.maximum(heights[rows.begin], heights[rows.begin + 1]), OF_THE_TOP * top),
+            self._solver.least, MATTERS, MOVES, FLANKS, RESOLVED, flags,
+        )  # fmt: skip
+        return flags
 
     def _ladders(
         self, left: Node, right: Node, wanted: list[Resonance] | tuple[()], top: float, found: Search
@@ -327,15 +314,12 @@ class ResonanceSearch:
         return [*before, middle, *self._halved(middle, right, top, depth - 1, found)]
 
 
-def _groups(flagged: list[int]) -> list[list[int]]:
-    """Return ascending numbers in groups of neighbours, up to `GROUP` in each."""
-    groups: list[list[int]] = []
-    for j in flagged:
-        if groups and len(groups[-1]) < GROUP and groups[-1][-1] == j - 1:
-            groups[-1].append(j)
-        else:
-            groups.append([j])
-    return groups
+def _group_starts(i: Integer, j: Integer) -> Integer:
+    """Return where groups of neighbours begin, up to `GROUP` in each, in intervals j ascending for each i."""
+    place = np.arange(i.size)
+    follows = np.append(False, (np.diff(i) == 0) & (np.diff(j) == 1))
+    run = np.maximum.accumulate(np.where(follows, 0, place))
+    return np.flatnonzero((place - run) % GROUP == 0)
 
 
 def _ladder(one: Resonance, low: float, high: float) -> list[float]:

@@ -19,6 +19,7 @@ Real: TypeAlias = NDArray[np.float64]
 Complex: TypeAlias = NDArray[np.complex128]
 Integer: TypeAlias = NDArray[np.int64]
 Index: TypeAlias = NDArray[np.int32]  # LAPACK's pivots
+Flags: TypeAlias = NDArray[np.bool_]
 
 
 @compiled

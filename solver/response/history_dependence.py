@@ -112,6 +112,13 @@ class _Contact:
         load = self.found.load
         return np.asarray(self.given.mu * (fourier.basis(tau, (load.size - 1) // 2) @ load))
 
+    def lost(self, moved: Real) -> float:
+        """Return the most that motions of all ports up to `moved` [m] take of the room to the limit [N]."""
+        away = moved[self.ports]
+        if isinstance(self.given, ElasticNormalContact):
+            return float(self.given.kt * away[0] + self.given.mu * self.given.kn * away[1])
+        return float(self.given.kt * self.size(away))
+
     def size(self, forces: Real) -> Real:
         """Return what counts against the limit of forces (directions, ...)."""
         return np.asarray(np.abs(forces).max(axis=0) if self.boxed else np.sqrt((forces**2).sum(axis=0)))
@@ -209,20 +216,21 @@ def _sticks_from_rest(solution: Solution, sticking: tuple[_Contact, ...]) -> boo
     if reach is None:
         return False
 
-    def is_over(distance: float) -> bool:
-        """Whether this distance [J] cannot make a contact slip."""
-        return all(
-            float(np.min(left)) > _most_lost(contact.given, distance, *compliances)
-            for contact, left, compliances in zip(sticking, room, reach, strict=True)
-        )
-
+    least = [float(np.min(each)) for each in room]
     start = _start(solution, model, stiffness)
-    if is_over(start.distance(start.x, start.v) + _in_sliders(solution, model, stiffness)):
+    distance = start.distance(start.x, start.v) + _in_sliders(solution, model, stiffness)
+    lost = [_most_lost(each.given, distance, *by) for each, by in zip(sticking, reach, strict=True)]
+    if all(left > most for left, most in zip(least, lost, strict=True)):
         return True
     if len(sticking) < len(solution.contacts):
         return False
+
+    def holds(moved: Real) -> bool:
+        """Whether motions of the ports up to these [m] cannot make a contact slip."""
+        return all(left > each.lost(moved) for each, left in zip(sticking, least, strict=True))
+
     angles = np.arange(model.sectors, dtype=np.float64) * model.interblade_phase
-    return keeps_sticking(start, _Fits(sticking, angles), is_over)
+    return keeps_sticking(start, _Fits(sticking, angles), holds)
 
 
 def _most_lost(given: FrictionContact, distance: float, slip: float, approach: float) -> float:
@@ -241,29 +249,32 @@ class _Fits:
     """
 
     def __init__(self, sticking: tuple[_Contact, ...], angles: Real) -> None:
-        self._sticking, self._angles = sticking, angles.tolist()
+        self._sticking, self._angles = sticking, angles
         self._tau = np.zeros(0)
-        self._known: list[tuple[_Contact, int, Real, Real]] = []
+        self._known: list[tuple[_Contact, Real, Real]] = []
 
     def __call__(self, moved: Real, tau: Real) -> bool:
         """Judge motions `moved` (n, sectors, n_ports) [m] at `tau` (n,)."""
         if tau is not self._tau:
             self._tau = tau
+            here = tau[:, None] + self._angles
             self._known = [
-                (contact, sector, contact.limit(tau + angle), contact.forces(tau + angle))
+                (
+                    contact, contact.limit(here.ravel()).reshape(here.shape),
+                    contact.forces(here.ravel()).reshape(-1, *here.shape),
+                )
                 for contact in self._sticking
-                for sector, angle in enumerate(self._angles)
-            ]
+            ]  # fmt: skip
         return all(self._sticks(moved, *known) for known in self._known)
 
     @staticmethod
-    def _sticks(moved: Real, contact: _Contact, sector: int, limit: Real, forces: Real) -> bool:
-        away = moved[:, sector, contact.ports].T
+    def _sticks(moved: Real, contact: _Contact, limit: Real, forces: Real) -> bool:
+        away = np.moveaxis(moved[:, :, contact.ports], 2, 0)
         if isinstance(contact.given, ElasticNormalContact):
             limit = limit + contact.given.mu * contact.given.kn * away[1]
             away = away[:1]
         change = contact.given.kt * away
-        between = _BETWEEN * float(np.abs(change).max(initial=0.0))
+        between = _BETWEEN * np.abs(change).max(axis=(0, 1), initial=0.0)
         return not bool(np.any(contact.size(forces + change) + between >= limit))
 
 

@@ -4,26 +4,31 @@ With all contacts stuck and closed the motion from rest differs from the respons
 
     M Δẍ + C Δẋ + K_s Δx = 0,  Δx(0) = −x(0),  Δẋ(0) = −ẋ(0),
 
-until the first contact slips, if one does. The decay is exact at every instant looked at (a matrix
-exponential), of the whole annulus where the structure is one.
+until the first contact slips, if one does. In an annulus it falls into nodal diameters, in each of them into
+modes e^{λτ} that decay, so that it is exact at every instant looked at, and from any period on a motion of a
+port is at most the sum of the amplitudes of its modes there.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.jit.fourier import Real
+from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import LinearModel
 
-LARGEST = 400  # coordinates of the annulus: above, the exponential would cost more than the response
+LARGEST = 400  # coordinates of the annulus: above, the modes would cost more than the response
 _TURN = 0.1  # rad of the fastest motion from instant to instant
 _MOST_INSTANTS = 4096
 _MOST_PERIODS = 3000
-_MOST_PRODUCTS = 200_000_000  # multiplications of all periods: a fraction of a second
+_MOST_PRODUCTS = 200_000_000  # multiplications of all periods, were there no nodal diameters
+# Condition of the modes above which they do not span what moves; of a pair of equal modes it is 1e8.
+_WORST = 1e10
+_GROWS = 1e-9  # of a mode's speed: a rate of growth below is rounding
+_ROUNDING = 1e-6  # of a bound, for what rounding leaves
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,9 +62,68 @@ class Start:
         return 0.5 * float(kinetic + elastic + np.sum(self.stiffness * u**2))
 
 
-def keeps_sticking(
-    start: Start, fits: Callable[[Real, Real], bool], is_over: Callable[[float], bool]
-) -> bool:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Transient:
+    """What is left of the start, in the modes of every nodal diameter; 2 n of them in each.
+
+    Attributes
+    ----------
+    rates : (sectors, 2 n) array
+        λ by τ.
+    amplitudes : (sectors, 2 n) array
+        Of the modes at the beginning of a period.
+    ports : (sectors, n_ports, 2 n) array
+        Their motions of the ports of sector 0.
+    """
+
+    rates: Complex
+    amplitudes: Complex
+    ports: Complex
+
+    @classmethod
+    def of(cls, start: Start) -> _Transient | None:
+        """Return the transient at its beginning; None if its modes do not span it, or one of them grows."""
+        turns = np.exp(2j * np.pi * np.arange(len(start.x)) / len(start.x))[:, None, None]
+        model, omega = start.model, start.omega
+        L = model.contact_here + model.contact_next * turns
+        K = model.K0 + model.Kp * turns + model.Kp.T / turns
+        K = K + np.swapaxes(L.conj(), 1, 2) @ (start.stiffness[:, None] * L)
+        C = model.C0 + model.Cp * turns + model.Cp.T / turns
+        inverse, n = np.linalg.inv(model.M), start.x.shape[1]
+        generator = np.zeros((len(turns), 2 * n, 2 * n), np.complex128)
+        generator[:, :n, n:] = np.eye(n)
+        generator[:, n:, :n], generator[:, n:, n:] = -inverse @ K / omega**2, -inverse @ C / omega
+        state = -np.fft.fft(np.hstack([start.x, start.v / omega]), axis=0) / len(turns)
+        try:
+            rates, modes = np.linalg.eig(generator.real if len(turns) == 1 else generator)
+            duals = np.linalg.inv(modes)
+        except np.linalg.LinAlgError:
+            return None
+        condition = np.linalg.norm(modes, axis=(1, 2)) * np.linalg.norm(duals, axis=(1, 2))
+        if not np.all(condition <= _WORST) or np.any(rates.real > _GROWS * np.abs(rates)):
+            return None
+        return cls(
+            rates=np.minimum(rates.real, 0.0) + 1j * rates.imag,
+            amplitudes=(duals @ state[..., None])[..., 0],
+            ports=L @ modes[:, :n],
+        )  # fmt: skip
+
+    def later(self, periods: int) -> _Transient:
+        """Return the same some periods on."""
+        return replace(self, amplitudes=self.amplitudes * np.exp(2.0 * math.pi * periods * self.rates))
+
+    def bound(self) -> Real:
+        """Return what a port of any sector moves at most, now and later, (n_ports,) [m]."""
+        largest = np.einsum("spm,sm->p", np.abs(self.ports), np.abs(self.amplitudes))
+        return np.asarray((1.0 + _ROUNDING) * largest)
+
+    def motions(self, over_a_period: Complex) -> Real:
+        """Return the motions of all ports, (count, sectors, n_ports) [m], at the instants of e^{λτ} given."""
+        moved = (over_a_period * self.amplitudes[:, None]) @ np.swapaxes(self.ports, 1, 2)
+        return np.swapaxes(len(moved) * np.fft.ifft(moved, axis=0).real, 0, 1)
+
+
+def keeps_sticking(start: Start, fits: Callable[[Real, Real], bool], holds: Callable[[Real], bool]) -> bool:
     """Return whether the transient ends without a slip, as far as bounded work can tell.
 
     Parameters
@@ -67,65 +131,36 @@ def keeps_sticking(
     start : where it begins.
     fits : whether motions of all ports away from the response, (n, sectors, n_ports) [m], at the angles (n,)
         of a period keep every contact stuck.
-    is_over : whether an energy [J] is too small for a slip.
+    holds : whether every contact sticks at any instant whose motions of the ports of its sector, (n_ports,)
+        [m], are at most these.
     """
     sectors, n = start.x.shape
-    if sectors * n > LARGEST:
+    transient = _Transient.of(start) if sectors * n <= LARGEST else None
+    if transient is None:
         return False
-    generator, ports = _whole(start)
-    fastest = float(np.abs(np.linalg.eigvals(generator)).max())
-    count = max(128, math.ceil(2.0 * math.pi * fastest / _TURN))
+    if holds(transient.bound()):
+        return True
+    count = max(128, math.ceil(2.0 * math.pi * float(np.abs(transient.rates).max()) / _TURN))
     if count > _MOST_INSTANTS:
         return False
-    from scipy.linalg import expm  # most responses never come here, and it takes long to import
-
-    rows = _rows(expm(2.0 * math.pi / count * generator), ports, count)
-    over_a_period = expm(2.0 * math.pi * generator)
-    tau = 2.0 * math.pi / count * np.arange(count, dtype=np.float64)
-    state = -np.concatenate([start.x.ravel(), start.v.ravel() / start.omega])
-
-    def over(state: Real) -> bool:
-        x, v = state.reshape(2, sectors, n)
-        return is_over(start.distance(x, v * start.omega))
-
-    periods = min(_MOST_PERIODS, _MOST_PRODUCTS // rows.size)
-    # The energy never grows: what is not over at the end is so at no instant before.
-    if not over(np.linalg.matrix_power(over_a_period, periods) @ state):
+    size = count * sectors * start.stiffness.size * 2 * sectors * n
+    periods = _first(transient, holds, min(_MOST_PERIODS, _MOST_PRODUCTS // max(size, 1)))
+    if periods is None:
         return False
-    for _ in range(periods):
-        if not fits((rows @ state).reshape(count, sectors, -1), tau):
-            return False
-        state = over_a_period @ state
-        if over(state):
-            return True
-    return False
+    tau = 2.0 * math.pi / count * np.arange(count, dtype=np.float64)
+    over_a_period = np.exp(transient.rates[:, None] * tau[:, None])
+    return all(fits(transient.later(i).motions(over_a_period), tau) for i in range(periods))
 
 
-def _whole(start: Start) -> tuple[Real, Real]:
-    """Return the matrix of the decay by τ and the ports, (sectors · n_ports, 2 sectors · n)."""
-    model, (sectors, n) = start.model, start.x.shape
-    here, beyond = np.eye(sectors), np.roll(np.eye(sectors), 1, axis=1)
-    L = np.kron(here, model.contact_here) + np.kron(beyond, model.contact_next)
+def _first(transient: _Transient, holds: Callable[[Real], bool], most: int) -> int | None:
+    """Return the number of periods from which on no contact can slip; None if `most` are not enough.
 
-    def whole(own: Real, coupling: Real) -> Real:
-        return np.asarray(np.kron(here, own) + np.kron(beyond, coupling) + np.kron(beyond.T, coupling.T))
-
-    K = whole(model.K0, model.Kp) + L.T @ (np.tile(start.stiffness, sectors)[:, None] * L)
-    C = whole(model.C0, model.Cp)
-    inverse = np.kron(here, np.linalg.inv(model.M))
-    size = sectors * n
-    generator = np.zeros((2 * size, 2 * size))
-    generator[:size, size:] = np.eye(size)
-    generator[size:, :size] = -inverse @ K / start.omega**2
-    generator[size:, size:] = -inverse @ C / start.omega
-    return generator, np.hstack([L, np.zeros_like(L)])
-
-
-def _rows(step: Real, ports: Real, count: int) -> Real:
-    """Return ports · stepⁱ for i = 0 … count − 1, (count · n_ports, size)."""
-    rows = ports
-    powers = step
-    while len(rows) < count * len(ports):
-        rows = np.vstack([rows, rows @ powers])
-        powers = powers @ powers
-    return rows[: count * len(ports)]
+    What a port moves at most only falls.
+    """
+    if not holds(transient.later(most).bound()):
+        return None
+    low, high = 0, most
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if holds(transient.later(middle).bound()) else (middle, high)
+    return high

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TypeAlias
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from solver.jit.fourier import Integer, Real
+from solver.jit.fourier import Flags, Integer, Real
 from solver.scene.scene import FrictionContact, Scene
-
-Flags: TypeAlias = NDArray[np.bool_]
 
 MOST_HARMONICS = 1000
 # A force of this harmonic or above is a fast wave of its own: it gets its multiples, as harmonic 1 does.
@@ -74,7 +71,8 @@ def spread(coefficients: Real, ks: Integer, wider: Integer) -> Real:
 
     A harmonic that `wider` lacks is left out.
     """
-    full = np.zeros((*coefficients.shape[:-1], _numbers(wider).size))
+    size = 2 * wider.size - (wider[0] == 0)
+    full = np.zeros((*coefficients.shape[:-1], size))
     here, there = places(ks, wider)
     full[..., there] = coefficients[..., here]
     return full
@@ -82,7 +80,13 @@ def spread(coefficients: Real, ks: Integer, wider: Integer) -> Real:
 
 def places(ks: Integer, wider: Integer) -> tuple[Integer, Integer]:
     """Return where the coefficients that two sets of harmonics share stand in each of them."""
-    _, here, there = np.intersect1d(_numbers(ks), _numbers(wider), assume_unique=True, return_indices=True)
+    return _places(ks.tobytes(), wider.tobytes())
+
+
+@lru_cache(maxsize=64)
+def _places(one: bytes, other: bytes) -> tuple[Integer, Integer]:
+    ks, wider = (_numbers(np.frombuffer(each, np.int64)) for each in (one, other))
+    _, here, there = np.intersect1d(ks, wider, assume_unique=True, return_indices=True)
     return here.astype(np.int64), there.astype(np.int64)
 
 

@@ -7,13 +7,44 @@ import numpy as np
 from solver.balance.kernels.output import force_slope
 from solver.balance.kernels.residual import evaluate
 from solver.contacts.kernels.system import Evaluation, Receptance, System
+from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance import receptance
 
 
 @apart
-def _linearise(
+def _fill_stiffness(system: System, point: Evaluation, stiffness: Complex) -> None:
+    """Fill ĝ_k, (nk, nc, nc) [N/m], of the contacts where `point` was evaluated: F̂_k changes by ĝ_k û_k.
+
+    It is the part of dF/dU that commutes with a shift in time; what answers a change with its mirror image is
+    left out.
+    """
+    for i in range(system.ks.size):
+        here = cosine_position(system.ks, i)
+        for c in range(system.owner.size):
+            for d in range(system.owner.size):
+                stiffness[i, c, d] = 0.0
+            e = system.owner[c]
+            first, m = system.first_port[e], system.first_port[e + 1] - system.first_port[e]
+            for q in range(m):
+                block = point.dF_dU[system.first_block[e] + (c - first) * m + q]
+                answer = complex(block[here, here], 0.0)
+                if system.ks[i] > 0:
+                    even = 0.5 * (block[here, here] + block[here + 1, here + 1])
+                    answer = complex(even, 0.5 * (block[here, here + 1] - block[here + 1, here]))
+                stiffness[i, c, first + q] = answer
+
+
+@compiled
+def _amplitude(system: System, i: int, coefficients: Real, at: int) -> complex:
+    """Return the complex amplitude of harmonic number i of the motion whose coefficients begin at `at`."""
+    here = at + cosine_position(system.ks, i)
+    return complex(coefficients[here], -coefficients[here + 1] if system.ks[i] > 0 else 0.0)
+
+
+@apart
+def linearise(
     system: System, linear: Receptance, point: Evaluation, u: Real, p: float, du: Real, motions: Complex,
     stiffness: Complex,
 ) -> float:  # fmt: skip
@@ -23,8 +54,7 @@ def _linearise(
     ----------
     motions : (4, nk, nc) complex amplitudes of u, du/dλ, the forces less those of the shift, and their slope
         by λ; filled.
-    stiffness : (nk, nc, nc) what a small change of a harmonic of the motions changes in the same harmonic of
-        the forces, the shift included [N/m]: the part of dF/dU that commutes with a shift in time; filled.
+    stiffness : (nk, nc, nc) as in `_fill_stiffness`, the shift included [N/m]; filled.
 
     Returns
     -------
@@ -36,48 +66,39 @@ def _linearise(
     dF = np.empty((nc, n))
     force_slope(system, point, du, 1.0, dF)
     for i in range(system.ks.size):
-        here = cosine_position(system.ks, i)
-        has_sine = system.ks[i] > 0
         for c in range(nc):
-            at = c * n + here
-            motions[0, i, c], motions[1, i, c] = complex(u[at], 0.0), complex(du[at], 0.0)
-            motions[2, i, c] = complex(point.F[c, here] - system.shift[c] * u[at], 0.0)
-            motions[3, i, c] = complex(dF[c, here], 0.0)
-            if has_sine:
-                motions[0, i, c] -= 1j * u[at + 1]
-                motions[1, i, c] -= 1j * du[at + 1]
-                motions[2, i, c] -= 1j * (point.F[c, here + 1] - system.shift[c] * u[at + 1])
-                motions[3, i, c] -= 1j * dF[c, here + 1]
-            for d in range(nc):
-                stiffness[i, c, d] = 0.0
-            e = system.owner[c]
-            first, m = system.first_port[e], system.first_port[e + 1] - system.first_port[e]
-            for q in range(m):
-                block = point.dF_dU[system.first_block[e] + (c - first) * m + q]
-                answer = complex(block[here, here], 0.0)
-                if has_sine:
-                    even = 0.5 * (block[here, here] + block[here + 1, here + 1])
-                    answer = complex(even, 0.5 * (block[here, here + 1] - block[here + 1, here]))
-                stiffness[i, c, first + q] = answer
+            motions[0, i, c] = _amplitude(system, i, u, c * n)
+            motions[1, i, c] = _amplitude(system, i, du, c * n)
+            motions[2, i, c] = _amplitude(system, i, point.F[c], 0) - system.shift[c] * motions[0, i, c]
+            motions[3, i, c] = _amplitude(system, i, dF[c], 0)
+    _fill_stiffness(system, point, stiffness)
     return norm
 
 
 @apart
-def linearise_all(
-    system: System, linear: Receptance, point: Evaluation, solutions: Real, tangents: Real, motions: Complex,
+def forces_at(
+    system: System,
+    linear: Receptance,
+    point: Evaluation,
+    solutions: Real,
+    forces: Complex,
     stiffness: Complex,
-) -> None:  # fmt: skip
-    """Evaluate points of a branch.
+) -> None:
+    """Evaluate the contacts at points.
 
     Parameters
     ----------
-    solutions, tangents : (P, nt + 1) points and directions of the branch, λ last, which must change.
-    motions, stiffness : (P, 4, nk, nc) and (P, nk, nc, nc), as in `_linearise`; filled.
+    solutions : (P, nt + 1) motions, λ last.
+    forces : (P, nk, nc) complex amplitudes of the forces less those of the shift; filled.
+    stiffness : (P, nk, nc, nc) as in `_fill_stiffness`, filled; or of no row where it is not wanted.
     """
-    nt = solutions.shape[1] - 1
-    du = np.empty(nt)
+    nt, n = solutions.shape[1] - 1, coefficient_count(system.ks)
     for row in range(solutions.shape[0]):
-        for i in range(nt):
-            du[i] = tangents[row, i] / tangents[row, nt]
-        p = solutions[row, nt]
-        _linearise(system, linear, point, solutions[row, :nt], p, du, motions[row], stiffness[row])
+        u = solutions[row, :nt]
+        evaluate(system, linear, u, solutions[row, nt], 0.0, point)
+        for i in range(system.ks.size):
+            for c in range(system.owner.size):
+                carried = system.shift[c] * _amplitude(system, i, u, c * n)
+                forces[row, i, c] = _amplitude(system, i, point.F[c], 0) - carried
+        if stiffness.shape[0] > 0:
+            _fill_stiffness(system, point, stiffness[row])

@@ -16,7 +16,8 @@ force of each depending on all of them. The unknowns are the motions of all port
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from functools import cached_property
+from typing import NamedTuple, cast
 
 import numpy as np
 from numba.experimental import structref
@@ -159,9 +160,19 @@ class _SystemReference(structref.StructRefProxy):
 class _ReceptanceReference(structref.StructRefProxy):
     """A `Receptance` by reference."""
 
+    @cached_property
+    def arrays(self) -> Receptance:
+        """Its arrays; no kernel puts others in their place."""
+        return receptance_arrays(cast(Receptance, self))
+
 
 class _EvaluationReference(structref.StructRefProxy):
     """An `Evaluation` by reference."""
+
+    @cached_property
+    def arrays(self) -> Evaluation:
+        """Its arrays; no kernel puts others in their place."""
+        return evaluation_arrays(cast(Evaluation, self))
 
 
 structref.define_proxy(_SystemReference, _SystemType, list(System._fields))
@@ -179,9 +190,14 @@ def by_reference(system: System) -> System:
     return _new_system(*system)
 
 
-@compiled
 def evaluation_by_value(point: Evaluation) -> Evaluation:
     """Return the arrays of an evaluation as a tuple that Python can read (views, not copies)."""
+    return cast(_EvaluationReference, point).arrays
+
+
+@compiled
+def evaluation_arrays(point: Evaluation) -> Evaluation:
+    """Return the same, made anew: it takes longer than to evaluate a point of few contacts."""
     return Evaluation(
         point.residual, point.dr_dp, point.F, point.dF_dU, point.dF_dp, point.dF_dkt, point.dF_dmu,
         point.dF_dN, point.states, point.pieces, point.slopes, point.segments, point.jacobian, point.lu,
@@ -197,9 +213,14 @@ def receptance_over(A: Complex, u_linear: Complex, B: Complex, x_linear: Complex
     return _receptance_of(A, u_linear, B, x_linear)
 
 
-@compiled
 def receptance_by_value(linear: Receptance) -> Receptance:
     """Return the arrays of a receptance as a tuple that Python can read (views, not copies)."""
+    return cast(_ReceptanceReference, linear).arrays
+
+
+@compiled
+def receptance_arrays(linear: Receptance) -> Receptance:
+    """Return the same, made anew."""
     return Receptance(linear.A, linear.u_linear, linear.B, linear.x_linear)
 
 
