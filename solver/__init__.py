@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from solver.peaks.track_peak import track_peak
     from solver.response.floquet import Growth, Stability, branch_stability, stability
     from solver.response.power_balance import PowerBalance, power_balance
-    from solver.response.solve import Solution, SolutionStatus, solve
+    from solver.response.solution import Solution, SolutionStatus
+    from solver.response.solve import solve
     from solver.response.time_history import hysteresis_loop, motion, time_history
     from solver.response.wear import ContactWear, Measured, WearSensitivity, contact_wear
     from solver.response.wear_nonsmooth import worst_slopes
@@ -55,7 +56,7 @@ _HOME = {
     "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
     "Effects": "balance.simplifications", "Plan": "studies.plan", "plan": "studies.plan",
     "Scene": "scene.scene", "load_scene": "scene.scene", "shipped_scenes": "scene.scene",
-    "Solution": "response.solve", "SolutionStatus": "response.solve", "solve": "response.solve",
+    "Solution": "response.solution", "SolutionStatus": "response.solution", "solve": "response.solve",
     "Growth": "response.floquet", "Stability": "response.floquet", "branch_stability": "response.floquet",
     "stability": "response.floquet", "BladePeaks": "studies.blades", "blade_peaks": "studies.blades",
     "MistunedDisk": "studies.mistuning", "MistuningStatus": "studies.mistuning",

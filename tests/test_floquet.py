@@ -33,7 +33,7 @@ from solver.marching import march as marching
 from solver.marching.kernels import taylor as kernel
 from solver.response.floquet import Growth, coulomb_pieces, growth_of, scene_monodromy
 from solver.response.monodromy import PERIOD, Element, Monodromy, Piece, Structure, monodromy
-from solver.response.solve import Solution
+from solver.response.solution import Solution
 from solver.scene.scene import CyclicStructure
 
 UNSTABLE = oscillator({"kt": 0.5, "mu": 0.3, "N0": 5.0}, k=1.0, c=0.05)

@@ -248,7 +248,7 @@ class Branch(Drawn):
         """
         if self.peak is None:
             return None
-        return "mean_undetermined" in on_demand("solver.response.history_dependence:peak_flags")(self)
+        return "mean_undetermined" in on_demand("solver.response.solve:peak_flags")(self)
 
     @property
     def folds(self) -> int:

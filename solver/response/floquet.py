@@ -28,7 +28,7 @@ from solver.jit.fourier import Complex, Real
 from solver.jit.trig_polynomial import grid_size, grid_tables
 from solver.linear.assembly import linear_model
 from solver.response.monodromy import PERIOD, SHORTEST, Element, Monodromy, Piece, Structure, monodromy
-from solver.response.solve import Solution
+from solver.response.solution import Solution
 from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.annulus import annulus

@@ -28,16 +28,13 @@ more from no motion, and says so if it finds one, but no more than that.
 from __future__ import annotations
 
 import math
-import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.balance.balance import build
-from solver.balance.parameter import Kind
-from solver.balance.workspace import PointSolution, Workspace
+from solver.balance.workspace import Workspace
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import LinearModel, linear_model
@@ -46,13 +43,13 @@ from solver.linear.rigid_body_modes import CANCELLED
 from solver.matrices.normal_modes import least_stiffness
 from solver.response.contact_response import ContactResponse, ContactState
 from solver.response.force_history import force_at
-from solver.response.solve import Solution, describe
+from solver.response.solution import Solution
 from solver.response.start_from_rest import Start, keeps_sticking
 from solver.response.time_history import all_coordinates
 from solver.scene.scene import AnyContact, ElasticNormalContact, FrictionContact, PlanarContact
 
 if TYPE_CHECKING:
-    from solver.continuation.branch import Branch
+    pass
 
 _TURN = 2.0 * math.pi
 # A force with a circular limit that differs from kt u + c by less, relative to it, has not slipped.
@@ -152,18 +149,6 @@ def has_another_solution(workspace: Workspace, u: Real, p: float) -> bool:
     if not other.converged:
         return False
     return float(np.abs(other.u - u).max(initial=0.0)) > _ELSEWHERE * float(np.abs(u).max(initial=0.0))
-
-
-def peak_flags(branch: Branch) -> tuple[str, ...]:
-    """Return the flags of the response at the highest peak of a branch that has one, see `Solution`."""
-    balance, (peak, *_) = branch.balance, branch.peaks
-    scene, frequency_hz = balance.scene, peak.at
-    if balance.parameter.kind is not Kind.FREQUENCY:
-        scene, frequency_hz = scene.with_values({branch.parameter: peak.at}), balance.system.omega / _TURN
-        effects = replace(balance.effects, even_harmonics=int(balance.system.ks[0]) == 0)
-        balance = build(scene, harmonics=balance.n_harmonics, effects=effects)
-    found = PointSolution(converged=True, u=peak.solution, iterations=0, residual=0.0)
-    return describe(Workspace.of(balance), found, frequency_hz, time.perf_counter(), estimated=False).flags
 
 
 def load_is_given(contact: AnyContact) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from solver.jit import fourier
 from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
-from solver.response.solve import Solution
+from solver.response.solution import Solution
 from solver.response.time_history import coordinates, matrices
 from solver.results.told import Piece
 

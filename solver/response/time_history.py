@@ -17,7 +17,7 @@ from solver.linear.assembly import LinearModel, linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.linear.contact_table import port_stiffnesses
 from solver.response.force_history import force_at
-from solver.response.solve import Solution
+from solver.response.solution import Solution
 from solver.scene.validation import listing
 
 LARGEST_SAMPLES = 10_000_000

@@ -26,7 +26,7 @@ from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.contact_table import DEFAULT_SAMPLES
 from solver.linear.kernels.receptance import receptance
-from solver.response.solve import Solution
+from solver.response.solution import Solution
 from solver.response.wear_measures import Change, Cycle, friction_work, least_load, slip_travel
 from solver.results.told import Piece
 from solver.scene.validation import listing

@@ -18,7 +18,7 @@ from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.jit.trig_polynomial import grid_size, grid_tables, on_grid
-from solver.response.solve import Solution
+from solver.response.solution import Solution
 from solver.response.time_history import motion
 from solver.results.base import Drawn
 from solver.results.views import Views

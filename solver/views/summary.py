@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from solver.marching.result import MarchResult
     from solver.peaks.results import LeastPeak, PeakTrack
     from solver.response.floquet import Stability
-    from solver.response.solve import Solution
+    from solver.response.solution import Solution
     from solver.studies.blades import BladeAmplitudes, BladePeaks
     from solver.studies.convergence import AccuracyStudy
     from solver.studies.mistuning import MistuningStudy

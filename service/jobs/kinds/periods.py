@@ -13,7 +13,7 @@ from solver.scene.scene import AnyContact, FrictionContact, GapSpring
 if TYPE_CHECKING:
     from solver.marching.result import MarchResult
     from solver.response.contact_response import ContactResponse
-    from solver.response.solve import Solution
+    from solver.response.solution import Solution
 
 STICK, SLIP, SEPARATION = 0, 1, 2
 FloatArray = NDArray[np.float64]

@@ -8,7 +8,7 @@ from solver.continuation.branch import Branch
 from solver.marching.result import MarchResult
 from solver.peaks.results import PeakTrack
 from solver.response.floquet import Stability
-from solver.response.solve import Solution
+from solver.response.solution import Solution
 from solver.results.base import Into
 from solver.scene.scene import Scene
 from solver.studies.blades import BladeAmplitudes, BladePeaks

@@ -17,7 +17,7 @@ from solver.views.plots.curves import FloatArray
 
 if TYPE_CHECKING:
     from solver.marching.result import MarchResult
-    from solver.response.solve import Solution
+    from solver.response.solution import Solution
 
 MOST_LOOPS = 3
 _SAMPLES = 1000

@@ -1,0 +1,136 @@
+"""One periodic response: what `solve` returns, and what can be read off it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, ClassVar
+
+from solver.jit.fourier import Real
+from solver.response.contact_response import ContactResponse
+from solver.results.base import Drawn
+from solver.results.views import Views, on_demand
+from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    pass
+
+MEAN_UNDETERMINED = "mean_undetermined"
+HISTORY_DEPENDENT = "history_dependent"
+
+
+class SolutionStatus(Enum):
+    """How a solve ended; the value is a sentence a user can act on."""
+
+    CONVERGED = "The balance is satisfied."
+    ACCURACY_NOT_REACHED = (
+        "The balance is satisfied, but the accuracy asked for was not reached with the most harmonics "
+        "allowed: ask for less, or set the harmonics yourself."
+    )
+    NOT_CONVERGED = (
+        "No solution was found at this frequency: try more harmonics, or a sweep that passes through it."
+    )
+    RATCHETS = (
+        "There is no periodic motion: a part that contacts alone hold ratchets, it drifts a little further "
+        "every period. Press it harder, take away what pulls it to one side, or hold it by a spring."
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Solution(Drawn):
+    """A periodic response at one frequency.
+
+    Attributes
+    ----------
+    status : SolutionStatus
+        Whether and why; every number below is NaN if it is NOT_CONVERGED or RATCHETS.
+    max_abs, half_peak_to_peak, mean : float
+        Of the observed DOF over the period [m]. Not unique when `flags` has ``mean_undetermined``: the first
+        and the last then depend on the history, and with ``history_dependent`` the second does too. Without
+        these flags they are what a start from rest with contacts free of force leads to.
+    n_harmonics : int
+        The number asked for.
+    harmonics : (H + 1,) array
+        |mean| and the amplitude of each harmonic of the observed DOF [m], up to the highest one kept: that is
+        above `n_harmonics` where a force is, see `solver.scene.harmonics.kept_harmonics`. Zero if not kept.
+    observed : (2H + 1,) array
+        Its coefficients [m].
+    contacts : tuple of ContactResponse
+        One for each contact of the scene.
+    flags : tuple of str
+        ``mean_undetermined``, ``history_dependent``, ``all_stuck``, ``separation``, ``not_unique``,
+        ``symmetric_unstable``, ``travelling_wave_assumed`` where they apply; for the last three see
+        `solver.branches.symmetry_breaking`.
+    residual : float
+        Relative residual of the balance.
+    error_estimate : float
+        Estimated error of `max_abs` by the harmonics left out and the residual [m]; of `half_peak_to_peak`
+        where the mean is not determined. See `solver.extrema.error_estimate`.
+    mean_range : (float, float)
+        Bounds of the mean over every history [m], forces left in contacts by assembly included; NaN where no
+        bound is known. See `solver.response.history_dependence`.
+    """
+
+    scene: Scene
+    frequency_hz: float
+    n_harmonics: int
+    status: SolutionStatus
+    max_abs: float
+    half_peak_to_peak: float
+    mean: float
+    harmonics: Real
+    observed: Real
+    contacts: tuple[ContactResponse, ...]
+    flags: tuple[str, ...]
+    residual: float
+    error_estimate: float
+    newton_iterations: int
+    seconds: float
+    mean_range: tuple[float, float] = (math.nan, math.nan)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the numbers are a solution."""
+        return self.status not in (SolutionStatus.NOT_CONVERGED, SolutionStatus.RATCHETS)
+
+    @property
+    def highest_harmonic(self) -> int:
+        """The last one in `harmonics`, H of every (2H + 1,) array."""
+        return int(self.harmonics.size) - 1
+
+    @property
+    def reached(self) -> bool:
+        """Whether they are, with the accuracy asked for."""
+        return self.status is SolutionStatus.CONVERGED
+
+    VIEWS: ClassVar = Views("solver.views", "of_solution", "solution_dataset", "of_solution")
+
+    def to_json(self, *, with_stability: bool = False) -> dict[str, object]:
+        """Return the answer as one JSON object; on request with what `solver.stability` says, which costs."""
+        if with_stability:
+            found = on_demand("solver.response.floquet:stability")(self).to_json() if self.converged else None
+            return {**self.to_json(), "stability": found}
+        return {
+            "scene": self.scene.name,
+            "frequency_hz": self.frequency_hz,
+            "converged": self.converged,
+            "status": self.status.value,
+            "max_abs": _number(self.max_abs),
+            "half_peak_to_peak": _number(self.half_peak_to_peak),
+            "mean": _number(self.mean),
+            "harmonics": self.harmonics.tolist() if self.converged else None,
+            "flags": list(self.flags),
+            "contacts": {contact.name: contact.state.value for contact in self.contacts},
+            "residual": _number(self.residual),
+            "error_estimate": _number(self.error_estimate),
+            "n_harmonics": self.n_harmonics,
+            "newton_iterations": self.newton_iterations,
+            "seconds": self.seconds,
+            **({"mean_range": [*map(_number, self.mean_range)]} if MEAN_UNDETERMINED in self.flags else {}),
+        }
+
+
+def _number(value: float) -> float | None:
+    """Return a float that JSON can carry."""
+    return float(value) if math.isfinite(value) else None
