@@ -13,8 +13,6 @@ from solver.results.base import Drawn
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
 
-if TYPE_CHECKING:
-    pass
 
 MEAN_UNDETERMINED = "mean_undetermined"
 HISTORY_DEPENDENT = "history_dependent"
