@@ -63,6 +63,11 @@ def test_eigenvectors_that_nearly_coincide(apart: float) -> None:
     assert max(residuals(np.array([[1.0, 1.0, 0.0], [0.0, 1.0 + apart, 1.0], [0.0, 0.0, 2.0]]))) <= 1e-14
 
 
+def test_a_free_body_has_a_double_eigenvalue() -> None:
+    """Position and speed of a mass nothing holds: V⁻¹ would be as large as numbers get."""
+    assert max(residuals(np.array([[0.0, 1.0], [0.0, 0.0]]))) <= 1e-14
+
+
 def test_small_problems_import_no_scipy() -> None:
     code = (
         "import sys, numpy as np; from solver import eigen; A = np.diag([2.0, 3.0]) + 0.1\n"

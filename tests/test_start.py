@@ -63,3 +63,27 @@ def test_the_table_says_what_the_commands_say(entry: Entry) -> None:
     loaded = Deferred(entry).load()
     assert loaded.name == entry.name
     assert ("key_file" in {parameter.name for parameter in loaded.params}) == entry.keyed
+
+
+def test_lapack_comes_without_its_package() -> None:
+    """A matrix too large for the kernels' own loop; afterwards the package is what it always is."""
+    code = """
+import sys
+import numpy as np
+from solver.jit.lapack import OWN_UP_TO, back_substitute, factorise
+assert "scipy.linalg.cython_lapack" in sys.modules
+n = OWN_UP_TO + 10
+A = np.random.default_rng(1).normal(size=(n, n))
+factors, pivots, x = A.copy(), np.zeros(n, np.int32), np.ones(n)
+assert factorise(factors, n, pivots) == np.sign(np.linalg.det(A))
+back_substitute(factors, n, pivots, x)
+assert np.abs(A @ x - 1.0).max() < 1e-10
+assert "scipy.linalg" not in sys.modules
+before = sys.modules["scipy.linalg.cython_lapack"]
+import scipy.linalg
+from scipy.linalg import cython_lapack
+assert cython_lapack is before
+assert np.abs(scipy.linalg.solve(A, np.ones(n)) - x).max() < 1e-9 * np.abs(x).max()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

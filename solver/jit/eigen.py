@@ -15,6 +15,7 @@ Matrix = NDArray[Any]
 Complex = NDArray[np.complex128]
 
 SMALL = 48  # rows up to which a triangular solve row by row costs less than importing SciPy
+LARGEST = 1e8  # entry of V⁻¹, the columns of V being of length 1: beyond, half of the digits are gone
 ROUNDING = 16.0  # largest error of a left eigenvector, in units of n eps |A|, that counts as rounding
 
 
@@ -70,10 +71,11 @@ def two_sided(A: Matrix) -> tuple[Complex, Complex, Complex]:
             rows = np.linalg.inv(right)
         except np.linalg.LinAlgError:
             rows = np.full_like(right, np.nan)
-        rows /= np.linalg.norm(rows, axis=1, keepdims=True)
-        error = np.linalg.norm(rows @ A - values[:, None] * rows, axis=1).max(initial=0.0)
-        if error <= ROUNDING * n * np.finfo(float).eps * np.linalg.norm(A):
-            return _complex(values, rows.conj().T, right)
+        if np.all(np.abs(rows) < LARGEST):  # the size of a row is the condition of its eigenvalue
+            rows /= np.linalg.norm(rows, axis=1, keepdims=True)
+            error = np.linalg.norm(rows @ A - values[:, None] * rows, axis=1).max(initial=0.0)
+            if error <= ROUNDING * n * np.finfo(float).eps * np.linalg.norm(A):
+                return _complex(values, rows.conj().T, right)
     from scipy import linalg
 
     values, left, right = linalg.eig(A, left=True, right=True)

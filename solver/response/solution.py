@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from solver.jit.fourier import Real
 from solver.response.contact_response import ContactResponse
 from solver.results.base import Drawn
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
-
 
 MEAN_UNDETERMINED = "mean_undetermined"
 HISTORY_DEPENDENT = "history_dependent"
