@@ -24,6 +24,8 @@ from service.schemas.answers import (
     JobAnswer,
     JobPage,
     JobScene,
+    KindAnswer,
+    KindList,
     ResultsAnswer,
     SceneAnswer,
     SceneDetail,
@@ -94,6 +96,10 @@ class Client:
     ) -> JobAnswer:
         """Submit a design: the body of ``POST /v1/designs``; as `submit`."""
         return self._submit("/v1/designs", body, idempotency_key, wait)
+
+    def kinds(self) -> list[KindAnswer]:
+        """The kinds of job of the service, with the schemas of their bodies and results."""
+        return self._get(KindList, "/v1/kinds").items
 
     def job(self, job_id: str) -> JobAnswer:
         """How a job is."""

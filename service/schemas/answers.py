@@ -89,6 +89,21 @@ class JobAnswer(Answer):
         )
 
 
+class KindAnswer(Answer):
+    """A kind of job."""
+
+    name: str
+    summary: str
+    body: dict[str, Any] = Field(description="JSON Schema of the body of `POST /v1/jobs`, with examples.")
+    result: dict[str, Any] | None = Field(description="JSON Schema of the result; null for any object.")
+
+
+class KindList(Answer):
+    """All kinds of job."""
+
+    items: list[KindAnswer]
+
+
 class JobPage(Answer):
     """A page of jobs, newest first."""
 

@@ -230,6 +230,7 @@ def test_a_refusal_names_field_value_and_what_is_right(
 
 def test_the_client_submits_follows_and_reads_it(url: str) -> None:
     with Client(url) as client:
+        assert "distortion" in [kind.name for kind in client.kinds()]
         job = client.submit({"kind": "distortion", **BODY, "frequencies_hz": [1.1], "fresh": True})
         assert client.wait(job.id).status is JobState.SUCCESSFUL
         assert client.results(job.id).result["worst"] == pytest.approx(wanted(1.1)[0], rel=1e-9)

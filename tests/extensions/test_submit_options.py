@@ -40,6 +40,12 @@ class Unsaid(JobRequest):
     """A kind without a scene."""
 
 
+class Decided(JobRequest):
+    """A key that must be yes or no."""
+
+    really: bool
+
+
 class Further(ProblemRequest):
     """A design problem with a key of its own."""
 
@@ -117,6 +123,12 @@ def test_what_cannot_be_read_names_its_option(words: list[str], said: str) -> No
 def test_a_kind_without_a_scene_takes_none(told: list[Mapping[str, Any]]) -> None:
     run(kind(Unsaid), "--priority", "1")
     assert told == [{"kind": "shapes", "priority": 1}]
+
+
+@pytest.mark.parametrize(("word", "value"), [("--really", True), ("--no-really", False)])
+def test_a_yes_or_no_that_is_needed_is_given(told: list[Mapping[str, Any]], word: str, value: bool) -> None:
+    run(kind(Decided), word)
+    assert told == [{"kind": "shapes", "really": value}]
 
 
 def test_a_problem_of_another_kind_has_the_options_of_problems(told: list[Mapping[str, Any]]) -> None:

@@ -135,7 +135,11 @@ def _made(flag: str, schema: Schema, whole: Schema, *, needed: bool) -> inspect.
         return _parameter(options.Values, None)
     kind, default = schema.get("type"), whole.get("default")
     words = whole.get("description", "")
+    if kind == "boolean" and needed:
+        both = f"{flag}/--no-{flag.removeprefix('--')}"
+        return _parameter(Annotated[bool, typer.Option(both, help=words)], inspect.Parameter.empty)
     if kind == "boolean":
+        words = f"Switch off: {words}" if flag.startswith("--no-") else words
         return _parameter(Annotated[bool, typer.Option(flag, help=words)], False)
     type_, parser, metavar = _read_as(schema)
     if get_origin(type_) is list and kind == "array":

@@ -7,7 +7,6 @@ from collections.abc import Container, Sequence
 from typing import TYPE_CHECKING, Any, get_type_hints
 
 import typer
-from typer.core import TyperCommand, TyperGroup
 
 from service.cli.commands.jobs import hand_in, scene_of
 from service.cli.commands.key_options import (
@@ -24,36 +23,12 @@ from service.cli.options.keyed import keyed
 from service.cli.options.problem import FLAGS, ProblemFlags, takes_problem
 from service.cli.options.problem_inputs import OPTIONS
 from service.cli.table import COMMANDS
-from service.jobs.registry import JobKind, Registry
+from service.jobs.registry import JobKind
 
 if TYPE_CHECKING:
     from service.jobs.kinds.problem import ProblemRequest
 
 _OF_ALL = ("fresh", "priority", "max_seconds")
-
-
-class SubmitGroup(TyperGroup):
-    """The group `submit`: a command for every kind of job there is, made when it is asked for."""
-
-    def list_commands(self, ctx: Any) -> list[str]:
-        """The names of the kinds."""
-        self._fill()
-        return super().list_commands(ctx)
-
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Name and summary of a kind; None if there is none of this name."""
-        self._fill()
-        return super().get_command(ctx, cmd_name)
-
-    def resolve_command(self, ctx: Any, args: Any) -> Any:
-        """The name of the kind asked for, its command, and the arguments left."""
-        name, _, rest = super().resolve_command(ctx, args)
-        return name, None if name is None else command_of(_registry()[name]), rest
-
-    def _fill(self) -> None:
-        if not self.commands:
-            for kind in _registry():
-                self.add_command(TyperCommand(kind.name, help=kind.summary, rich_markup_mode=None))
 
 
 def command_of(kind: JobKind) -> Any:
@@ -62,13 +37,6 @@ def command_of(kind: JobKind) -> Any:
     take = keyed(submission(kind, _local(kind.name)))
     alone.command(kind.name, help=f"{kind.summary}\n\nSubmitted as a job.")(take)
     return typer.main.get_command(alone)
-
-
-def _registry() -> Registry:
-    # Loaded here: `stickslip --help` needs no kinds.
-    from service.settings.kinds import registry_here
-
-    return registry_here()
 
 
 def _local(name: str) -> Command | None:

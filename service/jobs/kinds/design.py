@@ -172,6 +172,8 @@ class RobustResult(ReachedResult):
 class DesignResult(RootModel[OptimumResult | RobustResult]):
     """A design; with `uncertain` a robust one."""
 
+    model_config = ConfigDict(defer_build=True)
+
 
 def resolve(request: _DesignRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check the problem, fill in the variables."""

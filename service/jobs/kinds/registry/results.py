@@ -14,11 +14,14 @@ Curve = Annotated[list[float | None], Field(description="A number a point.")]
 class KindResult(BaseModel):
     """Root of the results of the kinds; a later version may add keys."""
 
-    model_config = ConfigDict(extra="allow")
+    # Built when a description of the API asks for it.
+    model_config = ConfigDict(extra="allow", defer_build=True)
 
 
 class PeakAt(BaseModel):
     """The height of a peak [m], and where it is."""
+
+    model_config = ConfigDict(defer_build=True)
 
     value: float
     at: float
