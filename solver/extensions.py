@@ -12,12 +12,17 @@ from functools import cache
 from importlib import import_module
 from typing import TypeVar
 
+from solver.errors import SettingError
+
 VARIABLE = "STICKSLIP_EXTENSIONS"
 T = TypeVar("T")
 
 
-class ExtensionError(ValueError):
+class ExtensionError(SettingError):
     """The variable does not name objects that can be imported."""
+
+    def __init__(self, value: str, reason: str = "") -> None:
+        super().__init__(VARIABLE, value, f'must be a list such as ["module:NAME"]{reason}')
 
 
 def extensions(kind: type[T]) -> tuple[T, ...]:
@@ -38,9 +43,9 @@ def _named(text: str) -> tuple[object, ...]:
     try:
         names = json.loads(text)
     except json.JSONDecodeError as error:
-        raise ExtensionError(_refusal(text)) from error
+        raise ExtensionError(text[:200]) from error
     if not isinstance(names, list) or not all(isinstance(name, str) and ":" in name for name in names):
-        raise ExtensionError(_refusal(text))
+        raise ExtensionError(text[:200])
     return tuple(_imported(name) for name in names)
 
 
@@ -49,8 +54,4 @@ def _imported(name: str) -> object:
     try:
         return getattr(import_module(module), attribute)
     except (ImportError, AttributeError) as error:
-        raise ExtensionError(f"`{VARIABLE}` names {name!r}, which cannot be imported: {error}") from error
-
-
-def _refusal(text: str) -> str:
-    return f'`{VARIABLE}` must be a list such as ["module:NAME"], got {text[:80]!r}'
+        raise ExtensionError(name, f" that can be imported ({error})") from error

@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import brentq
 
 from optim import sensitivities
-from optim.criteria.slopes import Sensitivity
+from optim.criteria.response_gradients import Sensitivity
 from solver import Branch, Scene, load_scene, sweep
 
 DATA = Path(__file__).parent / "data"

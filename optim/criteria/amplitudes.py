@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from optim.criteria.criterion import Criterion
 from optim.criteria.judged import Judged
+from optim.criteria.response_gradients import Sensitivity
 from optim.criteria.rows import Row
-from optim.criteria.slopes import Sensitivity
 from optim.problem.variables import Real
 from solver.continuation.branch import Peak
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from optim.criteria.criterion import Criterion
+from optim.criteria.response_gradients import Sensitivity
 from optim.criteria.rows import Row
-from optim.criteria.slopes import Sensitivity
 from optim.problem.cases import Case
 from optim.problem.problem import Problem
 from optim.problem.variables import Real, by_variables, by_variables_twice

@@ -1,8 +1,8 @@
 """Sensitivities in engineering form: per cent of the peaks and of the band for one per cent of a parameter.
 
-From the exact gradients through the whole solve (`optim.criteria.slopes`), all parameters from one adjoint a
-peak or band edge. An elasticity is (p / a) da/dp: it has no unit, and says what matters. Of a homogeneous
-system of degree one the elasticities of a peak by f0 and by all normal loads add up to 1 (Euler).
+From the exact gradients through the whole solve (`optim.criteria.response_gradients`), all parameters from
+one adjoint a peak or band edge. An elasticity is (p / a) da/dp: it has no unit, and says what matters. Of a
+homogeneous system of degree one the elasticities of a peak by f0 and by all normal loads add up to 1 (Euler).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from optim.criteria.amplitudes import COMPETES
-from optim.criteria.slopes import Sensitivity
+from optim.criteria.response_gradients import Sensitivity
 from optim.problem.variables import Real
 from solver.balance.parameter import resolve
 from solver.balance.parameter_derivatives import resolved

@@ -42,9 +42,9 @@ def named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(extensions.VARIABLE, NAMED[extensions.VARIABLE])
 
 
-def by_solutions(load: float) -> float:
+def by_solutions(load: float, mu: float = 0.3) -> float:
     """The same number from responses at single frequencies."""
-    scene = solver.load_scene("two-dof").with_values({"damper.N0": load})
+    scene = solver.load_scene("two-dof").with_values({"damper.N0": load, "damper.mu": mu})
     a = [
         solver.solve(scene, frequency_hz=hz, harmonics=HARMONICS).max_abs
         for hz in frequencies(scene).tolist()
@@ -112,6 +112,22 @@ def test_it_limits_the_least_peak() -> None:
     assert by_solutions(found.optimum["damper.N0"]) == pytest.approx(bound, rel=1e-4)
     assert found.peak.value > free.peak.value
     assert any(words.startswith("rms amplitude limit of") for words in found.active)
+
+
+@pytest.mark.usefixtures("named")
+def test_its_worst_case_is_minimised() -> None:
+    uncertain = [{"damper.mu": mu} for mu in (0.28, 0.32)]
+    found = optim.robust_design(
+        solver.load_scene("two-dof"), variables=BOUNDS, weights={"rms": 1.0}, harmonics=HARMONICS,
+        uncertain=uncertain, samples=2,
+    )  # fmt: skip
+    assert found.reached, found.status
+    best = found.optimum["damper.N0"]
+    here, below, above = (
+        max(by_solutions(best * factor, mu) for mu in (0.28, 0.32)) for factor in (1.0, 0.99, 1.01)
+    )
+    assert found.objective == pytest.approx(here, rel=1e-9)
+    assert here < min(below, above)
 
 
 @pytest.mark.usefixtures("named")

@@ -1,4 +1,4 @@
-"""A format of matrix files that lives here: registered once, it is read wherever files are."""
+"""A format of matrix files of this folder (`banded_text`): named once, it is read wherever files are."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 import httpx
 import numpy as np
 import pytest
+from banded_text import BANDED
 from service_helpers import serving
 
 import solver
@@ -18,35 +19,11 @@ from service.jobs.kinds import SHIPPED
 from solver import extensions
 from solver.matrices.files import MatrixFileError, read_matrix
 from solver.matrices.readers import registry
-from solver.matrices.readers.reader import Reader
 from solver.matrices.readers.table import formats_table
 from solver.scene.scene import Scene
 
 M = np.diag([0.02, 0.03, 0.04])
 K = np.array([[5e5, -3e5, 0.0], [-3e5, 7e5, -2e5], [0.0, -2e5, 9e5]])
-
-
-def banded(path: Path, _key: str) -> np.ndarray:
-    """Diagonals of a symmetric matrix, a line each, below the line `BANDED`."""
-    head, *lines = path.read_text(encoding="ascii").splitlines()
-    if head != "BANDED":
-        raise ValueError(f"line 1 must be BANDED, got {head[:40]!r}")
-    rows = [np.array([float(word) for word in line.split()]) for line in lines]
-    matrix = np.diag(rows[0])
-    for offset, row in enumerate(rows[1:], start=1):
-        matrix += np.diag(row, offset) + np.diag(row, -offset)
-    return matrix
-
-
-def begins(start: bytes) -> bool:
-    return start.startswith(b"BANDED")
-
-
-BANDED = Reader(
-    name="banded text", suffixes=(".mband", ".kband"), word="kband", media=("text/x-banded",),
-    recognises=begins, help="A program of one's own: diagonals, a line each.", matrix=banded,
-    roles={".mband": "M", ".kband": "K"},
-)  # fmt: skip
 
 
 def text(matrix: np.ndarray) -> str:
@@ -57,7 +34,7 @@ def text(matrix: np.ndarray) -> str:
 @pytest.fixture(autouse=True)
 def named(monkeypatch: pytest.MonkeyPatch) -> None:
     """The processes that read uploads find it by the environment."""
-    monkeypatch.setenv(extensions.VARIABLE, json.dumps([f"{__name__}:BANDED"]))
+    monkeypatch.setenv(extensions.VARIABLE, json.dumps(["banded_text:BANDED"]))
 
 
 @pytest.fixture
