@@ -50,7 +50,7 @@ def test_nothing_else_is_served(shipped: httpx.Client, path: str) -> None:
 
 
 def test_the_page_has_words_for_every_flag() -> None:
-    text = (FOLDER / "js" / "words.js").read_text(encoding="utf-8")
+    text = (FOLDER / "js" / "base" / "words.js").read_text(encoding="utf-8")
     told = dict(re.findall(r'^  (\w+): "(.*)",$', text, flags=re.MULTILINE))
     assert told.keys() == FLAGS.keys()
     assert told["not_unique"] == FLAGS["not_unique"]

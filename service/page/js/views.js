@@ -1,11 +1,11 @@
 // The kinds of job with a view of their own: a further one is its module and a line here. The card "Other
 // studies" has a form and a view for every other kind the service knows.
 
-import { designView } from "./design.js";
-import { frontView } from "./front.js";
-import { mapView } from "./map.js";
-import { sweepView } from "./response.js";
-import { accuracyView, campbellView } from "./studies.js";
+import { designView } from "./views/design.js";
+import { frontView } from "./views/front.js";
+import { mapView } from "./views/map.js";
+import { sweepView } from "./views/response.js";
+import { accuracyView, campbellView } from "./views/studies.js";
 
 export const VIEWS = {
   sweep: sweepView,

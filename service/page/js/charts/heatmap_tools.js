@@ -1,7 +1,7 @@
 // The buttons that take a map away: its CSV is a table of every cell.
 
 import { saving } from "./chart.js";
-import { el } from "./dom.js";
+import { el } from "../base/dom.js";
 
 function columns({ x, y, rows }) {
   const [xs, ys, values] = [[], [], []];

@@ -1,6 +1,6 @@
 // Requests to the service: problem documents as errors, keys, the state of the connection.
 
-import { tell } from "./events.js";
+import { tell } from "../base/events.js";
 
 const KEY = "stickslip-key";
 const BACKOFF = [0.25, 0.5, 1, 1.5];

@@ -1,14 +1,14 @@
 // One point: loops, a period against the time march, harmonics.
 
-import { state, write } from "./address.js";
-import { chart } from "./chart.js";
-import { byId, el, facts, say, show } from "./dom.js";
-import { on, tell } from "./events.js";
-import { largest, length, lengthUnit, number, percent } from "./format.js";
-import { resume, run } from "./jobs.js";
-import { previewer } from "./previews.js";
-import { asked, current } from "./scenes.js";
-import { notes } from "./words.js";
+import { state, write } from "../base/address.js";
+import { chart } from "../charts/chart.js";
+import { byId, el, facts, say, show } from "../base/dom.js";
+import { on, tell } from "../base/events.js";
+import { largest, length, lengthUnit, number, percent } from "../base/format.js";
+import { resume, run } from "../network/jobs.js";
+import { previewer } from "../network/previews.js";
+import { asked, current } from "../scene/scenes.js";
+import { notes } from "../base/words.js";
 
 const MARCH_EVERY = 16;
 const MOTIONS = [["stick", "sticks", undefined], ["slip", "slips", "dashed"], ["apart", "open", "dotted"]];

@@ -1,6 +1,6 @@
 // What a scene of matrices needs beside its files: DOFs by name, what acts on them, what is kept.
 
-import { el, show } from "./dom.js";
+import { el, show } from "../base/dom.js";
 
 const GROUND = "ground";
 const FEW_ROWS = 300;

@@ -1,6 +1,6 @@
 // What the page says about itself: the service away, a key wanted, a refusal.
 
-import { setKey } from "./api.js";
+import { setKey } from "../network/api.js";
 import { byId, el, say, show } from "./dom.js";
 import { on, tell } from "./events.js";
 

@@ -1,8 +1,8 @@
 // A chart of lines and points in SVG: read by mouse and keyboard, picked by click and Enter, saved as files.
 
-import { el, show, svg } from "./dom.js";
-import { csvText, pngBlob, saveBlob, saveText, svgText } from "./exports.js";
-import { number } from "./format.js";
+import { el, show, svg } from "../base/dom.js";
+import { csvText, pngBlob, saveBlob, saveText, svgText } from "../base/exports.js";
+import { number } from "../base/format.js";
 import { pathOf, plane, shape } from "./plane.js";
 import { extent } from "./scales.js";
 

@@ -1,7 +1,7 @@
 // The drawing of a scene: masses, springs, contacts with what they do.
 
-import { el, show, svg, table } from "./dom.js";
-import { number } from "./format.js";
+import { el, show, svg, table } from "../base/dom.js";
+import { number } from "../base/format.js";
 import { GROUND, chain, ownName, partsOf, ring } from "./layout.js";
 
 export const STATES = {

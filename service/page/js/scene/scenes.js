@@ -1,7 +1,7 @@
 // The scene that is looked at: its tables, its values as set, its paths.
 
-import { request } from "./api.js";
-import { state } from "./address.js";
+import { request } from "../network/api.js";
+import { state } from "../base/address.js";
 
 export const current = { body: null };
 

@@ -1,12 +1,12 @@
 // The best design, and the plan of the scene.
 
-import { Problem, patiently, post } from "./api.js";
-import { state } from "./address.js";
-import { byId, el, facts, say, show } from "./dom.js";
-import { on, tell } from "./events.js";
-import { length, number, percent, quantity, seconds } from "./format.js";
+import { Problem, patiently, post } from "../network/api.js";
+import { state } from "../base/address.js";
+import { byId, el, facts, say, show } from "../base/dom.js";
+import { on, tell } from "../base/events.js";
+import { length, number, percent, quantity, seconds } from "../base/format.js";
 import { putAll } from "./live.js";
-import { asked } from "./scenes.js";
+import { asked } from "../scene/scenes.js";
 
 let token = 0;
 

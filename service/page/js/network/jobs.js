@@ -1,10 +1,10 @@
 // Jobs of this page: submitted, watched, taken up again after a reload or a restart of the service.
 
 import { Problem, patiently, post, request } from "./api.js";
-import { state, write } from "./address.js";
-import { byId, el, show } from "./dom.js";
-import { tell } from "./events.js";
-import { percent } from "./format.js";
+import { state, write } from "../base/address.js";
+import { byId, el, show } from "../base/dom.js";
+import { tell } from "../base/events.js";
+import { percent } from "../base/format.js";
 import { watch } from "./stream.js";
 
 const WORDS = { accepted: "waits", running: "runs", successful: "done", failed: "failed", dismissed: "stopped" };

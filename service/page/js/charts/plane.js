@@ -1,6 +1,6 @@
 // The frame of a chart: paper, grid, axes with their names, and the box inside.
 
-import { svg } from "./dom.js";
+import { svg } from "../base/dom.js";
 import { scale } from "./scales.js";
 
 const MARGIN = { left: 62, right: 14, top: 12, bottom: 44 };

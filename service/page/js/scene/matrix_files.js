@@ -1,7 +1,7 @@
 // Files of matrices: sent to the service one by one, each with what it is and what is wrong beside it.
 
-import { Problem, request } from "./api.js";
-import { el, show } from "./dom.js";
+import { Problem, request } from "../network/api.js";
+import { el, show } from "../base/dom.js";
 
 export const SCENES = /\.(toml|json)$/i;
 const ROLES = { M: "the mass matrix M", K: "the stiffness matrix K", C: "the damping matrix C", mapping: "the names of the rows", modes: "modes", "": "not used" };

@@ -2,7 +2,7 @@
 
 import { state } from "./address.js";
 import { saveFrom } from "./exports.js";
-import { current, variable } from "./scenes.js";
+import { current, variable } from "../scene/scenes.js";
 
 export function commands(file) {
   const { observe } = current.body;

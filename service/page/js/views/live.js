@@ -1,12 +1,12 @@
 // Sliders of the contact and the force, and the response that follows them.
 
-import { state, write } from "./address.js";
-import { chart } from "./chart.js";
-import { byId, el, show } from "./dom.js";
-import { on, tell } from "./events.js";
-import { length, lengthUnit, number, quantity, unitOf } from "./format.js";
-import { previewer } from "./previews.js";
-import { asked, current, frictionContacts, ownValue, value } from "./scenes.js";
+import { state, write } from "../base/address.js";
+import { chart } from "../charts/chart.js";
+import { byId, el, show } from "../base/dom.js";
+import { on, tell } from "../base/events.js";
+import { length, lengthUnit, number, quantity, unitOf } from "../base/format.js";
+import { previewer } from "../network/previews.js";
+import { asked, current, frictionContacts, ownValue, value } from "../scene/scenes.js";
 
 const STEPS = 400;
 const RATE_WINDOW = 20;

@@ -1,11 +1,11 @@
 // The map of the response over load and frequency, with the ridge of its peaks and the optimum.
 
-import { byId, el, facts, say, show } from "./dom.js";
-import { on, tell } from "./events.js";
-import { length, number, percent, quantity, seconds, withUnit } from "./format.js";
-import { heatmap, shadeStrip } from "./heatmap.js";
+import { byId, el, facts, say, show } from "../base/dom.js";
+import { on, tell } from "../base/events.js";
+import { length, number, percent, quantity, seconds, withUnit } from "../base/format.js";
+import { heatmap, shadeStrip } from "../charts/heatmap.js";
 import { load } from "./design.js";
-import { warnings } from "./words.js";
+import { warnings } from "../base/words.js";
 
 let plot = null;
 let last = null;

@@ -1,6 +1,6 @@
 // Axes: from values to pixels, and where the ticks go.
 
-import { number } from "./format.js";
+import { number } from "../base/format.js";
 
 const STEPS = [1, 2, 2.5, 5, 10];
 

@@ -1,14 +1,14 @@
 // The stored sweeps: filters, files, and several of them side by side.
 
-import { state, write } from "./address.js";
-import { request } from "./api.js";
-import { chart } from "./chart.js";
+import { state, write } from "../base/address.js";
+import { request } from "../network/api.js";
+import { chart } from "../charts/chart.js";
 import { load } from "./design.js";
-import { byId, el, say, show, table } from "./dom.js";
-import { on, tell } from "./events.js";
-import { saveFrom } from "./exports.js";
-import { length, lengthUnit, number, quantity, when, withUnit } from "./format.js";
-import { current } from "./scenes.js";
+import { byId, el, say, show, table } from "../base/dom.js";
+import { on, tell } from "../base/events.js";
+import { saveFrom } from "../base/exports.js";
+import { length, lengthUnit, number, quantity, when, withUnit } from "../base/format.js";
+import { current } from "../scene/scenes.js";
 
 const FILTERS = [
   ["scene", "Scene", "text"], ["parameter", "Parameter", "text"], ["contact", "Contact", "text"], ["N0_min", "N0 from [N]", "number"], ["N0_max", "N0 to [N]", "number"],

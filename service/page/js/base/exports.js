@@ -1,6 +1,6 @@
 // Taking things away: files of charts, numbers and answers.
 
-import { blobOf, Problem } from "./api.js";
+import { blobOf, Problem } from "../network/api.js";
 import { tell } from "./events.js";
 
 const PAINT = ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "stroke-linecap", "opacity",

@@ -2,9 +2,9 @@
 
 import { empty } from "./chart.js";
 import { chartTools } from "./heatmap_tools.js";
-import { SHADES } from "./colours.js";
-import { el, show, svg } from "./dom.js";
-import { lengthUnit, number } from "./format.js";
+import { SHADES } from "../base/colours.js";
+import { el, show, svg } from "../base/dom.js";
+import { lengthUnit, number } from "../base/format.js";
 import { pathOf, plane, shape } from "./plane.js";
 
 const LEGEND = 14;

@@ -1,10 +1,10 @@
 // Matrices of a finite-element program become a scene: files in, what was read, what is needed, the editor.
 
-import { Problem, post, request } from "./api.js";
-import { byId, el, facts, say, show } from "./dom.js";
+import { Problem, post, request } from "../network/api.js";
+import { byId, el, facts, say, show } from "../base/dom.js";
 import { edit } from "./editor.js";
-import { on } from "./events.js";
-import { number } from "./format.js";
+import { on } from "../base/events.js";
+import { number } from "../base/format.js";
 import { matrixFiles } from "./matrix_files.js";
 import { matrixForm } from "./matrix_form.js";
 

@@ -1,16 +1,16 @@
 // The frequency response of the study: points as they come, then peak, band, linear limits, files.
 
-import { chart } from "./chart.js";
-import { byId, el, facts, say, show } from "./dom.js";
-import { on, tell } from "./events.js";
-import { saveFrom } from "./exports.js";
-import { length, number, percent, seconds } from "./format.js";
+import { chart } from "../charts/chart.js";
+import { byId, el, facts, say, show } from "../base/dom.js";
+import { on, tell } from "../base/events.js";
+import { saveFrom } from "../base/exports.js";
+import { length, number, percent, seconds } from "../base/format.js";
 import { responseOf } from "./live.js";
-import { previewer } from "./previews.js";
-import { current } from "./scenes.js";
-import { state } from "./address.js";
-import { saveToml } from "./toml.js";
-import { betweenPoints, notes } from "./words.js";
+import { previewer } from "../network/previews.js";
+import { current } from "../scene/scenes.js";
+import { state } from "../base/address.js";
+import { saveToml } from "../base/toml.js";
+import { betweenPoints, notes } from "../base/words.js";
 
 const FORMS = [["CSV", "text/csv", "csv"], ["npz", "application/x-npz", "npz"], ["Parquet", "application/vnd.apache.parquet", "parquet"]];
 let plot = null;

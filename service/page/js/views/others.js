@@ -1,14 +1,14 @@
 // Studies of kinds that have no view of their own: a form made of the schema of their body, any result as a table.
 
-import { request } from "./api.js";
-import { state } from "./address.js";
-import { byId, el, facts, say, show, table } from "./dom.js";
-import { on } from "./events.js";
-import { saveText } from "./exports.js";
-import { number, percent } from "./format.js";
-import { resume, run } from "./jobs.js";
-import { asked } from "./scenes.js";
-import { VIEWS } from "./views.js";
+import { request } from "../network/api.js";
+import { state } from "../base/address.js";
+import { byId, el, facts, say, show, table } from "../base/dom.js";
+import { on } from "../base/events.js";
+import { saveText } from "../base/exports.js";
+import { number, percent } from "../base/format.js";
+import { resume, run } from "../network/jobs.js";
+import { asked } from "../scene/scenes.js";
+import { VIEWS } from "../views.js";
 
 const OF_THE_PAGE = ["kind", "scene", "set", "harmonics", "fresh", "priority", "max_seconds"];
 const ROWS = 200;

@@ -1,10 +1,10 @@
 // The Pareto front of peak against band; a click loads a design.
 
-import { chart } from "./chart.js";
+import { chart } from "../charts/chart.js";
 import { load } from "./design.js";
-import { byId, el, say, show, table } from "./dom.js";
-import { on } from "./events.js";
-import { length, lengthUnit, number, percent, quantity, seconds } from "./format.js";
+import { byId, el, say, show, table } from "../base/dom.js";
+import { on } from "../base/events.js";
+import { length, lengthUnit, number, percent, quantity, seconds } from "../base/format.js";
 
 const FAR_APART = 8;
 let plot = null;

@@ -1,8 +1,8 @@
 // A scene as fields: every value of its tables, what is wrong beside the field it is about.
 
-import { Problem, post } from "./api.js";
-import { byId, el, say, show } from "./dom.js";
-import { tell } from "./events.js";
+import { Problem, post } from "../network/api.js";
+import { byId, el, say, show } from "../base/dom.js";
+import { tell } from "../base/events.js";
 import { current } from "./scenes.js";
 
 const escaped = (key) => String(key).replaceAll("~", "~0").replaceAll("/", "~1");

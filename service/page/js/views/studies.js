@@ -1,11 +1,11 @@
 // What accuracy costs, and the Campbell diagram.
 
-import { chart } from "./chart.js";
-import { byId, el, facts, say, show } from "./dom.js";
-import { on, tell } from "./events.js";
-import { length, number, percent } from "./format.js";
-import { current } from "./scenes.js";
-import { warnings } from "./words.js";
+import { chart } from "../charts/chart.js";
+import { byId, el, facts, say, show } from "../base/dom.js";
+import { on, tell } from "../base/events.js";
+import { length, number, percent } from "../base/format.js";
+import { current } from "../scene/scenes.js";
+import { warnings } from "../base/words.js";
 
 let costs = null;
 let speeds = null;
