@@ -202,7 +202,7 @@ def layers(root: Path) -> dict[str, list[str]]:
     settings = tomllib.loads((root / "pyproject.toml").read_text("utf-8"))
     contracts = settings["tool"]["importlinter"]["contracts"]
     return {
-        package: contract["layers"]
+        package: [name for layer in contract["layers"] for name in re.split(r" *[:|] *", layer)]
         for package in reversed(PACKAGES)
         for contract in contracts
         if contract.get("containers") == [package]
