@@ -211,7 +211,7 @@ def layers(root: Path) -> dict[str, list[str]]:
 
 def drawn(root: Path) -> str:
     """The map as SVG: a box for every layer with what its docstring says, highest first."""
-    wide, high, x, y = 720, 26, 150, 10
+    wide, high, x, y = 800, 26, 90, 10
     rows: list[str] = []
     for package, names in layers(root).items():
         rows.append(f'<text x="10" y="{y + 18}" class="package">{package}</text>')
