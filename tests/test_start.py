@@ -56,7 +56,7 @@ ENTRIES = [*COMMANDS, *(entry for _, _, entries in GROUPS for entry in entries)]
 @pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: f"{entry.home}")
 def test_the_table_says_what_the_commands_say(entry: Entry) -> None:
     """The summary in the list of commands is the first line of the command's own help."""
-    module, _, function = entry.home.partition(".")
+    module, _, function = entry.home.rpartition(".")
     text = inspect.getdoc(getattr(import_module(f"service.cli.{module}"), function))
     assert text is not None
     assert entry.summary == text.splitlines()[0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
@@ -20,9 +20,8 @@ from solver.results.told import Piece
 from solver.results.views import Views, on_demand
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from solver.results.base import Into
 
 
 class BranchStatus(Enum):
@@ -257,7 +256,7 @@ class Branch(Drawn):
 
     VIEWS: ClassVar = Views("solver.views", "of_branch", "branch_dataset", "of_branch")
 
-    def plot(self, ax: Into = None, *, limit: float | None = None) -> Figure:
+    def plot(self, ax: Axes | Sequence[Axes] | None = None, *, limit: float | None = None) -> Figure:
         """Draw the response, its peak and its band.
 
         Parameters

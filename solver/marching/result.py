@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
@@ -15,9 +16,9 @@ from solver.results.base import Drawn
 from solver.results.views import Views
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from solver.results.base import Into
     from solver.scene.scene import Scene
 
 
@@ -110,7 +111,7 @@ class MarchResult(Drawn):
 
     VIEWS: ClassVar = Views("solver.views", "of_march", "march_dataset", "of_march")
 
-    def plot(self, ax: Into = None, *, scene: Scene | None = None) -> Figure:
+    def plot(self, ax: Axes | Sequence[Axes] | None = None, *, scene: Scene | None = None) -> Figure:
         """Draw the last period and its hysteresis loops.
 
         Parameters

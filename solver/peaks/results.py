@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
@@ -17,9 +17,9 @@ from solver.results.told import Piece
 from solver.results.views import Views
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from solver.results.base import Into
     from solver.scene.scene import Scene
 
 
@@ -160,7 +160,7 @@ class LeastPeak(Shown):
 
     VIEWS: ClassVar = Views("solver.views", "of_least", "least_dataset")
 
-    def plot(self, ax: Into = None) -> Figure:
+    def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Figure:
         """Draw the response at the optimum; `ax`: axes to draw into, else a new figure."""
         if self.branch is None:
             raise SettingError(

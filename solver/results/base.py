@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from solver.results.told import Summary, Told
 from solver.results.views import Views
@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from solver.results.dataset import Dataset
-
-Into: TypeAlias = "Axes | Sequence[Axes] | None"
-"""Axes to draw into; None makes a new figure."""
 
 
 class Shown(Told):
@@ -50,7 +47,7 @@ class Drawn(Shown):
 
     __slots__ = ()
 
-    def plot(self, ax: Into = None) -> Figure:
+    def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Figure:
         """Draw the result; `ax`: axes to draw into, else a new figure."""
         figure: Figure = self.VIEWS.call("plots.figures", self, ax)
         return figure

@@ -14,9 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from solver.results import units
-from solver.results.base import Into
 from solver.views.plots import style
 from solver.views.plots.curves import Response
+from solver.views.plots.style import Into
 
 Json = Mapping[str, Any]
 

@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 
 from solver.jit.fourier import Real
 from solver.results import units
-from solver.results.base import Into
 from solver.views.plots import style
 from solver.views.plots.curves import Response
 from solver.views.plots.responses import Demands, response_figure
+from solver.views.plots.style import Into
 
 if TYPE_CHECKING:
     from optim.results.design import DesignResult

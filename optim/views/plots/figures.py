@@ -13,8 +13,8 @@ from optim.views.plots.campbell import campbell_figure
 from optim.views.plots.designs import design_figure, robust_figure
 from optim.views.plots.pareto import pareto_figure
 from optim.views.plots.shares import sensitivities_figure
-from solver.results.base import Into
 from solver.views.plots.curves import Response
+from solver.views.plots.style import Into
 
 
 def of_design(result: DesignResult, ax: Into = None) -> Figure:

@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from solver.results import units
-from solver.results.base import Into
 from solver.results.units import LengthUnit
 from solver.views.plots import style
+from solver.views.plots.style import Into
 
 Point = Mapping[str, Any]
 _SHOWN = 3  # variables named beside a point

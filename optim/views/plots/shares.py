@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from solver.results import units
-from solver.results.base import Into
 from solver.views.plots import style
+from solver.views.plots.style import Into
 
 MOST = 12  # parameters shown, those that matter most
 _LEAST = 1e-3  # per cent below which a bar is not worth a line

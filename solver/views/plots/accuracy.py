@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from solver.results import units
-from solver.results.base import Into
 from solver.views.plots import style
+from solver.views.plots.style import Into
 
 Row = Mapping[str, Any]
 

@@ -11,8 +11,8 @@ from matplotlib.ticker import MaxNLocator
 
 from solver.jit.fourier import Real
 from solver.results import units
-from solver.results.base import Into
 from solver.views.plots import style
+from solver.views.plots.style import Into
 
 
 def mistuning_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:

@@ -9,7 +9,6 @@ from solver.marching.result import MarchResult
 from solver.peaks.results import PeakTrack
 from solver.response.floquet import Stability
 from solver.response.solution import Solution
-from solver.results.base import Into
 from solver.scene.scene import Scene
 from solver.studies.blades import BladeAmplitudes, BladePeaks
 from solver.studies.convergence import AccuracyStudy
@@ -21,6 +20,7 @@ from solver.views.plots.disks import blades_figure, mistuning_figure
 from solver.views.plots.motion import Motion, motion_figure
 from solver.views.plots.multipliers import multipliers_figure
 from solver.views.plots.responses import Demands, response_figure
+from solver.views.plots.style import Into
 from solver.views.plots.tracks import map_figure, track_figure
 
 

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from solver.results import units
-from solver.results.base import Into
 from solver.views.plots import style
 from solver.views.plots.curves import FloatArray
+from solver.views.plots.style import Into
 
 if TYPE_CHECKING:
     from solver.marching.result import MarchResult

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from solver.results.base import Into
 from solver.views.plots import style
+from solver.views.plots.style import Into
 
 if TYPE_CHECKING:
     from solver.response.floquet import Stability

@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from solver.results import units
-from solver.results.base import Into
 from solver.views.plots import style
 from solver.views.plots.curves import FloatArray, Response
+from solver.views.plots.style import Into
 
 _DOTTED = (0, (1.2, 1.8))
 _DASHED = (0, (5.0, 2.5))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -17,13 +17,15 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from solver.errors import SettingError
 from solver.results import units
-from solver.results.base import Into
 
 # Okabe and Ito's colours, which the colour-blind can tell apart (jfly.uni-koeln.de/color).
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
 SKY = "#56B4E9"
 INK, GREY = "#222222", "#7A7A7A"
 
+
+Into: TypeAlias = Axes | Sequence[Axes] | None
+"""Axes to draw into; None makes a new figure."""
 
 DOTS_PER_INCH = 200
 _STYLE: dict[Any, Any] = {

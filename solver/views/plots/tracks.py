@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from solver.jit.fourier import Real
 from solver.results import units
-from solver.results.base import Into
 from solver.views.plots import style
 from solver.views.plots.responses import axis_name
+from solver.views.plots.style import Into
 
 if TYPE_CHECKING:
     from solver.peaks.results import PeakTrack
