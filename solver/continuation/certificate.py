@@ -25,8 +25,9 @@ class PeakCertificate(Piece):
         Why, or why it is not known.
     bound : float
         What the amplitude does not exceed between points [m]: of the cubics through them, which near the top
-        are checked by solutions between, and of the motion predicted at every resonance of the structure with
-        its contacts that is narrower than the points are apart. NaN if not known.
+        are checked by their neighbours or by solutions between, and of the motion predicted at every
+        resonance of the structure with its contacts that is narrower than the points are apart. NaN if not
+        known.
     widest_gap : float
         Largest distance between neighbouring points, in units of the parameter (Hz for a frequency).
     resonances : int

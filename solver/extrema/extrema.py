@@ -2,7 +2,8 @@
 
 max|x| is the larger of max x and −min x, and each of these is smooth along a branch between changes of
 contact state. First the branch is made dense: narrow resonances that stand between its points are solved for
-(`solver.extrema.resonance_search`), and near the top cubics through its points have to predict the solutions
+(`solver.extrema.resonance_search`), so are both sides of changes of what contacts do
+(`solver.extrema.state_changes`), and near the top cubics through its points have to predict the solutions
 between them. A maximum then shows between two points as a change of sign of its slope along the arc, a band
 edge as a change of sign of amplitude − limit; both are refined by solving on the arc between the points, so
 that folds need no special care. What could not be settled is said in the certificate
@@ -12,16 +13,14 @@ that folds need no special care. What could not be settled is said in the certif
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.balance.closed_loop_poles import ClosedLoop
 from solver.balance.kernels.locate import EDGE
-from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS, RESIDUAL
+from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS, PIECE, RESIDUAL
 from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Band, Edge, Peak
@@ -31,6 +30,7 @@ from solver.extrema.intervals import CURVES, highest_share, lowest_share, may_cr
 from solver.extrema.kernels.intervals import IS_BENT, WAVES, WORTH_POLISHING
 from solver.extrema.nodes import Node, NodeSolver, Points, nodes_of, points_of
 from solver.extrema.resonance_search import ResonanceSearch, Search
+from solver.extrema.state_changes import ChangeSearch
 from solver.jit.fourier import Real
 
 SHARP_RESIDUAL = 2e-11  # of a peak; what is above was accepted because arcs allowed no better
@@ -42,6 +42,7 @@ COMPETES = 0.5  # share of the highest from which a maximum is polished to the l
 SHARP, ENOUGH = 1e-10, 1e-5  # slope relative to that of the interval at which a maximum is found
 NEAR_THE_TOP = 0.97  # share of the highest point from which the branch has to be dense
 PREDICTED = 1e-4  # relative error of the cubics up to which it is
+SURE = 0.03  # share of that up to which the error the neighbours suggest needs no solution to tell it
 MOST_HALVINGS = 5
 # Elsewhere: each makes the error of a cubic 16 times smaller, and a kink needs no more.
 COARSE_HALVINGS = 4
@@ -60,6 +61,10 @@ class Survey:
         self._undone: list[tuple[float, str]] = []  # λ and why
         self._search = Search(nodes=self._nodes)
         if self._nodes:
+            if len(self._nodes) > 1:
+                changes = ChangeSearch(self._solver)
+                self._nodes = changes.run(self._nodes)
+                self._undone += changes.left
             self._look_for_resonances()
             self._densify()
             self._find_peaks()
@@ -114,47 +119,28 @@ class Survey:
             bent = self._solver.look(self._nodes, top).flags & IS_BENT > 0
             if not bent.any():
                 break
-            self._nodes = self._with(bent, self._middle)
+            self._nodes, _, _ = self._solver.halved(self._nodes, bent)
         top = max(node.measures[MAX_ABS] for node in self._nodes)
-        near = self._solver.look(self._nodes, top).reach >= NEAR_THE_TOP * top
-        self._nodes = self._with(near, lambda left, right: self._halved(left, right, top, MOST_HALVINGS))
-
-    def _with(self, wanted: NDArray[np.bool_], inside: Callable[[Node, Node], list[Node]]) -> list[Node]:
-        """Return the nodes with those that `inside` gives for the intervals wanted."""
-        if not wanted.any():
-            return self._nodes
-        nodes = [self._nodes[0]]
-        for right, here in zip(self._nodes[1:], wanted, strict=True):
-            nodes += [*(inside(nodes[-1], right) if here else ()), right]
-        return nodes
-
-    def _middle(self, left: Node, right: Node) -> list[Node]:
-        middle = self._solver.between(left, right, 0.5)
-        return [] if middle is None else [middle]
-
-    def _halved(self, left: Node, right: Node, top: float, depth: int) -> list[Node]:
-        """Return the nodes to be inserted between two."""
-        if depth == 0 or self._solver.look([left, right], top).reach[0] < NEAR_THE_TOP * top:
-            return []
-        middle = self._solver.between(left, right, 0.5)
-        if middle is None:
-            self._undone.append((left.at, "no solution was found between two points"))
-            return []
-        by_share = self._solver.scales(left, right)
-        error = max(abs(_middle(left, right, by_share, c) - middle.measures[c[0]]) for c in CURVES)
-        if error <= PREDICTED * top:
-            return [middle]
-        before = self._halved(left, middle, top, depth - 1)
-        after = self._halved(middle, right, top, depth - 1)
-        return [*before, middle, *after]
+        off = np.full(len(self._nodes) - 1, np.inf)
+        seen = self._solver.look(self._nodes, top)
+        off[(seen.error <= SURE * PREDICTED * top) & (np.diff(seen.measures[:, PIECE]) == 0.0)] = 0.0
+        for _ in range(MOST_HALVINGS):
+            near = self._solver.look(self._nodes, top).reach >= NEAR_THE_TOP * top
+            wanted = near & (off > PREDICTED * top)
+            if not wanted.any():
+                break
+            self._nodes, off, lost = self._solver.halved(self._nodes, wanted)
+            self._undone += [(at, "no solution was found between two points") for at in lost]
 
     def _find_peaks(self) -> None:
         """Collect the maxima of both curves where they are max|x|, and the ends the branch falls from."""
         top = max(node.measures[MAX_ABS] for node in self._nodes)
         dense = self._nodes
-        if len(dense) > 1:
+        for _ in range(MOST_WAVES if len(dense) > 1 else 0):
             waving = self._solver.look(dense, top).flags & WAVES > 0
-            dense = self._with(waving, lambda left, right: self._parted(left, right, top, MOST_WAVES))
+            if not waving.any():
+                break
+            dense, _, _ = self._solver.halved(dense, waving)
         refined: list[Node] = [dense[0]]
         slopes = self._solver.look(dense, top).slopes if len(dense) > 1 else np.zeros((0, 2, 2))
         for j, (left, right) in enumerate(pairwise(dense)):
@@ -165,6 +151,8 @@ class Survey:
                     node = self._peak_between(left, right, curve, ends, top)
                     if node.measures[curve[0]] >= node.measures[MAX_ABS] * (1.0 - 1e-12):
                         inside.append(node)
+            if left.tangent[-1] * right.tangent[-1] > 0.0:
+                inside.sort(key=lambda node: node.at * left.tangent[-1])
             for node in map(self._sharpened, _distinct(inside)):
                 self._peaks.append(self._peak(node, interior=True))
                 if node is not left and node is not right:
@@ -176,16 +164,6 @@ class Survey:
             self._peaks.append(self._peak(first, interior=False))
         if len(self._nodes) > 1 and _slope(last) >= 0.0:
             self._peaks.append(self._peak(last, interior=False))
-
-    def _parted(self, left: Node, right: Node, top: float, depth: int) -> list[Node]:
-        """Return nodes that part maxima from minima which the cubics of one interval both have."""
-        if depth == 0 or not self._solver.look([left, right], top).flags[0] & WAVES:
-            return []
-        middle = self._solver.between(left, right, 0.5)
-        if middle is None:
-            return []
-        before = self._parted(left, middle, top, depth - 1)
-        return [*before, middle, *self._parted(middle, right, top, depth - 1)]
 
     def _peak_between(
         self, left: Node, right: Node, curve: tuple[int, int, int], ends: tuple[float, float], top: float
@@ -331,13 +309,6 @@ def _slope(node: Node) -> float:
     """Return the slope of max|x| along the node's tangent."""
     higher = HIGH_SLOPE if node.measures[HIGH] >= node.measures[LOW] else LOW_SLOPE
     return node.measures[higher]
-
-
-def _middle(left: Node, right: Node, by_share: tuple[float, float], curve: tuple[int, int, int]) -> float:
-    """Return the cubic of a curve half way between two nodes."""
-    value, slope, _ = curve
-    turn = left.measures[slope] * by_share[0] - right.measures[slope] * by_share[1]
-    return 0.5 * (left.measures[value] + right.measures[value]) + turn / 8.0
 
 
 def _distinct(nodes: list[Node]) -> list[Node]:

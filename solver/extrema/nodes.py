@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.balance.kernels.jacobian import factorise, step_back
-from solver.balance.kernels.locate import EDGE, HIGH_PEAK, LOW_PEAK, between, refine
+from solver.balance.kernels.locate import EDGE, HIGH_PEAK, LOW_PEAK, refine
 from solver.balance.kernels.output import (
     HIGH,
     HIGH_SLOPE,
@@ -17,17 +19,23 @@ from solver.balance.kernels.output import (
     LOW_SLOPE,
     MAX_ABS,
     MEASURES,
+    RANGE_SLOPE,
     RESIDUAL,
+    SLOPE,
     measure,
 )
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import evaluation_by_value
-from solver.continuation.folds import OnBranch, motion_scales
-from solver.extrema.kernels.intervals import look_between
+from solver.continuation.folds import OnBranch
+from solver.extrema.kernels import intervals
+from solver.extrema.kernels.intervals import look_between, middles_between
+from solver.extrema.kernels.state_changes import locate_change
 from solver.jit.fourier import Integer, Real
 
 MOST_ITERATIONS = 12
 MOST_TRIALS = 120
+MOST_SOLVES = 12  # of a change of state
+SLOPES = [SLOPE, RANGE_SLOPE, HIGH_SLOPE, LOW_SLOPE]  # measures along the tangent
 NARROW = 1e-13  # relative width at which a place is found
 
 
@@ -42,13 +50,16 @@ class Points:
     states: Integer
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Node:
-    """One row of `Points`; the tangent points onward along the branch, and slopes are along it."""
+class Node(NamedTuple):
+    """One row of `Points`; the tangent points onward along the branch, and slopes are along it.
+
+    A tuple, because hundreds are made of every branch; nodes are told apart by identity.
+    """
 
     solution: Real
     tangent: Real
-    measures: list[float]  # not an array: they are looked at one by one
+    measures: list[float]  # the row as a list: they are looked at one by one
+    row: Real  # (MEASURES,)
     observed: Real
     states: Integer
 
@@ -62,30 +73,32 @@ def points_of(nodes: Sequence[Node], like: Points) -> Points:
     """Return nodes as the rows of a branch; `like` gives the shapes where there is none."""
     if not nodes:
         return like
+    solutions, tangents, measures = _tables(nodes)
     return Points(
-        solutions=np.array([node.solution for node in nodes]),
-        tangents=np.array([node.tangent for node in nodes]),
-        measures=np.array([node.measures for node in nodes]),
-        observed=np.array([node.observed for node in nodes]),
+        solutions=solutions, tangents=tangents, measures=measures,
+        observed=_stacked([node.observed for node in nodes]),
         states=np.array([node.states for node in nodes]),
-    )
+    )  # fmt: skip
 
 
 def nodes_of(points: Points) -> list[Node]:
     """Return the rows of a branch as nodes."""
     rows = zip(
-        points.solutions, points.tangents, points.measures.tolist(), points.observed, points.states,
-        strict=True,
+        points.solutions, points.tangents, points.measures.tolist(), points.measures, points.observed,
+        points.states, strict=True,
     )  # fmt: skip
-    return [Node(solution=s, tangent=t, measures=m, observed=o, states=e) for s, t, m, o, e in rows]
+    return [Node._make(row) for row in rows]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Between:
     """What may stand between nodes, see `solver.extrema.kernels.intervals.look_between` for the shapes."""
 
+    measures: Real
+    at: Real
     slopes: Real
     reach: Real
+    error: Real
     flags: Integer
 
 
@@ -103,14 +116,27 @@ class NodeSolver:
         known = self._last[2]
         if known is not None and nodes is self._last[0] and top == self._last[1]:
             return known
-        size, count = nodes[0].solution.size, len(nodes) - 1
-        solutions = np.concatenate([node.solution for node in nodes]).reshape(-1, size)
-        tangents = np.concatenate([node.tangent for node in nodes]).reshape(-1, size)
+        count = len(nodes) - 1
+        solutions, tangents, measures = _tables(nodes)
         found = Between(
-            slopes=np.empty((count, 2, 2)), reach=np.empty(count), flags=np.empty(count, np.int64)
+            measures=measures,
+            at=solutions[:, -1],
+            slopes=np.empty((count, 2, 2)),
+            reach=np.empty(count),
+            error=np.empty(count),
+            flags=np.empty(count, np.int64),
         )
-        measures = np.array([node.measures for node in nodes])
-        look_between(solutions, tangents, measures, self.least, top, found.slopes, found.reach, found.flags)
+        look_between(
+            solutions,
+            tangents,
+            measures,
+            self.least,
+            top,
+            found.slopes,
+            found.reach,
+            found.error,
+            found.flags,
+        )
         self._last = nodes, top, found
         return found
 
@@ -120,20 +146,69 @@ class NodeSolver:
 
     def between(self, left: Node, right: Node, share: float) -> Node | None:
         """Return the node at a share of the way between two, or None if there is no solution there."""
-        rows = self._rows(left)
-        by_share = self.scales(left, right)
+        return self.between_pairs([left, right], share)[0][0]
+
+    def between_pairs(self, ends: Sequence[Node], share: float = 0.5) -> tuple[list[Node | None], Real]:
+        """Return the nodes at a share of the way between pairs of nodes.
+
+        Parameters
+        ----------
+        ends : (2k) left, right, left, right, …
+
+        Returns
+        -------
+        The k nodes, None where there is no solution, and by how much the cubics of max x and −min x miss
+        them [m], infinite where the node was not found on the plane across the chord.
+        """
+        count, size = len(ends) // 2, ends[0].solution.size
+        found, ways = np.zeros((count, size)), np.zeros((count, size))
+        x, out = np.zeros((count, ends[0].observed.size)), np.zeros((count, MEASURES))
+        states, off = np.zeros((count, ends[0].states.size), np.int64), np.zeros(count)
         workspace = self.workspace
-        good, iterations = between(
-            workspace.system, workspace.linear, workspace.point, left.solution, left.tangent * by_share[0],
-            right.solution, right.tangent * by_share[1], share, MOST_ITERATIONS, *rows,
+        self.spent += middles_between(
+            workspace.system, workspace.linear, workspace.point, *_tables(ends), share, MOST_ITERATIONS,
+            found, ways, x, out, states, off,
         )  # fmt: skip
-        self.spent += int(iterations)
-        # Around a fold nothing holds λ to its place but the motion: a solution far from both ends is another.
-        ways = abs(left.tangent[-1] * by_share[0]) + abs(right.tangent[-1] * by_share[1])
-        away = abs(rows[0][-1] - left.at - share * (right.at - left.at))
-        if good and away <= abs(right.at - left.at) + 0.5 * ways:
-            return self._node(*rows)
-        return self._aside(left, right, left.at + share * (right.at - left.at))
+        nodes: list[Node | None] = []
+        good = np.isfinite(off) & np.isfinite(out).all(axis=1)
+        for i, values in enumerate(out.tolist()):
+            if good[i]:
+                nodes.append(Node(
+                    solution=found[i], tangent=ways[i], measures=values, row=out[i], observed=x[i],
+                    states=states[i],
+                ))  # fmt: skip
+                continue
+            left, right = ends[2 * i], ends[2 * i + 1]
+            nodes.append(self._aside(left, right, left.at + share * (right.at - left.at)))
+        return nodes, np.where(good, off, np.inf)
+
+    def halved(self, nodes: list[Node], wanted: NDArray[np.bool_]) -> tuple[list[Node], Real, list[float]]:
+        """Return the nodes with those in the middle of the intervals wanted.
+
+        Returns
+        -------
+        The nodes; of each new interval by how much the cubics missed its new end [m], 0 without one; and the
+        λ where intervals without a solution begin.
+        """
+        places = np.flatnonzero(wanted).tolist()
+        middles, off = self.between_pairs([nodes[k] for j in places for k in (j, j + 1)])
+        grown: list[Node] = []
+        missed: list[float] = []
+        lost: list[float] = []
+        begun = 0
+        for j, middle, by in zip(places, middles, off.tolist(), strict=True):
+            grown += nodes[begun : j + 1]
+            missed += [0.0] * (j - begun)
+            begun = j + 1
+            if middle is None:
+                missed.append(0.0)
+                lost.append(nodes[j].at)
+            else:
+                grown.append(middle)
+                missed += [by, by]
+        grown += nodes[begun:]
+        missed += [0.0] * (len(nodes) - 1 - begun)
+        return grown, np.array(missed), lost
 
     def refine(
         self, left: Node, right: Node, what: int, level: float, ends: tuple[float, float], close: float
@@ -149,12 +224,49 @@ class NodeSolver:
         rows = self._rows(left)
         by_share = self.scales(left, right)
         workspace = self.workspace
+        value = LOW if what == LOW_PEAK else HIGH
+        values = left.measures[value], right.measures[value]
         good, iterations = refine(
             workspace.system, workspace.linear, workspace.point, left.solution, left.tangent * by_share[0],
-            right.solution, right.tangent * by_share[1], what, level, *ends, close, MOST_ITERATIONS, *rows,
+            right.solution, right.tangent * by_share[1], what, level, *ends, *values, close,
+            MOST_ITERATIONS, *rows,
         )  # fmt: skip
         self.spent += int(iterations)
         return self._node(*rows) if good else self._bracketed(left, right, what, level, close)
+
+    def change(self, left: Node, right: Node, allowed: float) -> list[Node]:
+        """Return the nodes nearest to the first change of state between two, of those before and behind it.
+
+        `allowed` is the height of a maximum between both that does not matter [m].
+        """
+        ends = (left, right)
+        by_parameter = np.array([1.0 / node.tangent[-1] for node in ends])
+        found, states = np.array([node.solution for node in ends]), np.array([node.states for node in ends])
+        ways = np.array([node.tangent for node in ends]) * by_parameter[:, None]
+        x, measures = np.array([node.observed for node in ends]), np.array([node.measures for node in ends])
+        for column in SLOPES:
+            measures[:, column] *= by_parameter
+        sides, onward = np.zeros(2, np.int64), math.copysign(1.0, left.tangent[-1])
+        workspace = self.workspace
+        self.spent += int(locate_change(
+            workspace.system, workspace.linear, workspace.point, found, ways, x, measures, states, allowed,
+            MOST_SOLVES, sides,
+        ))  # fmt: skip
+        ways *= onward
+        for column in SLOPES:
+            measures[:, column] *= onward
+        return [
+            Node(
+                solution=found[side],
+                tangent=ways[side],
+                measures=measures[side].tolist(),
+                row=measures[side],
+                observed=x[side],
+                states=states[side],
+            )
+            for side in range(2)
+            if sides[side]
+        ]
 
     def _aside(self, left: Node, right: Node, p: float) -> Node | None:
         """Return the node at λ = `p` between two, or None if the branch turns there or has no solution.
@@ -242,27 +354,35 @@ class NodeSolver:
             return None
         states = evaluation_by_value(self.workspace.point).states.copy()
         return Node(
-            solution=solution, tangent=tangent, measures=values.tolist(), observed=observed, states=states
+            solution=solution,
+            tangent=tangent,
+            measures=values.tolist(),
+            row=values,
+            observed=observed,
+            states=states,
         )
 
 
 def share_scales(left: OnBranch, right: OnBranch, least: float) -> tuple[float, float]:
     """Return the factors that turn both tangents into derivatives by the share of the chord between them.
 
-    `least` is the size of a motion below which it is rounding [m], as in `solver.balance.kernels.locate`.
-    Around a fold λ goes there and back, so that the motion alone tells how far it is. Across a resonance much
-    narrower than the chord the motion comes back turned round, against its tangent: there λ alone tells it,
-    so that slopes keep their signs and no maximum is lost.
+    `least` is the size of a motion below which it is rounding [m]; see `solver.extrema.kernels.intervals`.
     """
-    if left.tangent[-1] * right.tangent[-1] < 0.0:
-        return motion_scales(left, right)
-    chord = right.solution - left.solution
-    moved, size = float(chord[-1]), max(float(np.abs(left.solution[:-1]).max(initial=0.0)), least)
-    weighted = chord / max(size**2, 1e-300)
-    weighted[-1] = moved / max(moved**2, 1e-300)
-    length = float(weighted @ chord)
-    at_left, at_right = float(weighted @ left.tangent), float(weighted @ right.tangent)
-    torn = at_left < 0.0 or at_right < 0.0
-    if torn and moved * left.tangent[-1] > 0.0 and moved * right.tangent[-1] > 0.0:
-        return moved / float(left.tangent[-1]), moved / float(right.tangent[-1])
-    return length / at_left if at_left != 0.0 else 0.0, length / at_right if at_right != 0.0 else 0.0
+    scales: tuple[float, float] = intervals.share_scales(
+        left.solution, right.solution, left.tangent, right.tangent, least
+    )
+    return scales
+
+
+def _tables(nodes: Sequence[Node]) -> tuple[Real, Real, Real]:
+    """Return solutions, tangents and measures of nodes, one a row."""
+    return (
+        _stacked([node.solution for node in nodes]),
+        _stacked([node.tangent for node in nodes]),
+        _stacked([node.row for node in nodes]),
+    )
+
+
+def _stacked(rows: Sequence[Real]) -> Real:
+    """Return rows as a matrix (`concatenate` is several times faster than `array`)."""
+    return np.concatenate(rows).reshape(len(rows), -1)

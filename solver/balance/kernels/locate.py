@@ -8,14 +8,16 @@ import numpy as np
 
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.newton import arc_newton
-from solver.balance.kernels.output import HIGH_SLOPE, LOW_SLOPE, MAX_ABS, RESIDUAL, measure
+from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS, RESIDUAL, SLOPE, measure
 from solver.contacts.kernels.system import Evaluation, Receptance, System
+from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
 from solver.jit.lapack import copy_to, largest_entry, set_to
 from solver.jit.separate import apart
 
 _AT_A_FOLD = 1e-9  # weight of λ there
 HIGH_PEAK, LOW_PEAK, EDGE = 0, 1, 2
+_BY_CUBIC, _BY_SECANT = 2, 7  # trials up to which a cubic tells where to look, then a secant or a slope
 
 
 @apart
@@ -32,6 +34,18 @@ def slope_by_parameter(
     step_back(system, point, slope)
     measure(system, linear, u, point, slope, 1.0, x, out)
     return True
+
+
+@compiled
+def cubic_between(
+    left: Real, left_slope: Real, right: Real, right_slope: Real, width: float, share: float, out: Real
+) -> None:
+    """Fill `out` with the cubic at a share of the way; slopes are by what both are `width` apart in."""
+    t, r = share, 1.0 - share
+    a, b = (1.0 + 2.0 * t) * r * r, t * t * (3.0 - 2.0 * t)
+    da, db = t * r * r * width, -t * t * r * width
+    for i in range(out.size):
+        out[i] = a * left[i] + da * left_slope[i] + b * right[i] + db * right_slope[i]
 
 
 @apart
@@ -52,28 +66,31 @@ def between(
     -------
     (converged, Newton iterations). The guess is the cubic through both points and tangents.
     """
+    cubic_between(left, left_slope, right, right_slope, 1.0, share, found)
+    folds = left_slope[left.size - 1] * right_slope[left.size - 1] < 0.0
+    return _on_plane(system, linear, point, left, right, folds, share, most, found, tangent, x, out)
+
+
+@apart
+def _on_plane(
+    system: System, linear: Receptance, point: Evaluation, left: Real, right: Real, folds: bool, share: float,
+    most: int, found: Real, tangent: Real, x: Real, out: Real,
+) -> tuple[bool, int]:  # fmt: skip
+    """Solve as `between` from the guess in `found`; `folds`: whether the branch turns between the points."""
     n = left.size - 1
-    chord, plane, guess, u = np.empty(n + 1), np.empty(n), np.empty(n), np.empty(n)
+    chord, plane, u = np.empty(n + 1), np.empty(n), np.empty(n)
     set_to(chord, right, -1.0, left)
     size, span = max(largest_entry(left[:n]), system.least_size), abs(chord[n])
     weight_u = 1.0 / (size * size) if size > 0.0 else 1.0
     weight_p = 1.0 / (span * span) if span > 0.0 else 1.0
-    if left_slope[n] * right_slope[n] < 0.0:
-        # A fold between the points: λ goes there and back, and only u tells the places on the arc apart.
+    if folds:
+        # λ goes there and back, and only u tells the places on the arc apart.
         weight_p *= _AT_A_FOLD
     set_to(plane, left, share, chord)
-    t, r = share, 1.0 - share
-    for i in range(n + 1):
-        tangent[i] = (
-            (1.0 + 2.0 * t) * r * r * left[i] + t * r * r * left_slope[i]
-            + t * t * (3.0 - 2.0 * t) * right[i] - t * t * r * right_slope[i]
-        )  # fmt: skip
-    copy_to(guess, tangent)
-    copy_to(u, guess)
+    copy_to(u, found)
     good, iterations, p, norm = arc_newton(
-        system, linear, u, tangent[n], plane, left[n] + share * chord[n], chord, weight_u, weight_p, point,
-        most,
-    )  # fmt: skip
+        system, linear, u, found[n], plane, left[n] + share * chord[n], chord, weight_u, weight_p, point, most
+    )
     if not good:
         return False, iterations
     if factorise(system, linear, point, chord, weight_u, weight_p) == 0.0:
@@ -91,11 +108,21 @@ def between(
     return True, iterations
 
 
+@compiled
+def _top_of_cubic(a: float, da: float, b: float, db: float) -> float:
+    """Return where the cubic through values and slopes by the share has its maximum, −1 without one."""
+    c1, c2 = 3.0 * (b - a) - 2.0 * da - db, da + db - 2.0 * (b - a)
+    root = c1 * c1 - 3.0 * c2 * da
+    # The form of the root that does not cancel.
+    below = -c1 + math.sqrt(root) if root >= 0.0 else 0.0
+    return da / below if below > 0.0 and da < below else -1.0
+
+
 @apart
 def refine(
     system: System, linear: Receptance, point: Evaluation, left: Real, left_slope: Real, right: Real,
-    right_slope: Real, what: int, level: float, g_left: float, g_right: float, close: float, most: int,
-    found: Real, tangent: Real, x: Real, out: Real,
+    right_slope: Real, what: int, level: float, g_left: float, g_right: float, v_left: float, v_right: float,
+    close: float, most: int, found: Real, tangent: Real, x: Real, out: Real,
 ) -> tuple[bool, int]:  # fmt: skip
     """Find a peak (slope 0) or an edge (amplitude = level) between two points of a branch.
 
@@ -104,36 +131,59 @@ def refine(
     left, left_slope, right, right_slope, most, found, tangent, x, out : as in `between`.
     what : HIGH_PEAK of max x, LOW_PEAK of −min x, or EDGE.
     g_left, g_right : the function at both ends, of opposite sign: slope by the share, or amplitude − level.
+    v_left, v_right : the curve there that a peak is one of.
     close : how near to 0 it has to come, relative to the larger of them.
 
     Returns
     -------
-    (found, Newton iterations). A bracketed secant (Illinois) on the arc, every trial a converged solution.
+    (found, Newton iterations). Every trial is a converged solution on the arc: where the cubic has its peak,
+    then by secants, an edge by its slope; by bracketed secants (Illinois) where these lead out of the
+    bracket, or do not end soon, as at the corner where a contact changes its state.
     """
+    n = left.size
+    folds = left_slope[n - 1] * right_slope[n - 1] < 0.0
+    value, slope = (LOW, LOW_SLOPE) if what == LOW_PEAK else (HIGH, HIGH_SLOPE)
+    ends, ways = np.empty((2, n)), np.empty((2, n))
+    copy_to(ends[0], left)
+    copy_to(ends[1], right)
+    copy_to(ways[0], left_slope)
+    copy_to(ways[1], right_slope)
     lo, hi, g_lo, g_hi = 0.0, 1.0, g_left, g_right
     scale = max(abs(g_left), abs(g_right))
     total, side = 0, 0
-    for iteration in range(40):
-        share = lo + (hi - lo) * g_lo / (g_lo - g_hi) if g_lo != g_hi else 0.5 * (lo + hi)
-        if not (lo < share < hi) or iteration % 8 == 7:
-            share = 0.5 * (lo + hi)
-        good, iterations = between(
-            system, linear, point, left, left_slope, right, right_slope, share, most, found, tangent, x, out
+    last, g_last, share, g = 0.0, g_left, 1.0, g_right
+    for trial in range(40):
+        ahead, width = -1.0, hi - lo
+        if what != EDGE and trial < _BY_CUBIC:
+            place = _top_of_cubic(v_left, g_left * width, v_right, g_right * width)
+            ahead = lo + place * width if place > 0.0 else -1.0
+        elif what != EDGE and trial < _BY_SECANT and g != g_last:
+            ahead = share - g * (share - last) / (g - g_last)
+        elif what == EDGE and 0 < trial < _BY_SECANT and out[SLOPE] != 0.0:
+            ahead = share - g / out[SLOPE]
+        if not lo < ahead < hi:
+            ahead = lo + width * g_lo / (g_lo - g_hi) if g_lo != g_hi else 0.5 * (lo + hi)
+        if not lo < ahead < hi or trial % 8 == 7:
+            ahead = 0.5 * (lo + hi)
+        last, g_last, share = share, g, ahead
+        cubic_between(ends[0], ways[0], ends[1], ways[1], width, (share - lo) / width, found)
+        good, iterations = _on_plane(
+            system, linear, point, left, right, folds, share, most, found, tangent, x, out
         )
         total += iterations
         if not good:
             return False, total
-        g = out[MAX_ABS] - level
-        if what != EDGE:
-            g = out[HIGH_SLOPE] if what == HIGH_PEAK else out[LOW_SLOPE]
+        g = out[MAX_ABS] - level if what == EDGE else out[slope]
         if abs(g) <= close * scale or hi - lo <= 1e-11:
             break
         now = -1 if (g > 0.0) == (g_lo > 0.0) else 1
         if now < 0:
-            lo, g_lo = share, g
+            lo, g_lo, g_left, v_left = share, g, g, out[value]
             g_hi = 0.5 * g_hi if side == now else g_hi
         else:
-            hi, g_hi = share, g
+            hi, g_hi, g_right, v_right = share, g, g, out[value]
             g_lo = 0.5 * g_lo if side == now else g_lo
+        copy_to(ends[0 if now < 0 else 1], found)
+        copy_to(ways[0 if now < 0 else 1], tangent)
         side = now
     return math.isfinite(out[MAX_ABS]), total

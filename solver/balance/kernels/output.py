@@ -16,8 +16,18 @@ from solver.jit.trig_polynomial import on_grid, unpack
 # Columns of the measures of a point. HIGH is max x and LOW is −min x: each is smooth along a branch, while
 # max|x|, the larger of the two, has a kink where they cross.
 MAX_ABS, HALF_RANGE, MEAN, SLOPE, RANGE_SLOPE, RESIDUAL, HIGH, LOW, HIGH_SLOPE, LOW_SLOPE = range(10)
-MEASURES = 10
+PIECE = 10  # a number for the smooth pieces of their laws that all contacts are on, see `piece`
+MEASURES = 11
 SAME_HEIGHT = 1e-12  # relative distance within which max x and −min x are the same but for rounding
+
+
+@compiled
+def piece(point: Evaluation) -> float:
+    """Return one number for the smooth pieces all contacts are on."""
+    mixed = 0
+    for c in range(point.pieces.size):
+        mixed = (31 * mixed + point.pieces[c]) & 0xFFFFFFFFFFFF
+    return float(mixed)
 
 
 @apart
@@ -125,6 +135,7 @@ def measure(
     out[HIGH], out[LOW], out[HIGH_SLOPE], out[LOW_SLOPE] = high, -low, rise, -sink
     out[MEAN] = x[0] if system.ks[0] == 0 else 0.0
     out[MAX_ABS] = max(high, -low)
+    out[PIECE] = piece(point)
     if abs(high + low) <= SAME_HEIGHT * out[MAX_ABS]:
         # A symmetric motion: onward along (du, dλ) the larger slope leads.
         out[SLOPE] = max(rise, -sink)

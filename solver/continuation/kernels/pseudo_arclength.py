@@ -16,7 +16,7 @@ import numpy as np
 from solver.balance.kernels.broyden import frozen_arc
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.newton import arc_newton, newton
-from solver.balance.kernels.output import RESIDUAL, measure
+from solver.balance.kernels.output import RESIDUAL, measure, piece
 from solver.balance.kernels.residual import evaluate
 from solver.contacts.kernels.system import AT_BRANCH_POINT, Evaluation, Receptance, System
 from solver.continuation.kernels.predictor import predict
@@ -78,15 +78,6 @@ def begin_walk(
     return RUNNING, walk
 
 
-@compiled
-def _piece(point: Evaluation) -> float:
-    """Return one number for the smooth pieces all contacts are on."""
-    mixed = 0
-    for c in range(point.pieces.size):
-        mixed = (31 * mixed + point.pieces[c]) & 0xFFFFFFFFFFFF
-    return float(mixed)
-
-
 @apart
 def _turn(system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk) -> bool:
     """Replace the tangent by the one at the new point (`point` is evaluated there), oriented onward."""
@@ -110,11 +101,11 @@ def _turn(system: System, linear: Receptance, point: Evaluation, control: Contro
     if walk.numbers[ORIENTATION] == 0.0:
         walk.numbers[ORIENTATION] = sign
     elif sign != walk.numbers[ORIENTATION]:
-        if _piece(point) == walk.numbers[PIECE] and 1.0 / (length * math.sqrt(old)) > STRAIGHT_ON:
+        if piece(point) == walk.numbers[PIECE] and 1.0 / (length * math.sqrt(old)) > STRAIGHT_ON:
             walk.numbers[ORIENTATION] = sign
         else:
             length = -length
-    walk.numbers[PIECE] = _piece(point)
+    walk.numbers[PIECE] = piece(point)
     for i in range(n + 1):
         walk.tangent[i] = rhs[i] / length
     return True
@@ -201,11 +192,11 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
         if last:
             _turn(system, linear, point, control, walk)
             return FINISHED
-        orientation, piece = walk.numbers[ORIENTATION], walk.numbers[PIECE]
+        orientation, before = walk.numbers[ORIENTATION], walk.numbers[PIECE]
         if not _turn(system, linear, point, control, walk):
             return STALLED
         if step <= _TINY * control.smallest_step and turned_back(system, control, walk):
-            undo(walk, orientation, piece)
+            undo(walk, orientation, before)
             return STALLED
         return RUNNING
     return STALLED
@@ -280,7 +271,7 @@ def _turn_over(system: System, linear: Receptance, point: Evaluation, control: C
             along += weight_u * (share * walk.tangent[i]) ** 2
         if off <= 0.01 * along or off > (4.0 * control.largest_step) ** 2:
             continue
-        orientation, piece = walk.numbers[ORIENTATION], walk.numbers[PIECE]
+        orientation, before = walk.numbers[ORIENTATION], walk.numbers[PIECE]
         accept(walk, trial, p, norm)
         walk.numbers[ROUGH] = 1.0
         walk.numbers[STEP] = max(control.first_step * 0.1, 256.0 * control.smallest_step)
@@ -289,7 +280,7 @@ def _turn_over(system: System, linear: Receptance, point: Evaluation, control: C
         if not turned_back(system, control, walk):
             walk.numbers[STEPPED_OVER] += 1
             return RUNNING
-        undo(walk, orientation, piece)
+        undo(walk, orientation, before)
     return STALLED
 
 

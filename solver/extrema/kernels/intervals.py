@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import math
 
-from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE
+import numpy as np
+
+from solver.balance.kernels.locate import between
+from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, PIECE
+from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real
 from solver.jit.separate import apart
@@ -13,15 +17,21 @@ from solver.jit.separate import apart
 WORTH_POLISHING = 5e-3
 BENT = 5e-4  # relative error of the cubics from which an interval is halved wherever it is
 STEEP = 8.0  # slope by the share, relative to that error, above which a cubic hides no extremum
+# Share of a neighbour below which an interval with a change of piece is one whose both sides were solved.
+LOCATED = 0.34
+MATTERS = 1e-4  # relative height up to which a maximum is left unpolished beside others
 # Bits of the flags: the cubics are too far from the curves; a maximum and a minimum may both stand there.
 IS_BENT, WAVES = 1, 2
 
 
 @compiled
-def _share_scales(before: Real, after: Real, way: Real, onward: Real, least: float) -> tuple[float, float]:
-    """Return the factors that turn both tangents into derivatives by the share of the chord.
+def share_scales(before: Real, after: Real, way: Real, onward: Real, least: float) -> tuple[float, float]:
+    """Return the factors that turn both tangents into derivatives by the share of the chord between them.
 
-    Around a fold λ goes there and back, so that the motion alone tells how far it is.
+    `least` is the size of a motion below which it is rounding [m], as in `solver.balance.kernels.locate`.
+    Around a fold λ goes there and back, so that the motion alone tells how far it is. Across a resonance much
+    narrower than the chord the motion comes back turned round, against its tangent: there λ alone tells it,
+    so that slopes keep their signs and no maximum is lost.
     """
     nt = before.size - 1
     size = least
@@ -40,7 +50,6 @@ def _share_scales(before: Real, after: Real, way: Real, onward: Real, least: flo
         length += step * moved
         at_left += step * way[nt]
         at_right += step * onward[nt]
-    # Where the arc bends so sharply that a tangent leads against the chord, λ tells how far it is.
     if min(at_left, at_right) < 0.0 and moved * way[nt] > 0.0 and moved * onward[nt] > 0.0:
         return moved / way[nt], moved / onward[nt]
     return length / at_left if at_left != 0.0 else 0.0, length / at_right if at_right != 0.0 else 0.0
@@ -76,15 +85,73 @@ def _waves(a: float, da: float, b: float, db: float) -> bool:
 
 
 @apart
+def middles_between(
+    system: System, linear: Receptance, point: Evaluation, solutions: Real, tangents: Real, measures: Real,
+    share: float, most: int, found: Real, ways: Real, x: Real, out: Real, states: Integer, off: Real,
+) -> int:  # fmt: skip
+    """Solve at a share of the way, as `between`, of every pair of points.
+
+    Parameters
+    ----------
+    solutions, tangents, measures : (2P, …) pairs of points one after the other, as in `look_between`.
+    found, ways, x, out, states : (P, …) what is found between each pair; filled.
+    off : (P,) by how much the cubics of max x and −min x miss the values found [m], NaN where no solution
+        was found; filled.
+
+    Returns
+    -------
+    Newton iterations.
+    """
+    n, total = solutions.shape[1], 0
+    left_slope, right_slope = np.empty(n), np.empty(n)
+    t, r = share, 1.0 - share
+    for i in range(off.size):
+        left, right, way, onward = (
+            solutions[2 * i],
+            solutions[2 * i + 1],
+            tangents[2 * i],
+            tangents[2 * i + 1],
+        )
+        scales = share_scales(left, right, way, onward, system.least_size)
+        for k in range(n):
+            left_slope[k], right_slope[k] = scales[0] * way[k], scales[1] * onward[k]
+        good, iterations = between(
+            system, linear, point, left, left_slope, right, right_slope, share, most, found[i], ways[i], x[i],
+            out[i],
+        )  # fmt: skip
+        total += iterations
+        # Around a fold nothing holds λ to its place but the motion: a solution far from both ends is another.
+        span = abs(right[n - 1] - left[n - 1])
+        away = abs(found[i, n - 1] - left[n - 1] - share * (right[n - 1] - left[n - 1]))
+        off[i] = np.nan
+        if not good or away > span + 0.5 * (abs(left_slope[n - 1]) + abs(right_slope[n - 1])):
+            continue
+        off[i] = 0.0
+        for c in range(2):
+            value, slope = (HIGH, HIGH_SLOPE) if c == 0 else (LOW, LOW_SLOPE)
+            cubic = (
+                (1.0 + 2.0 * t) * r * r * measures[2 * i, value]
+                + t * r * r * scales[0] * measures[2 * i, slope]
+                + t * t * (3.0 - 2.0 * t) * measures[2 * i + 1, value]
+                - t * t * r * scales[1] * measures[2 * i + 1, slope]
+            )
+            off[i] = max(off[i], abs(cubic - out[i, value]))
+        for e in range(states.shape[1]):
+            states[i, e] = point.states[e]
+    return total
+
+
+@apart
 def look_between(
     solutions: Real, tangents: Real, measures: Real, least: float, top: float, slopes: Real, reach: Real,
-    flags: Integer,
+    error: Real, flags: Integer,
 ) -> None:  # fmt: skip
     """Look at all intervals between neighbouring points.
 
     Neighbouring cubics share value and slope at a point, and their second derivatives differ there by
-    D ≈ (ℓ² + ℓ'²) x⁗ / 12 where x is smooth, by its own jump at a change of contact state: in both cases the
-    cubic is wrong by about D ℓ² / 64 in the middle (Hermite's error x⁗ ℓ⁴ / 384).
+    D ≈ (ℓ² + ℓ'²) x⁗ / 12 where x is smooth, by its own jump where a contact changes the piece of its law: in
+    both cases the cubic is wrong by about D ℓ² / 64 in the middle (Hermite's error x⁗ ℓ⁴ / 384). Where both
+    sides of such a change are solved, D tells of the change alone and counts on neither side of it.
 
     Parameters
     ----------
@@ -93,12 +160,13 @@ def look_between(
     top : the highest amplitude [m].
     slopes : (P − 1, 2, 2) interval, end, max x or −min x: by the share of the interval; filled.
     reach : (P − 1,) how high max|x| may be there by its slopes [m]; filled.
+    error : (P − 1,) by how much the cubics are estimated to be wrong [m], 0 where that was not looked at;
+        filled.
     flags : (P − 1,) bits of `IS_BENT` and `WAVES`; filled.
     """
     count, nt = solutions.shape[0] - 1, solutions.shape[1] - 1
-    far = 1e-9 * abs(solutions[count, nt])
     for j in range(count):
-        scales = _share_scales(solutions[j], solutions[j + 1], tangents[j], tangents[j + 1], least)
+        scales = share_scales(solutions[j], solutions[j + 1], tangents[j], tangents[j + 1], least)
         reach[j], flags[j] = 0.0, 0
         for c in range(2):
             value, slope = (HIGH, HIGH_SLOPE) if c == 0 else (LOW, LOW_SLOPE)
@@ -106,25 +174,37 @@ def look_between(
             da, db = measures[j, slope] * scales[0], measures[j + 1, slope] * scales[1]
             slopes[j, 0, c], slopes[j, 1, c] = da, db
             reach[j] = max(reach[j], max(a, b) + 0.25 * (max(da, 0.0) + max(-db, 0.0)))
-            if max(a, b) >= WORTH_POLISHING * top and _waves(a, da, b, db):
+            most = max(abs(da), abs(db), abs(b - a))
+            if (
+                max(a, b) >= WORTH_POLISHING * top
+                and most > 5.0 * MATTERS * max(a, b)
+                and _waves(a, da, b, db)
+            ):
                 flags[j] |= WAVES
-    for c in range(2):
-        value = HIGH if c == 0 else LOW
-        for j in range(count):
-            stands = max(measures[j, HIGH], measures[j, LOW], measures[j + 1, HIGH], measures[j + 1, LOW])
-            length = abs(solutions[j + 1, nt] - solutions[j, nt])
-            if stands < WORTH_POLISHING * top or length <= far:
-                continue
-            jump = 0.0
-            if j > 0:
-                jump = max(jump, _jump(solutions, measures, slopes, j, c, value))
-            if j + 1 < count:
+    far = 1e-9 * abs(solutions[count, nt])
+    length, narrow = np.empty(count), np.zeros(count, np.bool_)
+    for j in range(count):
+        length[j] = abs(solutions[j + 1, nt] - solutions[j, nt])
+    for j in range(count):
+        beside = max(length[j - 1] if j > 0 else 0.0, length[j + 1] if j + 1 < count else 0.0)
+        narrow[j] = length[j] < LOCATED * beside and measures[j, PIECE] != measures[j + 1, PIECE]
+    for j in range(count):
+        stands = max(measures[j, HIGH], measures[j, LOW], measures[j + 1, HIGH], measures[j + 1, LOW])
+        error[j] = 0.0
+        if stands < WORTH_POLISHING * top or length[j] <= far or narrow[j]:
+            continue
+        before, after = j > 0 and not narrow[j - 1], j + 1 < count and not narrow[j + 1]
+        for c in range(2):
+            value = HIGH if c == 0 else LOW
+            jump = _jump(solutions, measures, slopes, j, c, value) if before else 0.0
+            if after:
                 jump = max(jump, _jump(solutions, measures, slopes, j + 1, c, value))
-            error = jump * length * length / 64.0
+            off = jump * length[j] * length[j] / 64.0
+            error[j] = max(error[j], off)
             a, b = measures[j, value], measures[j + 1, value]
             da, db = slopes[j, 0, c], slopes[j, 1, c]
             # A curve that is steeper than its error can bend hides no extremum.
-            if error > BENT * stands and _least_slope(a, da, b, db) < STEEP * error:
+            if off > BENT * stands and _least_slope(a, da, b, db) < STEEP * off:
                 flags[j] |= IS_BENT
 
 
