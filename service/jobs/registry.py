@@ -38,10 +38,7 @@ class JobRequest(BaseModel):
         Longest time an attempt at it may take [s]; that of the service if left out.
     """
 
-    # Built when a kind is asked for: the command and the workers load all of them.
-    model_config = ConfigDict(
-        extra="forbid", allow_inf_nan=False, frozen=True, validate_by_name=True, defer_build=True
-    )
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, validate_by_name=True)
 
     fresh: bool = Field(
         default=False, strict=True, description="Compute again even if a stored result exists."
