@@ -50,10 +50,11 @@ $(DEV): $(STAMP)
 demo: setup
 	$(BIN)/stickslip demo
 
-# Two processes: the kernels are compiled before, so that not both do it.
+# The kernels are compiled before, so that not every process does it. Three processes for two cores: tests of the
+# service also wait.
 test: lint
 	$(BIN)/python -m service.warm_up
-	$(BIN)/python -m pytest -n 2 $(PYTEST)
+	$(BIN)/python -m pytest -n 3 --dist worksteal $(PYTEST)
 
 test-long: dev
 	$(BIN)/python -m pytest -m long $(PYTEST)

@@ -1,9 +1,15 @@
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 
 import pytest
 from launch import served
+
+# Before anything loads numpy. Workers compute with one thread; who computes the same with several gets other
+# last bits, and two processes of pytest have no more than two cores between them.
+for _library in ("OMP", "OPENBLAS", "MKL"):
+    os.environ[f"{_library}_NUM_THREADS"] = "1"
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -78,23 +78,33 @@ def evaluated(name: str) -> Evaluation:
     return evaluate(problem_of(POINTS[name]), POINTS[name].values)
 
 
-def moved(problem: Problem, values: Mapping[str, float], row: Row, path: str, step: float) -> Row:
-    """The same row a step further."""
-    there = evaluate(problem, {**values, path: values[path] + step})
-    assert there.good
-    place = nearest(row, there.rows)
-    assert place is not None
-    return there.rows[place]
+Moved = Callable[[Row, str, float], Row]
 
 
-def difference(
-    problem: Problem, values: Mapping[str, float], row: Row, path: str, room: float
-) -> tuple[float, float]:
+def stepping(point: Point) -> Moved:
+    """The same row a step of a variable further; each place is evaluated once, for all rows."""
+    problem = problem_of(point)
+
+    @cache
+    def there(path: str, step: float) -> Evaluation:
+        found = evaluate(problem, {**point.values, path: point.values[path] + step})
+        assert found.good
+        return found
+
+    def moved(row: Row, path: str, step: float) -> Row:
+        rows = there(path, step).rows
+        place = nearest(row, rows)
+        assert place is not None
+        return rows[place]
+
+    return moved
+
+
+def difference(moved: Moved, row: Row, path: str, step: float) -> tuple[float, float]:
     """The derivative by Richardson-extrapolated central differences, and how sure it is."""
-    step = room * values[path]
 
     def slope(h: float) -> float:
-        ahead, behind = (moved(problem, values, row, path, way * h).value for way in (1.0, -1.0))
+        ahead, behind = (moved(row, path, way * h).value for way in (1.0, -1.0))
         return (ahead - behind) / (2.0 * h)
 
     coarse, fine = slope(step), slope(0.5 * step)
@@ -103,7 +113,7 @@ def difference(
 
 @pytest.mark.parametrize("name", POINTS)
 def test_gradients_equal_differences_of_the_whole_solve(name: str) -> None:
-    point, problem = POINTS[name], problem_of(POINTS[name])
+    point, moved = POINTS[name], stepping(POINTS[name])
     rows = evaluated(name).rows
     wanted = {PEAK, BAND}
     wanted |= {FORBIDDEN} if point.forbidden else set()
@@ -112,7 +122,7 @@ def test_gradients_equal_differences_of_the_whole_solve(name: str) -> None:
     assert wanted == {row.quantity for row in rows}
     for row in rows:
         for i, path in enumerate(point.values):
-            found, doubt = difference(problem, point.values, row, path, point.room)
+            found, doubt = difference(moved, row, path, point.room * point.values[path])
             scale = max(abs(found), abs(row.value / point.values[path]))
             rounding = 1e-11 * abs(row.value) / (point.room * point.values[path])
             assert abs(row.gradient[i] - found) <= 1e-6 * scale + 0.05 * doubt + rounding, (row.what, path)
@@ -131,14 +141,14 @@ def test_gradient_of_the_band_beside_edges_that_appear_or_vanish(share: float) -
     plain = evaluate(problem_of(Point(name, values)), values)
     second = plain.responses[0].branch.peaks[1].value
     point = Point(name, values, limit=share * second, room=5e-6)
-    problem = problem_of(point)
+    problem, moved = problem_of(point), stepping(point)
     band = evaluate(problem, values).band
     assert band is not None
     # Below the height of the second peak its interval is there, just above it is not.
     intervals = evaluate(problem, values).responses[0].branch.band.intervals  # type: ignore[union-attr]
     assert len(intervals) == (2 if share < 1.0 else 1)
     for i, path in enumerate(values):
-        found, doubt = difference(problem, values, band, path, point.room)
+        found, doubt = difference(moved, band, path, point.room * values[path])
         scale = max(abs(found), abs(band.value / values[path]))
         rounding = 1e-10 * abs(band.value) / (point.room * values[path])
         assert abs(band.gradient[i] - found) <= 1e-6 * scale + 0.05 * doubt + rounding, path
@@ -146,7 +156,7 @@ def test_gradient_of_the_band_beside_edges_that_appear_or_vanish(share: float) -
 
 @pytest.mark.parametrize("name", ["smooth", "shared", "forbidden", "just below the exchange"])
 def test_second_derivatives_equal_differences_of_gradients(name: str) -> None:
-    point, problem = POINTS[name], problem_of(POINTS[name])
+    point, moved = POINTS[name], stepping(POINTS[name])
     for row in evaluated(name).rows:
         assert row.second is not None
         second = row.second()
@@ -154,8 +164,8 @@ def test_second_derivatives_equal_differences_of_gradients(name: str) -> None:
             continue  # a corner of the response has no second derivatives, and says so
         for i, path in enumerate(point.values):
             step = point.room * point.values[path]
-            ahead = moved(problem, point.values, row, path, step).gradient
-            behind = moved(problem, point.values, row, path, -step).gradient
+            ahead = moved(row, path, step).gradient
+            behind = moved(row, path, -step).gradient
             found = (ahead - behind) / (2.0 * step)
             sizes = np.array([abs(row.value / point.values[p]) for p in point.values]) / point.values[path]
             scale = np.maximum(np.abs(second[i]), sizes)

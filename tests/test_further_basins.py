@@ -146,12 +146,12 @@ def check_random(seed: int, points: int) -> None:
         assert top(float(value)) >= best.peak * (1.0 - 1e-7)  # as far as a proof tells heights apart
 
 
-@pytest.mark.parametrize("seed", [6, 10, 13, 17])
+@pytest.mark.parametrize("seed", [10, 13, 17])
 def test_random_scenes(seed: int) -> None:
-    check_random(seed, 21)
+    check_random(seed, 13)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", [5, 34, *range(100, 130)])
+@pytest.mark.parametrize("seed", [5, 6, 10, 13, 17, 34, *range(100, 130)])
 def test_more_random_scenes(seed: int) -> None:
     check_random(seed, 61)

@@ -36,27 +36,28 @@ PROBLEM = Path(__file__).parent.parent / "docs" / "problem.toml"
 LOADS = {"c0.N0": (6.8237, 682.37), "c1.N0": (10.815, 1081.5)}
 
 
-def check_design(asked: dict[str, Any], n: int) -> None:
+def check_design(asked: dict[str, Any], n: int, **finer: int) -> None:
     """Brute force never beats a design by more than 1e-4 unless its status says that it is local."""
     found = optim.design(**asked)
     if found.status is DesignStatus.LOCAL:
         return
     problem = posed(asked)
-    brute = brute_force(problem, n)
+    brute = brute_force(problem, n, **finer)
     good = found.evaluation is not None and found.evaluation.good
     mine = rank(problem, found.evaluation) if good else (math.inf, math.inf)  # type: ignore[arg-type]
     by = beaten_by(mine, brute)
     assert by == 0.0 or not stands(problem, brute), (found.status, found.optimum, mine, brute)
 
 
-@pytest.mark.parametrize("seed", [0, 8, 18])
+# The second has a limit that no design keeps, the third a forbidden range and an optimum on a bound.
+@pytest.mark.parametrize("seed", [8, 0, 3, pytest.param(18, marks=pytest.mark.long)])
 def test_one_variable(seed: int) -> None:
-    check_design(random_design(seed, 1, limits=seed % 3 == 0), 25)
+    check_design(random_design(seed, 1, limits=seed % 3 == 0), 25, levels=3)
 
 
 @pytest.mark.parametrize("seed", [3])
 def test_two_variables(seed: int) -> None:
-    check_design(random_design(seed, 2), 7)
+    check_design(random_design(seed, 2), 7, places=2, levels=2, fine=5)
 
 
 @pytest.mark.long
@@ -99,7 +100,7 @@ def test_limits_do_not_make_a_design_worse_than_brute_force_within_them() -> Non
         "harmonics": 3, "limit": 0.00706232, "max_band_hz": 0.7483277,
         "forbidden_hz": [(0.85367861, 1.00571949)],
     }  # fmt: skip
-    check_design(asked, 17)
+    check_design(asked, 17, places=2, levels=3)
 
 
 def test_limits_that_do_not_bind_leave_the_optimum_as_it_is() -> None:
@@ -205,7 +206,7 @@ def test_worst_cases_of_many_scenes(seed: int) -> None:
 def test_a_search_hears_that_it_shall_stop_within_a_second(asked: str) -> None:
     """Processor time from the first True to the end; asked early, in the middle, and late."""
     scene = solver.load_scene(DATA / "two_loads.toml")
-    for after in (3, 60, 400):
+    for after in (3, 30, 70):
         calls, since = 0, math.nan
 
         def stop() -> bool:
@@ -228,7 +229,8 @@ def test_a_search_hears_that_it_shall_stop_within_a_second(asked: str) -> None:
             optim.robust_design(
                 scene, uncertain=uncertain, variables={"c0.N0": (5.0, 2000.0)}, samples=4, **given
             )
-        assert not time.process_time() - since > 1.0
+        assert calls >= after
+        assert time.process_time() - since < 1.0
 
 
 def test_a_look_has_the_corners_and_the_middles_of_the_faces() -> None:

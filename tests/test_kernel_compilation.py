@@ -72,7 +72,7 @@ def python(folder: Path, program: str, *arguments: str) -> subprocess.Popen[str]
 
 
 def said(process: subprocess.Popen[str]) -> tuple[str, str]:
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=600)
     assert process.returncode == 0, err
     return out, err
 

@@ -59,10 +59,11 @@ def test_no_sweep_nearby_is_lower(name: str, path: str, low: float, high: float)
         assert value >= best.peak * (1.0 - 1e-8)
 
 
+@pytest.mark.parametrize("points", [31, pytest.param(241, marks=pytest.mark.long)])
 @pytest.mark.parametrize(("name", "path", "low", "high"), DESIGNS)
-def test_no_sweep_anywhere_is_lower(name: str, path: str, low: float, high: float) -> None:
+def test_no_sweep_anywhere_is_lower(name: str, path: str, low: float, high: float, points: int) -> None:
     best = best_of(name, path, low, high)
-    for value in np.geomspace(low, high, 61):
+    for value in np.geomspace(low, high, points):
         assert highest(scene_of(name), path, float(value))[0] >= best.peak * (1.0 - 1e-8)
 
 
@@ -109,13 +110,16 @@ OTHERS = [
 ]
 
 
+@pytest.mark.parametrize("points", [15, pytest.param(121, marks=pytest.mark.long)])
 @pytest.mark.parametrize(("name", "path", "low", "high"), OTHERS)
-def test_other_parameters_against_brute_force(name: str, path: str, low: float, high: float) -> None:
+def test_other_parameters_against_brute_force(
+    name: str, path: str, low: float, high: float, points: int
+) -> None:
     best = least_peak(scene_of(name), path, low, high)
     assert best.status.proven
     assert highest(scene_of(name), path, best.at)[0] == pytest.approx(best.peak, rel=1e-8)
     spaced = np.geomspace if low > 0.0 else np.linspace
-    for value in spaced(low, high, 25):
+    for value in spaced(low, high, points):
         assert highest(scene_of(name), path, float(value))[0] >= best.peak * (1.0 - 1e-8)
 
 
@@ -135,14 +139,15 @@ def test_two_peaks_close_beside_each_other() -> None:
         assert highest(scene, "shroud.N0", float(value))[0] >= best.peak * (1.0 - 1e-8)
 
 
+@pytest.mark.parametrize("points", [13, pytest.param(81, marks=pytest.mark.long)])
 @pytest.mark.parametrize("ratio", [0.6, 1.5, 2.5])
-def test_loads_that_vary_as_far_as_separation(ratio: float) -> None:
+def test_loads_that_vary_as_far_as_separation(ratio: float, points: int) -> None:
     """Many peaks, high and narrow: where lines only have to be high enough no cubic may dip below that."""
     scene = scene_of("bladed-disk").with_values({"shroud.N1_ratio": ratio})
     best = least_peak(scene, "shroud.N0", 20.0, 3000.0)
     assert best.status is TrackStatus.TRACKED
     assert best.sweeps <= 12
-    for value in np.geomspace(20.0, 3000.0, 21):
+    for value in np.geomspace(20.0, 3000.0, points):
         assert highest(scene, "shroud.N0", float(value))[0] >= best.peak * (1.0 - 1e-8)
 
 

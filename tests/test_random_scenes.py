@@ -86,13 +86,13 @@ def marched(scene: Scene, harmonics: int, frequency_hz: float) -> None:
 
 
 @given(problem=problems())
-@settings(max_examples=300, **_ALWAYS_THE_SAME)
+@settings(max_examples=150, **_ALWAYS_THE_SAME)
 def test_random_solves(problem: tuple[Scene, int, float]):
     solved(*problem)
 
 
 @given(problem=problems())
-@settings(max_examples=50, **_ALWAYS_THE_SAME)
+@settings(max_examples=25, **_ALWAYS_THE_SAME)
 def test_random_responses(problem: tuple[Scene, int, float]):
     swept(*problem[:2])
 

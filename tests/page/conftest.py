@@ -21,7 +21,7 @@ def browser() -> Iterator[Browser]:
     if program is None:
         pytest.skip("chromium is not installed (Debian's package `chromium`)")
     # The first preview waits for its worker, on a machine that may have other work.
-    api.expect.set_options(timeout=30_000)
+    api.expect.set_options(timeout=90_000)
     with api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
         yield browser

@@ -12,14 +12,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import httpx
 import pytest
-from launch import COMMAND
+from launch import COMMAND, answers
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
 
-READY_SECONDS = 90.0
+READY_SECONDS = 180.0
 
 
 class Site:
@@ -42,11 +41,8 @@ class Site:
             self._process = subprocess.Popen(command, stderr=log, stdout=log, env=self._environment)
         end = time.monotonic() + READY_SECONDS
         while time.monotonic() < end and self._process.poll() is None:
-            try:
-                if httpx.get(f"{self.url}/health/ready").status_code == 200:
-                    return
-            except httpx.TransportError:
-                pass
+            if answers(self.port, "/health/ready"):
+                return
             time.sleep(0.05)
         self._process.kill()
         self._process.wait()
@@ -55,7 +51,7 @@ class Site:
     def stop(self) -> None:
         if self._process is not None:
             self._process.terminate()
-            assert self._process.wait(timeout=30) == 0, (self._folder / "log").read_text()
+            assert self._process.wait(timeout=120) == 0, (self._folder / "log").read_text()
             self._process = None
 
 
@@ -86,7 +82,7 @@ class Watch:
 def opened(browser: Browser, site: Site, **options: Any) -> Iterator[tuple[BrowserContext, Watch]]:
     """A fresh profile of the browser whose pages must not complain nor ask elsewhere."""
     context = browser.new_context(viewport={"width": 1280, "height": 900}, **options)
-    context.set_default_timeout(30_000)
+    context.set_default_timeout(90_000)
     watch = Watch(site.url)
     context.on("page", watch.listen)
     try:

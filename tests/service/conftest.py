@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import httpx
@@ -36,6 +36,19 @@ def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
         return
     with request.getfixturevalue("cluster").database() as made:
         yield made
+
+
+@pytest.fixture(scope="module", params=BACKENDS)
+def lasting(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[EmbeddedService]:
+    """A service with the private kinds, shared by the tests of a module that leave no job behind."""
+    with ExitStack() as stack:
+        if request.param == "sqlite":
+            url = f"sqlite:///{tmp_path_factory.mktemp('lasting')}/jobs.db"
+        else:
+            url = stack.enter_context(request.getfixturevalue("cluster").database())
+        yield stack.enter_context(EmbeddedService(settings_of(url)(), PRIVATE))
 
 
 @pytest.fixture(params=BACKENDS)

@@ -60,8 +60,8 @@ class DaskCluster:
             for each in family:
                 with suppress(psutil.NoSuchProcess):
                     each.kill()
-            process.wait(10)
-            psutil.wait_procs(family, 10)
+            process.wait(60)
+            psutil.wait_procs(family, 60)
 
     def start_scheduler(self) -> None:
         """Start the scheduler, at the same address again if there was one."""
@@ -81,7 +81,7 @@ class DaskCluster:
     def kill_scheduler(self) -> None:
         """kill -9."""
         self.scheduler.send_signal(signal.SIGKILL)
-        self.scheduler.wait(10)
+        self.scheduler.wait(60)
 
     @staticmethod
     def family(process: subprocess.Popen[bytes]) -> list[psutil.Process]:

@@ -54,7 +54,7 @@ def program_stopped(site: Site, generator: random.Random) -> None:
     """SIGTERM to a service or dispatcher; it ends with status 0 and is started again."""
     program = _one(site, generator)
     program.process.terminate()
-    status = program.process.wait(20.0)
+    status = program.process.wait(60.0)
     if status != 0:
         site.wrong.append(f"a program ended with status {status} after SIGTERM")
     site.again(program)
@@ -73,7 +73,7 @@ def queue_full(site: Site, generator: random.Random) -> None:
     full = threading.Event()
 
     def burst(number: int) -> None:
-        with httpx.Client(timeout=20.0) as client:
+        with httpx.Client(timeout=60.0) as client:
             for index in range(20):
                 seed = generator.randrange(10**12) + 1000 * number + index
                 body = {"kind": "iteration", "seed": seed, "sweeps": 0}
@@ -144,7 +144,7 @@ def cluster_worker_killed(dask: DaskCluster) -> Fault:
             with contextlib.suppress(psutil.NoSuchProcess):
                 process.kill()
         if whole:
-            nanny.wait(10)
+            nanny.wait(60)
             dask.workers.remove(nanny)
             dask.add_worker()
 
@@ -161,7 +161,7 @@ def scheduler_killed(dask: DaskCluster) -> Fault:
             for process in dask.family(nanny):
                 with contextlib.suppress(psutil.NoSuchProcess):
                     process.kill()
-            nanny.wait(10)
+            nanny.wait(60)
         number = len(dask.workers)
         dask.workers.clear()
         dask.start_scheduler()

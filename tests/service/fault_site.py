@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import httpx
+from launch import answers
 
 SCRIPT = Path(__file__).with_name("serve_private.py")
 LEASE = 1.0
@@ -84,7 +85,7 @@ class Site:
             program.process.terminate()
         for program in self.programs:
             try:
-                program.process.wait(20.0)
+                program.process.wait(60.0)
             except subprocess.TimeoutExpired:
                 program.process.kill()
                 program.process.wait()
@@ -107,9 +108,8 @@ class Site:
             assert time.monotonic() < end, "the dispatcher starts no worker"
             time.sleep(0.05)
         while program.port is not None:
-            with contextlib.suppress(httpx.TransportError):
-                if httpx.get(f"http://127.0.0.1:{program.port}/health/live").status_code == 200:
-                    return
+            if answers(program.port):
+                return
             if program.process.poll() is not None or time.monotonic() > end:
                 log = (self.folder / f"log-{program.port}").read_text()[-3000:]
                 raise AssertionError(f"the service on port {program.port} does not come up:\n{log}")
@@ -132,7 +132,7 @@ class Site:
                 found.append(int(folder.name))
         return found
 
-    def await_nobody(self, seconds: float = 5.0) -> list[int]:
+    def await_nobody(self, seconds: float = 60.0) -> list[int]:
         """Processes of this site that are left after its end."""
         end = time.monotonic() + seconds
         while (left := self.alive()) and time.monotonic() < end:
@@ -189,7 +189,7 @@ def clients(site: Site, jobs: int, seed: int) -> Iterator[list[threading.Thread]
 
 def _submitting(site: Site, jobs: int, seed: int) -> None:
     generator = random.Random(seed)
-    with httpx.Client(timeout=20.0) as client:
+    with httpx.Client(timeout=60.0) as client:
         for number in range(jobs):
             if site.over.is_set():
                 return
@@ -206,7 +206,7 @@ def _submitting(site: Site, jobs: int, seed: int) -> None:
 def _watching(site: Site, seed: int) -> None:
     """A successful job has its whole result, one that has not ended has none."""
     generator = random.Random(seed)
-    with httpx.Client(timeout=20.0) as client:
+    with httpx.Client(timeout=60.0) as client:
         while not site.over.is_set():
             time.sleep(0.02)
             jobs = list(site.accepted)

@@ -114,7 +114,7 @@ class Cluster:
             return
         self._process.send_signal(2)  # SIGINT: a "fast" shutdown
         try:
-            self._process.wait(20.0)
+            self._process.wait(60.0)
         finally:
             self._process.kill()
             self._process.wait()

@@ -1,4 +1,7 @@
-"""A service with the private kinds as a process of its own: ``serve_private.py URL port|work|dispatch``."""
+"""A service with the private kinds as a process of its own: ``serve_private.py URL WHAT [WORKERS]``.
+
+WHAT is a port, `work` or `dispatch`.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +13,8 @@ from service.http.server import serve, work
 from service.settings.settings import load_settings
 
 if __name__ == "__main__":
-    url, what = sys.argv[1:]
+    url, what, *workers = sys.argv[1:]
     if what in ("work", "dispatch"):
         work(load_settings(database=url, workers=1), PRIVATE, until_empty=what == "work")
     else:
-        serve(load_settings(database=url, workers=2, port=int(what)), PRIVATE)
+        serve(load_settings(database=url, workers=int(*workers or [2]), port=int(what)), PRIVATE)

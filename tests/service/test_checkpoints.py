@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from private_kinds import PRIVATE
-from service_helpers import MakeSettings, settings_of, until
+from service_helpers import PATIENCE, MakeSettings, settings_of, until
 from sqlalchemy import func, select, update
 
 import solver
@@ -124,7 +124,7 @@ def test_a_killed_child_is_followed_by_one_that_goes_on(make_settings: MakeSetti
         watcher = threading.Thread(target=watch, args=(service, job, seen, done))
         watcher.start()
         os.kill(next(p.pid for p in mp.active_children() if p.name == "stickslip worker"), signal.SIGKILL)
-        row = service.wait(job, 60.0)
+        row = service.wait(job, PATIENCE)
         done.set()
         watcher.join()
         assert (row.state, row.attempt) == (JobState.SUCCESSFUL, 2)
@@ -152,7 +152,7 @@ def test_a_stopped_service_leaves_what_its_jobs_have_to_the_next(
         assert row.attempt <= 1, "an orderly stop costs no attempt"
         before = kept(service.database, job)
         assert len(before) >= 2
-        assert service.wait(job, 60.0).state is JobState.SUCCESSFUL
+        assert service.wait(job, PATIENCE).state is JobState.SUCCESSFUL
         is_what_it_would_have_been(service, job, name)
 
 

@@ -19,7 +19,7 @@ import pytest
 import yaml
 from dask_cluster import DaskCluster, lives
 from private_kinds import PRIVATE
-from service_helpers import pids, until
+from service_helpers import PATIENCE, pids, until
 from sqlalchemy import select
 
 import solver
@@ -86,7 +86,7 @@ def service(
     dask: DaskCluster, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[tuple[EmbeddedService, DaskCluster]]:
     with EmbeddedService(settings_on(tmp_path_factory.mktemp("service"), dask), BOTH) as embedded:
-        until(lambda: check(embedded._service).workers_ready == 2, 30.0)
+        until(lambda: check(embedded._service).workers_ready == 2)
         yield embedded, dask
 
 
@@ -106,7 +106,7 @@ def ended(service: EmbeddedService, kind: str, body: dict[str, Any]) -> Ended:
 
 
 def results_of(service: EmbeddedService, job: str) -> Ended:
-    done = service.wait(job, timeout=60.0)
+    done = service.wait(job, timeout=PATIENCE)
     assert done.status is JobState.SUCCESSFUL, done
     results = service.results(job)
     arrays = [service._service.sweeps.arrays(sweep.id) for sweep in results.sweeps]
@@ -154,7 +154,7 @@ def test_failures_are_those_of_a_local_worker(service: tuple[EmbeddedService, Da
         "out-of-memory": ("worker-lost", 3),
     }  # fmt: skip
     jobs = {kind: embedded.submit(kind, {}) for kind in expected}
-    ends = {kind: embedded.wait(job, timeout=30.0) for kind, job in jobs.items()}
+    ends = {kind: embedded.wait(job, timeout=PATIENCE) for kind, job in jobs.items()}
     assert {k: (e.error and e.error["type"], e.attempt) for k, e in ends.items()} == expected
     threads = embedded.submit("threads", {})
     assert embedded.wait(threads).status is JobState.SUCCESSFUL
@@ -164,17 +164,19 @@ def test_failures_are_those_of_a_local_worker(service: tuple[EmbeddedService, Da
 def test_progress_and_cancel(service: tuple[EmbeddedService, DaskCluster]) -> None:
     embedded, _ = service
     seen: list[float] = []
-    job = embedded.submit("iteration", {"seconds": 0.6})
+    job, begun = embedded.submit("iteration", {"seconds": 0.6}), time.monotonic()
     done = embedded.wait(job, on_progress=lambda share, _points: seen.append(share))
+    elapsed = time.monotonic() - begun
     assert done.status is JobState.SUCCESSFUL
     assert seen == sorted(seen)
-    assert 2 <= len(seen) <= 8, "at most ten times a second"
-    job = embedded.submit("iteration", {"seconds": 60.0})
+    assert 2 <= len(seen) <= 10 * elapsed + 2, "at most ten times a second"
+    processes = embedded._service.queue._executor._cluster._client.run
+    before = processes(os.getpid)
+    job = embedded.submit("iteration", {"seconds": 600.0})
     until(lambda: embedded.job(job).progress > 0.0)
-    begun = time.monotonic()
     assert embedded.dismiss(job).status is JobState.DISMISSED
-    until(lambda: threads_idle(embedded), 3.0)
-    assert time.monotonic() - begun < 2.0, "its worker heeded, it is not restarted"
+    until(lambda: threads_idle(embedded))
+    assert processes(os.getpid) == before, "its worker heeded, it is not restarted"
 
 
 def test_a_divided_job_leaves_room_for_others(service: tuple[EmbeddedService, DaskCluster]) -> None:
@@ -183,11 +185,12 @@ def test_a_divided_job_leaves_room_for_others(service: tuple[EmbeddedService, Da
     study = embedded.submit("mistuning", {**BODIES["mistuning"], "samples": 2000})
     until(lambda: embedded._service.queue.status().busy == 2)
     until(lambda: embedded.job(study).points > 0)
-    small = embedded.wait(embedded.submit("iteration", {"seed": 4}), timeout=20.0)
+    small = embedded.wait(embedded.submit("iteration", {"seed": 4}), timeout=PATIENCE)
     assert small.status is JobState.SUCCESSFUL
     assert embedded.job(study).status is JobState.RUNNING
     assert embedded.dismiss(study).status is JobState.DISMISSED
-    until(lambda: threads_idle(embedded), 3.0)
+    until(lambda: threads_idle(embedded))
+    assert embedded.job(study).points < 1000, "half of it"
 
 
 def test_a_worker_with_another_version_computes_nothing(
@@ -195,7 +198,7 @@ def test_a_worker_with_another_version_computes_nothing(
 ) -> None:
     embedded, _ = service
     monkeypatch.setattr(embedded._service.queue._executor, "_version", "0.0.0")
-    done = embedded.wait(embedded.submit("iteration", {"seed": 99}), timeout=20.0)
+    done = embedded.wait(embedded.submit("iteration", {"seed": 99}), timeout=PATIENCE)
     assert done.status is JobState.FAILED
     assert done.error is not None
     assert "the service 0.0.0, in attempt 3 of 3" in done.error["detail"]
@@ -214,7 +217,7 @@ def test_closing_gives_jobs_back_and_frees_the_workers(
     with EmbeddedService(settings, BOTH) as other:
         until(lambda: other.job(study).status is JobState.RUNNING)
         assert other.job(study).points > 15
-        assert other.wait(job, timeout=30.0).attempt == 1, "a shutdown costs no attempt"
+        assert other.wait(job, timeout=PATIENCE).attempt == 1, "a shutdown costs no attempt"
         assert other.dismiss(study).status is JobState.DISMISSED
 
 
@@ -228,10 +231,10 @@ def test_a_worker_killed_costs_an_attempt(
     until(lambda: embedded.job(job).progress > 0.0)
     first = pids(file)[0]
     os.kill(first, signal.SIGKILL)
-    done = embedded.wait(job, timeout=40.0)
+    done = embedded.wait(job, timeout=PATIENCE)
     assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 2)
     assert first not in pids(file)[1:]
-    until(lambda: threads_idle(embedded), 20.0)
+    until(lambda: threads_idle(embedded))
 
 
 def test_a_sweep_goes_on_behind_its_last_checkpoint(
@@ -281,19 +284,19 @@ def test_a_sweep_goes_on_behind_its_last_checkpoint(
             # The finished branch has the points that were told, in their order, and those put between.
             rest = iter(curve)
             assert all(point in rest for point in found)
-        until(lambda: threads_idle(embedded), 20.0)
+        until(lambda: threads_idle(embedded))
 
 
 def test_a_part_that_is_lost_is_computed_again_alone(
     service: tuple[EmbeddedService, DaskCluster],
 ) -> None:
     embedded, dask = service
-    body = {**BODIES["mistuning"], "samples": 12, "harmonics": 3, "seed": 70}
+    body = {**BODIES["mistuning"], "samples": 24, "seed": 70}
     job = embedded.submit("mistuning", body)
     until(lambda: embedded.job(job).points > 0)
     victim = next(p for p in dask.family(dask.workers[0]) if "spawn_main" in " ".join(p.cmdline()))
     victim.kill()
-    done = embedded.wait(job, timeout=60.0)
+    done = embedded.wait(job, timeout=PATIENCE)
     assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 1)
     assert timeless(embedded.results(job).result) == computed(embedded, "mistuning", body)[0]
 
@@ -301,7 +304,7 @@ def test_a_part_that_is_lost_is_computed_again_alone(
 def test_the_scheduler_dies_and_comes_back(service: tuple[EmbeddedService, DaskCluster]) -> None:
     """Health says so; what ran is tried again when scheduler and workers are back."""
     embedded, dask = service
-    until(lambda: threads_idle(embedded), 20.0)
+    until(lambda: threads_idle(embedded))
     job = embedded.submit("iteration", {"seconds": 1.0})
     until(lambda: embedded.job(job).progress > 0.0)
     before = [process for worker in dask.workers for process in dask.family(worker)]
@@ -310,16 +313,16 @@ def test_the_scheduler_dies_and_comes_back(service: tuple[EmbeddedService, DaskC
     assert any("Dask scheduler" in line for line in check(embedded._service).trouble)
     until(lambda: embedded.job(job).status is JobState.ACCEPTED)
     for worker in dask.workers:
-        assert worker.wait(20) is not None, "Dask's workers end with their scheduler"
+        assert worker.wait(PATIENCE) is not None, "Dask's workers end with their scheduler"
     until(lambda: not [process for process in before if lives(process)])
     dask.workers.clear()
     dask.start_scheduler()
     until(lambda: any("no workers" in line for line in check(embedded._service).trouble))
     dask.add_worker()
     dask.add_worker()
-    done = embedded.wait(job, timeout=40.0)
+    done = embedded.wait(job, timeout=PATIENCE)
     assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 2)
-    until(lambda: threads_idle(embedded), 20.0)
+    until(lambda: threads_idle(embedded))
     assert check(embedded._service).trouble == []
 
 
@@ -330,7 +333,7 @@ def test_a_worker_that_does_not_heed_is_ended(service: tuple[EmbeddedService, Da
     until(lambda: embedded.job(job).progress > 0.0)
     assert embedded.dismiss(job).status is JobState.DISMISSED
     assert embedded._service.queue.status().busy == 1, "its thread is not given to others"
-    until(lambda: threads_idle(embedded), 40.0)
+    until(lambda: threads_idle(embedded))
 
 
 def test_a_service_without_the_extra_says_what_is_missing(
@@ -351,7 +354,7 @@ def test_a_scheduler_that_is_not_there(tmp_path: Path) -> None:
     with EmbeddedService(settings, PRIVATE) as embedded:
         assert not check(embedded._service).ready
         job = embedded.submit("iteration", {})
-        until(lambda: "does not answer" in " ".join(check(embedded._service).trouble), 10.0)
+        until(lambda: "does not answer" in " ".join(check(embedded._service).trouble))
         assert embedded.job(job).status is JobState.ACCEPTED
 
 
@@ -390,13 +393,13 @@ def test_certificates_on_all_sides(tmp_path: Path) -> None:
     with DaskCluster(tmp_path, workers=1, extra=("--protocol", "tls", *flags), scheme="tls") as cluster:
         names = {f"dask_{name}_file": files[name] for name in ("ca", "cert", "key")}
         with EmbeddedService(settings_on(tmp_path, cluster, **names), BOTH) as embedded:
-            done = embedded.wait(embedded.submit("iteration", {}), timeout=60.0)
+            done = embedded.wait(embedded.submit("iteration", {}), timeout=PATIENCE)
             assert done.status is JobState.SUCCESSFUL
         (tmp_path / "others").mkdir()
         others = certificates(tmp_path / "others")
         names = {f"dask_{name}_file": others[name] for name in ("ca", "cert", "key")}
         with EmbeddedService(settings_on(tmp_path, cluster, **names), BOTH) as stranger:
-            until(lambda: "does not answer" in " ".join(check(stranger._service).trouble), 20.0)
+            until(lambda: "does not answer" in " ".join(check(stranger._service).trouble))
 
 
 @pytest.mark.long

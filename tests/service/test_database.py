@@ -14,7 +14,7 @@ import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from private_kinds import PRIVATE
-from service_helpers import MakeSettings, new_job
+from service_helpers import PATIENCE, MakeSettings, new_job
 from sqlalchemy import CheckConstraint, insert, inspect, select, text
 from sqlalchemy.exc import DBAPIError, StatementError
 
@@ -50,7 +50,7 @@ def test_read_modify_writes_of_four_processes_lose_nothing(file_url: str) -> Non
         connection.execute(text("INSERT INTO counter VALUES (0)"))
     script = Path(__file__).with_name("counting.py")
     running = [subprocess.Popen([sys.executable, str(script), file_url, "300"]) for _ in range(4)]
-    assert [process.wait(60) for process in running] == [0, 0, 0, 0]
+    assert [process.wait(PATIENCE) for process in running] == [0, 0, 0, 0]
     with engine.begin() as connection:
         assert connection.execute(text("SELECT number FROM counter")).scalar_one() == 1200
     engine.dispose()
@@ -219,7 +219,7 @@ def test_a_second_service_is_refused(make_settings: MakeSettings) -> None:
         assert "DatabaseInUseError" in other.stderr
         with pytest.raises(DatabaseInUseError):
             revisions.upgrade(settings.database)
-        done = service.wait(service.submit("iteration", {}), timeout=30.0)
+        done = service.wait(service.submit("iteration", {}), timeout=PATIENCE)
         assert done.status is JobState.SUCCESSFUL
     with EmbeddedService(settings, PRIVATE) as service:
         assert service.job(done.id).status is JobState.SUCCESSFUL

@@ -12,7 +12,7 @@ from pathlib import Path
 import httpx
 from postgresql_cluster import Cluster
 from private_kinds import PRIVATE
-from service_helpers import is_problem, serving, settings_of, until
+from service_helpers import PATIENCE, is_problem, serving, settings_of, until
 
 from service.auth.callers import KEYLESS
 from service.http.events import job_events
@@ -112,7 +112,7 @@ def test_streams_hold_no_threads_and_do_not_hold_a_shutdown(tmp_path: Path) -> N
 
     async def watch(url: str, job: str, count: int, started: threading.Event) -> None:
         limits = httpx.Limits(max_connections=None)
-        async with httpx.AsyncClient(base_url=url, timeout=30.0, limits=limits) as client:
+        async with httpx.AsyncClient(base_url=url, timeout=PATIENCE, limits=limits) as client:
             open_streams = 0
 
             async def one() -> None:
@@ -127,19 +127,20 @@ def test_streams_hold_no_threads_and_do_not_hold_a_shutdown(tmp_path: Path) -> N
 
             await asyncio.gather(*(one() for _ in range(count)))
 
-    with serving(tmp_path, PRIVATE) as client:
-        job = client.post("/v1/jobs", json=SLOW).json()["id"]
+    # Streams that nobody sends home end with the job, or are cut when the time of open requests is over.
+    with serving(tmp_path, PRIVATE, shutdown_seconds=60.0) as client:
+        job = client.post("/v1/jobs", json={**SLOW, "seconds": 600.0}).json()["id"]
         before = threading.active_count()
         started = threading.Event()
         watcher = threading.Thread(
             target=lambda: asyncio.run(watch(str(client.base_url), job, 120, started)), daemon=True
         )
         watcher.start()
-        assert started.wait(20.0)
+        assert started.wait(PATIENCE)
         assert threading.active_count() - before <= 42, "40 short reads at a time, and the watcher"
         begin = time.monotonic()
-    assert time.monotonic() - begin < 2.0
-    watcher.join(5.0)
+    assert time.monotonic() - begin < 30.0
+    watcher.join(PATIENCE)
     assert len(ended) == 120
 
 

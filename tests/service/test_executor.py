@@ -72,7 +72,7 @@ def heard() -> Heard:
 def executor(heard: Heard) -> Iterator[LocalExecutor]:
     """One process that has done a few short attempts, so that others may wait in its pipe."""
     made = LocalExecutor(
-        PRIVATE.runs(), PRIVATE.warm_up, workers=1, grace_seconds=0.2, pace=load_settings().pace
+        PRIVATE.runs(), PRIVATE.warm_up, workers=1, grace_seconds=1.0, pace=load_settings().pace
     )
     made.start(heard)
     until(lambda: made.status().ready)
@@ -106,24 +106,24 @@ def test_attempts_wait_in_the_pipe_and_end_in_order(executor: LocalExecutor, hea
 def test_what_waits_behind_a_long_attempt_goes_back_to_the_queue(
     executor: LocalExecutor, heard: Heard
 ) -> None:
-    executor.submit(attempt("long", 30.0))
+    executor.submit(attempt("long", 600.0))
     for number in range(3):
         executor.submit(attempt(f"behind {number}"))
-    until(lambda: heard.of("behind 2"), seconds=2.0)
+    until(lambda: heard.of("behind 2"))
     assert [heard.of(f"behind {number}") for number in range(3)] == [Stopped()] * 3
     assert heard.of("long") is None
     assert executor.free() == 0
-    executor.stop_attempt(attempt("long", 30.0))
+    executor.stop_attempt(attempt("long", 600.0))
     assert heard.of("long") is None, "another attempt is meant"
 
 
 @pytest.mark.parametrize("kind", ["iteration", "deaf"])
 def test_an_attempt_that_waits_can_be_stopped(executor: LocalExecutor, heard: Heard, kind: str) -> None:
-    first, second, third = attempt("first", 0.15), attempt("second", 30.0, kind), attempt("third")
+    first, second, third = attempt("first", 0.15), attempt("second", 600.0, kind), attempt("third")
     for one in (first, second, third):
         executor.submit(one)
     executor.stop_attempt(second)
-    until(lambda: heard.of("third"), seconds=5.0)
+    until(lambda: heard.of("second") and heard.of("third"))
     assert isinstance(heard.of("first"), Finished)
     killed = kind == "deaf"
     assert isinstance(heard.of("second"), Lost if killed else Stopped)
@@ -149,8 +149,8 @@ def test_a_process_that_dies_costs_the_attempt_it_computed_alone(
 
 def test_closing_gives_back_what_waits(executor: LocalExecutor, heard: Heard) -> None:
     for number in range(4):
-        executor.submit(attempt(f"job {number}", 30.0))
+        executor.submit(attempt(f"job {number}", 600.0))
     begun = time.monotonic()
     executor.close()
-    assert time.monotonic() - begun < 2.0
+    assert time.monotonic() - begun < 60.0, "the first alone would take 600 s"
     assert [heard.of(f"job {number}") for number in range(4)] == [Stopped()] * 4

@@ -70,10 +70,10 @@ def undergo(site: Site, faults: Mapping[str, Fault], number: int, seed: int) -> 
     )
 
 
-def await_end(site: Site, seconds: float = 120.0) -> float:
+def await_end(site: Site, seconds: float = 300.0) -> float:
     """Wait until every accepted job has ended; the time it took [s]."""
     begin = time.monotonic()
-    with httpx.Client(timeout=20.0) as client:
+    with httpx.Client(timeout=60.0) as client:
         for job in list(site.accepted):
             while True:
                 assert time.monotonic() < begin + seconds, f"job {job} does not end"

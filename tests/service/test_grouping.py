@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 
 import pytest
-from service_helpers import new_job, until
+from service_helpers import PATIENCE, new_job, until
 from sqlalchemy import Connection, event, func, insert, select, text
 from sqlalchemy.exc import DBAPIError
 
@@ -34,7 +34,7 @@ def held_up(database: Database, works: list) -> tuple[list, int]:
     """The outcomes of `works`, all of which wait while another transaction is open; and the commits."""
     free, commits = threading.Event(), []
     event.listen(database._write, "commit", lambda _connection: commits.append(1))
-    blocked = [lambda _connection: free.wait(10.0)] * database._grouped._leading._value
+    blocked = [lambda _connection: free.wait(PATIENCE)] * database._grouped._leading._value
 
     def outcome(work: object) -> object:
         try:

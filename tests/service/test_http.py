@@ -10,7 +10,7 @@ import time
 
 import httpx
 import pytest
-from service_helpers import is_problem, job_ids, until
+from service_helpers import is_problem, job_ids, promptly, until
 from starlette.requests import Request
 
 from service.client.client import Client
@@ -67,14 +67,18 @@ def test_prefer_wait_answers_small_jobs_directly(http: httpx.Client) -> None:
 
 
 def test_dismiss(http: httpx.Client) -> None:
-    job = http.post("/v1/jobs", json={**SLOW, "fresh": True}).json()
-    until(lambda: http.get(job["links"]["self"]).json()["status"] == "running")
-    asked = time.monotonic()
-    answer = http.delete(job["links"]["self"])
-    assert answer.status_code == 200
-    assert answer.json()["status"] == "dismissed"
-    assert time.monotonic() - asked < 1.0
-    is_problem(http.get(job["links"]["results"]), 409)
+    def trial() -> float:
+        job = http.post("/v1/jobs", json={**SLOW, "fresh": True}).json()
+        until(lambda: http.get(job["links"]["self"]).json()["status"] == "running")
+        asked = time.monotonic()
+        answer = http.delete(job["links"]["self"])
+        took = time.monotonic() - asked
+        assert answer.status_code == 200
+        assert answer.json()["status"] == "dismissed"
+        is_problem(http.get(job["links"]["results"]), 409)
+        return took
+
+    promptly(trial, 1.0)
     done = http.post("/v1/jobs", json={"kind": "iteration"}, headers={"Prefer": "wait=20"}).json()
     is_problem(http.delete(done["links"]["self"]), 409)
 
@@ -302,12 +306,13 @@ def test_an_error_of_the_program_is_a_problem_with_a_reference(http: httpx.Clien
 
 def test_answers_are_not_held_back(http: httpx.Client) -> None:
     """Nagle's algorithm and delayed acknowledgements together would cost each one 40 ms."""
-    times = []
-    for _ in range(20):
+
+    def trial() -> float:
         begin = time.perf_counter()
         http.get("/health/live")
-        times.append(time.perf_counter() - begin)
-    assert min(times) < 0.03
+        return time.perf_counter() - begin
+
+    promptly(trial, 0.03, tries=200)
 
 
 def test_a_full_queue_says_when_to_come_back() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from private_kinds import PRIVATE
-from service_helpers import MakeSettings, settings_of
+from service_helpers import PATIENCE, MakeSettings, settings_of
 
 from service.cli import main
 from service.client.embedded import EmbeddedService
@@ -118,7 +118,7 @@ def test_a_database_in_use_can_be_checked(make_settings: MakeSettings) -> None:
 
 def test_what_a_job_computed_short_of_its_goal_is_no_damage(url: str) -> None:
     with EmbeddedService(settings_of(url)(), PRIVATE) as service:
-        done = service.wait(service.submit("falls-short", {"sweeps": 1}), timeout=30.0)
+        done = service.wait(service.submit("falls-short", {"sweeps": 1}), timeout=PATIENCE)
         assert done.status is JobState.FAILED
         assert service.results(done.id).sweeps
         assert check(url).trouble == ()

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 from private_kinds import PRIVATE
-from service_helpers import settings_of
+from service_helpers import PATIENCE, settings_of
 
 from service.auth.callers import KEYLESS, Caller, Scope, included
 from service.db.models import JobState
@@ -40,7 +40,7 @@ def test_jobs_and_what_they_computed_are_their_owners(service: Service) -> None:
         row, inserted = service.submit(BODY, "same-key", caller)
         assert inserted, "an Idempotency-Key is its owner's"
         assert row.result_of is None, "a result of another is computed anew"
-        assert service.wait(row.id, 20.0, caller=caller).state is JobState.SUCCESSFUL
+        assert service.wait(row.id, PATIENCE, caller=caller).state is JobState.SUCCESSFUL
         assert service.submit(BODY, None, caller)[0].result_of == row.id
         jobs[caller.owner] = row.id
     for caller in (ANN, BEN, KEYLESS):
@@ -69,7 +69,7 @@ def test_an_admin_sees_and_dismisses_everything(service: Service) -> None:
     assert service.submit({**BODY, "seconds": 60.0}, None, CHIEF)[0].owner == "chief"
     for job in jobs:
         service.dismiss(job.id, CHIEF)
-        assert service.wait(job.id, 20.0, caller=CHIEF).state is JobState.DISMISSED
+        assert service.wait(job.id, PATIENCE, caller=CHIEF).state is JobState.DISMISSED
     with pytest.raises(ConflictError):
         service.results(jobs[0].id, CHIEF)
 

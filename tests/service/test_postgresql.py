@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from postgresql_cluster import Cluster
 from private_kinds import PRIVATE
-from service_helpers import pids, settings_of, until
+from service_helpers import PATIENCE, pids, settings_of, until
 from sqlalchemy import select, text, update
 
 from service.cli import main
@@ -82,8 +82,8 @@ def test_renewing_leases_waits_for_nobody_who_changes_a_row(url: str) -> None:
     with database.writing() as changing:
         changing.execute(select(Job.id).where(Job.id == attempts[1].job_id).with_for_update())
         with ThreadPoolExecutor(1) as thread:
-            assert thread.submit(jobs.renew, attempts, later).result(timeout=10.0) == []
-        changing.execute(text("SET LOCAL lock_timeout = '1s'"))
+            assert thread.submit(jobs.renew, attempts, later).result(timeout=PATIENCE) == []
+        changing.execute(text("SET LOCAL lock_timeout = '20s'"))
         assert [found == later for found in changing.execute(until).scalars()] == [True, False, True]
         changing.execute(update(Job).where(Job.id == attempts[0].job_id).values(points=1))
     assert jobs.succeed(attempts[2], JobOutput(result={}))
@@ -187,13 +187,13 @@ def test_two_services_in_one_process_share_the_jobs(url: str) -> None:
         bodies = [{"kind": "iteration", "seconds": 0.4, "seed": seed} for seed in range(6)]
         jobs = [one.submit(body)[0].id for body in bodies]
         until(lambda: all(service.queue.status().busy for service in services))
-        done = [other.wait(job, 30.0) for job in jobs]
+        done = [other.wait(job, PATIENCE) for job in jobs]
         assert [(row.state, row.attempt) for row in done] == [(JobState.SUCCESSFUL, 1)] * 6
-        long = one.submit({"kind": "iteration", "seconds": 60.0})[0].id
+        long = one.submit({"kind": "iteration", "seconds": 600.0})[0].id
         until(lambda: one.job(long).state is JobState.RUNNING)
         away = next(service for service in services if service.queue.live_progress(long) is None)
         away.dismiss(long)
-        assert away.wait(long, 10.0).state is JobState.DISMISSED, "wherever it runs"
+        assert away.wait(long, PATIENCE).state is JobState.DISMISSED, "wherever it runs"
 
 
 Start = Callable[[], "tuple[subprocess.Popen[bytes], Client]"]
@@ -202,7 +202,7 @@ Start = Callable[[], "tuple[subprocess.Popen[bytes], Client]"]
 @pytest.fixture
 def start(url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
     """Starts services as processes; what they log is shown if the test fails."""
-    monkeypatch.setenv("STICKSLIP_LEASE_SECONDS", "1")
+    monkeypatch.setenv("STICKSLIP_LEASE_SECONDS", "2")
     monkeypatch.setenv("STICKSLIP_POLL_SECONDS", "0.2")
     log = tmp_path / "log"
     with ExitStack() as stack:
@@ -239,12 +239,12 @@ def test_the_jobs_of_a_killed_service_are_done_by_another(tmp_path: Path, start:
     jobs = [first.submit(spec).id for spec in specs]
     until(lambda: len(pids(file)) >= 4)
     os.kill(killed.pid, signal.SIGKILL)
-    done = [second.wait(job, timeout=30.0) for job in jobs]
+    done = [second.wait(job, timeout=PATIENCE) for job in jobs]
     assert [job.status for job in done] == [JobState.SUCCESSFUL] * 8
     assert max(job.attempt for job in done) == 2
     assert sum(job.attempt for job in done) == len(pids(file)), "each attempt is counted, none is made twice"
     process.terminate()
-    assert process.wait(10.0) == 0
+    assert process.wait(PATIENCE) == 0
 
 
 def test_names_that_cannot_be_stored_are_refused(start: Start) -> None:
@@ -268,14 +268,14 @@ def test_services_tell_each_other_without_polling(url: str, monkeypatch: pytest.
             stack.callback(service.stop)
         one, other = services
         until(lambda: all(service.queue.status().ready for service in services))
-        bodies = [{"kind": "iteration", "seconds": seconds, "seed": 1} for seconds in (60.0, 61.0)]
+        bodies = [{"kind": "iteration", "seconds": seconds, "seed": 1} for seconds in (599.0, 600.0)]
         long = [one.submit(body)[0].id for body in bodies]
         until(lambda: all(service.queue.status().busy for service in services))
         away = next(job for job in long if one.queue.live_progress(job) is None)
         one.dismiss(away)
-        assert one.wait(away, 20.0).state is JobState.DISMISSED
+        assert one.wait(away, 30.0).state is JobState.DISMISSED
         here = next(job for job in long if job != away)
         job = one.submit({"kind": "iteration", "seconds": 0.2, "seed": 2})[0].id
-        assert one.wait(job, 20.0).state is JobState.SUCCESSFUL
+        assert one.wait(job, 30.0).state is JobState.SUCCESSFUL
         assert not other.queue.status().busy
         one.dismiss(here)

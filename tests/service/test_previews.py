@@ -202,7 +202,7 @@ def test_few_wait(previews: Previews) -> None:
     assert any(isinstance(answer, bytes) for answer in answers)
     waits: Callable[[object], bool] = lambda answer: isinstance(answer, QueueFullError)  # noqa: E731
     assert all(isinstance(answer, bytes) or waits(answer) for answer in answers)
-    slow = [("spend", 0.5, "")] + [("spend", 0.0, "")] * (MOST_WAITING + 1)
+    slow = [("spend", 0.9, "")] + [("spend", 0.0, "")] * (MOST_WAITING + 1)
     assert any(waits(answer) for answer in together(previews, *slow))
 
 

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import httpx
 import pytest
-from service_helpers import pids, until
+from launch import answers
+from service_helpers import PATIENCE, pids, until
 
 import solver
 from service.client.client import Client
@@ -50,7 +51,7 @@ def start(tmp_path: Path) -> Iterator[Start]:
 
     def begin(what: object) -> subprocess.Popen[bytes]:
         with log.open("ab") as stderr:
-            command = [sys.executable, str(SCRIPT), f"sqlite:///{tmp_path}/jobs.db", str(what)]
+            command = [sys.executable, str(SCRIPT), f"sqlite:///{tmp_path}/jobs.db", str(what), "1"]
             started.append(subprocess.Popen(command, stderr=stderr))
         return started[-1]
 
@@ -59,14 +60,6 @@ def start(tmp_path: Path) -> Iterator[Start]:
         process.kill()
         process.wait()
     sys.stderr.write(log.read_text())
-
-
-def answers(port: int) -> bool:
-    """Whether the service is there; asked without the client, which tries again by itself for a while."""
-    try:
-        return httpx.get(f"http://127.0.0.1:{port}/health/live").status_code == 200
-    except httpx.TransportError:
-        return False
 
 
 def alive(pid: int) -> bool:
@@ -88,21 +81,19 @@ def test_a_service_killed_loses_nothing_and_leaves_no_worker(
     until(lambda: pids(file))
     process.kill()
     process.wait()
-    until(lambda: not any(alive(pid) for pid in pids(file)), seconds=2.0)
+    until(lambda: not any(alive(pid) for pid in pids(file)))
 
     process = start(port)
     until(lambda: answers(port))
-    done = [client.wait(job, timeout=30.0) for job in jobs]
+    done = [client.wait(job, timeout=PATIENCE) for job in jobs]
     assert [job.status for job in done] == [JobState.SUCCESSFUL] * 4
     assert max(job.attempt for job in done) == 2
     assert sum(job.attempt for job in done) == len(pids(file)), "each attempt is counted, none is made twice"
 
-    running = client.submit({"kind": "deaf", "seconds": 60.0, "pid_file": str(file)}).id
+    running = client.submit({"kind": "deaf", "seconds": 600.0, "pid_file": str(file)}).id
     until(lambda: len(pids(file)) > sum(job.attempt for job in done))
-    asked = time.monotonic()
     process.terminate()
-    assert process.wait(10.0) == 0
-    assert time.monotonic() - asked < 3.0
+    assert process.wait(PATIENCE) == 0, "it does not wait for what takes 600 s"
     assert not any(alive(pid) for pid in pids(file))
 
     process = start(port)
@@ -111,7 +102,7 @@ def test_a_service_killed_loses_nothing_and_leaves_no_worker(
     assert client.job(running).attempt == 1, "an orderly stop costs no attempt"
     assert client.dismiss(running).status is JobState.DISMISSED
     process.send_signal(signal.SIGINT)
-    assert process.wait(10.0) == 0
+    assert process.wait(PATIENCE) == 0
 
 
 def test_workers_that_get_the_same_sigterm_as_their_service_cost_no_attempt(
@@ -125,10 +116,10 @@ def test_workers_that_get_the_same_sigterm_as_their_service_cost_no_attempt(
     until(lambda: pids(file))
     for pid in (*pids(file), process.pid):
         os.kill(pid, signal.SIGTERM)
-    assert process.wait(10.0) == 0
+    assert process.wait(PATIENCE) == 0
 
     worked = start("work")
-    assert worked.wait(30.0) == 0, "until nothing waits"
+    assert worked.wait(PATIENCE) == 0, "until nothing waits"
     database = Database(f"sqlite:///{tmp_path}/jobs.db")
     done = JobRepository(database).get(job)
     database.close()
@@ -161,11 +152,11 @@ def test_a_long_sweep_goes_on_after_every_way_to_end_a_service(
         until(lambda far=known: client.job(job).progress > far + 0.1)
         reached = client.job(job).progress
         process.send_signal(number)
-        process.wait(10.0)
+        process.wait(PATIENCE)
         process = start(port)
         until(lambda: answers(port))
         assert client.job(job).progress > 0.5 * reached, "what was computed is not lost"
-    done = client.wait(job, timeout=30.0)
+    done = client.wait(job, timeout=PATIENCE)
     assert (done.status, done.attempt) == (JobState.SUCCESSFUL, 2), "a kill costs an attempt"
     branch = solver.sweep(Scene.from_dict(disk), start=650.0, stop=750.0, harmonics=13)
     result = client.results(job).result
@@ -174,7 +165,7 @@ def test_a_long_sweep_goes_on_after_every_way_to_end_a_service(
         {"value": branch.peak.value, "at": branch.peak.at} if branch.peak else None, rel=1e-9
     )
     process.terminate()
-    assert process.wait(10.0) == 0
+    assert process.wait(PATIENCE) == 0
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.long)])
@@ -182,17 +173,18 @@ def test_a_stop_waits_for_nobody(
     port: int, start: Start, client: Client, number: signal.Signals, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Open streams and waiting requests are sent home, clients that do nothing are left behind."""
-    monkeypatch.setenv("STICKSLIP_SHUTDOWN_SECONDS", "1")
+    for name, seconds in {"SHUTDOWN": 3, "HEADER": 600, "BODY": 600, "MAX_WAIT": 600}.items():
+        monkeypatch.setenv(f"STICKSLIP_{name}_SECONDS", str(seconds))
     process = start(port)
     until(lambda: answers(port))
-    job = client.submit({"kind": "iteration", "seconds": 60.0}).id
+    job = client.submit({"kind": "iteration", "seconds": 600.0}).id
     until(lambda: client.job(job).status is JobState.RUNNING)
     address = f"http://127.0.0.1:{port}"
     ended: dict[str, float] = {}
     began = threading.Barrier(4)
 
     def follow(name: str) -> None:
-        with httpx.stream("GET", f"{address}/v1/jobs/{job}/events", timeout=60.0) as response:
+        with httpx.stream("GET", f"{address}/v1/jobs/{job}/events", timeout=PATIENCE) as response:
             lines = response.iter_lines()
             next(lines)
             began.wait()
@@ -202,8 +194,8 @@ def test_a_stop_waits_for_nobody(
 
     def wait() -> None:
         began.wait()
-        body = {"kind": "iteration", "seconds": 60.0, "seed": 1}
-        answer = httpx.post(f"{address}/v1/jobs", json=body, headers={"Prefer": "wait=50"}, timeout=60.0)
+        body = {"kind": "iteration", "seconds": 600.0, "seed": 1}
+        answer = httpx.post(f"{address}/v1/jobs", json=body, headers={"Prefer": "wait=600"}, timeout=PATIENCE)
         assert answer.status_code == 202, "it is told where its job is"
         ended["waiting"] = time.monotonic()
 
@@ -224,13 +216,10 @@ def test_a_stop_waits_for_nobody(
     time.sleep(0.3)
     asked = time.monotonic()
     process.send_signal(number)
-    assert process.wait(20.0) == 0
-    took = time.monotonic() - asked
+    assert process.wait(PATIENCE) == 0, "nobody is waited for for 600 s"
     for thread in threads:
-        thread.join(5.0)
+        thread.join(PATIENCE)
     for one in sockets:
         one.close()
     assert set(ended) == {"one", "two", "waiting"}
-    assert max(ended.values()) - asked < 1.5, "who waits is sent home at once"
-    # Settings: 1 s for open requests, 0.5 s of grace for workers.
-    assert took < 1.0 + 0.5 + 2.5
+    assert max(ended.values()) - asked < 3.0, "who waits is sent home at once, not after 3 s"

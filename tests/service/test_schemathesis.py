@@ -41,7 +41,7 @@ def known(service: ServedClient) -> dict[str, str]:
 
 
 def check(case: Any, url: str) -> None:
-    case.validate_response(case.call(base_url=url, timeout=30.0), checks=CHECKS)
+    case.validate_response(case.call(base_url=url, timeout=120.0), checks=CHECKS)
 
 
 def run(service: ServedClient, known: dict[str, str], examples: int) -> int:
