@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from other_units import in_other_units
 from scene_cases import bladed_disk, loose_mass, oscillator, two_dof
-from test_exact_checks import in_other_units
 
 from solver import Scene, annulus, solve
 

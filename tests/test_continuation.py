@@ -9,19 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from itertools import islice
 
 import numpy as np
 import pytest
 from contact_cases import central_difference
 from scene_cases import bladed_disk, loose_mass, mixed_disk, oscillator, two_dof
+from walked_branches import UNSTABLE, walked, with_damping
 
 from solver import BranchStatus, ContinuationSettings, Predictor, Scene, march, solve, sweep
-from solver.balance.balance import Balance, build
+from solver.balance.balance import build
 from solver.balance.kernels.output import RESIDUAL
 from solver.balance.workspace import Workspace
-from solver.branches.sweep import Stretch, walk
 
 RESPONSES: dict[str, Callable[[], Scene]] = {
     **{f"two-dof N1={N1:g}": lambda N1=N1: two_dof(N1=N1) for N1 in (0.0, 30.0, 200.0)},
@@ -237,44 +235,6 @@ def test_tangents_against_solving_again(
         measures = workspace.measure(u.copy(), p)
         assert measures is not None
         assert slope == pytest.approx(measures.values[3], rel=1e-8)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Walked:
-    """A branch of a balance that no scene describes."""
-
-    status: BranchStatus | None
-    values: np.ndarray
-    solutions: np.ndarray
-    measures: np.ndarray
-
-    @property
-    def turns(self) -> np.ndarray:
-        """Parameter values at which the branch turns back."""
-        return self.values[1:-1][np.diff(np.sign(np.diff(self.values))) != 0]
-
-
-def with_damping(scene: Scene, path: str, damping: float, frequency_hz: float | None = None) -> Balance:
-    """The balance of a scene whose modes are all given this damping, which may be negative."""
-    balance = build(scene, path, harmonics=5, frequency_hz=frequency_hz)
-    dampings = np.full_like(balance.system.dampings, damping)
-    return replace(balance, system=balance.system._replace(dampings=dampings))
-
-
-def walked(balance: Balance, start: float, stop: float, predictor: Predictor = Predictor.TANGENT) -> Walked:
-    stretches: list[Stretch] = list(
-        islice(walk(Workspace.of(balance), start, stop, ContinuationSettings(predictor=predictor)), 20)
-    )
-    solutions = np.concatenate([stretch.solutions for stretch in stretches])
-    return Walked(
-        status=stretches[-1].status,
-        values=balance.parameter.all_outside(solutions[:, -1].copy()),
-        solutions=solutions,
-        measures=np.concatenate([stretch.measures for stretch in stretches]),
-    )
-
-
-UNSTABLE = oscillator({"kt": 0.5, "mu": 0.3, "N0": 5.0}, k=1.0, c=0.05)
 
 
 @pytest.mark.parametrize("predictor", Predictor)

@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from contact_cases import central_difference
+from law_scene_cases import GAP
+from law_scene_cases import scene as two_directions
 from matrix_cases import beam_scene
-from test_law_scenes import GAP
-from test_law_scenes import scene as two_directions
-from test_sensitivity import BEAM, TWO_DOF, disk, loose, two_dof
+from sensitivity_cases import BEAM, TWO_DOF, disk, loose, two_dof
 
 import solver
 from solver.balance.balance import Balance, build

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from other_units import in_other_units
 from scene_cases import DISK_ROWS, bladed_disk, loose_mass, mixed_disk, oscillator, row_scene, two_dof
 
 from solver import (
@@ -128,23 +129,6 @@ def test_homogeneity(name: str):
     assert other.max_abs == pytest.approx(factor * one.max_abs, rel=1e-10)
     np.testing.assert_allclose(other.observed, factor * one.observed, atol=1e-10 * other.max_abs)
     assert other.error_estimate == pytest.approx(factor * one.error_estimate, rel=1e-3)
-
-
-def in_other_units(scene: Scene, *, length: float, time: float) -> Scene:
-    """The scene in units of `length` metres and `time` seconds; the unit of force stays the newton."""
-    raw: dict[str, Any] = scene.to_dict()
-    structure = raw["structure"]
-    structure["stiffness_proportional_damping"] = scene.structure.stiffness_proportional_damping / time
-    structure["masses"] = {mass.dof: mass.m * length / time**2 for mass in scene.structure.masses}
-    for spring in structure["springs"]:
-        spring["k"] *= length
-        spring["c"] = spring.get("c", 0.0) * length / time
-    for damper in structure.get("dampers", []):
-        damper["c"] *= length / time
-    for contact in raw["contacts"]:
-        contact["kt"] *= length
-    raw["observe"]["band"] = [edge * time for edge in scene.observe.band]
-    return Scene.from_dict(raw)
 
 
 @every_case

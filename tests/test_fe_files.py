@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fe_files import abaqus_input, ansys_mapping, coordinate, dmig, hbmat, op4_binary, op4_text
+from fe_file_set import NODES, A, files
+from fe_files import abaqus_input, ansys_mapping, dmig, hbmat, op4_binary, op4_text
 
 from solver.matrices.files import MatrixFileError, array_names, read_labelled, read_matrix
 from solver.matrices.labels import label, read_labels
@@ -15,10 +16,6 @@ from solver.matrices.load_set import in_si, read_set
 from solver.matrices.readers.label import Label
 from solver.matrices.readers.numbers_in_text import FormatError
 
-A = np.array(
-    [[4.0, -1.5, 0, 0, 1e-3], [-1.5, 3, 0.25, 0, 0], [0, 0.25, 2, 0, 0], [0, 0, 0, 7, 0], [1e-3, 0, 0, 0, 1]]
-)
-NODES = [(3, 1), (3, 2), (8, 1), (8, 6), (12, 3)]
 LABELS = tuple(Label(*pair) for pair in ((3, "UX"), (3, "UY"), (8, "UX"), (8, "ROTZ"), (12, "UZ")))
 # Two masses by hand after the documents, so that our writer and reader do not share a mistake.
 BY_HAND = {
@@ -69,25 +66,6 @@ BY_HAND = {
 def test_layouts_by_hand(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text(BY_HAND[name])
     assert np.array_equal(read_matrix(tmp_path / name, "K").toarray(), [[3.0, -1.5], [-1.5, 2.5]])
-
-
-def files() -> dict[str, bytes]:
-    pair = {"MAA": np.eye(5), "KAA": A, "RECT": A[:, :2]}
-    texts = {
-        "k.matrix": hbmat(A), "k.mtx": abaqus_input(A, NODES), "full.mtx": abaqus_input(A, NODES, full=True),
-        "triplets.mtx": coordinate(A), "k.sti": coordinate(A), "k.mas": coordinate(A),
-        "k.pch": dmig("MAAX", np.eye(5), NODES) + dmig("KAAX", A, NODES),
-        "k.dmig": dmig("K2GG", A, NODES, large=False),
-        "dense.op4": op4_text(pair), "single.op4": op4_text(pair, double=False),
-        "strings.op4": op4_text(pair, sparse=True), "big.op4": op4_text(pair, sparse=True, bigmat=True),
-    }  # fmt: skip
-    made = {name: text.encode() for name, text in texts.items()}
-    for order in "<>":
-        for sparse, big, word in ((False, False, 4), (True, False, 4), (True, True, 4), (True, True, 8)):
-            name = f"{'little' if order == '<' else 'big'}-{sparse}-{big}-{word}.op4"
-            made[name] = op4_binary(pair, order=order, sparse=sparse, bigmat=big, word=word)
-    made["single-binary.op4"] = op4_binary({"K": A.astype(np.float32)}, double=False, sparse=True)
-    return made
 
 
 @pytest.mark.parametrize("name", files())

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_floating import pulled, two_blades, underplatform
-from test_floquet import Return
+from floating_cases import pulled, two_blades, underplatform
+from return_map import Return
 
 import optim
 from optim.results.design import DesignStatus

@@ -9,8 +9,9 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from mistuned_cases import VALUES, disk
+from return_map import Return
 from scene_cases import bladed_disk, loose_mass, oscillator, two_dof
-from test_mistuning import VALUES, disk
 
 from solver import (
     ContinuationSettings,
@@ -34,7 +35,6 @@ from solver.marching.kernels import taylor as kernel
 from solver.response.floquet import Growth, coulomb_pieces, growth_of, scene_monodromy
 from solver.response.monodromy import PERIOD, Element, Monodromy, Piece, Structure, monodromy
 from solver.response.solution import Solution
-from solver.scene.scene import CyclicStructure
 
 UNSTABLE = oscillator({"kt": 0.5, "mu": 0.3, "N0": 5.0}, k=1.0, c=0.05)
 
@@ -74,52 +74,6 @@ def test_linear_limits_have_the_multipliers_of_their_poles(name: str):
     assert found.neutral == (1 if name == "stuck" else 0)
     assert found.stable
     assert found.radius == pytest.approx(np.abs(expected).max(), rel=1e-11)
-
-
-class Return:
-    """The marched map of the state from one period to the next, around the motion that repeats."""
-
-    def __init__(self, scene: Scene, frequency_hz: float, steps: int = 1024) -> None:
-        whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
-        self.system, _ = marching._system(whole, 2.0 * math.pi * frequency_hz)
-        self.steps = steps
-        self.orbit = marching._at_rest(self.system)
-        code, _ = self.march(self.orbit, 5000, 1e-13)
-        assert code == kernel.SETTLED
-        self.ports = linear_model(whole).contact_here
-        self.sliders = np.flatnonzero(self.orbit.mode == kernel.STICK)
-
-    def march(self, state: kernel.State, periods: int, tolerance: float = 0.0) -> tuple[int, int]:
-        one, many = np.zeros(0), np.zeros((self.system.kt.size, 0))
-        nothing = kernel.Record(one, one, many, many, many)
-        return kernel.run_periods(self.system, state, self.steps, tolerance, 0, nothing, np.empty(periods))
-
-    def state(self, move: np.ndarray) -> kernel.State:
-        """The orbit's state moved by (x, v, places of the sliders that are held)."""
-        n, kt, held = self.orbit.x.size, self.system.kt, self.sliders
-        force = self.orbit.force.copy()
-        force[held] += kt[held] * (self.ports[held] @ move[:n] - move[2 * n :])
-        return kernel.State(
-            self.orbit.x + move[:n], self.orbit.v + move[n : 2 * n], force, self.orbit.mode.copy()
-        )
-
-    def places(self, state: kernel.State) -> np.ndarray:
-        held = self.sliders
-        sliders = self.ports[held] @ state.x - state.force[held] / self.system.kt[held]
-        return np.concatenate([state.x, state.v, sliders])
-
-    def jacobian(self) -> np.ndarray:
-        size = 2 * self.orbit.x.size + self.sliders.size
-        step = 1e-6 * max(np.abs(self.orbit.x).max(), np.abs(self.orbit.v).max())
-        columns = []
-        for i in range(size):
-            ends = []
-            for sign in (1.0, -1.0):
-                state = self.state(sign * step * np.eye(size)[i])
-                self.march(state, 1)
-                ends.append(self.places(state))
-            columns.append((ends[0] - ends[1]) / (2.0 * step))
-        return np.array(columns).T
 
 
 @pytest.mark.parametrize(

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fe_file_set import files
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from matrix_cases import beam, hb_text
 from scipy.io import mmwrite, savemat
 from scipy.sparse import coo_array, csc_array, dia_array, save_npz
-from test_fe_files import files
 
 import solver
 from solver.errors import SceneError

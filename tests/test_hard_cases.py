@@ -15,7 +15,7 @@ import pytest
 from hard_scenes import HARD, Hard, together, weakly_damped
 from referee import law_error, lost_power, motion_error
 from scene_cases import bladed_disk, two_dof
-from test_continuation import UNSTABLE, Walked, walked, with_damping
+from walked_branches import UNSTABLE, Walked, walked, with_damping
 
 from solver import BranchStatus, ContinuationSettings, Solution, SolutionStatus, march, solve, sweep
 from solver.balance.balance import build

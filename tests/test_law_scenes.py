@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from law_scene_cases import CUBIC, GAP, PLANE, RUB, cyclic, scene
 
 from solver import annulus, hysteresis_loop, march, plan, power_balance, solve, sweep
 from solver.balance.balance import build
@@ -14,43 +15,6 @@ from solver.balance.workspace import Workspace
 from solver.errors import SceneError, SettingError
 from solver.jit import fourier
 from solver.scene.scene import GapSpring, PolynomialSpring, Scene
-
-RUB: dict[str, Any] = {
-    "law": "elastic-normal", "normal_between": ["v", "ground"], "kt": 2.0, "mu": 0.4, "kn": 1.5, "N0": 0.2,
-}  # fmt: skip
-PLANE: dict[str, Any] = {
-    "law": "coulomb-2d",
-    "between_second": ["v", "ground"],
-    "kt": 2.0,
-    "mu": 0.5,
-    "N0": 0.8,
-}
-GAP: dict[str, Any] = {"law": "gap", "k": 3.0, "gap": 0.25}
-CUBIC: dict[str, Any] = {"law": "polynomial", "a1": 0.2, "a2": 0.1, "a3": 1.0}
-
-
-def scene(*contacts: dict[str, Any], amplitude: float = 1.0, second: float = 0.6) -> Scene:
-    """Two masses u and v in two directions, coupled, both driven; contacts of u to the ground."""
-    return Scene.from_dict(
-        {
-            "name": "two-directions",
-            "structure": {
-                "kind": "lumped",
-                "masses": {"u": 1.0, "v": 1.3},
-                "springs": [
-                    {"between": ["u", "ground"], "k": 1.0, "c": 0.06},
-                    {"between": ["v", "ground"], "k": 1.6, "c": 0.08},
-                    {"between": ["u", "v"], "k": 0.4, "c": 0.02},
-                ],
-            },
-            "contacts": [{"name": f"c{i}", "between": ["u", "ground"], **c} for i, c in enumerate(contacts)],
-            "excitation": [
-                {"dof": "u", "amplitude": amplitude},
-                {"dof": "v", "amplitude": second * amplitude, "phase": 0.9},
-            ],
-            "observe": {"dof": "u", "band": [0.05, 0.5]},
-        }
-    )
 
 
 def issues(**contact: Any) -> dict[str, str]:
@@ -289,28 +253,6 @@ def test_a_gap_bends_the_peak_over():
     assert both[0].peak is not None
     assert both[1].peak is not None
     assert both[0].peak.value == pytest.approx(both[1].peak.value, rel=1e-8)
-
-
-def cyclic(contact: dict[str, Any]) -> Scene:
-    return Scene.from_dict(
-        {
-            "name": "ring",
-            "structure": {
-                "kind": "cyclic",
-                "sectors": 5,
-                "masses": {"u": 1.0, "v": 1.4},
-                "springs": [
-                    {"between": ["u", "ground"], "k": 1.0, "c": 0.05},
-                    {"between": ["v", "ground"], "k": 1.3, "c": 0.05},
-                    {"between": ["u", "v"], "k": 0.3},
-                    {"between": ["u", "u@next"], "k": 0.2},
-                ],
-            },
-            "contacts": [{"name": "shroud", "between": ["u", "u@next"], **contact}],
-            "excitation": {"dof": "u", "amplitude": 1.0, "engine_order": 2},
-            "observe": {"dof": "u", "band": [0.05, 0.5]},
-        }
-    )
 
 
 @pytest.mark.parametrize(

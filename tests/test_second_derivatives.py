@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from contact_cases import STATES, Case, central_difference, evaluate, random_case
-from test_contact_force import NAMES, TRANSITIONS, critical, reference_case
+from force_cases import NAMES, TRANSITIONS, critical, reference_case
 
 import solver
 from solver.balance.balance import build

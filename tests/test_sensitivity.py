@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from contact_cases import central_difference
+from law_scene_cases import CUBIC, GAP, PLANE, RUB
+from law_scene_cases import scene as two_directions
 from matrix_cases import beam_scene
-from test_law_scenes import CUBIC, GAP, PLANE, RUB
-from test_law_scenes import scene as two_directions
+from sensitivity_cases import BEAM, TWO_DOF, disk, loose, two_dof
 
 import solver
 from solver.balance.balance import Balance, build, for_parameter
@@ -24,44 +25,8 @@ from solver.sensitivity.gradient import Sensitivities
 from solver.sensitivity.nonsmooth import PeakKind, peak_gradient
 
 HARMONICS = 7
-TWO_DOF = ("damper.N0", "damper.N1_ratio", "damper.N1_phase", "damper.kt", "damper.mu", "structure.k1",
-           "structure.k2", "excitation.amplitude", "excitation.phase")  # fmt: skip
 DISK = ("shroud.N0", "shroud.N1", "shroud.kt", "root.mu", "root.kt", "structure.tip_middle",
         "structure.disk_next", "excitation.amplitude")  # fmt: skip
-
-BEAM = ("c.N0", "c.kt", "structure.stiffness_proportional_damping", "structure.mass_proportional_damping")
-
-
-def two_dof(**values: float) -> Scene:
-    changed = {f"damper.{key}": value for key, value in values.items()}
-    return solver.load_scene("two-dof").with_values({"damper.N1_phase": 0.4, **changed})
-
-
-def disk(**values: float) -> Scene:
-    return solver.load_scene("bladed-disk").with_values({"root.N0": 300.0} | values)
-
-
-def loose() -> Scene:
-    """The second mass is held by contacts alone, two of them in a group, and springs share a value."""
-    raw: dict[str, Any] = {
-        "name": "loose",
-        "structure": {
-            "kind": "lumped", "masses": {"a": 1.0, "b": 0.7},
-            "springs": [
-                {"name": "left", "between": ["a", "ground"], "k": 40.0, "c": 0.5, "group": "both"},
-                {"name": "right", "between": ["a", "ground"], "k": 20.0, "c": 0.2, "group": "both",
-                 "factor": 0.5},
-            ],
-        },
-        "contacts": [
-            {"name": "one", "between": ["a", "b"], "kt": 30.0, "mu": 0.3, "N0": 15.0, "N1": 5.0,
-             "group": "pair"},
-            {"name": "two", "between": ["b", "ground"], "kt": 30.0, "mu": 0.3, "N0": 300.0, "N1": 8.0,
-             "group": "pair"},
-        ],
-        "excitation": {"dof": "a", "amplitude": 25.0}, "observe": {"dof": "b", "band": [0.2, 2.0]},
-    }  # fmt: skip
-    return Scene.from_dict(raw)
 
 
 ANY_LAW = two_directions(RUB, GAP, CUBIC, {"kt": 1.0, "mu": 0.3, "N0": 0.4, "N1": 0.1})

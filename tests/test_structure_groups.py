@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mistuned_cases import VALUES, disk, with_mistuning
 from scene_cases import two_dof
-from test_mistuning import VALUES, disk, with_mistuning
 
 from solver import Scene, SceneError, SettingError, annulus, mistuned, solve, sweep
 from solver.linear.assembly import linear_model, structure_derivative

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from law_scene_cases import CUBIC, GAP, cyclic
 from scene_cases import bladed_disk, two_dof
-from test_law_scenes import CUBIC, GAP, cyclic
 
 from solver import Effects, Scene, march, plan, solve, sweep
 from solver.balance.balance import build

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from law_scene_cases import CUBIC, GAP, PLANE, RUB, scene
 from random_scenes import random_scene
 from scene_cases import bladed_disk, mixed_disk, two_dof
-from test_law_scenes import CUBIC, GAP, PLANE, RUB, scene
 
 from solver import (
     Branch,

@@ -12,6 +12,7 @@ import httpx
 import numpy as np
 import pytest
 from page_site import Site, Watch
+from page_visits import BAD_SCENE, visit
 
 import solver
 
@@ -22,35 +23,6 @@ if TYPE_CHECKING:
 
 Profile = tuple["BrowserContext", Watch]
 LONG_MS = 120_000
-BAD_SCENE = """
-name = "my-damper"
-[structure]
-kind = "lumped"
-masses = { blade = 0.05, disk = 0.4 }
-springs = [
-  { name = "airfoil", between = ["blade", "disk"], k = 4.0e5, c = 2.0 },
-  { name = "web", between = ["disk", "ground"], k = 3.0e6, c = 2.0 },
-]
-[[contacts]]
-name = "damper"
-between = ["blade", "disk"]
-kt = 5.0e5
-mu = -0.3
-N0 = 40.0
-[excitation]
-dof = "wing"
-amplitude = 5.0
-[observe]
-dof = "blade"
-band = [300.0, 900.0]
-"""
-
-
-def visit(context: BrowserContext, site: Site, words: str = "") -> Page:
-    page = context.new_page()
-    page.goto(f"{site.url}/{words}")
-    page.locator("html[data-ready]").wait_for(state="attached")
-    return page
 
 
 def downloaded(page: Page, selector: str) -> bytes:

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from page_matrices import ANSYS, place
 from page_site import Site, opened
+from page_visits import BAD_SCENE
 from PIL import Image
-from test_page import BAD_SCENE
-from test_page_matrices import ANSYS, place
 
 from benchmarks.page import OPENED, SLIDE
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import httpx
 import numpy as np
 import pytest
-from fe_files import ansys_mapping, coordinate, hbmat
+from fe_files import coordinate, hbmat
 from matrix_cases import beam
+from page_matrices import ANSYS, K, M, file, place
 from page_site import Site, Watch
-from test_page import visit
+from page_visits import visit
 
 from solver.matrices.readers.registry import readers
 
@@ -19,12 +20,9 @@ expect = pytest.importorskip("playwright.sync_api", reason="the package playwrig
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
 
 if TYPE_CHECKING:
-    from playwright.sync_api import BrowserContext, Page
+    from playwright.sync_api import BrowserContext
 
 Profile = tuple["BrowserContext", Watch]
-# A blade of 0.3 kg, 0.2 m long, clamped at its root: 1.1 kHz.
-M, K = beam(20, length=0.2, EI=2000.0, mass=0.3)
-LABELS = [(2 + row // 2, ("UY", "ROTZ")[row % 2]) for row in range(len(M))]
 DROP = """([selector, name, text]) => {
   const dataTransfer = new DataTransfer();
   dataTransfer.items.add(new File([text], name));
@@ -33,23 +31,6 @@ DROP = """([selector, name, text]) => {
     document.querySelector(selector).dispatchEvent(event);
   }
 }"""
-
-
-def file(name: str, text: str | bytes) -> Any:
-    buffer = text if isinstance(text, bytes) else text.encode()
-    return {"name": name, "mimeType": "application/octet-stream", "buffer": buffer}
-
-
-ANSYS = [
-    file("blade K.matrix", hbmat(K)), file("blade M.matrix", hbmat(M)),
-    file("blade K.mapping", ansys_mapping(LABELS)),
-]  # fmt: skip
-
-
-def place(page: Page, *rows: str) -> None:
-    for at, row in enumerate(rows):
-        page.get_by_label("Node and direction, or row").nth(at).fill(row)
-    page.get_by_role("button", name="Make the scene").click()
 
 
 def test_matrices_become_a_scene_and_its_response(profile: Profile, site: Site) -> None:

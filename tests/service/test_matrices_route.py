@@ -11,7 +11,7 @@ import pytest
 from fe_files import abaqus_input, ansys_mapping, coordinate, dmig, hbmat, op4_binary
 from matrix_cases import beam
 from service_helpers import is_problem
-from test_uploads import npz, upload
+from upload_cases import npz, upload
 
 import solver
 from service.uploads import inspection

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from service_helpers import MakeSettings, until
+from service_helpers import MakeSettings, new_job, until
 from sqlalchemy import func, select, text, update
-from test_database import new_job
 
 from service.cli import main
 from service.client.embedded import EmbeddedService

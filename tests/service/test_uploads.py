@@ -20,6 +20,7 @@ from matrix_cases import beam, hb_text, write_scene
 from scipy.io import mmwrite, savemat
 from scipy.sparse import coo_array, save_npz
 from service_helpers import is_problem
+from upload_cases import npz, saved, upload
 
 import solver
 from service.db.engine import Database
@@ -29,16 +30,6 @@ from service.uploads import inspection
 
 M, K = beam(4)
 MARKET = b"%%%%MatrixMarket matrix %s real general\n%s"
-
-
-def saved(write: Callable[[Any], object]) -> bytes:
-    buffer = io.BytesIO()
-    write(buffer)
-    return buffer.getvalue()
-
-
-def npz(**arrays: Any) -> bytes:
-    return saved(lambda file: np.savez(file, **arrays))
 
 
 FILES: dict[str, bytes] = {
@@ -53,10 +44,6 @@ FILES: dict[str, bytes] = {
     "M.dof": "".join(f"{row + 1}.2\n" for row in range(len(M))).encode(),
     "modes.npz": npz(modes=np.eye(3), omega2=np.arange(1.0, 4.0)),
 }
-
-
-def upload(client: httpx.Client, name: str, data: bytes, **params: str) -> httpx.Response:
-    return client.post("/v1/uploads", params={"name": name, **params}, content=data)
 
 
 @pytest.mark.parametrize("name", FILES)
