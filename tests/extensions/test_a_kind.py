@@ -152,7 +152,7 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    paths = [str(ROOT), str(ROOT / "tests"), str(Path(__file__).parent)]
+    paths = [str(ROOT), str(ROOT / "tests" / "cases"), str(Path(__file__).parent)]
     environment = {**os.environ, "STICKSLIP_KINDS": json.dumps([ENTRY]), "PYTHONPATH": os.pathsep.join(paths)}
     words = ("serve", "--port", str(port), "--database", f"sqlite:///{folder}/jobs.db", "--workers", "1")
     with (folder / "log").open("w") as log:

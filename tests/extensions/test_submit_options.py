@@ -10,7 +10,7 @@ from pydantic import Field
 
 from service.cli import app as commands
 from service.cli.commands import submit
-from service.cli.failures import InputError
+from service.errors import InputError
 from service.jobs.kind_view import KindView
 from service.jobs.kinds import SHIPPED
 from service.jobs.kinds.problem import Pair, ProblemRequest, Ranges

@@ -1,0 +1,89 @@
+"""`import stickslip`: every public name under one, loaded on first use, with types and short texts."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import optim
+import solver
+import stickslip
+from service.client.client import Client
+from service.errors import ServiceProblem
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+HEAVY = {"numba", "llvmlite", "numpy", "scipy", "pydantic", "casadi", "httpx", "typer", "rich", "matplotlib"}
+
+
+def test_every_name_is_that_of_its_home() -> None:
+    for home in (solver, optim):
+        assert [name for name in home.__all__ if getattr(stickslip, name) is not getattr(home, name)] == []
+    assert stickslip.Client is Client
+    assert stickslip.ServiceProblem is ServiceProblem
+
+
+def test_no_name_has_two_homes() -> None:
+    names = [*solver.__all__, *optim.__all__, "Client", "ServiceProblem"]
+    assert len(names) == len(set(names))
+    assert sorted(stickslip.__all__) == sorted(names)
+
+
+@pytest.mark.parametrize("module", [stickslip, solver, optim], ids=lambda module: module.__name__)
+def test_completion_offers_every_public_name(module: object) -> None:
+    assert set(module.__all__) <= set(dir(module))  # type: ignore[attr-defined]
+
+
+def test_what_is_not_there_is_said() -> None:
+    with pytest.raises(AttributeError, match=r"module 'stickslip' has no attribute 'solv'"):
+        stickslip.solv  # type: ignore[attr-defined]  # noqa: B018
+    with pytest.raises(ImportError):
+        from stickslip import solv  # type: ignore[attr-defined]  # noqa: F401
+
+
+def test_the_version_is_that_of_the_project() -> None:
+    assert f'version = "{stickslip.__version__}"' in (ROOT / "pyproject.toml").read_text("utf-8")
+
+
+def loaded_by(code: str) -> set[str]:
+    """The modules a new process has after these lines."""
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}\nimport sys; sys.stderr.write(' '.join(sys.modules))"],
+        cwd=ROOT, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return set(done.stderr.split())
+
+
+def test_importing_loads_nothing_heavy() -> None:
+    code = "import stickslip; dir(stickslip); 'solve' in stickslip.__all__"
+    assert loaded_by(code) & HEAVY == set()
+
+
+def test_errors_and_scenes_load_no_kernels() -> None:
+    """What a script does before it computes."""
+    code = "import stickslip; stickslip.SceneError; stickslip.load_scene('two-dof')"
+    assert loaded_by(code) & {"numba", "scipy", "casadi", "matplotlib", "httpx"} == set()
+
+
+def check(script: str, folder: Path) -> str:
+    """What mypy says of a user's script under its strictest rules, as of an installed package."""
+    pytest.importorskip("mypy")
+    (folder / "script.py").write_text(script, "utf-8")
+    words = ["--strict", "--follow-imports", "silent", "--config-file", os.devnull, "--cache-dir", "cache"]
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", *words, "script.py"], cwd=folder, capture_output=True, text=True,
+        check=False, env={**os.environ, "MYPYPATH": str(ROOT)},
+    )  # fmt: skip
+    return done.stdout
+
+
+@pytest.mark.long
+def test_a_checker_knows_every_name_and_no_other(tmp_path: Path) -> None:
+    names = "\n".join(f"stickslip.{name}" for name in (*stickslip.__all__, "__version__"))
+    assert check(f"import stickslip\nfrom stickslip import Scene, solve\n{names}\n", tmp_path).startswith(
+        "Success"
+    )
+    assert 'has no attribute "solv"' in check("import stickslip\nstickslip.solv\n", tmp_path)
