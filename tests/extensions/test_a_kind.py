@@ -23,7 +23,6 @@ from jsonschema import Draft202012Validator
 from launch import COMMAND
 from pydantic import BaseModel, ConfigDict, Field
 
-import optim
 import solver
 from service.cli import main
 from service.client.client import Client
@@ -35,7 +34,7 @@ from service.jobs.kind_view import KindView, Told
 from service.jobs.kinds import SHIPPED
 from service.jobs.kinds.records import sweep_record
 from service.jobs.kinds.registry.loading import registry_of
-from service.jobs.kinds.registry.table import kinds_table, with_tables
+from service.jobs.kinds.registry.table import with_tables
 from service.jobs.kinds.scenes import FrequencyHz, HarmonicRequest, require, resolve_scene, resolved
 from service.jobs.kinds.sizes import balance_issues
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop, SweepRecord
@@ -380,26 +379,6 @@ def test_a_wrong_entry_is_refused_when_the_service_starts(
     with pytest.raises(ConfigurationError) as refused:
         create_app(settings)
     assert [word for word in words if word not in str(refused.value)] == []
-
-
-def test_the_recipe_works_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The file that CONTRIBUTING.md has for a kind, and the row of the table it promises."""
-    recipe = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
-    [code] = re.findall(r"^```python\n(.*?)^```$", recipe, re.DOTALL | re.MULTILINE)
-    (tmp_path / "a_recipe.py").write_text(code, "utf-8")
-    monkeypatch.syspath_prepend(tmp_path)
-    kinds = ("a_recipe:SENSITIVITIES",)
-    [row] = re.findall(r"^\+(\| `sensitivities` .*)$", recipe, re.MULTILINE)
-    assert row in kinds_table(registry_of(kinds)).splitlines()
-    settings = load_settings(database=f"sqlite:///{tmp_path}/jobs.db", workers=1, kinds=kinds)
-    with EmbeddedService(settings) as service:
-        [example] = registry_of(kinds)["sensitivities"].request.model_json_schema()["examples"]
-        job = service.wait(service.submit("sensitivities", example))
-        answer = service.results(job.id)
-    assert job.status is JobState.SUCCESSFUL, job.error
-    wanted = optim.sensitivities(solver.load_scene("two-dof"), harmonics=5).to_json()
-    assert answer.result["rows"] == wanted["rows"]
-    assert [sweep.peak.value for sweep in answer.sweeps if sweep.peak] == [answer.result["peaks"][0]["value"]]
 
 
 @pytest.mark.parametrize("name", ["", "Sweep", "a b", "1st", "x" * 33])
