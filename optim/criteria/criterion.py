@@ -33,7 +33,7 @@ class Form(Enum):
     NAMES = "NAME, repeatable"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Key:
     """A key of problem files, REST bodies and `optim.design`, with its option of the command.
 

@@ -35,7 +35,7 @@ from service.schemas.answers import (
     SweepPage,
 )
 from service.schemas.event_answers import END, EventData, JobPoints, JobProgress, told
-from service.schemas.matrix_answers import MatricesAnswer
+from service.schemas.matrix_answers import FormatAnswer, FormatsAnswer, MatricesAnswer
 from service.schemas.upload_answers import NewUpload, UploadAnswer, UploadPage
 
 _SILENCE_SECONDS = 60.0
@@ -279,6 +279,10 @@ class Client:
     def delete_upload(self, upload_id: str) -> None:
         """Forget an upload."""
         self._transport.send("DELETE", f"/v1/uploads/{segment(upload_id)}")
+
+    def formats(self) -> list[FormatAnswer]:
+        """The formats of files that can be uploaded."""
+        return self._get(FormatsAnswer, "/v1/matrices/formats").items
 
     def matrices(self, body: Mapping[str, Any]) -> MatricesAnswer:
         """What uploaded matrices are; with DOFs named, the scene that begins with them."""

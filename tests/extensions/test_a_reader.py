@@ -15,6 +15,7 @@ from service_helpers import serving
 
 import solver
 from service.cli import main
+from service.client.client import Client
 from service.jobs.kinds import SHIPPED
 from solver import extensions
 from solver.matrices.files import MatrixFileError, read_matrix
@@ -134,6 +135,11 @@ def test_a_damaged_upload_is_refused_by_its_reader(http: httpx.Client) -> None:
     answer = http.post("/v1/uploads", params={"name": "k.kband"}, content="BANDED\nx\n")
     assert answer.status_code == 422
     assert "'x'" in answer.json()["detail"]
+
+
+def test_the_client_lists_it(http: httpx.Client) -> None:
+    with Client(str(http.base_url)) as client:
+        assert [one.suffixes for one in client.formats() if one.name == BANDED.name] == [[".mband", ".kband"]]
 
 
 def test_the_service_describes_it(http: httpx.Client) -> None:

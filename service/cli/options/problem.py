@@ -113,8 +113,9 @@ NOT_OF_A_FRONT = ("weights", "basins", *(key.name for key in limit_keys(of_front
 _LIMITS = "limits"
 
 
+@functools.cache
 def _option(key: Key) -> Any:
-    """The option of a key of a criterion."""
+    """The option of a key of a criterion, the same for every command."""
     words = key.option_help or key.help
     if key.form is Form.NUMBER:
         return Annotated[float | None, typer.Option(key.flag, metavar=key.metavar, parser=number, help=words)]

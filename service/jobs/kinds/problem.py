@@ -108,7 +108,7 @@ class ProblemRequest(HarmonicRequest):
         ``auto``, ``tracked``, ``minimax`` or ``ipopt``.
     """
 
-    # Built when it is first used: most programs only need models of other kinds, and those with all keys.
+    # Used with the keys of criteria alone: `with_keys` builds it.
     model_config = ConfigDict(defer_build=True)
 
     variables: Annotated[dict[VariableName, Pair], Field(min_length=1, max_length=MAX_VARIABLES)] | None = (
@@ -160,8 +160,9 @@ def with_keys(model: type[Problem], keys: Iterable[Key], **further: Any) -> type
     }
     name = model.__name__.removeprefix("_")
     return create_model(
-        name, __base__=model, __module__=model.__module__, __doc__=model.__doc__, **limits, **further
-    )
+        name, __base__=model, __module__=model.__module__, __doc__=model.__doc__,
+        __cls_kwargs__={"defer_build": False}, **limits, **further,
+    )  # fmt: skip
 
 
 ABOUT_THE_SCENE = ("scene", "set")
