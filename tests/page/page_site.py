@@ -26,7 +26,8 @@ class Site:
 
     def __init__(self, folder: Path, **environment: str) -> None:
         self._folder = folder
-        self._environment = {**os.environ, **environment}
+        # The first preview of a kind may take longer than the usual limit where the machine has other work.
+        self._environment = {**os.environ, "STICKSLIP_PREVIEW_SECONDS": "60", **environment}
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self.port: int = free.getsockname()[1]
