@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg
 
 from solver.balance.balance import Balance
 from solver.balance.kernels.poles import spring_poles
@@ -251,7 +250,7 @@ class ClosedLoop:
             L = system.L[s]
             K = system.K[s] + L.conj().T @ one @ L
             state = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse[s] @ K, -inverse[s] @ system.C[s]]])
-            values = linalg.eigvals(state)
+            values = np.linalg.eigvals(state)
             at.append(np.where(values.imag > 0.0, values.imag, _FASTEST))
             half_width.append(np.abs(values.real))
         return Poles(at=np.array(at), half_width=np.array(half_width))

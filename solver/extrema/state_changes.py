@@ -132,7 +132,7 @@ def _departures(v: Real, begin: Real, end: Real, at: Real) -> Real:
     (2, P − 1, 2) : by the parabola that goes on from the interval before, and from the one behind; infinite
     where there is none.
     """
-    lengths = np.maximum(np.abs(np.diff(at)), 1e-300)
+    lengths = np.maximum(np.abs(np.diff(at)), 1e-100)  # the square of a ratio must not overflow
     rise = np.diff(v, axis=0)
     ratio = ((lengths[1:] / lengths[:-1]) ** 2)[:, None]
     # Second derivatives, by the share of the interval itself, of the cubics of those beside it.

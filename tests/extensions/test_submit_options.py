@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import Field
 
-from service.cli import app as commands
 from service.cli.commands import submit
 from service.errors import InputError
 from service.jobs.kind_view import KindView
@@ -152,4 +151,3 @@ def test_options_of_the_local_command_keep_their_words() -> None:
         assert {flag: made[flag].annotation for flag in known} == {
             flag: param.annotation for flag, param in known.items()
         }
-    assert commands.app.registered_groups

@@ -23,7 +23,7 @@ TESTS = Path(__file__).parents[1]
 @pytest.fixture(scope="module")
 def extended(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """A service with the kind of tests/extensions/test_a_kind.py."""
-    paths = [str(TESTS.parent), str(TESTS), str(TESTS / "extensions")]
+    paths = [str(TESTS.parent), str(TESTS / "cases"), str(TESTS / "extensions")]
     made = Site(
         tmp_path_factory.mktemp("others"),
         PYTHONPATH=os.pathsep.join(paths),

@@ -31,7 +31,10 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 ADDRESS = "http://127.0.0.1:8000"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 # Pages whose lines need each other, or draw pictures: tests that run them.
-ELSEWHERE = {"fe-example.md": "test_fe_example.py", "paper.md": "test_paper_figures.py"}
+ELSEWHERE = {
+    "fe-example.md": "project/test_fe_example.py",
+    "paper.md": "solver/published/test_paper_figures.py",
+}
 BLOCKS = [
     block
     for page in PAGES

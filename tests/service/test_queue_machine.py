@@ -294,7 +294,7 @@ def unguarded() -> Iterator[None]:
     forgotten = (bindparam("number", type_=Integer) >= 0) & (bindparam("holder", type_=String) != "")
     with pytest.MonkeyPatch.context() as patch:
         weak = (Job.id == bindparam("job")) & (Job.state == JobState.RUNNING) & forgotten
-        for module in ("guarding", "jobs"):
+        for module in ("guards", "jobs"):
             patch.setattr(f"service.db.repositories.{module}.OWNED", weak)
         importlib.reload(job_statements)
         yield

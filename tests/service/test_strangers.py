@@ -72,6 +72,7 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     "POST /v1/uploads": (STORED, FILE),
     "GET /v1/uploads/{upload_id}": (OWNED, None),
     "GET /v1/matrices/formats": (LISTED, None),
+    "GET /v1/kinds": (LISTED, None),
     # Of another's upload it is said that there is none.
     "POST /v1/matrices": (
         (401, 401, 422, 401, 401, 403, 200, 200),

@@ -119,7 +119,10 @@ def _option(key: Key) -> Any:
     words = key.option_help or key.help
     if key.form is Form.NUMBER:
         return Annotated[float | None, typer.Option(key.flag, metavar=key.metavar, parser=number, help=words)]
-    return Annotated[list[str] | None, typer.Option(key.flag, metavar=key.metavar, help=words)]
+    offered = completion.contacts if key.form is Form.NAMES else None
+    return Annotated[
+        list[str] | None, typer.Option(key.flag, metavar=key.metavar, help=words, autocompletion=offered)
+    ]
 
 
 def takes_problem(command: Command, without: Sequence[str] = ()) -> Command:

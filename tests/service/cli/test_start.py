@@ -29,11 +29,16 @@ def loaded_by(*arguments: str) -> set[str]:
     return set(done.stderr.split())
 
 
-@pytest.mark.parametrize("words", ["--help", "--version", "submit --help", "db --help", "keys --help"])
+@pytest.mark.parametrize("words", ["--help", "--version", "db --help", "keys --help"])
 def test_help_loads_no_command(words: str) -> None:
     loaded = loaded_by(*words.split())
     assert loaded & (SERVICE | PICTURES | DESIGN | NUMBERS | {"rich"}) == set()
-    assert [name for name in loaded if name.endswith("_commands") or name.endswith("_command")] == []
+    assert [name for name in loaded if name.startswith("service.cli.commands.")] == []
+
+
+def test_the_list_of_kinds_loads_no_service() -> None:
+    """Their names and summaries stand in the files of the kinds alone, which are loaded for it."""
+    assert loaded_by("submit", "--help") & (SERVICE | PICTURES | DESIGN | {"rich", "numba", "scipy"}) == set()
 
 
 def test_help_of_a_command_loads_no_numbers() -> None:
