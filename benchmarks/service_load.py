@@ -146,8 +146,8 @@ def seconds_of_one_job(runs: int = 200) -> float:
 
 def _time_jobs(runs: int) -> float:
     from service.jobs.checkpoints import Checkpoints
+    from service.jobs.common.scenes import shipped_scene
     from service.jobs.kinds import SHIPPED, warm_up
-    from service.jobs.kinds.scenes import shipped_scene
     from service.workers.worker import Throttle, checked
 
     warm_up()

@@ -133,7 +133,7 @@ class Work:
 
 def _one_output() -> tuple[dict[str, object], JobOutput]:
     """Return spec and output of a real small job."""
-    from service.jobs.kinds.scenes import shipped_scene
+    from service.jobs.common.scenes import shipped_scene
 
     scene = shipped_scene("two-dof")
     spec: dict[str, object] = {

@@ -31,9 +31,9 @@ from service.db.repositories import (
 )
 from service.db.repositories.keys import KeyRepository
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
+from service.jobs.common.sizes import work_limited
 from service.jobs.kinds.registry.bodies import KIND
 from service.jobs.kinds.registry.loading import registry_of
-from service.jobs.kinds.sizes import work_limited
 from service.jobs.outputs import OnProgress
 from service.jobs.registry import JobKind, JobRequest, Registry
 from service.jobs.strict_json import digest

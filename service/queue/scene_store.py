@@ -11,7 +11,7 @@ from service.auth.callers import KEYLESS, Caller
 from service.db.models import NOBODY
 from service.db.repositories import SceneRepository, SceneRow
 from service.errors import ConflictError, NotFoundError
-from service.jobs.kinds.scenes import read_scene
+from service.jobs.common.scenes import read_scene
 from service.jobs.strict_json import digest
 from service.uploads.uploads import Uploads
 from solver.scene.scene import load_scene, shipped_scenes

@@ -9,7 +9,7 @@ from typing import Any
 
 from service.errors import InvalidRequestError, MalformedBodyError
 from service.jobs import strict_json
-from service.jobs.kinds.scenes import read_scene
+from service.jobs.common.scenes import read_scene
 from service.jobs.registry import SceneSource
 from solver.errors import Issue
 

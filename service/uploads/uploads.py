@@ -14,7 +14,7 @@ from typing import Any
 from service.auth.callers import KEYLESS, Caller, visible
 from service.db.repositories.uploads import UploadRepository, UploadRow
 from service.errors import InvalidRequestError, NotFoundError, UnreadableUploadError
-from service.jobs.kinds.scenes import UPLOAD
+from service.jobs.common.scenes import UPLOAD
 from service.jobs.strict_json import digest, pointer
 from service.settings.settings import Settings
 from service.uploads.inspection import contents, look_at, resolved_structure

@@ -30,13 +30,13 @@ from service.client.embedded import EmbeddedService
 from service.db.models import JobState
 from service.errors import ConfigurationError, InvalidRequestError, ServiceProblem
 from service.http.app import create_app
+from service.jobs.common.records import sweep_record
+from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, require, resolve_scene, resolved
+from service.jobs.common.sizes import balance_issues
 from service.jobs.kind_view import KindView, Told
 from service.jobs.kinds import SHIPPED
-from service.jobs.kinds.records import sweep_record
 from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.kinds.registry.table import with_tables
-from service.jobs.kinds.scenes import FrequencyHz, HarmonicRequest, require, resolve_scene, resolved
-from service.jobs.kinds.sizes import balance_issues
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop, SweepRecord
 from service.jobs.parts import Part, PartOutput, Parts
 from service.jobs.registry import JobKind, Resolved, SceneSource

@@ -10,10 +10,10 @@ from pydantic import Field
 
 from service.cli.commands import submit
 from service.errors import InputError
+from service.jobs.common.problem import Pair, ProblemRequest, Ranges
+from service.jobs.common.scenes import Number, SceneRequest
 from service.jobs.kind_view import KindView
 from service.jobs.kinds import SHIPPED
-from service.jobs.kinds.problem import Pair, ProblemRequest, Ranges
-from service.jobs.kinds.scenes import Number, SceneRequest
 from service.jobs.registry import JobKind, JobRequest
 
 

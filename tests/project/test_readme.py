@@ -21,8 +21,8 @@ import solver
 from service.cli import main
 from service.cli.app import command
 from service.cli.options.problem_inputs import OPTIONS
+from service.jobs.common.problem import arguments
 from service.jobs.kinds.design import DesignRequest, design_issues
-from service.jobs.kinds.problem import arguments
 from service.jobs.validation import validated
 from service.settings.settings import Settings
 

@@ -27,8 +27,8 @@ from service.db.models import Base, Job, JobState
 from service.db.repositories import DesignRepository
 from service.db.repositories.designs import insert_design
 from service.errors import InvalidRequestError
+from service.jobs.common.records import design_record
 from service.jobs.ids import new_id
-from service.jobs.kinds.records import design_record
 from service.jobs.outputs import DesignRecord, VariableValues
 from service.jobs.validation import validated
 from service.schemas.answers import DesignDetail

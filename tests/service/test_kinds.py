@@ -11,9 +11,9 @@ import pytest
 from service_helpers import is_problem, job_ids
 
 import solver
+from service.jobs.common.records import contact_values
+from service.jobs.common.scenes import MAX_HARMONICS
 from service.jobs.kinds import SHIPPED
-from service.jobs.kinds.records import contact_values
-from service.jobs.kinds.scenes import MAX_HARMONICS
 from service.jobs.validation import validated
 
 

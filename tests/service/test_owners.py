@@ -12,7 +12,7 @@ from service_helpers import PATIENCE, settings_of
 from service.auth.callers import KEYLESS, Caller, Scope, included
 from service.db.models import JobState
 from service.errors import ConflictError, IdempotencyError, InvalidRequestError, NotFoundError
-from service.jobs.kinds.scenes import HarmonicRequest, resolve_scene
+from service.jobs.common.scenes import HarmonicRequest, resolve_scene
 from service.jobs.kinds.sweep import SWEEP
 from service.queue.core import Service
 from solver.scene.scene import load_scene

@@ -15,10 +15,10 @@ import solver
 from optim.criteria import registry
 from optim.problem.problem import Method, pose
 from service.errors import InvalidRequestError
+from service.jobs.common.problem import arguments, problem_of
 from service.jobs.kinds.design import DesignRequest, resolve
 from service.jobs.kinds.pareto import ParetoRequest
 from service.jobs.kinds.pareto import resolve as resolve_front
-from service.jobs.kinds.problem import arguments, problem_of
 from service.jobs.validation import validated
 
 VARIABLES = {"damper.N0": [20, 1000]}

@@ -26,7 +26,7 @@ from service.cli.table import COMMANDS
 from service.jobs.registry import JobKind
 
 if TYPE_CHECKING:
-    from service.jobs.kinds.problem import ProblemRequest
+    from service.jobs.common.problem import ProblemRequest
 
 _OF_ALL = ("fresh", "priority", "max_seconds")
 
@@ -52,7 +52,7 @@ def submission(kind: JobKind, local: Command | None) -> Command:
     kind : what is submitted.
     local : the command that computes the same here; its options are reused.
     """
-    from service.jobs.kinds.problem import ProblemRequest
+    from service.jobs.common.problem import ProblemRequest
 
     made = key_options(kind, local)
     if issubclass(kind.request, ProblemRequest):

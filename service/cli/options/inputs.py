@@ -79,7 +79,7 @@ def join_words(arguments: Sequence[str]) -> list[str]:
 
 def _is_problem(kind: str) -> bool:
     """Whether jobs of this kind are design problems."""
-    from service.jobs.kinds.problem import ProblemRequest
+    from service.jobs.common.problem import ProblemRequest
     from service.settings.kinds import registry_here
 
     registry = registry_here()

@@ -18,7 +18,7 @@ from service.errors import InputError
 from solver.errors import Issue, SceneError, SettingError
 
 if TYPE_CHECKING:
-    from service.jobs.kinds.problem import ProblemRequest
+    from service.jobs.common.problem import ProblemRequest
     from solver.scene.scene import Scene
 
 IssuesOf = Callable[["Scene", Mapping[str, Any]], list[Issue]]
@@ -109,7 +109,7 @@ def posed(
     InputError, SceneError
         What is wrong, by the option or the key that has to change.
     """
-    from service.jobs.kinds.problem import arguments
+    from service.jobs.common.problem import arguments
 
     request = checked(told, model)
     scene = _with_values(told, _scene(told), request)

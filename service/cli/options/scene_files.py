@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from service.errors import InputError
-from service.jobs.kinds.scenes import UPLOAD
+from service.jobs.common.scenes import UPLOAD
 
 if TYPE_CHECKING:
     from service.client.client import Client

@@ -12,7 +12,7 @@ from sqlalchemy.orm import aliased
 
 from service.db.engine import Database
 from service.db.models import Design, Job, JobState, Sweep, Upload
-from service.jobs.kinds.scenes import UPLOAD
+from service.jobs.common.scenes import UPLOAD
 
 _ENDED = [state for state in JobState if state.finished]
 _NO_ANSWER = ""

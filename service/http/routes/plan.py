@@ -9,7 +9,7 @@ from pydantic import ConfigDict
 
 import solver
 from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute
-from service.jobs.kinds.scenes import HarmonicRequest, resolve_scene
+from service.jobs.common.scenes import HarmonicRequest, resolve_scene
 from service.schemas.answers import Answer
 
 _EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "set": {"shroud.N0": 150}}

@@ -7,9 +7,9 @@ from starlette.concurrency import run_in_threadpool
 
 from service.auth.callers import Caller
 from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute, takes_body
+from service.jobs.common.sizes import work_limited
 from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
 from service.jobs.kinds.registry.bodies import KIND, any_body, examples, request_of
-from service.jobs.kinds.sizes import work_limited
 from service.jobs.registry import JobKind, Resolved
 from service.queue.core import Service
 from service.schemas.preview_answers import LimitsPreview, PointPreview, SweepPreview

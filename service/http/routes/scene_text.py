@@ -10,7 +10,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute
 from service.http.routes.described import TEXT, media
-from service.jobs.kinds.scenes import SceneRequest, resolve_scene
+from service.jobs.common.scenes import SceneRequest, resolve_scene
 from service.jobs.registry import SceneSource
 from service.schemas.scene_text import issues_of_scene, read_text
 from solver.scene.toml import toml_text

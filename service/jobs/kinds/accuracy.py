@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 import solver
-from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.records import sweep_records
-from service.jobs.kinds.registry.results import Amplitude, EndedResult, Table
-from service.jobs.kinds.scenes import (
+from service.jobs.common.records import sweep_records
+from service.jobs.common.scenes import (
     FrequencyHz,
     Harmonics,
     SceneRequest,
@@ -22,6 +20,8 @@ from service.jobs.kinds.scenes import (
     resolve_scene,
     resolved,
 )
+from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
+from service.jobs.kinds.registry.results import Amplitude, EndedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from service.jobs.strict_json import pointer

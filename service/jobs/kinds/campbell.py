@@ -10,11 +10,9 @@ from pydantic import ConfigDict, Field
 
 import optim
 from optim.errors import DesignError
-from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.problem import Pair, Ranges
-from service.jobs.kinds.records import sweep_records
-from service.jobs.kinds.registry.results import Amplitude, EndedResult, Table
-from service.jobs.kinds.scenes import (
+from service.jobs.common.problem import Pair, Ranges
+from service.jobs.common.records import sweep_records
+from service.jobs.common.scenes import (
     HarmonicRequest,
     PositiveNumber,
     refusal,
@@ -22,7 +20,9 @@ from service.jobs.kinds.scenes import (
     resolve_scene,
     resolved,
 )
-from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
+from service.jobs.kinds.registry.results import Amplitude, EndedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from service.jobs.strict_json import pointer

@@ -9,8 +9,7 @@ from pydantic import ConfigDict, Field, RootModel
 
 import optim
 from optim.criteria.registry import criteria, limit_keys, weight_words
-from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.problem import (
+from service.jobs.common.problem import (
     ProblemRequest,
     Weight,
     arguments,
@@ -18,12 +17,13 @@ from service.jobs.kinds.problem import (
     problem_of,
     with_keys,
 )
-from service.jobs.kinds.problem_check import problem_issues, uncertainty_issues
-from service.jobs.kinds.records import design_record, robust_record, sweep_record
+from service.jobs.common.problem_check import problem_issues, uncertainty_issues
+from service.jobs.common.records import design_record, robust_record, sweep_record
+from service.jobs.common.scenes import refusal, require, resolve_scene, resolved
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.common.uncertain import Uncertain
+from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
 from service.jobs.kinds.registry.results import Amplitude, PeakAt, ReachedResult, Table
-from service.jobs.kinds.scenes import refusal, require, resolve_scene, resolved
-from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
-from service.jobs.kinds.uncertain import Uncertain
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from service.jobs.strict_json import pointer

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 import solver
+from service.jobs.common.periods import history_of
+from service.jobs.common.scenes import FrequencyHz, SceneRequest, require, resolve_scene, resolved
+from service.jobs.common.sizes import march_issues
 from service.jobs.kind_view import Json, KindView, ReadSweep, StoredSweep
-from service.jobs.kinds.periods import history_of
 from service.jobs.kinds.registry.results import Amplitude, KindResult, Table
-from service.jobs.kinds.scenes import FrequencyHz, SceneRequest, require, resolve_scene, resolved
-from service.jobs.kinds.sizes import march_issues
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.scene.scene import Scene

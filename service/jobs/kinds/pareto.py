@@ -9,13 +9,13 @@ from pydantic import ConfigDict, Field
 
 import optim
 from optim.criteria.registry import limit_keys
+from service.jobs.common.problem import ProblemRequest, arguments, default_variables, problem_of, with_keys
+from service.jobs.common.problem_check import problem_issues
+from service.jobs.common.records import sweep_record
+from service.jobs.common.scenes import require, resolve_scene, resolved
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.problem import ProblemRequest, arguments, default_variables, problem_of, with_keys
-from service.jobs.kinds.problem_check import problem_issues
-from service.jobs.kinds.records import sweep_record
 from service.jobs.kinds.registry.results import Amplitude, ReachedResult, Table
-from service.jobs.kinds.scenes import require, resolve_scene, resolved
-from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue

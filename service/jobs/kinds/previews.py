@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field
 
 import solver
-from service.jobs.kinds.scenes import (
+from service.jobs.common.scenes import (
     FrequencyHz,
     HarmonicRequest,
     PositiveNumber,
@@ -20,7 +20,7 @@ from service.jobs.kinds.scenes import (
     resolve_scene,
     resolved,
 )
-from service.jobs.kinds.sizes import (
+from service.jobs.common.sizes import (
     POINTS_OF_A_SWEEP,
     balance_issues,
     coefficients,
@@ -169,7 +169,7 @@ def run_limits(spec: Mapping[str, Any], _progress: Progress, should_stop: Should
 
 def run_point(spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
     """Solve the balance, and look at one period of it."""
-    from service.jobs.kinds.periods import period_of
+    from service.jobs.common.periods import period_of
 
     solution = solver.solve(
         Scene.from_dict(spec["scene"]), frequency_hz=spec["frequency_hz"], harmonics=spec["harmonics"]

@@ -10,10 +10,8 @@ from pydantic import ConfigDict, Field
 
 import solver
 from service.jobs.checkpoints import Checkpoints
-from service.jobs.kind_view import KindView
-from service.jobs.kinds.records import sweep_record
-from service.jobs.kinds.registry.results import Amplitude, Curve, EndedResult, PeakAt, Table
-from service.jobs.kinds.scenes import (
+from service.jobs.common.records import sweep_record
+from service.jobs.common.scenes import (
     FrequencyHz,
     HarmonicRequest,
     Number,
@@ -25,7 +23,9 @@ from service.jobs.kinds.scenes import (
     resolve_scene,
     resolved,
 )
-from service.jobs.kinds.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
+from service.jobs.kind_view import KindView
+from service.jobs.kinds.registry.results import Amplitude, Curve, EndedResult, PeakAt, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, SettingError

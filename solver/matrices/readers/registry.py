@@ -22,8 +22,8 @@ SHIPPED = (
     "solver.matrices.readers.ansys",
     "solver.matrices.readers.abaqus",
     "solver.matrices.readers.calculix",
-    "solver.matrices.readers.output4",
-    "solver.matrices.readers.dmig",
+    "solver.matrices.readers.nastran.output4",
+    "solver.matrices.readers.nastran.dmig",
 )
 _START = 200
 _added: list[Reader] = []

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from service.jobs.common.scenes import HarmonicRequest, SceneRequest
 from service.jobs.kinds import SHIPPED
-from service.jobs.kinds.scenes import HarmonicRequest, SceneRequest
 from service.jobs.registry import JobKind, JobRequest, Registry
 
 KINDS, AGAIN = "kinds", "interrupted"

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
+from solver.matrices.readers.nastran.output4_records import Collector, Heading
 from solver.matrices.readers.numbers_in_text import FormatError
-from solver.matrices.readers.output4_records import Collector, Heading
 
 Order = Literal["<", ">"]
 _HEADINGS = {24: 4, 48: 8}  # bytes of the first record, bytes of a word

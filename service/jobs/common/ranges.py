@@ -6,7 +6,7 @@ from functools import partial
 
 from pydantic import ConfigDict, Field
 
-from service.jobs.kinds.scenes import HarmonicRequest, Number, ParameterPath, check, refusal
+from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath, check, refusal
 from solver.errors import Issue
 from solver.scene.scene import Scene
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-from service.jobs.kinds.scenes import refusal
+from service.jobs.common.scenes import refusal
 from solver.errors import Issue
 from solver.scene.scene import CyclicStructure, Scene
 

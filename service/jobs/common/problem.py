@@ -16,7 +16,7 @@ from optim.criteria.json_types import LARGEST, Number, PositiveNumber
 from optim.criteria.json_types import Name as Name
 from optim.criteria.json_types import Pair as Pair
 from optim.criteria.json_types import Ranges as Ranges
-from service.jobs.kinds.scenes import HarmonicRequest, ParameterPath
+from service.jobs.common.scenes import HarmonicRequest, ParameterPath
 from solver.scene.scene import Scene
 
 MAX_VARIABLES = 50

@@ -18,9 +18,9 @@ import numpy as np
 from scipy.sparse import coo_array
 
 from solver.matrices.readers.choosing import chosen_by_initials, named_by_role
+from solver.matrices.readers.nastran.output4_binary import binary_order, read_binary
+from solver.matrices.readers.nastran.output4_records import Collector, Heading
 from solver.matrices.readers.numbers_in_text import FormatError, ascii_lines, fortran_real
-from solver.matrices.readers.output4_binary import binary_order, read_binary
-from solver.matrices.readers.output4_records import Collector, Heading
 from solver.matrices.readers.reader import Reader
 
 _FORMAT = re.compile(r"\(?\s*(?:1P\s*,?)?\s*(\d+)\s*[EDF]\s*(\d+)\.\d+(?:E\d+)?\s*\)?")

@@ -1,0 +1,1 @@
+"""What several kinds of job share: their scenes, problems, sizes and records."""
