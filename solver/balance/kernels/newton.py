@@ -106,13 +106,18 @@ def arc_newton(
     """
     n = u.size
     rhs = np.empty(n + 1)
-    before, norm = np.inf, np.inf
+    before, norm, stalls = np.inf, np.inf, 0
     for iteration in range(most + 1):
         receptance(system, p, linear)
         norm = evaluate(system, linear, u, p, 0.0, point)
         if not math.isfinite(norm):
             return False, iteration, p, norm
-        if norm <= TARGET or (norm <= ACCEPTED and norm > 0.5 * before):
+        if norm <= TARGET:
+            return True, iteration, p, norm
+        # Far above the target once may be a kink on the way; twice is rounding.
+        stalls = stalls + 1 if norm > 0.5 * before else 0
+        enough = 0 if norm <= 0.1 * ACCEPTED else 1
+        if norm <= ACCEPTED and (stalls > enough or iteration == most):
             return True, iteration, p, norm
         if iteration == most or norm > 1e3 * max(before, 1e-3):
             return False, iteration, p, norm
