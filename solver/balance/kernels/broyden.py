@@ -53,7 +53,12 @@ def frozen_arc(
         if norm <= TARGET:
             return True, iteration, p, norm
         if norm <= ACCEPTED and norm > 0.5 * before:
-            return False, iteration, p, norm  # whether rounding allows no better is for Newton's method to say
+            return (
+                False,
+                iteration,
+                p,
+                norm,
+            )  # whether rounding allows no better is for Newton's method to say
         if iteration == _MOST_SOLVES or norm > 1e3 * max(before, 1e-3):
             return False, iteration, p, norm
         if iteration > 2 and norm > _SLOWEST * before:

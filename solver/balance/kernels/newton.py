@@ -105,25 +105,28 @@ def arc_newton(
     (converged, iterations, p, relative residual).
     """
     n = u.size
-    rhs = np.empty(n + 1)
+    rhs, best = np.empty(n + 1), np.empty(n)
     before, norm, stalls = np.inf, np.inf, 0
+    best_p, best_norm = p, np.inf
+    iteration = 0
     for iteration in range(most + 1):
         receptance(system, p, linear)
         norm = evaluate(system, linear, u, p, 0.0, point)
         if not math.isfinite(norm):
-            return False, iteration, p, norm
-        if norm <= TARGET:
-            return True, iteration, p, norm
-        # Far above the target once may be a kink on the way; twice is rounding.
+            break
+        if norm < best_norm:
+            copy_to(best, u)
+            best_p, best_norm = p, norm
+        # A first stall far above the target may be a kink on the way; a second one is rounding.
         stalls = stalls + 1 if norm > 0.5 * before else 0
-        enough = 0 if norm <= 0.1 * ACCEPTED else 1
-        if norm <= ACCEPTED and (stalls > enough or iteration == most):
+        settled = norm <= 0.1 * ACCEPTED or stalls > 1
+        if norm <= TARGET or (norm <= ACCEPTED and stalls > 0 and settled):
             return True, iteration, p, norm
         if iteration == most or norm > 1e3 * max(before, 1e-3):
-            return False, iteration, p, norm
+            break
         before = norm
         if factorise(system, linear, point, tangent, weight_u, weight_p) == 0.0:
-            return False, iteration, p, norm
+            break
         plane = weight_p * tangent[n] * (p - guess_p)
         for i in range(n):
             rhs[i] = point.residual[i]
@@ -133,7 +136,11 @@ def arc_newton(
         step_back(system, point, rhs)
         set_to(u, u, -1.0, rhs)
         p -= rhs[n]
-    return False, most, p, norm
+    if best_norm <= ACCEPTED:
+        copy_to(u, best)
+        receptance(system, best_p, linear)
+        return True, iteration, best_p, evaluate(system, linear, u, best_p, 0.0, point)
+    return False, iteration, p, norm
 
 
 @apart

@@ -15,7 +15,7 @@ import numpy as np
 
 from solver.balance.kernels.broyden import frozen_arc
 from solver.balance.kernels.jacobian import factorise, step_back
-from solver.balance.kernels.newton import arc_newton, newton
+from solver.balance.kernels.newton import ACCEPTED, arc_newton, newton
 from solver.balance.kernels.output import RESIDUAL, measure, piece
 from solver.balance.kernels.residual import evaluate
 from solver.contacts.kernels.system import AT_BRANCH_POINT, Evaluation, Receptance, System
@@ -122,17 +122,21 @@ def _correct(
     -------
     (converged, iterations as far as the step control is concerned, λ, relative residual).
     """
+    copy_to(trial, guess)
+    p = p_guess
     if trial.size >= FROZEN_FROM and point.counts[AT_BRANCH_POINT] == 1:
-        copy_to(trial, guess)
         good, solves, p, norm = frozen_arc(
             system, linear, trial, p_guess, walk.tangent, weight_u, weight_p, point
         )
         walk.numbers[FROZEN] += solves
         if good:
             return True, (solves + 1) // 2, p, norm
-    copy_to(trial, guess)
+        # What is a solution but for a stall is where Newton's method goes on.
+        if not norm <= ACCEPTED:
+            copy_to(trial, guess)
+            p = p_guess
     good, iterations, p, norm = arc_newton(
-        system, linear, trial, p_guess, guess, p_guess, walk.tangent, weight_u, weight_p, point,
+        system, linear, trial, p, guess, p_guess, walk.tangent, weight_u, weight_p, point,
         control.most_iterations,
     )  # fmt: skip
     walk.numbers[ITERATIONS] += iterations
