@@ -10,6 +10,8 @@ from solver.balance.kernels.linearised_contacts import forces_at, linearise
 from solver.extrema.nodes import Node, NodeSolver
 from solver.jit.fourier import Complex, Integer, Real, cosine_position
 
+_UNKNOWN = -2  # row of a node whose stiffness was not asked for
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resonance:
@@ -53,25 +55,37 @@ class LocalModel:
         balance = solver.workspace.balance
         self._system = balance.system
         nk, nc = balance.system.ks.size, balance.n_ports
-        self._rows: dict[int, tuple[Node, int]] = {}
+        self._rows = np.zeros(0, np.int64)
         self._springs: dict[int, tuple[Node, Springs]] = {}
         self.stiffness = np.zeros((0, nk, nc, nc), np.complex128)
 
-    def rows(self, nodes: list[Node]) -> Integer:
-        """Return the rows of nodes in `stiffness`, -1 for a fold, where nothing is a function of λ."""
-        new = {id(node): node for node in nodes if id(node) not in self._rows}
-        chosen = [node for node in new.values() if node.tangent[-1] != 0.0]
-        self._rows |= {key: (node, -1) for key, node in new.items()}
-        if chosen:
+    def rows(self, numbers: Integer) -> Integer:
+        """Return the rows in `stiffness` of nodes by their `numbers`, -1 for a fold.
+
+        There nothing is a function of λ.
+        """
+        table, workspace = self._solver.table, self._solver.workspace
+        if numbers.max(initial=-1) >= self._rows.size:
+            unknown = np.full(len(table.partners) - self._rows.size, _UNKNOWN)
+            self._rows = np.concatenate([self._rows, unknown])
+        new = np.unique(numbers[self._rows[numbers] == _UNKNOWN])
+        self._rows[new] = -1
+        chosen = new[table.tangents[new, -1] != 0.0]
+        if chosen.size:
             first = len(self.stiffness)
-            self._rows |= {id(node): (node, first + row) for row, node in enumerate(chosen)}
-            stiffness = np.empty((len(chosen), *self.stiffness.shape[1:]), np.complex128)
-            workspace = self._solver.workspace
-            solutions = np.array([node.solution for node in chosen])
+            self._rows[chosen] = first + np.arange(chosen.size)
+            stiffness = np.empty((chosen.size, *self.stiffness.shape[1:]), np.complex128)
             forces = np.empty(stiffness.shape[:3], np.complex128)
-            forces_at(workspace.system, workspace.linear, workspace.point, solutions, forces, stiffness)
+            forces_at(
+                workspace.system,
+                workspace.linear,
+                workspace.point,
+                table.solutions[chosen],
+                forces,
+                stiffness,
+            )
             self.stiffness = np.concatenate([self.stiffness, stiffness]) if first else stiffness
-        return np.array([self._rows[id(node)][1] for node in nodes], np.int64)
+        return self._rows[numbers]
 
     def at(self, node: Node) -> Springs | None:
         """Return the contacts at a node; None at a fold."""

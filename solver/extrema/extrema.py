@@ -28,7 +28,7 @@ from solver.continuation.certificate import PeakCertificate, certified, uncertai
 from solver.continuation.folds import fold_between, motion_scales
 from solver.extrema.intervals import CURVES, highest_share, lowest_share, may_cross
 from solver.extrema.kernels.intervals import IS_BENT, WAVES, WORTH_POLISHING
-from solver.extrema.nodes import Node, NodeSolver, Points, nodes_of, points_of
+from solver.extrema.nodes import Node, NodeSolver, Points
 from solver.extrema.resonance_search import ResonanceSearch, Search
 from solver.extrema.state_changes import ChangeSearch
 from solver.jit.fourier import Real
@@ -56,7 +56,7 @@ class Survey:
     def __init__(self, workspace: Workspace, points: Points) -> None:
         self._workspace, self._points = workspace, points
         self._solver = NodeSolver(workspace)
-        self._nodes = nodes_of(points)
+        self._nodes = self._solver.nodes_of(points)
         self._peaks: list[Peak] = []
         self._undone: list[tuple[float, str]] = []  # λ and why
         self._search = Search(nodes=self._nodes)
@@ -82,7 +82,7 @@ class Survey:
     @property
     def points(self) -> Points:
         """The branch with everything that was solved for between its points, peaks included."""
-        return points_of(self._nodes, self._points)
+        return self._solver.points_of(self._nodes, self._points)
 
     def certificate(self, *, completed: bool) -> PeakCertificate:
         """Say why no higher peak hides between two points, or why that is not known."""
@@ -90,8 +90,8 @@ class Survey:
         if not self._nodes or not completed:
             return uncertain("the branch does not cover the range")
         undone = [*self._search.left, *self._undone]
-        ends = [float(outside(node.at)) for node in self._nodes]
-        gap = max((abs(b - a) for a, b in pairwise(ends)), default=0.0)
+        ends = self._workspace.balance.parameter.all_outside(np.array([node.at for node in self._nodes]))
+        gap = float(np.abs(np.diff(ends)).max(initial=0.0))
         if self._workspace.balance.parameter.kind is Kind.STRUCTURE:
             return uncertain("resonances between points are looked for over the frequency alone", gap)
         if undone:
@@ -141,29 +141,38 @@ class Survey:
             if not waving.any():
                 break
             dense, _, _ = self._solver.halved(dense, waving)
-        refined: list[Node] = [dense[0]]
+        refined: list[Node] = []
         slopes = self._solver.look(dense, top).slopes if len(dense) > 1 else np.zeros((0, 2, 2))
-        for j, (left, right) in enumerate(pairwise(dense)):
-            inside = []
-            for c, curve in enumerate(CURVES):
-                ends = float(slopes[j, 0, c]), float(slopes[j, 1, c])
-                if ends[0] > 0.0 >= ends[1]:
-                    node = self._peak_between(left, right, curve, ends, top)
-                    if node.measures[curve[0]] >= node.measures[MAX_ABS] * (1.0 - 1e-12):
-                        inside.append(node)
-            if left.tangent[-1] * right.tangent[-1] > 0.0:
-                inside.sort(key=lambda node: node.at * left.tangent[-1])
-            for node in map(self._sharpened, _distinct(inside)):
-                self._peaks.append(self._peak(node, interior=True))
-                if node is not left and node is not right:
-                    refined.append(node)
-            refined.append(right)
+        begun = 0
+        for j in np.flatnonzero(np.any((slopes[:, 0] > 0.0) & (slopes[:, 1] <= 0.0), axis=1)).tolist():
+            refined += dense[begun : j + 1]
+            begun = j + 1
+            refined += self._peaks_between(dense[j], dense[j + 1], slopes[j].tolist(), top)
+        refined += dense[begun:]
         self._nodes = refined
         first, last = self._nodes[0], self._nodes[-1]
         if len(self._nodes) == 1 or _slope(first) <= 0.0:
             self._peaks.append(self._peak(first, interior=False))
         if len(self._nodes) > 1 and _slope(last) >= 0.0:
             self._peaks.append(self._peak(last, interior=False))
+
+    def _peaks_between(self, left: Node, right: Node, slopes: list[list[float]], top: float) -> list[Node]:
+        """Collect the maxima of max|x| between two nodes; return the nodes that come between for them.
+
+        `slopes` are those of max x and −min x by the share, at the left and at the right.
+        """
+        inside = []
+        for c, curve in enumerate(CURVES):
+            ends = slopes[0][c], slopes[1][c]
+            if ends[0] > 0.0 >= ends[1]:
+                node = self._peak_between(left, right, curve, ends, top)
+                if node.measures[curve[0]] >= node.measures[MAX_ABS] * (1.0 - 1e-12):
+                    inside.append(node)
+        if left.tangent[-1] * right.tangent[-1] > 0.0:
+            inside.sort(key=lambda node: node.at * left.tangent[-1])
+        found = [self._sharpened(node) for node in _distinct(inside)]
+        self._peaks += [self._peak(node, interior=True) for node in found]
+        return [node for node in found if node is not left and node is not right]
 
     def _peak_between(
         self, left: Node, right: Node, curve: tuple[int, int, int], ends: tuple[float, float], top: float

@@ -30,6 +30,7 @@ from solver.continuation.folds import OnBranch
 from solver.extrema.kernels import intervals
 from solver.extrema.kernels.intervals import look_between, middles_between
 from solver.extrema.kernels.state_changes import locate_change
+from solver.extrema.node_table import NodeTable
 from solver.jit.fourier import Integer, Real
 
 MOST_ITERATIONS = 12
@@ -59,35 +60,14 @@ class Node(NamedTuple):
     solution: Real
     tangent: Real
     measures: list[float]  # the row as a list: they are looked at one by one
-    row: Real  # (MEASURES,)
     observed: Real
     states: Integer
+    number: int  # of its row in `NodeSolver.table`
 
     @property
     def at(self) -> float:
         """λ, in the unit inside."""
         return float(self.solution[-1])
-
-
-def points_of(nodes: Sequence[Node], like: Points) -> Points:
-    """Return nodes as the rows of a branch; `like` gives the shapes where there is none."""
-    if not nodes:
-        return like
-    solutions, tangents, measures = _tables(nodes)
-    return Points(
-        solutions=solutions, tangents=tangents, measures=measures,
-        observed=_stacked([node.observed for node in nodes]),
-        states=np.array([node.states for node in nodes]),
-    )  # fmt: skip
-
-
-def nodes_of(points: Points) -> list[Node]:
-    """Return the rows of a branch as nodes."""
-    rows = zip(
-        points.solutions, points.tangents, points.measures.tolist(), points.measures, points.observed,
-        points.states, strict=True,
-    )  # fmt: skip
-    return [Node._make(row) for row in rows]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,34 +89,47 @@ class NodeSolver:
         self.workspace = workspace
         self.spent = 0
         self.least = workspace.balance.system.least_size
+        balance = workspace.balance
+        self.table = NodeTable(balance.n_unknowns, balance.n_coefficients, MEASURES, balance.system.laws.size)
         self._last: tuple[Sequence[Node], float, Between] | tuple[None, float, None] = None, 0.0, None
+
+    def nodes_of(self, points: Points) -> list[Node]:
+        """Return the rows of a branch as nodes."""
+        return self._added(points.solutions, points.tangents, points.measures, points.observed, points.states)
+
+    def points_of(self, nodes: Sequence[Node], like: Points) -> Points:
+        """Return nodes as the rows of a branch; `like` gives the shapes where there is none."""
+        if not nodes:
+            return like
+        rows, table = numbers_of(nodes), self.table
+        return Points(
+            solutions=table.solutions[rows], tangents=table.tangents[rows], measures=table.measures[rows],
+            observed=table.observed[rows], states=table.states[rows],
+        )  # fmt: skip
+
+    def _added(
+        self, solutions: Real, tangents: Real, measures: Real, observed: Real, states: Integer
+    ) -> list[Node]:
+        """Return rows as nodes, which stand in the table from then on."""
+        first = self.table.add(solutions, tangents, measures, observed, states)
+        numbers = range(first, first + len(solutions))
+        rows = zip(solutions, tangents, measures.tolist(), observed, states, numbers, strict=True)
+        return [Node._make(row) for row in rows]
 
     def look(self, nodes: Sequence[Node], top: float) -> Between:
         """Return what may stand between neighbouring nodes, at least two; that of the last list is kept."""
         known = self._last[2]
         if known is not None and nodes is self._last[0] and top == self._last[1]:
             return known
-        count = len(nodes) - 1
-        solutions, tangents, measures = _tables(nodes)
+        count, table, rows = len(nodes) - 1, self.table, numbers_of(nodes)
         found = Between(
-            measures=measures,
-            at=solutions[:, -1],
-            slopes=np.empty((count, 2, 2)),
-            reach=np.empty(count),
-            error=np.empty(count),
-            flags=np.empty(count, np.int64),
-        )
+            measures=table.measures[rows], at=table.solutions[rows, -1], slopes=np.empty((count, 2, 2)),
+            reach=np.empty(count), error=np.empty(count), flags=np.empty(count, np.int64),
+        )  # fmt: skip
         look_between(
-            solutions,
-            tangents,
-            measures,
-            self.least,
-            top,
-            found.slopes,
-            found.reach,
-            found.error,
-            found.flags,
-        )
+            table.solutions, table.tangents, table.partners, table.scales, rows, found.at, found.measures,
+            self.least, top, found.slopes, found.reach, found.error, found.flags,
+        )  # fmt: skip
         self._last = nodes, top, found
         return found
 
@@ -160,26 +153,22 @@ class NodeSolver:
         The k nodes, None where there is no solution, and by how much the cubics of max x and −min x miss
         them [m], infinite where the node was not found on the plane across the chord.
         """
-        count, size = len(ends) // 2, ends[0].solution.size
-        found, ways = np.zeros((count, size)), np.zeros((count, size))
-        x, out = np.zeros((count, ends[0].observed.size)), np.zeros((count, MEASURES))
-        states, off = np.zeros((count, ends[0].states.size), np.int64), np.zeros(count)
+        table, pairs = self.table, numbers_of(ends).reshape(-1, 2)
+        count = len(pairs)
+        found, ways = np.zeros((count, table.solutions.shape[1])), np.zeros((count, table.solutions.shape[1]))
+        x, out = np.zeros((count, table.observed.shape[1])), np.zeros((count, MEASURES))
+        states, off = np.zeros((count, table.states.shape[1]), np.int64), np.zeros(count)
         workspace = self.workspace
         self.spent += middles_between(
-            workspace.system, workspace.linear, workspace.point, *_tables(ends), share, MOST_ITERATIONS,
-            found, ways, x, out, states, off,
+            workspace.system, workspace.linear, workspace.point, table.solutions, table.tangents,
+            table.measures, table.partners, table.scales, pairs, share, MOST_ITERATIONS, found, ways, x, out,
+            states, off,
         )  # fmt: skip
-        nodes: list[Node | None] = []
         good = np.isfinite(off) & np.isfinite(out).all(axis=1)
-        for i, values in enumerate(out.tolist()):
-            if good[i]:
-                nodes.append(Node(
-                    solution=found[i], tangent=ways[i], measures=values, row=out[i], observed=x[i],
-                    states=states[i],
-                ))  # fmt: skip
-                continue
+        nodes: list[Node | None] = list(self._added(found, ways, out, x, states))
+        for i in np.flatnonzero(~good).tolist():
             left, right = ends[2 * i], ends[2 * i + 1]
-            nodes.append(self._aside(left, right, left.at + share * (right.at - left.at)))
+            nodes[i] = self._aside(left, right, left.at + share * (right.at - left.at))
         return nodes, np.where(good, off, np.inf)
 
     def halved(self, nodes: list[Node], wanted: NDArray[np.bool_]) -> tuple[list[Node], Real, list[float]]:
@@ -239,11 +228,10 @@ class NodeSolver:
 
         `allowed` is the height of a maximum between both that does not matter [m].
         """
-        ends = (left, right)
-        by_parameter = np.array([1.0 / node.tangent[-1] for node in ends])
-        found, states = np.array([node.solution for node in ends]), np.array([node.states for node in ends])
-        ways = np.array([node.tangent for node in ends]) * by_parameter[:, None]
-        x, measures = np.array([node.observed for node in ends]), np.array([node.measures for node in ends])
+        by_parameter = np.array([1.0 / left.tangent[-1], 1.0 / right.tangent[-1]])
+        table, rows = self.table, [left.number, right.number]
+        found, ways = table.solutions[rows], table.tangents[rows] * by_parameter[:, None]
+        x, measures, states = table.observed[rows], table.measures[rows], table.states[rows]
         for column in SLOPES:
             measures[:, column] *= by_parameter
         sides, onward = np.zeros(2, np.int64), math.copysign(1.0, left.tangent[-1])
@@ -255,18 +243,8 @@ class NodeSolver:
         ways *= onward
         for column in SLOPES:
             measures[:, column] *= onward
-        return [
-            Node(
-                solution=found[side],
-                tangent=ways[side],
-                measures=measures[side].tolist(),
-                row=measures[side],
-                observed=x[side],
-                states=states[side],
-            )
-            for side in range(2)
-            if sides[side]
-        ]
+        near = sides > 0
+        return self._added(found[near], ways[near], measures[near], x[near], states[near])
 
     def _aside(self, left: Node, right: Node, p: float) -> Node | None:
         """Return the node at λ = `p` between two, or None if the branch turns there or has no solution.
@@ -354,13 +332,9 @@ class NodeSolver:
             return None
         states = evaluation_by_value(self.workspace.point).states.copy()
         return Node(
-            solution=solution,
-            tangent=tangent,
-            measures=values.tolist(),
-            row=values,
-            observed=observed,
-            states=states,
-        )
+            solution=solution, tangent=tangent, measures=values.tolist(), observed=observed,
+            states=states, number=self.table.add(solution, tangent, values, observed, states),
+        )  # fmt: skip
 
 
 def share_scales(left: OnBranch, right: OnBranch, least: float) -> tuple[float, float]:
@@ -374,15 +348,6 @@ def share_scales(left: OnBranch, right: OnBranch, least: float) -> tuple[float, 
     return scales
 
 
-def _tables(nodes: Sequence[Node]) -> tuple[Real, Real, Real]:
-    """Return solutions, tangents and measures of nodes, one a row."""
-    return (
-        _stacked([node.solution for node in nodes]),
-        _stacked([node.tangent for node in nodes]),
-        _stacked([node.row for node in nodes]),
-    )
-
-
-def _stacked(rows: Sequence[Real]) -> Real:
-    """Return rows as a matrix (`concatenate` is several times faster than `array`)."""
-    return np.concatenate(rows).reshape(len(rows), -1)
+def numbers_of(nodes: Sequence[Node]) -> Integer:
+    """Return the rows of nodes in the table of their solver."""
+    return np.array([node.number for node in nodes], np.int64)

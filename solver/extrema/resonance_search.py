@@ -21,7 +21,8 @@ import numpy as np
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS
 from solver.extrema.contact_springs import LocalModel, Resonance, unknowns
 from solver.extrema.kernels.suspects import find_suspects
-from solver.extrema.nodes import Node, NodeSolver
+from solver.extrema.node_table import NodeTable
+from solver.extrema.nodes import Node, NodeSolver, numbers_of
 from solver.jit.fourier import Complex, Flags, Integer, Real
 
 # What a resonance adds to the amplitude, relative to what stands there, from which it is solved for. What
@@ -72,27 +73,36 @@ class _Intervals:
 
     Attributes
     ----------
-    begin : (P,) number of the node that each begins at.
+    begin : (P,) which node each begins at.
+    numbers : (N,) of the nodes in their table.
     solutions : (N, nt + 1) motions, λ last.
+    observed, states : (N, …) see `solver.continuation.branch.Branch`.
+    amplitude : (N,) of the nodes [m].
     at : (N,) λ of the nodes [rad/s].
     low, high, length : (P,) of each [rad/s].
     """
 
-    nodes: list[Node]
     begin: Integer
+    numbers: Integer
     solutions: Real
+    observed: Real
+    states: Integer
+    amplitude: Real
     at: Real
     low: Real
     high: Real
     length: Real
 
     @classmethod
-    def of(cls, nodes: list[Node], begin: Integer) -> _Intervals:
-        solutions = np.array([node.solution for node in nodes])
+    def of(cls, nodes: list[Node], begin: Integer, table: NodeTable) -> _Intervals:
+        rows = numbers_of(nodes)
+        solutions = table.solutions[rows]
         at = solutions[:, -1]
         low, high = np.minimum(at[begin], at[begin + 1]), np.maximum(at[begin], at[begin + 1])
         return cls(
-            nodes=nodes, begin=begin, solutions=solutions, at=at, low=low, high=high, length=high - low
+            begin=begin, numbers=rows, solutions=solutions, observed=table.observed[rows],
+            states=table.states[rows], amplitude=table.measures[rows, MAX_ABS], at=at, low=low, high=high,
+            length=high - low,
         )  # fmt: skip
 
 
@@ -135,7 +145,7 @@ class ResonanceSearch:
         `begin` (P,) are the numbers of the nodes that the intervals begin at.
         """
         wanted: dict[int, list[Resonance]] = {}
-        rows = _Intervals.of(found.nodes, begin)
+        rows = _Intervals.of(found.nodes, begin, self._solver.table)
         for j, one in self._narrow(rows, *self._unsettled(rows, *np.nonzero(self._suspects(rows, top)))):
             left, right = found.nodes[begin[j]], found.nodes[begin[j] + 1]
             height, share = self._model.adds(left, right, one)
@@ -155,12 +165,11 @@ class ResonanceSearch:
         if not i.size:
             return i, j
         first = _group_starts(i, j)
-        group = np.cumsum(np.isin(np.arange(i.size), first)) - 1
         last = np.append(first[1:], i.size) - 1
+        group = np.repeat(np.arange(first.size), last - first + 1)
         ends = np.stack([rows.begin[j[first]], rows.begin[j[last]] + 1], axis=1)
-        states = np.array([node.states for node in rows.nodes])
-        same = np.all(states[ends[:, 0]] == states[ends[:, 1]], axis=1)
-        linear = self._model.rows([rows.nodes[e] for e in ends.ravel()]).reshape(ends.shape)
+        same = np.all(rows.states[ends[:, 0]] == rows.states[ends[:, 1]], axis=1)
+        linear = self._model.rows(rows.numbers[ends])
         known = (last - first + 1 == GROUP) & same & np.all(linear >= 0, axis=1)
         narrow = np.ones(first.size, bool)
         narrow[known] = self._are_narrow(
@@ -201,12 +210,12 @@ class ResonanceSearch:
         if not i.size:
             return []
         ends = np.stack([rows.begin[j], rows.begin[j] + 1], axis=1)
-        keys, entry = np.unique(i[:, None] * len(rows.nodes) + ends, return_inverse=True)
-        number, node = np.divmod(keys, len(rows.nodes))
+        keys, entry = np.unique(i[:, None] * rows.at.size + ends, return_inverse=True)
+        number, node = np.divmod(keys, rows.at.size)
         entry = entry.reshape(ends.shape)
         reach = np.zeros(keys.size)
         np.maximum.at(reach, entry, rows.length[j][:, None])
-        linear = self._model.rows([rows.nodes[e] for e in node])
+        linear = self._model.rows(rows.numbers[node])
         may = linear >= 0
         stiffness = self._model.stiffness[linear[may], number[may]]
         meets = self._loop.may_meet(stiffness, number[may], rows.at[node[may]], reach[may])
@@ -237,11 +246,10 @@ class ResonanceSearch:
         """
         workspace = self._solver.workspace
         flags = np.empty((self._loop.system.ks.size, rows.begin.size), bool)
-        heights = np.array([node.measures[MAX_ABS] for node in rows.nodes])
+        stands = np.maximum(rows.amplitude[rows.begin], rows.amplitude[rows.begin + 1])
         find_suspects(
-            workspace.system, *self._loop.range, rows.solutions,
-            np.array([node.observed for node in rows.nodes]), rows.begin,
-            np.maximum(np.maximum(heights[rows.begin], heights[rows.begin + 1]), OF_THE_TOP * top),
+            workspace.system, *self._loop.range, rows.solutions, rows.observed, rows.begin,
+            np.maximum(stands, OF_THE_TOP * top),
             self._solver.least, MATTERS, MOVES, FLANKS, RESOLVED, flags,
         )  # fmt: skip
         return flags

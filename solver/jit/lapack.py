@@ -130,11 +130,22 @@ def _own_factors(a: Real, n: int, pivots: Index) -> None:
         inverse = 1.0 / a[k, k]
         for j in range(k + 1, n):
             a[k, j] *= inverse
-        for i in range(k + 1, n):
+        i = k + 1
+        while i + 3 < n:
+            # Four rows at once: the row of the pivot is read a quarter as often.
+            first, second, third, fourth = a[i, k], a[i + 1, k], a[i + 2, k], a[i + 3, k]
+            for j in range(k + 1, n):
+                above = a[k, j]
+                a[i, j] -= first * above
+                a[i + 1, j] -= second * above
+                a[i + 2, j] -= third * above
+                a[i + 3, j] -= fourth * above
+            i += 4
+        while i < n:
             factor = a[i, k]
-            if factor != 0.0:
-                for j in range(k + 1, n):
-                    a[i, j] -= factor * a[k, j]
+            for j in range(k + 1, n):
+                a[i, j] -= factor * a[k, j]
+            i += 1
 
 
 @apart

@@ -33,6 +33,7 @@ from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine
 from solver.jit.lapack import (
     back_substitute,
     back_substitute_transposed,
+    copy_block,
     copy_to,
     fill,
     fill_block,
@@ -68,14 +69,13 @@ def _take_slopes(system: System, point: Evaluation) -> None:
         for a in range(m):
             for b in range(m):
                 block = system.first_block[e] + a * m + b
-                for i in range(n):
-                    for j in range(n):
-                        point.G[block, i, j] = point.dF_dU[block, i, j]
+                G = point.G[block]
+                copy_block(G, point.dF_dU[block])
                 if a == b:
                     stiffness = system.shift[first + a]
                     for i in range(n):
-                        point.G[block, i, i] -= stiffness
-                    point.G[block, 0, 0] += point.elastic[first + a]
+                        G[i, i] -= stiffness
+                    G[0, 0] += point.elastic[first + a]
 
 
 @apart
@@ -117,45 +117,47 @@ def _part(system: System, point: Evaluation) -> None:
 
 
 @apart
-def _eliminate(system: System, linear: Receptance, point: Evaluation, i: int) -> bool:
-    """Fill D⁻¹, W, V and A' of harmonic number i; False if D is singular."""
+def _eliminate(system: System, linear: Receptance, point: Evaluation) -> bool:
+    """Fill D⁻¹, W, V and A' of all harmonics; False if one's D is singular."""
     free, held = point.counts[FREE], point.counts[HELD]
-    A = linear.A[0, i]
-    reduced = point.reduced[i]
-    for a in range(free):
-        for b in range(free):
-            reduced[a, b] = A[point.free[a], point.free[b]]
+    A, reduced, kept, gone = linear.A[0], point.reduced, point.free, point.held
+    for i in range(system.ks.size):
+        for a in range(free):
+            for b in range(free):
+                reduced[i, a, b] = A[i, kept[a], kept[b]]
     if held == 0:
         return True
     D, inverse = np.empty((held, held), np.complex128), np.empty((held, held), np.complex128)
-    g = np.empty(held)
+    g, stored, W, V = np.empty(held), point.inverse, point.W, point.V
     for h in range(held):
-        c = point.held[h]
+        c = gone[h]
         g[h] = point.slopes[system.owner[c]] - system.shift[c]
-    for h in range(held):
-        c = point.held[h]
-        for other in range(held):
-            D[h, other] = A[c, point.held[other]] * g[other]
-        D[h, h] += 1.0
-    if not invert(D, inverse):
-        return False
-    for h in range(held):
-        for other in range(held):
-            point.inverse[i, h, other] = inverse[h, other]
-        for a in range(free):
-            point.W[i, h, a] = 0.0
-            point.V[i, a, h] = 0.0
-    for h in range(held):
-        for other in range(held):
-            c = point.held[other]
-            for a in range(free):
-                point.W[i, h, a] += inverse[h, other] * A[c, point.free[a]]
-                point.V[i, a, h] += A[point.free[a], c] * g[other] * inverse[other, h]
-    for a in range(free):
+    for i in range(system.ks.size):
         for h in range(held):
-            factor, c = point.V[i, a, h], point.held[h]
-            for b in range(free):
-                reduced[a, b] -= factor * A[c, point.free[b]]
+            c = gone[h]
+            for other in range(held):
+                D[h, other] = A[i, c, gone[other]] * g[other]
+            D[h, h] += 1.0
+        if held == 1:
+            if not abs(D[0, 0].real) + abs(D[0, 0].imag) > 0.0:
+                return False
+            inverse[0, 0] = 1.0 / D[0, 0]
+        elif not invert(D, inverse):
+            return False
+        for h in range(held):
+            for other in range(held):
+                stored[i, h, other] = inverse[h, other]
+            for a in range(free):
+                across, back = complex(0.0), complex(0.0)
+                for other in range(held):
+                    across += inverse[h, other] * A[i, gone[other], kept[a]]
+                    back += A[i, kept[a], gone[other]] * g[other] * inverse[other, h]
+                W[i, h, a], V[i, a, h] = across, back
+        for a in range(free):
+            for h in range(held):
+                factor, c = V[i, a, h], gone[h]
+                for b in range(free):
+                    reduced[i, a, b] -= factor * A[i, c, kept[b]]
     return True
 
 
@@ -262,9 +264,8 @@ def factorise(
     n, lu = coefficient_count(system.ks), point.lu
     _part(system, point)
     _take_slopes(system, point)
-    for i in range(system.ks.size):
-        if not _eliminate(system, linear, point, i):
-            return 0.0
+    if not _eliminate(system, linear, point):
+        return 0.0
     _assemble(system, point, lu)
     size = point.counts[FREE] * n
     point.counts[AT_BRANCH_POINT] = 0

@@ -84,16 +84,31 @@ def _waves(a: float, da: float, b: float, db: float) -> bool:
     return 0.0 < one < 1.0 and 0.0 < other < 1.0
 
 
+@compiled
+def _known_scales(
+    solutions: Real, tangents: Real, partners: Integer, scales: Real, one: int, other: int, least: float
+) -> tuple[float, float]:
+    """Return `share_scales` from row `one` of a table to row `other`, worked out once for neighbours."""
+    if partners[one] != other:
+        partners[one] = other
+        scales[one, 0], scales[one, 1] = share_scales(
+            solutions[one], solutions[other], tangents[one], tangents[other], least
+        )
+    return scales[one, 0], scales[one, 1]
+
+
 @apart
 def middles_between(
     system: System, linear: Receptance, point: Evaluation, solutions: Real, tangents: Real, measures: Real,
-    share: float, most: int, found: Real, ways: Real, x: Real, out: Real, states: Integer, off: Real,
+    partners: Integer, kept: Real, pairs: Integer, share: float, most: int, found: Real, ways: Real, x: Real,
+    out: Real, states: Integer, off: Real,
 ) -> int:  # fmt: skip
     """Solve at a share of the way, as `between`, of every pair of points.
 
     Parameters
     ----------
-    solutions, tangents, measures : (2P, …) pairs of points one after the other, as in `look_between`.
+    solutions, tangents, measures, partners, kept : a table of points, as in `look_between`.
+    pairs : (P, 2) rows of it.
     found, ways, x, out, states : (P, …) what is found between each pair; filled.
     off : (P,) by how much the cubics of max x and −min x miss the values found [m], NaN where no solution
         was found; filled.
@@ -106,13 +121,9 @@ def middles_between(
     left_slope, right_slope = np.empty(n), np.empty(n)
     t, r = share, 1.0 - share
     for i in range(off.size):
-        left, right, way, onward = (
-            solutions[2 * i],
-            solutions[2 * i + 1],
-            tangents[2 * i],
-            tangents[2 * i + 1],
-        )
-        scales = share_scales(left, right, way, onward, system.least_size)
+        a, b = pairs[i, 0], pairs[i, 1]
+        left, right, way, onward = solutions[a], solutions[b], tangents[a], tangents[b]
+        scales = _known_scales(solutions, tangents, partners, kept, a, b, system.least_size)
         for k in range(n):
             left_slope[k], right_slope[k] = scales[0] * way[k], scales[1] * onward[k]
         good, iterations = between(
@@ -130,10 +141,10 @@ def middles_between(
         for c in range(2):
             value, slope = (HIGH, HIGH_SLOPE) if c == 0 else (LOW, LOW_SLOPE)
             cubic = (
-                (1.0 + 2.0 * t) * r * r * measures[2 * i, value]
-                + t * r * r * scales[0] * measures[2 * i, slope]
-                + t * t * (3.0 - 2.0 * t) * measures[2 * i + 1, value]
-                - t * t * r * scales[1] * measures[2 * i + 1, slope]
+                (1.0 + 2.0 * t) * r * r * measures[a, value]
+                + t * r * r * scales[0] * measures[a, slope]
+                + t * t * (3.0 - 2.0 * t) * measures[b, value]
+                - t * t * r * scales[1] * measures[b, slope]
             )
             off[i] = max(off[i], abs(cubic - out[i, value]))
         for e in range(states.shape[1]):
@@ -143,8 +154,8 @@ def middles_between(
 
 @apart
 def look_between(
-    solutions: Real, tangents: Real, measures: Real, least: float, top: float, slopes: Real, reach: Real,
-    error: Real, flags: Integer,
+    solutions: Real, tangents: Real, partners: Integer, kept: Real, rows: Integer, at: Real, measures: Real,
+    least: float, top: float, slopes: Real, reach: Real, error: Real, flags: Integer,
 ) -> None:  # fmt: skip
     """Look at all intervals between neighbouring points.
 
@@ -155,7 +166,10 @@ def look_between(
 
     Parameters
     ----------
-    solutions, tangents : (P, nt + 1) λ last; measures : (P, MEASURES) with slopes along the tangents.
+    solutions, tangents : (R, nt + 1) a table of points, λ last.
+    partners, kept : (R,) and (R, 2) the row that `share_scales` are known to from each, and these; filled.
+    rows : (P,) the points of the branch in the table, in its order.
+    at, measures : (P,) λ and (P, MEASURES) of these, with slopes along the tangents.
     least : size of a motion below which it is rounding [m].
     top : the highest amplitude [m].
     slopes : (P − 1, 2, 2) interval, end, max x or −min x: by the share of the interval; filled.
@@ -164,9 +178,9 @@ def look_between(
         filled.
     flags : (P − 1,) bits of `IS_BENT` and `WAVES`; filled.
     """
-    count, nt = solutions.shape[0] - 1, solutions.shape[1] - 1
+    count = rows.size - 1
     for j in range(count):
-        scales = share_scales(solutions[j], solutions[j + 1], tangents[j], tangents[j + 1], least)
+        scales = _known_scales(solutions, tangents, partners, kept, rows[j], rows[j + 1], least)
         reach[j], flags[j] = 0.0, 0
         for c in range(2):
             value, slope = (HIGH, HIGH_SLOPE) if c == 0 else (LOW, LOW_SLOPE)
@@ -181,10 +195,10 @@ def look_between(
                 and _waves(a, da, b, db)
             ):
                 flags[j] |= WAVES
-    far = 1e-9 * abs(solutions[count, nt])
+    far = 1e-9 * abs(at[count])
     length, narrow = np.empty(count), np.zeros(count, np.bool_)
     for j in range(count):
-        length[j] = abs(solutions[j + 1, nt] - solutions[j, nt])
+        length[j] = abs(at[j + 1] - at[j])
     for j in range(count):
         beside = max(length[j - 1] if j > 0 else 0.0, length[j + 1] if j + 1 < count else 0.0)
         narrow[j] = length[j] < LOCATED * beside and measures[j, PIECE] != measures[j + 1, PIECE]
@@ -196,9 +210,9 @@ def look_between(
         before, after = j > 0 and not narrow[j - 1], j + 1 < count and not narrow[j + 1]
         for c in range(2):
             value = HIGH if c == 0 else LOW
-            jump = _jump(solutions, measures, slopes, j, c, value) if before else 0.0
+            jump = _jump(at, measures, slopes, j, c, value) if before else 0.0
             if after:
-                jump = max(jump, _jump(solutions, measures, slopes, j + 1, c, value))
+                jump = max(jump, _jump(at, measures, slopes, j + 1, c, value))
             off = jump * length[j] * length[j] / 64.0
             error[j] = max(error[j], off)
             a, b = measures[j, value], measures[j + 1, value]
@@ -209,10 +223,9 @@ def look_between(
 
 
 @compiled
-def _jump(solutions: Real, measures: Real, slopes: Real, j: int, c: int, value: int) -> float:
+def _jump(at: Real, measures: Real, slopes: Real, j: int, c: int, value: int) -> float:
     """Return by how much the second derivatives by λ of the cubics left and right of point j differ."""
-    nt = solutions.shape[1] - 1
-    left, right = solutions[j, nt] - solutions[j - 1, nt], solutions[j + 1, nt] - solutions[j, nt]
+    left, right = at[j] - at[j - 1], at[j + 1] - at[j]
     here = measures[j, value]
     before = 6.0 * (measures[j - 1, value] - here) + 2.0 * slopes[j - 1, 0, c] + 4.0 * slopes[j - 1, 1, c]
     after = 6.0 * (measures[j + 1, value] - here) - 4.0 * slopes[j, 0, c] - 2.0 * slopes[j, 1, c]

@@ -102,27 +102,32 @@ def _fill_weights(system: System, s: int, first: int, size: int, weights: Real) 
     For modes, whose y is x, pairs with d ≤ c are enough. Returns whether any imaginary part is not zero.
     """
     nc, symmetric = system.contact_modes.shape[1], system.form == MODES
-    modes, duals, seen = system.contact_modes[s], system.contact_duals[s], system.observe_modes[s]
+    modes, duals, seen = system.contact_modes, system.contact_duals, system.observe_modes
     turns = 0.0
     for c in range(nc):
         for d in range(c + 1 if symmetric else nc):
             row = 2 * (c * nc + d)
-            turns += _products(modes[c], duals[d], first, size, weights[row], weights[row + 1])
+            for m in range(size):
+                x, y = modes[s, c, first + m], duals[s, d, first + m]
+                weights[row, m] = x.real * y.real - x.imag * y.imag
+                weights[row + 1, m] = x.real * y.imag + x.imag * y.real
+                turns += abs(weights[row + 1, m])
         row = 2 * (nc * nc + c)
-        turns += _products(seen, duals[c], first, size, weights[row], weights[row + 1])
+        for m in range(size):
+            x, y = seen[s, first + m], duals[s, c, first + m]
+            weights[row, m] = x.real * y.real - x.imag * y.imag
+            weights[row + 1, m] = x.real * y.imag + x.imag * y.real
+            turns += abs(weights[row + 1, m])
     return turns > 0.0
 
 
 @compiled
-def _products(left: Complex, right: Complex, first: int, size: int, real: Real, imag: Real) -> float:
-    """Fill in real and imaginary parts of the products of a block; return the sum of |imaginary|."""
-    turns = 0.0
+def _products(left: Complex, right: Complex, first: int, size: int, real: Real, imag: Real) -> None:
+    """Fill in real and imaginary parts of the products of a block."""
     for m in range(size):
         x, y = left[first + m], right[first + m]
         real[m] = x.real * y.real - x.imag * y.imag
         imag[m] = x.real * y.imag + x.imag * y.real
-        turns += abs(imag[m])
-    return turns
 
 
 @compiled
@@ -173,16 +178,15 @@ def _fill_terms(
 
 
 @compiled
-def _sums(weights: Real, terms: Real, size: int) -> tuple[complex, complex]:
-    """Return Σ w_m / d_m and its derivative for real weights."""
-    a, b, da, db = terms[0], terms[1], terms[2], terms[3]
+def _sums(weights: Real, row: int, terms: Real, size: int) -> tuple[complex, complex]:
+    """Return Σ w_m / d_m and its derivative for one row of real weights."""
     re, im, dre, dim = 0.0, 0.0, 0.0, 0.0
     for m in range(size):
-        w = weights[m]
-        re += w * a[m]
-        im += w * b[m]
-        dre += w * da[m]
-        dim += w * db[m]
+        w = weights[row, m]
+        re += w * terms[0, m]
+        im += w * terms[1, m]
+        dre += w * terms[2, m]
+        dim += w * terms[3, m]
     return complex(re, im), complex(dre, dim)
 
 
@@ -191,26 +195,26 @@ def _add_pairs(
     system: System, size: int, i: int, turns: bool, weights: Real, terms: Real, out: Receptance
 ) -> None:
     """Add a block of modes to A and B of harmonic number i."""
-    nc = out.B.shape[2]
-    symmetric = system.form == MODES
+    A, B = out.A, out.B
+    nc, symmetric = B.shape[2], system.form == MODES
     turned, dturned = complex(0.0), complex(0.0)
     for c in range(nc):
         for d in range(c + 1 if symmetric else nc):
             row = 2 * (c * nc + d)
-            value, dvalue = _sums(weights[row], terms, size)
+            value, dvalue = _sums(weights, row, terms, size)
             if turns:
-                turned, dturned = _sums(weights[row + 1], terms, size)
-            out.A[0, i, c, d] += value + 1j * turned
-            out.A[1, i, c, d] += dvalue + 1j * dturned
+                turned, dturned = _sums(weights, row + 1, terms, size)
+            A[0, i, c, d] += value + 1j * turned
+            A[1, i, c, d] += dvalue + 1j * dturned
             if symmetric and c != d:
-                out.A[0, i, d, c] += value - 1j * turned
-                out.A[1, i, d, c] += dvalue - 1j * dturned
+                A[0, i, d, c] += value - 1j * turned
+                A[1, i, d, c] += dvalue - 1j * dturned
         row = 2 * (nc * nc + c)
-        value, dvalue = _sums(weights[row], terms, size)
+        value, dvalue = _sums(weights, row, terms, size)
         if turns:
-            turned, dturned = _sums(weights[row + 1], terms, size)
-        out.B[0, i, c] += value + 1j * turned
-        out.B[1, i, c] += dvalue + 1j * dturned
+            turned, dturned = _sums(weights, row + 1, terms, size)
+        B[0, i, c] += value + 1j * turned
+        B[1, i, c] += dvalue + 1j * dturned
 
 
 @compiled
@@ -218,8 +222,8 @@ def _add_driven(size: int, i: int, driven: Real, terms: Real, out: Receptance) -
     """Add a block of modes to ū and x̄ of harmonic number i."""
     nc = out.B.shape[2]
     for c in range(nc + 1):
-        value, dvalue = _sums(driven[2 * c], terms, size)
-        turned, dturned = _sums(driven[2 * c + 1], terms, size)
+        value, dvalue = _sums(driven, 2 * c, terms, size)
+        turned, dturned = _sums(driven, 2 * c + 1, terms, size)
         if c == nc:
             out.x_linear[0, i] += value + 1j * turned
             out.x_linear[1, i] += dvalue + 1j * dturned

@@ -58,7 +58,7 @@ def test_solves_as_the_whole_jacobian(
         assert transposed == pytest.approx(exact, rel=1e-9, abs=1e-10 * np.abs(exact).max())
 
 
-@pytest.mark.parametrize("n", [1, 2, 7, 36, 37, 60])
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 7, 24, 36, 37, 60])
 def test_both_sides_of_one_factorisation(n: int) -> None:
     """Below and above the size from which LAPACK factorises."""
     rng = np.random.default_rng(n)
