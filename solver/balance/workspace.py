@@ -202,15 +202,41 @@ class Workspace:
         held = self.balance.system._replace(hold=1)
         other = Workspace.of(replace(self.balance, system=held))
         found = other._plain(p)
-        u, spent = found.u, spent + found.iterations
-        if found.converged:
+        u, spent, good = found.u, spent + found.iterations, found.converged
+        for side in range(2):
+            if not good:
+                break
             drive = self.drive(u, p)
             if drive.relative <= BALANCED:
                 norm, _ = self.evaluate(u, p)
                 return PointSolution(converged=True, u=u, iterations=spent, residual=norm)
             if drive.unheld:
                 return PointSolution(converged=False, u=u, iterations=spent, residual=np.inf, ratchets=True)
+            start = self._other_side(u, p) if side == 0 else None
+            if start is None:
+                break
+            good, more, _ = other._newton(start, u, p)
+            spent += more
         return PointSolution(converged=False, u=u, iterations=spent, residual=np.inf)
+
+    def _other_side(self, u: Real, p: float) -> Real | None:
+        """Return u with loose parts driven on, to where contacts that stick hold them the other way, or None.
+
+        It is None where no contact that sticks all the time may.
+        """
+        system, n = self.balance.system, self.balance.n_coefficients
+        _, point = self.evaluate(u, p)
+        forces = system.loose @ (system.shift * point.residual[::n])
+        way, full = -(forces @ system.loose), point.elastic > 0.0
+        may = full & (np.abs(way) > 0.0)
+        if not np.any(may):
+            return None
+        # As far as takes each from its limit on one side beyond that on the other.
+        pulled = point.elastic * np.abs(u[::n]) + np.abs(point.F).max(axis=1)
+        far = 2.0 * float((pulled[may] / (point.elastic[may] * np.abs(way[may]))).max())
+        moved = u.copy()
+        moved[::n] += far * way
+        return moved
 
     def _by_level(self, u: Real, p: float) -> tuple[bool, int, float]:
         """Raise the excitation from nothing, the result in `u`; as `newton`."""
