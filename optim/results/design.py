@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from optim.criteria.band import BAND
 from optim.criteria.linearised import Conditions
@@ -28,10 +28,6 @@ from optim.results.json import (
 from solver.continuation.branch import Branch
 from solver.results.base import Drawn
 from solver.results.views import Views
-
-if TYPE_CHECKING:
-    pass
-
 
 SAME_HEIGHT = 1e-5  # relative distance within which rows count as equally high
 AT_LIMIT = 1e-4  # relative distance from a bound within which a limited row holds the design

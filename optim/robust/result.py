@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,10 +19,6 @@ from optim.robust.risk_measure import Aim, rank_of
 from optim.robust.scenarios import Outcome
 from solver.results.base import Drawn
 from solver.results.views import Views
-
-if TYPE_CHECKING:
-    pass
-
 
 QUANTILES = (0.05, 0.5, 0.95)
 

@@ -5,16 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from solver.continuation.branch import Branch
 from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.scene import Scene
-
-if TYPE_CHECKING:
-    pass
-
 
 Ranges = tuple[tuple[float, float], ...]
 

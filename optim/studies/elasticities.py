@@ -12,7 +12,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -31,10 +31,6 @@ from solver.results.views import Views
 from solver.scene.annulus import check_in_annulus
 from solver.scene.parameter_paths import PHASE
 from solver.scene.scene import Scene
-
-if TYPE_CHECKING:
-    pass
-
 
 _ANGLES = (".N1_phase", PHASE)
 

@@ -6,16 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from optim.problem.problem import Problem
 from optim.results.design import DesignResult
 from solver.results.base import Drawn
 from solver.results.views import Views
-
-if TYPE_CHECKING:
-    pass
-
 
 SAME = 1e-7  # relative distance within which two points are one
 

@@ -13,7 +13,6 @@ from solver.errors import SolverError
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
-Offers = Callable[[typer.Context, str], list[str]]
 
 _SCENE_FILES = (".toml", ".json")
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
+
+from solver.results.views import on_demand
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +36,7 @@ class Entry:
     def function(self) -> Any:
         """Import the module and return what stands there."""
         module, _, name = self.home.rpartition(".")
-        return getattr(import_module(f"service.cli.{module}"), name)
+        return on_demand(f"service.cli.{module}:{name}")
 
 
 class Deferred(TyperCommand):

@@ -175,8 +175,7 @@ class Workspace:
         """Return the mean force left on what contacts alone hold, where (u, p) solves the rest."""
         system, n = self.balance.system, self.balance.n_coefficients
         _, point = self.evaluate(u, p)
-        # Of the parts' rigid-body motions l, Σ_c l_c kt_c r_c is the sum of all mean forces along them.
-        forces = system.loose @ (system.shift * point.residual[::n])
+        forces = self._mean_forces(point)
         carried = np.abs(system.loose) @ np.abs(point.F).max(axis=1)
         applied = np.abs(system.loose @ (system.shift * self.receptance(p).u_linear[0, 0].real))
         size = max(float(carried.max()), float(applied.max()), float(np.abs(forces).max()))
@@ -192,6 +191,15 @@ class Workspace:
         touches = np.isin(system.laws, (ELASTIC_NORMAL, GAP_SPRING))[system.owner]
         away &= not np.any(system.loose[:, touches])
         return Drive(relative=relative, unheld=away and bool(full.any() or point.counts[UNHELD]))
+
+    def _mean_forces(self, point: Evaluation) -> Real:
+        """Return the mean forces along the motions of loose parts that were left where last evaluated.
+
+        Of the parts' rigid-body motions l, Σ_c l_c kt_c r_c is the sum of all mean forces along them.
+        """
+        system = self.balance.system
+        forces: Real = system.loose @ (system.shift * point.residual[:: self.balance.n_coefficients])
+        return forces
 
     def _held_in_place(self, p: float, spent: int) -> PointSolution:
         """Solve where a constant force holds what no contact does: is the force 0, nothing drives the part.
@@ -226,9 +234,8 @@ class Workspace:
         """
         system, n = self.balance.system, self.balance.n_coefficients
         _, point = self.evaluate(u, p)
-        forces = system.loose @ (system.shift * point.residual[::n])
-        way, full = -(forces @ system.loose), point.elastic > 0.0
-        may = full & (np.abs(way) > 0.0)
+        way = -(self._mean_forces(point) @ system.loose)
+        may = (point.elastic > 0.0) & (way != 0.0)
         if not np.any(may):
             return None
         # As far as takes each from its limit on one side beyond that on the other.

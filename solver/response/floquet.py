@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -33,9 +33,6 @@ from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.annulus import annulus
 from solver.scene.scene import Contact, CyclicStructure, Scene
-
-if TYPE_CHECKING:
-    pass
 
 GROWS = 1e-9  # a multiplier's modulus beyond 1 that is more than rounding
 REAL = 1e-7  # imaginary part, relative to the modulus, that counts as none

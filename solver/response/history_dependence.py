@@ -30,7 +30,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -47,9 +46,6 @@ from solver.response.solution import Solution
 from solver.response.start_from_rest import Start, keeps_sticking
 from solver.response.time_history import all_coordinates
 from solver.scene.scene import AnyContact, ElasticNormalContact, FrictionContact, PlanarContact
-
-if TYPE_CHECKING:
-    pass
 
 _TURN = 2.0 * math.pi
 # A force with a circular limit that differs from kt u + c by less, relative to it, has not slipped.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,9 +25,6 @@ from solver.results.views import Views
 from solver.scene.annulus import annulus, sectors_needed
 from solver.scene.scene import CyclicStructure, Observe, Scene
 from solver.scene.validation import listing, nearest
-
-if TYPE_CHECKING:
-    pass
 
 _OF_THE_SWEEP = 0.4  # share of the time; the rest looks for the peaks of the other blades
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,10 +25,6 @@ from solver.results.told import Piece
 from solver.results.views import Views
 from solver.scene.harmonics import kept_harmonics
 from solver.scene.scene import Scene
-
-if TYPE_CHECKING:
-    pass
-
 
 CLOSED_FORM, SAMPLED = "closed form", "sampled"
 HARMONICS = (1, 3, 5, 7, 11, 15, 21, 31, 41)

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -24,10 +24,6 @@ from solver.results.views import Views
 from solver.scene.parts import Mistuning
 from solver.scene.scene import CyclicStructure, Scene
 from solver.studies.blades import BladePeaks, blade_peaks, mistuned, with_mistuning
-
-if TYPE_CHECKING:
-    pass
-
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
 MOST_SAMPLES = 1_000_000

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -26,10 +26,6 @@ from solver.scene.scene import (
     PolynomialSpring,
     Scene,
 )
-
-if TYPE_CHECKING:
-    pass
-
 
 # Fitted to responses of the shipped scenes at 11 harmonics on one core of a server: seconds of a Newton
 # iteration, of one contact with n coefficients (times n²), and of a solve with n unknowns (times n³).

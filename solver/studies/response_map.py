@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -24,10 +24,6 @@ from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.scene import Scene
 from solver.studies.kernels.map_rows import GIVEN, MAX_ABS, RESIDUAL, ROW_VALUES, SOLVED, solve_row
-
-if TYPE_CHECKING:
-    pass
-
 
 MOST_POINTS = 4_000_000
 OF_THE_GRID = 0.7  # share of the progress, where the peaks are tracked too

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
 from solver.results.notes import BAND_OPEN, FLAGS, between_points, flag_words
+from solver.results.views import on_demand
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -168,8 +168,7 @@ def knows(kind: str) -> bool:
 def of_kind(kind: str) -> Callable[[Json], None]:
     """What prints the result of a job of a kind, imported when it is asked for."""
     module, _, function = _HOMES[kind].partition(".")
-    printed: Callable[[Json], None] = getattr(import_module(f"service.rendering.tables.{module}"), function)
-    return printed
+    return on_demand(f"service.rendering.tables.{module}:{function}")
 
 
 def _amplitudes(found: Json) -> Pairs:
