@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from optim.criteria.criterion import Asked, Criterion, Form, Key, Ranges
+from optim.criteria.criterion import Asked, Criterion, Form, Judged, Key, Ranges, Row
 from optim.criteria.json_types import Ranges as RangesInBodies
 
 if TYPE_CHECKING:
-    from optim.criteria.judged import Judged
-    from optim.criteria.rows import Row
     from optim.problem.cases import Case
 
 

@@ -7,22 +7,17 @@ The worst over a response is a maximum over the frequency, so its gradient is th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, WithJsonSchema
 
-from optim.criteria.criterion import Asked, Criterion, Form, Key
-
-if TYPE_CHECKING:
-    from optim.criteria.judged import Judged
-    from optim.criteria.rows import Row
+from optim.criteria.criterion import Asked, Criterion, Form, Judged, Key, Row, of_sector
 
 _KEY = "max_friction_work"
 
 
 def _rows(judged: Judged) -> list[Row]:
     """A row for every local maximum that competes, of every contact that is limited."""
-    from optim.criteria.judged import of_sector
     from solver.response.wear_nonsmooth import worst_slopes
     from solver.response.worst_wear import Measure, worst_wear
 

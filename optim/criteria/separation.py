@@ -12,12 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from optim.criteria.criterion import Asked, Criterion, Form, Key
+from optim.criteria.criterion import Asked, Criterion, Form, Judged, Key, Row
 from optim.criteria.json_types import Name
 
 if TYPE_CHECKING:
-    from optim.criteria.judged import Judged
-    from optim.criteria.rows import Row
     from solver.scene.scene import AnyContact, FrictionContact, Scene
 
 NEVER_SEPARATES = "never-separates"

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from optim.criteria.criterion import Limits
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.peak_tracking import Tracked, tracked_optimum
-from optim.problem.problem import Limits, Method, Problem
+from optim.problem.problem import Method, Problem
 from optim.results.design import DesignStatus
 
 NO_LIMITS = Limits()

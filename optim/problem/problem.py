@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from optim.criteria.band import BAND
-from optim.criteria.criterion import Asked, Criterion, Ranges
-from optim.criteria.forbidden import FORBIDDEN
+from optim.criteria.criterion import Asked, Criterion, Goals, Limits
 from optim.criteria.peak import PEAK
 from optim.criteria.registry import by_weight, criteria, weight_words
 from optim.errors import DesignError
@@ -32,67 +30,15 @@ class Method(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
-    """What a design must keep.
-
-    Attributes
-    ----------
-    read : mapping of Criterion to object
-        What the keys of each criterion that is limited came to.
-    """
-
-    read: Mapping[Criterion, Any] = field(default_factory=dict)
-
-    def of(self, criterion: Criterion) -> Any:
-        """Return what the keys of a criterion came to; None if none was given."""
-        return self.read.get(criterion)
-
-    def including(self, criterion: Criterion, read: object) -> Limits:
-        """Return the limits with another one of a criterion."""
-        return Limits(read={**self.read, criterion: read})
-
-    @property
-    def any(self) -> bool:
-        """Whether there is a limit at all."""
-        return bool(self.read)
-
-    @property
-    def peak(self) -> float | None:
-        """Largest amplitude over the band of any case [m]."""
-        found: float | None = self.of(PEAK)
-        return found
-
-    @property
-    def band_hz(self) -> float | None:
-        """Widest resonance band of any case [Hz]."""
-        found: float | None = self.of(BAND)
-        return found
-
-    @property
-    def forbidden_hz(self) -> Mapping[str, Ranges]:
-        """Frequencies [Hz] by case in which the amplitude must not exceed the limit that defines the band."""
-        found: Mapping[str, Ranges] = self.of(FORBIDDEN) or {}
-        return found
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Problem:
+class Problem(Goals):
     """A design problem, checked.
 
     Attributes
     ----------
     scene : Scene
         What is designed.
-    variables : tuple of Variable
-        What may be chosen.
     cases : tuple of Case
         The responses it is judged by.
-    limit : float or None
-        Amplitude [m] above which the resonance band is measured; half power of the highest peak if None.
-    weights : mapping of Criterion to float
-        What is minimised: of each the largest value times its weight, summed.
-    limits : Limits
-        What must be kept.
     harmonics : int
         Highest harmonic kept.
     start : mapping or None
@@ -104,20 +50,11 @@ class Problem:
     """
 
     scene: Scene
-    variables: tuple[Variable, ...]
     cases: tuple[Case, ...]
-    limit: float | None
-    weights: Mapping[Criterion, float]
-    limits: Limits
     harmonics: int
     start: Mapping[str, float] | None
     method: Method
     basins: int
-
-    @property
-    def paths(self) -> tuple[str, ...]:
-        """Every parameter path of every variable."""
-        return tuple(path for variable in self.variables for path in variable.paths)
 
     @property
     def plain(self) -> bool:

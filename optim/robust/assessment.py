@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from optim.criteria.band import BAND
+from optim.criteria.criterion import Row
 from optim.criteria.peak import PEAK
-from optim.criteria.rows import Row
 from optim.methods.kkt import KEPT
 from optim.problem.uncertainty_set import Scenario
 from optim.robust.result import Side, Spread

@@ -14,7 +14,7 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from optim.criteria.criterion import Form, Key
+from optim.criteria.key import Form, Key
 from optim.criteria.registry import limit_keys, weight_words
 from service.cli import completion
 from service.cli.options.inputs import number, whole_number

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from optim.criteria.criterion import Form, Key
+from optim.criteria.key import Form, Key
 from optim.criteria.registry import limit_keys
 from service.cli.options import inputs
 from service.cli.options.problem import ProblemFlags

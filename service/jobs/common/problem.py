@@ -11,11 +11,11 @@ from typing import Annotated, Any, Literal, Optional, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, create_model
 
-from optim.criteria.criterion import Key
 from optim.criteria.json_types import LARGEST, Number, PositiveNumber
 from optim.criteria.json_types import Name as Name
 from optim.criteria.json_types import Pair as Pair
 from optim.criteria.json_types import Ranges as Ranges
+from optim.criteria.key import Key
 from service.jobs.common.scenes import HarmonicRequest, ParameterPath
 from solver.scene.scene import Scene
 
