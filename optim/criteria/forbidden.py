@@ -44,10 +44,10 @@ def _ranges(name: str, ranges: object) -> Ranges:
         return ()
     if not isinstance(ranges, Sequence) or isinstance(ranges, str) or not ranges:
         raise DesignError(name, ranges, "must be a list of ranges, [[low, high], …]")
-    found = tuple(number_pair(f"{name}[{i}]", pair) for i, pair in enumerate(ranges))
+    found = tuple(number_pair((name, i), pair) for i, pair in enumerate(ranges))
     for i, (low, high) in enumerate(found):
         if not 0.0 < low < high:
-            raise DesignError(f"{name}[{i}]", [low, high], "must have 0 < low < high")
+            raise DesignError((name, i), [low, high], "must have 0 < low < high")
     return found
 
 

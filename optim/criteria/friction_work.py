@@ -46,8 +46,8 @@ def _read(asked: Asked) -> Mapping[str, float]:
         return dict.fromkeys(rubbing, positive(_KEY, limits))
     for name in limits:
         if name not in names:
-            raise DesignError(_KEY, name, f"must name contacts: {', '.join(names)}")
-    return {name: positive(f"{_KEY}.{name}", value) for name, value in limits.items()}
+            raise DesignError(_KEY, name, f"must name contacts: {', '.join(names)}", place=(_KEY, name))
+    return {name: positive((_KEY, name), value) for name, value in limits.items()}
 
 
 def _work(value: object) -> object:

@@ -1,4 +1,4 @@
-"""The keys by which criteria are limited: the same in problem files, REST bodies, Python and the command."""
+"""Keys by which criteria are limited, and how the command writes any key of a design problem."""
 
 from __future__ import annotations
 
@@ -15,14 +15,53 @@ class Form(Enum):
     """How the option of a key is written."""
 
     NUMBER = "one number"
+    WHOLE_NUMBER = "one whole number"
+    WORD = "one word"
     RANGES = "LO HI, repeatable"
+    BOUNDS = "PATH LO HI, repeatable"
     NUMBER_OR_TABLE = "one number, or NAME=NUMBER, repeatable"
+    NUMBERS_BY_PATH = "PATH=NUMBER, repeatable"
+    NUMBERS_BY_WORD = "WORD=NUMBER, repeatable"
+    WORDS_BY_PATH = "PATH=WORD, repeatable"
     NAMES = "NAME, repeatable"
+
+    @property
+    def repeatable(self) -> bool:
+        """Whether the option may be given several times."""
+        return self not in (Form.NUMBER, Form.WHOLE_NUMBER, Form.WORD)
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """The option of the command that stands for a key.
+
+    Attributes
+    ----------
+    form : Form
+        How it is written.
+    flag : str
+        Its name.
+    metavar : str
+        What stands behind it in the help.
+    help : str
+        What it means.
+    word : str
+        What each name of an option of `Form.NAMES` stands for in the table of the key.
+    example : str
+        Of its text.
+    """
+
+    form: Form
+    flag: str
+    metavar: str
+    help: str
+    word: str = ""
+    example: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Key:
-    """A key of problem files, REST bodies and `optim.design`, with its option of the command.
+    """A key that limits a criterion: of problem files, REST bodies and `optim.design`, with its option.
 
     Attributes
     ----------
@@ -32,18 +71,10 @@ class Key:
         What it means, with its unit; a sentence.
     annotation : type
         Its values in a body: a type that pydantic understands, without None.
-    form : Form
-        How the option is written.
-    flag : str
-        The option.
-    metavar : str
-        What stands behind the option in its help.
+    form, flag, metavar, word, example
+        Those of its option, see `Option`.
     option_help : str
         Help of the option; `help` if empty.
-    word : str
-        What each name of an option of `Form.NAMES` stands for in the table of the key.
-    example : str
-        Of the option's text.
     examples : tuple
         Values of the key.
     needs_limit : bool
@@ -67,3 +98,9 @@ class Key:
             raise ValueError(f"`name` of a key must be such as max_peak, got {self.name!r}")
         if not _FLAG.fullmatch(self.flag):
             raise ValueError(f"`flag` of {self.name} must be such as --max-peak, got {self.flag!r}")
+
+    @property
+    def option(self) -> Option:
+        """Its option."""
+        words = self.option_help or self.help
+        return Option(self.form, self.flag, self.metavar, words, word=self.word, example=self.example)

@@ -73,9 +73,10 @@ def _read(asked: Asked) -> tuple[str, ...]:
     names = [contact.name for contact in asked.scene.contacts if isinstance(contact, FrictionContact)]
     for name, state in states.items():
         if name not in names:
-            raise DesignError(_KEY, name, f"must name friction contacts: {', '.join(names)}")
+            wanted = f"must name friction contacts: {', '.join(names)}"
+            raise DesignError(_KEY, name, wanted, place=(_KEY, name))
         if state != NEVER_SEPARATES:
-            raise DesignError(f"{_KEY}.{name}", state, f"must be {NEVER_SEPARATES}")
+            raise DesignError((_KEY, name), state, f"must be {NEVER_SEPARATES}")
     return tuple(states)
 
 

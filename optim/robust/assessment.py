@@ -9,9 +9,10 @@ from optim.criteria.band import BAND
 from optim.criteria.criterion import Row
 from optim.criteria.peak import PEAK
 from optim.methods.kkt import KEPT
+from optim.problem.keys import Aim
 from optim.problem.uncertainty_set import Scenario
 from optim.robust.result import Side, Spread
-from optim.robust.risk_measure import Aim, rank_of
+from optim.robust.risk_measure import rank_of
 from optim.robust.scenarios import Outcome
 from optim.robust.search import RobustSearch
 from optim.robust.worst_case import Aspect, UnknownScenarioError, pessimise

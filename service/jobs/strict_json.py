@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping
 
 from service.errors import InvalidRequestError, MalformedBodyError
-from solver.errors import Issue
+from solver.errors import Issue, pointer
 
 
 class JsonText(str):
@@ -30,11 +30,6 @@ def encoded(value: object) -> JsonText:
 
 
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
-
-
-def pointer(*parts: object) -> str:
-    """RFC 6901 pointer from keys and indices."""
-    return "".join("/" + str(part).replace("~", "~0").replace("/", "~1") for part in parts)
 
 
 def loads(data: bytes) -> object:

@@ -22,8 +22,7 @@ from service.jobs.kinds.registry.results import EndedResult, Table
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
 from service.jobs.registry import JobKind, Resolved, SceneSource
-from service.jobs.strict_json import pointer
-from solver.errors import Issue, SceneError, SettingError
+from solver.errors import Issue, SceneError, SettingError, pointer
 from solver.scene.scene import CyclicStructure, Scene
 
 if TYPE_CHECKING:
