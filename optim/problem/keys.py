@@ -8,7 +8,6 @@ types and ranges; whether a description fits its scene, `optim.problem.reading` 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from enum import Enum
 from typing import Annotated, Any, Literal, Optional, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, create_model
@@ -17,6 +16,7 @@ from optim.criteria.json_types import LARGEST, Harmonics, Name, Number, Pair, Pa
 from optim.criteria.key import Form, Key, Option
 from optim.criteria.registry import criteria, limit_keys, weight_words
 from optim.problem.uncertainty_type import Uncertain
+from optim.problem.words import AimWord, MethodWord, ScalingWord
 
 MAX_VARIABLES = 50
 MAX_CASES = 50
@@ -27,31 +27,6 @@ POINTS, FEWEST_POINTS = 9, 3
 QUANTILE = 0.95
 FEWEST_SAMPLES = 2
 SEED = 0
-
-
-class Method(Enum):
-    """How the optimum is searched; the value is the word users write."""
-
-    AUTO = "auto"
-    TRACKED = "tracked"
-    MINIMAX = "minimax"
-    IPOPT = "ipopt"
-
-
-class Scaling(Enum):
-    """Whether equal steps or equal ratios of a variable count equally; AUTO chooses by the bounds."""
-
-    AUTO = "auto"
-    LINEAR = "linear"
-    LOGARITHMIC = "logarithmic"
-
-
-class Aim(Enum):
-    """Over the uncertainty, what is minimised; the value is the word users write."""
-
-    WORST_CASE = "worst-case"
-    MEAN = "mean"
-    QUANTILE = "quantile"
 
 
 def _observed(value: object) -> object:
@@ -74,9 +49,6 @@ Observed = Annotated[
     BeforeValidator(_observed),
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
 ]
-MethodWord = Literal["auto", "tracked", "minimax", "ipopt"]
-ScalingWord = Literal["auto", "linear", "logarithmic"]
-AimWord = Literal["worst-case", "mean", "quantile"]
 
 
 class CaseRequest(BaseModel):

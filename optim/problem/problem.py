@@ -13,8 +13,8 @@ from optim.criteria.registry import by_weight, criteria, limit_keys, weight_word
 from optim.errors import DesignError
 from optim.problem.cases import Case, positive, read_cases
 from optim.problem.keys import BASINS, HARMONICS, MOST_BASINS
-from optim.problem.keys import Method as Method
 from optim.problem.variables import Variable, check_variables
+from optim.problem.words import Method as Method
 from solver.balance.balance import check_harmonics
 from solver.scene.scene import Contact, Scene
 

@@ -273,8 +273,8 @@ def _no_path_twice(coordinates: Sequence[Coordinate]) -> None:
     for coordinate in coordinates:
         for path in coordinate.paths:
             if path in seen:
-                place = (*_WHERE, seen[path])
-                raise DesignError(
+                wanted = "must stand in one place, it is there twice"
+                raise DesignError("uncertain", path, wanted, place=(*_WHERE, seen[path]))
                     "uncertain", path, "must stand in one place, it is there twice", place=place
                 )
             seen[path] = coordinate.name

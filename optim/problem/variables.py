@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optim.errors import DesignError
-from optim.problem.keys import Scaling
+from optim.problem.words import Scaling
 from solver.balance.parameter import Kind, resolve
 from solver.errors import at
 from solver.scene.scene import FrictionContact, Scene

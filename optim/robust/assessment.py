@@ -9,8 +9,8 @@ from optim.criteria.band import BAND
 from optim.criteria.criterion import Row
 from optim.criteria.peak import PEAK
 from optim.methods.kkt import KEPT
-from optim.problem.keys import Aim
 from optim.problem.uncertainty_set import Scenario
+from optim.problem.words import Aim
 from optim.robust.result import Side, Spread
 from optim.robust.risk_measure import rank_of
 from optim.robust.scenarios import Outcome

@@ -12,9 +12,9 @@ import numpy as np
 
 from optim.criteria.linearised import Conditions
 from optim.criteria.peak import PEAK
-from optim.problem.keys import Aim
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet
+from optim.problem.words import Aim
 from optim.results.design import DesignResult
 from optim.robust.risk_measure import rank_of
 from optim.robust.scenarios import Outcome

@@ -23,8 +23,8 @@ import numpy as np
 from optim.criteria.criterion import Criterion
 from optim.criteria.linearised import PENALTY, Model, model_of
 from optim.criteria.rows import Evaluation
-from optim.problem.keys import Aim
 from optim.problem.variables import Variable
+from optim.problem.words import Aim
 from optim.robust.scenarios import number_of
 
 Scales = Mapping[Criterion, float]

@@ -21,10 +21,10 @@ from typing import Any
 from optim.criteria.peak import PEAK
 from optim.errors import DesignError
 from optim.methods.evaluator import StoppedError
-from optim.problem.keys import Aim
 from optim.problem.problem import Method, pose
 from optim.problem.uncertainty_input import check_settings, read_uncertain
 from optim.problem.uncertainty_set import Scenario, is_number
+from optim.problem.words import Aim
 from optim.results.design import DesignResult, DesignStatus
 from optim.robust.assessment import side_of
 from optim.robust.cutting_sets import CLOSED, Progress, cutting_sets, sampled

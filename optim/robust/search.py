@@ -10,10 +10,10 @@ from optim.criteria.rows import Evaluation
 from optim.methods.evaluator import StoppedError
 from optim.methods.kkt import Local
 from optim.methods.minimax import REMEMBERED, minimax_search
-from optim.problem.keys import Aim
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet
 from optim.problem.variables import Variable
+from optim.problem.words import Aim
 from optim.results.design import DesignStatus
 from optim.robust.risk_measure import aim_model
 from optim.robust.scenarios import Outcome, outcome, together
