@@ -275,8 +275,6 @@ def _no_path_twice(coordinates: Sequence[Coordinate]) -> None:
             if path in seen:
                 wanted = "must stand in one place, it is there twice"
                 raise DesignError("uncertain", path, wanted, place=(*_WHERE, seen[path]))
-                    "uncertain", path, "must stand in one place, it is there twice", place=place
-                )
             seen[path] = coordinate.name
 
 
