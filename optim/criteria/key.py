@@ -25,11 +25,6 @@ class Form(Enum):
     WORDS_BY_PATH = "PATH=WORD, repeatable"
     NAMES = "NAME, repeatable"
 
-    @property
-    def repeatable(self) -> bool:
-        """Whether the option may be given several times."""
-        return self not in (Form.NUMBER, Form.WHOLE_NUMBER, Form.WORD)
-
 
 @dataclass(frozen=True, slots=True)
 class Option:
@@ -49,6 +44,8 @@ class Option:
         What each name of an option of `Form.NAMES` stands for in the table of the key.
     example : str
         Of its text.
+    words : tuple of str
+        Those it takes, of `Form.WORD`.
     """
 
     form: Form
@@ -57,6 +54,12 @@ class Option:
     help: str
     word: str = ""
     example: str = ""
+    words: tuple[str, ...] = ()
+
+    @property
+    def several(self) -> int:
+        """How many words follow it each time it is given."""
+        return {Form.BOUNDS: 3, Form.RANGES: 2}.get(self.form, 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

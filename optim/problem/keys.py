@@ -8,7 +8,7 @@ types and ranges; whether a description fits its scene, `optim.problem.reading` 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Annotated, Any, Literal, Optional, TypeVar
+from typing import Annotated, Any, Literal, Optional, TypeVar, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, create_model
 
@@ -130,7 +130,13 @@ class ProblemKeys(BaseModel):
     )  # fmt: skip
     method: Annotated[
         MethodWord,
-        Option(Form.WORD, "--method", "M", help="auto, tracked, minimax or ipopt; auto."),
+        Option(
+            Form.WORD,
+            "--method",
+            "M",
+            help="auto, tracked, minimax or ipopt; auto.",
+            words=get_args(MethodWord),
+        ),
     ] = Field(default="auto", description="How the optimum is searched.")
 
 

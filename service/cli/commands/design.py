@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from optim.problem.keys import DesignKeys, FrontKeys
+from optim.problem.keys import options as key_options
 from service.cli.commands.report import SUFFIXES, write
 from service.cli.failures import FELL_SHORT
 from service.cli.options import inputs, problem_inputs
 from service.cli.options import shared as options
-from service.cli.options.problem import NOT_OF_A_FRONT, ProblemFlags, takes_problem
+from service.cli.options.problem import ProblemFlags, takes_problem
 from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.rendering.tables import design as design_reports
@@ -29,7 +30,7 @@ Report = Annotated[
 ]
 
 
-@takes_problem
+@takes_problem(key_options(DesignKeys))
 def design(
     flags: ProblemFlags,
     name: options.AnyScene = None,
@@ -65,11 +66,10 @@ def design(
     end(result.reached, result.status.value)
 
 
-@partial(takes_problem, without=NOT_OF_A_FRONT)
+@takes_problem(key_options(FrontKeys))
 def pareto(
     flags: ProblemFlags,
     name: options.AnyScene = None,
-    points: options.Points = None,
     plot: options.Plot = None,
     out: options.Out = None,
     report: Report = None,
@@ -84,7 +84,7 @@ def pareto(
 
     outputs = Outputs.asked(plot, out)
     page = inputs.output_path("--report", report, SUFFIXES)
-    told = problem_inputs.description(name, flags, "pareto", points=("--points", points))
+    told = problem_inputs.description(name, flags, "pareto")
     scene, given = problem_inputs.posed(told, ParetoRequest, pareto_issues)
     with bar("pareto", "designs") as on_progress:
         import optim
