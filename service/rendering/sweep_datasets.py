@@ -28,7 +28,7 @@ def sweep_dataset(
     scene : that of its job; it is told only if it is the one that was swept.
     """
     arrays = {name: decode(stored) for name, stored in repository.arrays(row.id).items()}
-    names = [contact.name for contact in repository.contacts([row.id])[row.id]]
+    names = [contact.name for contact in repository.parts([row.id])[row.id]]
     states = arrays.get("states")
     variables = point_variables(
         row.parameter, "SI" if row.parameter.startswith("structure.") else parameter_unit(row.parameter),

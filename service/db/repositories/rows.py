@@ -119,6 +119,11 @@ class SweepRow(SweepValues):
     owner: str
     created: datetime
 
+    @property
+    def key(self) -> str:
+        """Its id."""
+        return self.id
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DesignRow(DesignValues):
@@ -127,3 +132,8 @@ class DesignRow(DesignValues):
     job_id: str
     owner: str
     created: datetime
+
+    @property
+    def key(self) -> str:
+        """Its id, which is that of its job."""
+        return self.job_id
