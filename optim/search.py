@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,17 +16,18 @@ from optim.methods.eased import Eased
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.global_look import WholeRange
 from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
-from optim.methods.peak_tracking import Tracked, tracked_optimum
 from optim.problem.keys import ROBUST, DesignKeys
 from optim.problem.keywords import keywords
 from optim.problem.problem import Method, Problem, pose
 from optim.problem.watch import OnProgress, ShouldStop
-from optim.results.basins import Basin
+from optim.results.basins import SAME_PLACE, Basin
 from optim.results.design import DesignResult, DesignStatus
 from solver.scene.scene import Scene
 
+if TYPE_CHECKING:
+    from optim.methods.peak_tracking import Tracked
+
 SAME_HEIGHT = 1e-9  # relative, of two levels that are one
-SAME_PLACE = 1e-3  # scaled distance within which two optima are one
 
 
 @keywords(DesignKeys, without=ROBUST)
@@ -69,6 +70,8 @@ def _solved(problem: Problem, on_progress: OnProgress, should_stop: ShouldStop) 
     begun = time.perf_counter()
     trackable = problem.method in (Method.AUTO, Method.TRACKED) and problem.why_not_tracked is None
     if trackable:
+        from optim.methods.peak_tracking import tracked_optimum
+
         tracked = tracked_optimum(problem, on_progress=on_progress, should_stop=should_stop)
         if problem.method is Method.TRACKED or tracked.status is not DesignStatus.NOT_TRACKED:
             return _of_tracked(problem, tracked, time.perf_counter() - begun)

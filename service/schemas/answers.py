@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import asdict, fields
 from datetime import datetime
-from functools import cache
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -125,8 +124,8 @@ class StoredAnswer(Answer, ABC):
         peak = None
         if row.peak is not None and row.peak_at is not None:
             peak = Peak(value=row.peak, at=row.peak_at)
-        kind: type[Any] = type(row)
-        same = {name: getattr(row, name) for name in _same_names(cls, kind)}
+        columns = [one.name for one in fields(row) if one.name in cls.model_fields]
+        same = {name: getattr(row, name) for name in columns}
         return {**same, "scene": row.scene_name, "peak": peak}
 
     @classmethod
@@ -139,13 +138,6 @@ class StoredAnswer(Answer, ABC):
         """The answers for several rows."""
         parts = repository.parts([row.key for row in rows])
         return [cls(**cls.values(row, parts[row.key])) for row in rows]
-
-
-@cache
-def _same_names(answer: type[BaseModel], row: type[Any]) -> tuple[str, ...]:
-    """What an answer has under the name of its column."""
-    columns = {one.name for one in fields(row)} - {"peak"}
-    return tuple(name for name in answer.model_fields if name in columns)
 
 
 class ContactAnswer(Answer):

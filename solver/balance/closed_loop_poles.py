@@ -16,10 +16,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.balance.balance import Balance
 from solver.balance.kernels.poles import spring_poles
 from solver.balance.parameter import Kind
 from solver.contacts.kernels.columns import COULOMB
@@ -27,6 +27,9 @@ from solver.contacts.kernels.system import DENSE, MODES, POLES, System, by_refer
 from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
+
+if TYPE_CHECKING:
+    from solver.balance.balance import Balance
 
 # Modes that are kept of a large structure: those nearest to the frequencies looked at.
 MOST_MODES = 160
