@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.db.models import NOBODY
-from service.db.repositories.pagination import Range
+from service.db.pagination import Range
 from service.db.repositories.stored import Filter, Part, Row, StoredRepository
 from service.queue import cursors
 from service.settings.settings import Settings

@@ -10,15 +10,15 @@ import typer
 
 from optim.problem.keys import options as key_options_of
 from service.cli.commands.jobs import hand_in, scene_of
-from service.cli.commands.key_options import (
+from service.cli.options import problem_inputs
+from service.cli.options import shared as options
+from service.cli.options.key_options import (
     SCENE,
     Command,
     KeyOption,
     key_options,
     options_of,
 )
-from service.cli.options import problem_inputs
-from service.cli.options import shared as options
 from service.cli.options.keyed import keyed
 from service.cli.options.problem import FLAGS, ProblemFlags, takes_problem
 from service.cli.table import COMMANDS

@@ -11,7 +11,7 @@ from sqlalchemy.orm import InstrumentedAttribute
 
 from service.db.engine import Database
 from service.db.models import NOBODY
-from service.db.repositories.pagination import (
+from service.db.pagination import (
     FEW,
     Condition,
     Position,
@@ -74,7 +74,7 @@ class Parts(Generic[Part]):
     values : type
         Dataclass of what is read of it.
     few : int
-        Up to so many rows a condition on parts leads a query, see `pagination.met`.
+        Up to so many rows a condition on parts leads a query, see `service.db.pagination.met`.
     apart : bool
         Whether PostgreSQL is asked too how many there are.
     """

@@ -115,10 +115,10 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
         on_progress=progress,
         should_stop=should_stop,
     )
-    return JobOutput(
-        result=study.to_json(),
+    return JobOutput.of(
+        study,
+        reached=study.completed,
         sweeps=() if study.branch is None else sweep_records([study.branch]),
-        shortfall=None if study.completed else study.status.value,
     )
 
 

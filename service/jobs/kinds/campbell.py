@@ -133,10 +133,10 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
         on_progress=progress,
         should_stop=should_stop,
     )
-    return JobOutput(
-        result=diagram.to_json(),
+    return JobOutput.of(
+        diagram,
+        reached=diagram.completed,
         sweeps=sweep_records(one.branch for one in diagram.orders),
-        shortfall=None if diagram.completed else diagram.status.value,
     )
 
 

@@ -158,11 +158,11 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     if UNCERTAIN in given:
         return _run_robust(scene, given, progress, should_stop)
     found = optim.design(scene, **given, on_progress=progress, should_stop=should_stop)
-    return JobOutput(
-        result=found.to_json(),
+    return JobOutput.of(
+        found,
+        reached=found.reached,
         sweeps=tuple(sweep_record(branch) for branch in found.sweeps if len(branch.values)),
         design=design_record(found),
-        shortfall=None if found.reached else found.status.value,
     )
 
 
@@ -171,11 +171,11 @@ def _run_robust(
 ) -> JobOutput:
     """Search over the uncertainty; the stored sweeps are those of the search without it."""
     found = optim.robust_design(scene, **given, on_progress=progress, should_stop=should_stop)
-    return JobOutput(
-        result=found.to_json(),
+    return JobOutput.of(
+        found,
+        reached=found.reached,
         sweeps=tuple(sweep_record(branch) for branch in found.design.sweeps if len(branch.values)),
         design=robust_record(found),
-        shortfall=None if found.reached else found.status.value,
     )
 
 

@@ -256,10 +256,10 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
     # The first of those that are equally high.
     highest = max(others, key=lambda part: part.result["largest"], default=None)
     sweeps = [part for part in (parts[0], highest) if part is not None]
-    return JobOutput(
-        result=study.to_json(),
+    return JobOutput.of(
+        study,
+        reached=study.completed,
         sweeps=tuple(record for part in sweeps for record in unpacked(part.result["sweeps"], part.arrays)),
-        shortfall=None if study.completed else study.status.value,
     )
 
 

@@ -78,10 +78,10 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     branches = [
         r.branch for evaluation in evaluations if evaluation is not None for r in evaluation.responses
     ]
-    return JobOutput(
-        result=found.to_json(),
+    return JobOutput.of(
+        found,
+        reached=found.reached,
         sweeps=tuple(sweep_record(branch) for branch in branches if len(branch.values)),
-        shortfall=None if found.reached else found.status.value,
     )
 
 
