@@ -21,7 +21,7 @@ from sqlalchemy import (
     TypeDecorator,
     UniqueConstraint,
 )
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy.orm import DeclarativeBase, Mapped, MappedAsDataclass, mapped_column
 
 NAMING_CONVENTION = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -216,8 +216,8 @@ class Scene(Base):
     body: Mapped[dict[str, Any]]
 
 
-class Sweep(Base):
-    """One branch that a job computed: what people filter by."""
+class Sweep(MappedAsDataclass, Base, kw_only=True):
+    """One branch that a job computed, without its contacts and arrays: what people filter by."""
 
     __tablename__ = "sweep"
 
@@ -246,6 +246,11 @@ class Sweep(Base):
     completed: Mapped[bool]
     status: Mapped[str] = mapped_column(Text())
     created: Mapped[datetime]
+
+    @property
+    def key(self) -> str:
+        """Its id."""
+        return self.id
 
     __table_args__ = (
         Index(None, "job_id", "id"),
@@ -296,8 +301,8 @@ class SweepArray(Base):
     data: Mapped[bytes] = mapped_column(LargeBinary())
 
 
-class Design(Base):
-    """What a design job found: what people filter by. Its id is its job's; the job's result is the whole."""
+class Design(MappedAsDataclass, Base, kw_only=True):
+    """What a design job found, without its variables: what people filter by. Its id is its job's."""
 
     __tablename__ = "design"
 
@@ -322,6 +327,11 @@ class Design(Base):
     work: Mapped[float | None]
     seconds: Mapped[float]
     created: Mapped[datetime]
+
+    @property
+    def key(self) -> str:
+        """Its id."""
+        return self.job_id
 
     __table_args__ = (
         Index(None, "owner", "job_id"),

@@ -79,8 +79,8 @@ class Pace:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SweepValues:
-    """What is stored of a branch beside its arrays: the columns people filter by."""
+class SweepRecord:
+    """A branch to be stored: the columns people filter by, and its parts."""
 
     scene_name: str
     scene_hash: str
@@ -102,12 +102,6 @@ class SweepValues:
     status: str
     error_estimate: float | None = None
     peaks_known: bool | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SweepRecord(SweepValues):
-    """A branch to be stored."""
-
     contacts: tuple[ContactValues, ...] = ()
     arrays: Mapping[str, StoredArray] = field(default_factory=dict)
 
@@ -123,8 +117,8 @@ class VariableValues:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DesignValues:
-    """What is stored of a design beside its variables: the columns people filter by."""
+class DesignRecord:
+    """A design to be stored: the columns people filter by, and its parts."""
 
     scene_name: str
     scene_hash: str
@@ -142,12 +136,6 @@ class DesignValues:
     evaluations: int
     work: float | None
     seconds: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignRecord(DesignValues):
-    """A design to be stored."""
-
     variables: tuple[VariableValues, ...] = ()
 
 

@@ -16,17 +16,15 @@ from service.auth.callers import KEYLESS, Caller, visible
 from service.db import revisions
 from service.db.clock import Clock
 from service.db.engine import Database
-from service.db.models import JobState
+from service.db.models import Design, JobState, Sweep
 from service.db.pg_notify import Notices
 from service.db.repositories import (
     DesignRepository,
-    DesignRow,
     JobRepository,
     JobRow,
     NewJob,
     SceneRepository,
     SweepRepository,
-    SweepRow,
     UploadRepository,
 )
 from service.db.repositories.keys import KeyRepository
@@ -61,14 +59,14 @@ class Results:
 
     job: JobRow
     result: dict[str, Any]
-    sweeps: list[SweepRow]
+    sweeps: list[Sweep]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WholeDesign:
     """A stored design with the job that found it and the result of that job."""
 
-    row: DesignRow
+    row: Design
     job: JobRow
     result: dict[str, Any]
 
@@ -239,7 +237,7 @@ class Service:
         """
         return visible(self.jobs.get(job_id), caller, f"there is no job {job_id!r}")
 
-    def sweep(self, sweep_id: str, caller: Caller = KEYLESS) -> SweepRow:
+    def sweep(self, sweep_id: str, caller: Caller = KEYLESS) -> Sweep:
         """A stored sweep.
 
         Raises

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from service.db.repositories import SweepRepository, SweepRow
+from service.db.models import Sweep
+from service.db.repositories import SweepRepository
 from service.jobs.arrays import decode
 from service.jobs.strict_json import digest
 from solver.results.dataset import Dataset
@@ -16,9 +17,7 @@ from solver.views.to_dataset import attributes, point_variables
 _COLUMNS = ("parameter", "amplitude", "half_peak_to_peak", "mean", "residual")
 
 
-def sweep_dataset(
-    row: SweepRow, repository: SweepRepository, scene: Mapping[str, Any] | None = None
-) -> Dataset:
+def sweep_dataset(row: Sweep, repository: SweepRepository, scene: Mapping[str, Any] | None = None) -> Dataset:
     """A stored sweep, a point a row.
 
     Sweeps that an earlier version stored have no column `residual` and none of the states.

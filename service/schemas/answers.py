@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.db.models import JobState
-from service.db.repositories import DesignRow, JobRow, SweepRepository, SweepRow
+from service.db.models import Design, JobState, Sweep
+from service.db.repositories import JobRow, SweepRepository
 from service.db.repositories.stored import StoredRepository
 from service.jobs.arrays import decode
 from service.jobs.outputs import ContactValues, VariableValues
@@ -119,7 +119,7 @@ class StoredAnswer(Answer, ABC):
     """What the answers for a stored sweep and a stored design share."""
 
     @classmethod
-    def shared(cls, row: SweepRow | DesignRow) -> dict[str, Any]:
+    def shared(cls, row: Sweep | Design) -> dict[str, Any]:
         """The fields that both have: what is named like its column, the scene, and a peak with its place."""
         peak = None
         if row.peak is not None and row.peak_at is not None:
@@ -188,7 +188,7 @@ class SweepAnswer(StoredAnswer):
     links: dict[str, str]
 
     @classmethod
-    def values(cls, row: SweepRow, contacts: Sequence[ContactValues]) -> dict[str, Any]:
+    def values(cls, row: Sweep, contacts: Sequence[ContactValues]) -> dict[str, Any]:
         """The fields of the answer for a row."""
         return {
             **cls.shared(row),
@@ -206,7 +206,7 @@ class SweepDetail(SweepAnswer):
     arrays: dict[str, list[Any]]
 
     @classmethod
-    def load(cls, row: SweepRow, repository: SweepRepository) -> Self:
+    def load(cls, row: Sweep, repository: SweepRepository) -> Self:
         """The sweep of a row."""
         stored = repository.arrays(row.id)
         return cls(
@@ -281,7 +281,7 @@ class DesignAnswer(StoredAnswer):
     links: dict[str, str]
 
     @classmethod
-    def values(cls, row: DesignRow, variables: Sequence[VariableValues]) -> dict[str, Any]:
+    def values(cls, row: Design, variables: Sequence[VariableValues]) -> dict[str, Any]:
         """The fields of the answer for a row."""
         return {
             **cls.shared(row),

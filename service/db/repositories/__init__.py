@@ -1,15 +1,14 @@
 """All SQL of the service: each method is one transaction, each change of a job's state is guarded."""
 
-from service.db.repositories.designs import DesignRepository, DesignRow
+from service.db.repositories.designs import DesignRepository
 from service.db.repositories.jobs import Attempt, JobRepository, JobRow, NewJob, Recovered
 from service.db.repositories.scenes import SceneRepository, SceneRow
-from service.db.repositories.sweeps import SweepRepository, SweepRow
+from service.db.repositories.sweeps import SweepRepository
 from service.db.repositories.uploads import UploadRepository, UploadRow
 
 __all__ = [
     "Attempt",
     "DesignRepository",
-    "DesignRow",
     "JobRepository",
     "JobRow",
     "NewJob",
@@ -17,7 +16,6 @@ __all__ = [
     "SceneRepository",
     "SceneRow",
     "SweepRepository",
-    "SweepRow",
     "UploadRepository",
     "UploadRow",
 ]

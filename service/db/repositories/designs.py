@@ -11,13 +11,12 @@ from sqlalchemy.orm import InstrumentedAttribute
 
 from service.db.engine import Database
 from service.db.models import NOBODY, Design, DesignVariable
-from service.db.repositories.rows import DesignRow
 from service.db.repositories.stored import Parts, StoredRepository, part_rows
-from service.jobs.outputs import DesignRecord, DesignValues, VariableValues
+from service.jobs.outputs import DesignRecord, VariableValues
 
-__all__ = ["DESIGN_SORTS", "DesignRepository", "DesignRow", "insert_design"]
+__all__ = ["DESIGN_SORTS", "DesignRepository", "insert_design"]
 
-_OWN_FIELDS = [item.name for item in fields(DesignValues)]
+_OWN_FIELDS = [item.name for item in fields(DesignRecord) if item.name != "variables"]
 DESIGN_SORTS: dict[str, InstrumentedAttribute[Any]] = {
     "objective": Design.objective,
     "peak": Design.peak,
@@ -28,12 +27,12 @@ DESIGN_SORTS: dict[str, InstrumentedAttribute[Any]] = {
 }
 
 
-class DesignRepository(StoredRepository[DesignRow, VariableValues]):
+class DesignRepository(StoredRepository[Design, VariableValues]):
     """Designs of one database; their parts are the variables."""
 
     def __init__(self, database: Database) -> None:
         parts = Parts(table=DesignVariable, of=DesignVariable.design_id, values=VariableValues)
-        super().__init__(database, DesignRow, Design.job_id, DESIGN_SORTS, parts)
+        super().__init__(database, Design, Design.job_id, DESIGN_SORTS, parts)
 
 
 def insert_design(

@@ -7,7 +7,7 @@ from datetime import datetime
 from typing import Any
 
 from service.db.models import NOBODY, JobState
-from service.jobs.outputs import DesignValues, Piece, SweepValues
+from service.jobs.outputs import Piece
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,33 +107,3 @@ class SceneRow:
     scene_hash: str
     created: datetime
     body: dict[str, Any]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SweepRow(SweepValues):
-    """A stored sweep without its arrays and contacts."""
-
-    id: str
-    job_id: str
-    position: int
-    owner: str
-    created: datetime
-
-    @property
-    def key(self) -> str:
-        """Its id."""
-        return self.id
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignRow(DesignValues):
-    """A stored design without its variables."""
-
-    job_id: str
-    owner: str
-    created: datetime
-
-    @property
-    def key(self) -> str:
-        """Its id, which is that of its job."""
-        return self.job_id

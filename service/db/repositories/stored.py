@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Generic, TypeVar
 
-from sqlalchemy import Connection, bindparam, select
+from sqlalchemy import Connection, bindparam, inspect, select
 from sqlalchemy.orm import InstrumentedAttribute
 
 from service.db.engine import Database
@@ -92,21 +92,21 @@ class StoredRepository(Generic[Row, Part]):
     Parameters
     ----------
     database : where they are.
-    row : dataclass of a row, its fields named like the columns.
+    table : the mapped class.
     identity : column of the ids, which sort by time.
     sorts : word to the column it sorts by.
     parts : their table.
     """
 
     def __init__(
-        self, database: Database, row: type[Row], identity: Column, sorts: Mapping[str, Column],
+        self, database: Database, table: type[Row], identity: Column, sorts: Mapping[str, Column],
         parts: Parts[Part],
     ) -> None:  # fmt: skip
         self._db = database
-        self._row, self._identity, self._sorts, self._parts = row, identity, sorts, parts
-        self._table: Any = identity.class_
+        self._row, self._identity, self._sorts, self._parts = table, identity, sorts, parts
+        self._table: Any = table
         # Built once: building a statement costs more than running it.
-        self._select = select(*(getattr(self._table, one.name) for one in fields(row)))  # type: ignore[arg-type]
+        self._select = select(*(getattr(table, one.key) for one in inspect(self._table).column_attrs))
         self._part_names = [one.name for one in fields(parts.values)]  # type: ignore[arg-type]
         self._select_parts = (
             select(parts.of, *(getattr(parts.table, name) for name in self._part_names))

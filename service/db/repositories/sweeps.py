@@ -12,14 +12,13 @@ from sqlalchemy.orm import InstrumentedAttribute
 
 from service.db.engine import Database
 from service.db.models import NOBODY, Sweep, SweepArray, SweepContact
-from service.db.repositories.rows import SweepRow
 from service.db.repositories.stored import Parts, StoredRepository, part_rows
 from service.jobs.ids import new_id
-from service.jobs.outputs import ContactValues, StoredArray, SweepRecord, SweepValues
+from service.jobs.outputs import ContactValues, StoredArray, SweepRecord
 
-__all__ = ["SWEEP_SORTS", "SweepRepository", "SweepRow", "insert_sweeps"]
+__all__ = ["SWEEP_SORTS", "SweepRepository", "insert_sweeps"]
 
-_OWN_FIELDS = [item.name for item in fields(SweepValues)]
+_OWN_FIELDS = [item.name for item in fields(SweepRecord) if item.name not in ("contacts", "arrays")]
 # Built once: building a statement costs more than running it.
 _TABLES = Sweep.metadata.tables
 _INSERT = insert(_TABLES["sweep"])
@@ -38,7 +37,7 @@ SWEEP_SORTS: dict[str, InstrumentedAttribute[Any]] = {
 }
 
 
-class SweepRepository(StoredRepository[SweepRow, ContactValues]):
+class SweepRepository(StoredRepository[Sweep, ContactValues]):
     """Sweeps of one database; their parts are the contacts."""
 
     def __init__(self, database: Database) -> None:
@@ -46,10 +45,10 @@ class SweepRepository(StoredRepository[SweepRow, ContactValues]):
             table=SweepContact, of=SweepContact.sweep_id, values=ContactValues, few=_FEW_OF_CONTACTS,
             apart=True,
         )  # fmt: skip
-        super().__init__(database, SweepRow, Sweep.id, SWEEP_SORTS, parts)
+        super().__init__(database, Sweep, Sweep.id, SWEEP_SORTS, parts)
         self._of_job = self._select.where(Sweep.job_id == bindparam("job")).order_by(Sweep.position)
 
-    def of_job(self, job_id: str) -> list[SweepRow]:
+    def of_job(self, job_id: str) -> list[Sweep]:
         """The sweeps of a job in the order they were computed."""
         with self._db.reading() as connection:
             return self._read(connection, self._of_job, {"job": job_id})
