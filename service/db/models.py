@@ -21,7 +21,7 @@ from sqlalchemy import (
     TypeDecorator,
     UniqueConstraint,
 )
-from sqlalchemy.orm import DeclarativeBase, Mapped, MappedAsDataclass, mapped_column
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 NAMING_CONVENTION = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -216,7 +216,7 @@ class Scene(Base):
     body: Mapped[dict[str, Any]]
 
 
-class Sweep(MappedAsDataclass, Base, kw_only=True):
+class Sweep(Base):
     """One branch that a job computed, without its contacts and arrays: what people filter by."""
 
     __tablename__ = "sweep"
@@ -301,7 +301,7 @@ class SweepArray(Base):
     data: Mapped[bytes] = mapped_column(LargeBinary())
 
 
-class Design(MappedAsDataclass, Base, kw_only=True):
+class Design(Base):
     """What a design job found, without its variables: what people filter by. Its id is its job's."""
 
     __tablename__ = "design"

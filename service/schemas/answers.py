@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, Self
 
@@ -21,6 +21,12 @@ from service.queue.scene_store import KnownScene
 
 if TYPE_CHECKING:
     from service.queue.core import Results
+
+
+# What an answer has under the name of its column; a peak stands there with its place.
+_COLUMNS: dict[type[Any], frozenset[str]] = {
+    table: frozenset(table.__mapper__.columns.keys()) - {"peak"} for table in (Sweep, Design)
+}
 
 
 class Answer(BaseModel):
@@ -124,8 +130,8 @@ class StoredAnswer(Answer, ABC):
         peak = None
         if row.peak is not None and row.peak_at is not None:
             peak = Peak(value=row.peak, at=row.peak_at)
-        columns = [one.name for one in fields(row) if one.name in cls.model_fields]
-        same = {name: getattr(row, name) for name in columns}
+        columns = _COLUMNS[type(row)]
+        same = {name: getattr(row, name) for name in cls.model_fields if name in columns}
         return {**same, "scene": row.scene_name, "peak": peak}
 
     @classmethod

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Generic, TypeVar
 
-from sqlalchemy import Connection, bindparam, inspect, select
-from sqlalchemy.orm import InstrumentedAttribute
+from sqlalchemy import Connection, Select, bindparam, select
+from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from service.db.engine import Database
 from service.db.models import NOBODY
@@ -103,10 +103,10 @@ class StoredRepository(Generic[Row, Part]):
         parts: Parts[Part],
     ) -> None:  # fmt: skip
         self._db = database
-        self._row, self._identity, self._sorts, self._parts = table, identity, sorts, parts
+        self._identity, self._sorts, self._parts = identity, sorts, parts
         self._table: Any = table
         # Built once: building a statement costs more than running it.
-        self._select = select(*(getattr(table, one.key) for one in inspect(self._table).column_attrs))
+        self._select = select(table)
         self._part_names = [one.name for one in fields(parts.values)]  # type: ignore[arg-type]
         self._select_parts = (
             select(parts.of, *(getattr(parts.table, name) for name in self._part_names))
@@ -146,10 +146,12 @@ class StoredRepository(Generic[Row, Part]):
                 )  # fmt: skip
         return found
 
+    @staticmethod
     def _read(
-        self, connection: Connection, query: Any, given: Mapping[str, object] | None = None
+        connection: Connection, query: Select[Row], given: Mapping[str, Any] | None = None
     ) -> list[Row]:  # fmt: skip
-        return [self._row(**row) for row in connection.execute(query, given).mappings()]
+        with Session(connection) as session:
+            return list(session.scalars(query, given))
 
     def _conditions(self, wanted: Filter) -> list[Condition]:
         found = [getattr(self._table, name) == value for name, value in wanted.equal.items()]
