@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -32,6 +32,11 @@ class StoredQuery(BaseModel):
     part_ranges: ClassVar[Mapping[str, str]]
     """As `ranges`, of the parts."""
 
+    if TYPE_CHECKING:  # fields of every query, each where its list has them
+        sort: str
+        limit: int
+        cursor: str | None
+
     def to_filter(self, sees: str | None = NOBODY) -> Filter:
         """The query of the repository; of what belongs to `sees`, or to everybody (None)."""
         equal = {column: getattr(self, name) for name, column in self.equal.items()}
@@ -42,21 +47,16 @@ class StoredQuery(BaseModel):
             ranges={column: self._range(name) for name, column in self.ranges.items()},
             part=getattr(self, self.part),
             part_ranges={column: bounds for column, bounds in of_parts.items() if bounds != (None, None)},
-            sort=self._sort.removeprefix("-"),
-            descending=self._sort.startswith("-"),
+            sort=self.sort.removeprefix("-"),
+            descending=self.sort.startswith("-"),
         )
-
-    @property
-    def _sort(self) -> str:
-        word: str = getattr(self, "sort")  # noqa: B009 - a field of the queries
-        return word
 
     def _range(self, name: str) -> Range:
         return getattr(self, f"{name}_min"), getattr(self, f"{name}_max")
 
 
 def rows_of_page(
-    repository: StoredRepository[Row, Part], query: Any, settings: Settings, sees: str | None
+    repository: StoredRepository[Row, Part], query: StoredQuery, settings: Settings, sees: str | None
 ) -> tuple[list[Row], str | None]:
     """Return the rows of a page and the link to the next one, None on the last.
 
