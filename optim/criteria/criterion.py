@@ -62,7 +62,7 @@ def positive_limit(asked: Asked) -> object:
     DesignError
         It is none.
     """
-    from optim.problem.cases import positive
+    from optim.problem.numbers import positive
 
     ((name, value),) = asked.values.items()
     return positive(name, value)

@@ -38,7 +38,7 @@ def _read(asked: Asked) -> Mapping[str, Ranges]:
 
 def _ranges(name: str, ranges: object) -> Ranges:
     from optim.errors import DesignError
-    from optim.problem.cases import number_pair
+    from optim.problem.numbers import number_pair
 
     if ranges is None:
         return ()

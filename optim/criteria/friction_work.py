@@ -36,7 +36,7 @@ def _rows(judged: Judged) -> list[Row]:
 def _read(asked: Asked) -> Mapping[str, float]:
     """The limit of every contact named; a single number is that of every friction contact."""
     from optim.errors import DesignError
-    from optim.problem.cases import positive
+    from optim.problem.numbers import positive
     from solver.scene.scene import FrictionContact
 
     limits = asked.values[_KEY]

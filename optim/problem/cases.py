@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from optim.errors import DesignError
+from optim.problem.numbers import number_pair, positive, whole
 from solver.errors import Place, SettingError, at
 from solver.scene.scene import Observe, Scene
 
@@ -103,7 +103,7 @@ def read_case(scene: Scene, index: int, table: object) -> list[Case]:
         raise DesignError((*where, "set"), values, "must be a table of parameter paths and values")
     here = _with_values(here, where, values)
     band = _band(where, table.get("band"))
-    order = _whole((*where, "order"), table.get("order", max(here.engine_order, 1)), least=1)
+    order = whole((*where, "order"), table.get("order", max(here.engine_order, 1)), least=1)
     weight = positive((*where, "weight"), table.get("weight", 1.0))
     observed = table.get("observe", here.observe.dof)
     dofs = [observed] if isinstance(observed, str) else observed
@@ -138,7 +138,7 @@ def _engine_order(scene: Scene, where: Place, wanted: object) -> Scene:
     if scene.structure.kind != "cyclic":
         raise DesignError((*where, "engine_order"), wanted, "needs a cyclic structure; `order` fits any")
     with at(*where, "engine_order"):
-        return with_engine_order(scene, _whole((*where, "engine_order"), wanted, least=0))
+        return with_engine_order(scene, whole((*where, "engine_order"), wanted, least=0))
 
 
 def _observing(scene: Scene, where: Place, dof: str, band: tuple[float, float] | None) -> Scene:
@@ -159,40 +159,3 @@ def _band(where: Place, band: object) -> tuple[float, float] | None:
     if not 0.0 < low < high:
         raise DesignError((*where, "band"), band, "must have 0 < low < high [Hz]")
     return low, high
-
-
-def number_pair(name: str | Place, pair: object) -> tuple[float, float]:
-    """Return two finite numbers.
-
-    Raises
-    ------
-    DesignError
-        Anything else.
-    """
-    if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
-        raise DesignError(name, pair, "must be two numbers, low and high")
-    for value in pair:
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not math.isfinite(value):
-            raise DesignError(name, pair, "must be two finite numbers, low and high")
-    return float(pair[0]), float(pair[1])
-
-
-def _whole(name: Place, value: object, *, least: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise DesignError(name, value, f"must be a whole number >= {least}")
-    return value
-
-
-def positive(name: str | Place, value: object) -> float:
-    """Return a finite number above 0.
-
-    Raises
-    ------
-    DesignError
-        Anything else.
-    """
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not number or not math.isfinite(value) or value <= 0.0:  # type: ignore[arg-type,operator]
-        raise DesignError(name, value, "must be a number > 0")
-    return float(value)  # type: ignore[arg-type]

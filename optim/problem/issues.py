@@ -12,7 +12,8 @@ from typing import Any
 from optim.criteria.criterion import Asked
 from optim.criteria.registry import criteria
 from optim.errors import DesignError
-from optim.problem.cases import positive, read_case, read_cases
+from optim.problem.cases import read_case, read_cases
+from optim.problem.numbers import positive
 from optim.problem.problem import READERS, pose, read_start
 from optim.problem.uncertainty_input import read_uncertain
 from optim.problem.variables import check_variables

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,8 +10,9 @@ from optim.criteria.criterion import Asked, Criterion, Goals, Limits
 from optim.criteria.peak import PEAK
 from optim.criteria.registry import by_weight, criteria, limit_keys, weight_words
 from optim.errors import DesignError
-from optim.problem.cases import Case, positive, read_cases
+from optim.problem.cases import Case, read_cases
 from optim.problem.keys import BASINS, HARMONICS, MOST_BASINS
+from optim.problem.numbers import is_number, positive
 from optim.problem.variables import Variable, check_variables
 from optim.problem.words import Method as Method
 from solver.balance.balance import check_harmonics
@@ -117,8 +117,7 @@ def _weights(weights: Mapping[str, float] | None) -> dict[Criterion, float]:
             *others, last = (f"`{word}`" for word in weight_words())
             known = f"{', '.join(others)} and {last}"
             raise DesignError(("weights", name), value, f"is not known; {known} can be minimised")
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not math.isfinite(value) or value < 0.0:
+        if not is_number(value) or value < 0.0:
             raise DesignError(("weights", name), value, "must be a number >= 0")
         found[criterion] = float(value)
     if not any(found.values()):

@@ -9,7 +9,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from optim.errors import DesignError
-from optim.problem.uncertainty_set import Coordinate, Disk, How, Scenario, Shape, UncertainSet, is_number
+from optim.problem.numbers import is_number
+from optim.problem.uncertainty_set import Coordinate, Disk, How, Scenario, Shape, UncertainSet
 from optim.problem.variables import Real, Variable
 from solver.balance.parameter import Kind, resolve
 from solver.errors import Place, at
@@ -187,7 +188,7 @@ def _confidence(table: Mapping[str, object], n: int) -> float:
             raise DesignError((*_WHERE, "confidence"), table["confidence"], "needs a covariance")
         return 1.0
     share = table.get("confidence", CONFIDENCE)
-    if not is_number(share) or not 0.0 < share < 1.0:  # type: ignore[operator]
+    if not is_number(share) or not 0.0 < share < 1.0:
         raise DesignError((*_WHERE, "confidence"), share, "must be a number between 0 and 1")
     return math.sqrt(float(chi2.ppf(share, n)))
 
@@ -257,11 +258,11 @@ def _disks(scene: Scene, table: object, where: Place) -> tuple[Disk, ...]:
         disks = tuple(Disk(of=of, values=tuple(float(x) for x in row)) for row in lists)
     else:
         spread, seeds = table.get("spread"), table.get("seeds", [1])
-        if not is_number(spread) or spread <= 0.0:  # type: ignore[operator]
+        if not is_number(spread) or spread <= 0.0:
             raise DesignError((*where, "spread"), spread, "must be a number > 0")
         if not isinstance(seeds, Sequence) or isinstance(seeds, str) or not seeds:
             raise DesignError((*where, "seeds"), seeds, "must be a list of whole numbers")
-        disks = tuple(Disk(of=of, spread=float(spread), seed=seed) for seed in seeds)  # type: ignore[arg-type]
+        disks = tuple(Disk(of=of, spread=float(spread), seed=seed) for seed in seeds)
     for disk in disks:
         with at(*where):
             disk.on(scene)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optim.errors import DesignError
+from optim.problem.numbers import is_number
 from optim.problem.words import Scaling
 from solver.balance.parameter import Kind, resolve
 from solver.errors import at
@@ -188,8 +189,7 @@ def _bounds(path: str, bounds: object) -> tuple[float, float]:
         raise DesignError(name, bounds, "must be two numbers, low and high")
     low, high = bounds
     for value in (low, high):
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not math.isfinite(value):
+        if not is_number(value):
             raise DesignError(name, bounds, "must be two finite numbers, low and high")
     if not low < high:
         raise DesignError(name, bounds, "must have low < high")

@@ -23,9 +23,10 @@ from optim.errors import DesignError
 from optim.methods.evaluator import StoppedError
 from optim.problem.keys import FEWEST_SAMPLES, QUANTILE, SEED, DesignKeys
 from optim.problem.keywords import keywords
+from optim.problem.numbers import is_number, whole
 from optim.problem.problem import pose
 from optim.problem.uncertainty_input import check_settings, read_uncertain
-from optim.problem.uncertainty_set import Scenario, is_number
+from optim.problem.uncertainty_set import Scenario
 from optim.problem.watch import OnProgress, ShouldStop
 from optim.problem.words import Aim
 from optim.results.design import DesignResult, DesignStatus
@@ -86,8 +87,8 @@ def robust_design(
     posed = pose(scene, **problem)
     over = read_uncertain(scene, posed.variables, uncertain)
     search = RobustSearch(posed, over, _aim(aim), _quantile(quantile), on_progress, should_stop)
-    wanted = SAMPLES[search.aim] if samples is None else _count("samples", samples, FEWEST_SAMPLES)
-    drawn = over.draw(wanted, _count("seed", seed, 0))
+    wanted = SAMPLES[search.aim] if samples is None else whole("samples", samples, least=FEWEST_SAMPLES)
+    drawn = over.draw(wanted, whole("seed", seed, least=0))
     for scenario in drawn:
         check_settings(scene, posed.variables, scenario.settings)
     found = _run(search, drawn, should_stop)
@@ -106,15 +107,9 @@ def _aim(aim: object) -> Aim:
 
 
 def _quantile(share: object) -> float:
-    if not is_number(share) or not 0.0 < share < 1.0:  # type: ignore[operator]
+    if not is_number(share) or not 0.0 < share < 1.0:
         raise DesignError("quantile", share, "must be a number between 0 and 1")
-    return float(share)  # type: ignore[arg-type]
-
-
-def _count(name: str, value: object, least: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise DesignError(name, value, f"must be a whole number >= {least}")
-    return value
+    return float(share)
 
 
 @dataclass(slots=True, kw_only=True)
