@@ -37,12 +37,11 @@ def _read(asked: Asked) -> Mapping[str, float]:
     """The limit of every contact named; a single number is that of every friction contact."""
     from optim.errors import DesignError
     from optim.problem.numbers import positive
-    from solver.scene.scene import FrictionContact
 
     limits = asked.values[_KEY]
     names = [contact.name for contact in asked.scene.contacts]
     if not isinstance(limits, Mapping):
-        rubbing = [contact.name for contact in asked.scene.contacts if isinstance(contact, FrictionContact)]
+        rubbing = [contact.name for contact in asked.scene.contacts if contact.RUBBING]
         return dict.fromkeys(rubbing, positive(_KEY, limits))
     for name in limits:
         if name not in names:

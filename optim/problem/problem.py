@@ -16,7 +16,7 @@ from optim.problem.numbers import is_number, positive
 from optim.problem.variables import Variable, check_variables
 from optim.problem.words import Method as Method
 from solver.balance.balance import check_harmonics
-from solver.scene.scene import Contact, Scene
+from solver.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +63,7 @@ class Problem(Goals):
             return "tracked is for the highest peak of one case alone, without limits"
         if len(self.paths) != 1:
             return "tracked takes one variable with one parameter path"
-        others = [contact.name for contact in self.scene.contacts if not isinstance(contact, Contact)]
+        others = [contact.name for contact in self.scene.contacts if not contact.JENKINS]
         if others:
             return f"tracked knows the law coulomb alone, not that of {', '.join(others)}"
         return None

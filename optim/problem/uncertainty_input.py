@@ -14,7 +14,7 @@ from optim.problem.uncertainty_set import Coordinate, Disk, How, Scenario, Shape
 from optim.problem.variables import Real, Variable
 from solver.balance.parameter import Kind, resolve
 from solver.errors import Place, at
-from solver.scene.scene import FrictionContact, Scene
+from solver.scene.scene import Scene
 
 ELLIPSOID = ("centre", "relative", "paths", "half_axes", "shape", "covariance", "confidence", "mistuning")
 MISTUNING = ("of", "spread", "seeds", "values")
@@ -70,7 +70,7 @@ def _coordinate(scene: Scene, chosen: set[str], name: object, how: How, where: P
     tied = {
         f"{owner}.N1"
         for contact in scene.contacts
-        if isinstance(contact, FrictionContact) and contact.N1_ratio is not None
+        if contact.load is not None and contact.load.ratio is not None
         for owner in (contact.name, contact.group)
     }
     for path in paths:

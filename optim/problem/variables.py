@@ -14,7 +14,7 @@ from optim.problem.numbers import is_number
 from optim.problem.words import Scaling
 from solver.balance.parameter import Kind, resolve
 from solver.errors import at
-from solver.scene.scene import FrictionContact, Scene
+from solver.scene.scene import Scene
 
 Real = NDArray[np.float64]
 SNAP = 1e-7  # scaled distance within which a variable is put on its bound
@@ -198,11 +198,11 @@ def _bounds(path: str, bounds: object) -> tuple[float, float]:
 
 def _default(scene: Scene) -> dict[str, tuple[float, float]]:
     """Return N0 of the first contact with a tied load (else of the first), a tenth to 15 times its value."""
-    rubbing = [contact for contact in scene.contacts if isinstance(contact, FrictionContact)]
+    rubbing = [(contact, contact.load) for contact in scene.contacts if contact.load is not None]
     if not rubbing:
         raise DesignError("variables", None, "must be given: the scene has no friction contact to design")
-    tied = [contact for contact in rubbing if contact.N1_ratio is not None]
-    contact = (tied or rubbing)[0]
-    if contact.N0 <= 0.0:
+    tied = [(contact, load) for contact, load in rubbing if load.ratio is not None]
+    contact, load = (tied or rubbing)[0]
+    if load.mean <= 0.0:
         raise DesignError("variables", None, f"must be given: {contact.name}.N0 is 0, it suggests no range")
-    return {f"{contact.group or contact.name}.N0": (contact.N0 / 10.0, contact.N0 * 15.0)}
+    return {f"{contact.group or contact.name}.N0": (load.mean / 10.0, load.mean * 15.0)}

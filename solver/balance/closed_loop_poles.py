@@ -22,7 +22,6 @@ import numpy as np
 
 from solver.balance.kernels.poles import spring_poles
 from solver.balance.parameter import Kind
-from solver.contacts.kernels.columns import COULOMB
 from solver.contacts.kernels.system import DENSE, MODES, POLES, System, by_reference
 from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import linear_model
@@ -111,7 +110,7 @@ class ClosedLoop:
         """
         free, stuck = self.free, self.stuck
         half_width = np.minimum(free.half_width, stuck.half_width)
-        if not np.all(self.system.laws == COULOMB):
+        if not np.all(self.system.jenkins == 1):
             return np.zeros_like(free.at), np.full_like(free.at, np.inf), half_width
         return free.at, np.maximum(stuck.at, free.at), half_width
 
