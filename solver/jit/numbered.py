@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import ctypes
 import inspect
+import pickle
+import threading
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any, TypeVar
@@ -31,7 +33,8 @@ class _Table:
 
     def __init__(self, function: Callable[..., Any], form: Any, known: tuple[str, ...]) -> None:
         self.__module__, self.__name__ = function.__module__, function.__name__
-        self._form, self._names = form, list(known)
+        self._form, self._known, self._names = form, known, list(known)
+        self._lock = threading.Lock()
         self._addresses = (ctypes.c_uint64 * MOST)()
 
     def __call__(self, *_: object) -> None:
@@ -46,14 +49,24 @@ class _Table:
         TypeError
             It is no kernel of the contract.
         """
-        if kernel not in self._names:
-            self._names.append(kernel)
-        number = self._names.index(kernel)
-        if not self._addresses[number]:
-            module, _, name = kernel.partition(":")
-            made = getattr(import_module(module), name)
-            self._addresses[number] = made_address(made.name(self._form))
+        if kernel in self._names and self._addresses[self._names.index(kernel)]:
+            return self._names.index(kernel)
+        module, _, name = kernel.partition(":")
+        address = made_address(getattr(import_module(module), name).name(self._form))
+        with self._lock:
+            if kernel not in self._names:
+                self._names.append(kernel)
+            number = self._names.index(kernel)
+            self._addresses[number] = address
         return number
+
+    def under(self, _form: object) -> tuple[bytes, ...]:
+        """Return the names of the kernels that a call may need: those whose numbers are always the same."""
+        form = self._form
+        places = (kernel.partition(":") for kernel in self._known)
+        return tuple(
+            pickle.dumps((module, name, tuple(form.args), form.return_type)) for module, _, name in places
+        )
 
     def address(self, *_: object) -> int:
         """Return where the table lies."""

@@ -68,6 +68,10 @@ class _Apart:
         """Return a name for the kernel with these types, by which any process finds it."""
         return kernel_name(self, form)
 
+    def under(self, form: Any) -> tuple[bytes, ...]:
+        """Return the names of the kernels that a call of it may need: its own."""
+        return (self.name(form),)
+
     def result_of(self, arguments: tuple[types.Type, ...]) -> types.Type:
         """Return the type of the result; the kernel is compiled only where its annotation does not say."""
         written = str(self._kernel.py_func.__annotations__.get("return", ""))
@@ -125,8 +129,8 @@ def _call(context: Any, builder: Any, form: Any, arguments: Any, kernel: _Apart)
 def loaded(context: Any, builder: Any, kernel: Any, form: Any) -> Any:
     """Emit the load of the address in a kernel's slot, which is filled if it is empty."""
     name = kernel_name(kernel, form)
-    if _watcher is not None and isinstance(kernel, _Apart):
-        _watcher.called(name)
+    for called in kernel.under(form):
+        announce(called)
     slot = _slot(builder.module, f"{kernel.__name__}.{zlib.crc32(name):08x}")
     address = builder.load_atomic(slot, "acquire", 8)
     filled = cgutils.alloca_once_value(builder, address)
@@ -153,6 +157,12 @@ def call_at(context: Any, builder: Any, address: Any, form: Any, arguments: Any)
 def kernel_name(kernel: Any, form: Any) -> bytes:
     """Return a name for a kernel with these types, by which any process finds it."""
     return pickle.dumps((kernel.__module__, kernel.__name__, tuple(form.args), form.return_type))
+
+
+def announce(name: bytes) -> None:
+    """Tell who watches that a call of a kernel was compiled."""
+    if _watcher is not None:
+        _watcher.called(name)
 
 
 def _slot(module: Any, name: str) -> Any:
