@@ -1,0 +1,458 @@
+"""Coefficients of the force under a circular limit, and their derivatives, from the path and its nodes.
+
+The force is continuous everywhere, so the begins and ends of sticks and slips drop out of ∫ δt e; what is
+left is δt at a fixed time. It is followed backwards (adjoint): ψ(τ) says what a change of the force at τ adds
+to the integrals from there on, for all of them at once.
+
+- stick: δt = δt(τs) + δX − δX(τs); after separation the begin moves with N: δt(τs) = −t' δτs, δτs = −δL/L'.
+- begin of a slip: δτ = (δL − n·δt)/q and t' jumps by −Kλn, K ∝ diag(1, 1/κ), qn = …, so that q cancels:
+  L δθ = m·δt + along (δL − n·δt), see `solver.contacts.kernels.circle_path.projection`.
+- slip: the collocation of its panel, linearised; its transpose is solved for all integrals together.
+- where contact begins with a slip, δθ is the regular solution: (∂F/∂θ) δθ = g θ' δL − δF.
+- over a period that repeats, ψ at the end is ψ at the begin: two unknowns, two more rows in the sweep.
+
+Real or complex as `solver.contacts.kernels.circle_panels`. Derivation by ourselves.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.contacts.kernels.circle_panels import (
+    CURVES,
+    DDLIMIT,
+    DDX,
+    DDY,
+    DLIMIT,
+    DX,
+    DY,
+    LIMIT,
+    X,
+    Y,
+    curves_at,
+    solve_columns,
+    turning,
+)
+from solver.contacts.kernels.circle_path import (
+    BEGAN,
+    BEGIN,
+    COUNT,
+    END,
+    FIRST,
+    FROM,
+    MOTION,
+    START,
+    TO,
+    TX,
+    TY,
+    projection,
+)
+from solver.contacts.kernels.circle_state import CLOSES, HOW, PANELS, PIECES, SETTLES
+from solver.contacts.kernels.coulomb import moment_rows, products
+from solver.contacts.kernels.radau import NODES, SLOPES, STAGES, WEIGHTS
+from solver.contacts.kernels.stick_slip_events import AFTER_SEPARATION, SLIP, STICK, UNLOADED
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Integer, Real
+from solver.jit.separate import apart
+
+# Sums over sticks (1), and over slips weighted by cos θ and sin θ, of cos qτ and sin qτ.
+STUCK_COS, STUCK_SIN, ALONG_COS, ALONG_SIN, ACROSS_COS, ACROSS_SIN = 0, 1, 2, 3, 4, 5
+
+
+@compiled
+def basis_of(tau: float, ks: Integer, e: Real, de: Real) -> None:
+    """Fill `e` with the basis for `ks` at `tau`, real or complex, and `de` with its slope."""
+    cos1, sin1 = np.cos(tau), np.sin(tau)
+    cosine, sine = 0.0 * cos1 + 1.0, 0.0 * cos1
+    k, here = 0, 0
+    for i in range(ks.size):
+        while k < ks[i]:
+            cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
+            k += 1
+        e[here], de[here] = cosine, -k * sine
+        here += 1
+        if k > 0:
+            e[here], de[here] = sine, k * cosine
+            here += 1
+
+
+@compiled
+def _stick_moments(begin: float, end: float, cosines: Real, sines: Real) -> None:
+    """Set ∫cos qτ and ∫sin qτ over [begin, end]; see `solver.contacts.kernels.coulomb.add_moments`."""
+    half, middle = 0.5 * (end - begin), 0.5 * (end + begin)
+    cm1, sm1, ch1, sh1 = np.cos(middle), np.sin(middle), np.cos(half), np.sin(half)
+    cm, sm, ch, sh = cm1, sm1, ch1, sh1
+    cosines[0], sines[0] = end - begin, 0.0
+    for q in range(1, cosines.size):
+        factor = 2.0 * sh / q
+        cosines[q], sines[q] = factor * cm, factor * sm
+        cm, sm = cm * cm1 - sm * sm1, sm * cm1 + cm * sm1
+        ch, sh = ch * ch1 - sh * sh1, sh * ch1 + ch * sh1
+
+
+@compiled
+def _slip_moments(tau: float, along: float, across: float, sums: Real) -> None:
+    """Add along·(cos qτ, sin qτ) and across·(…) to the sums over slips."""
+    cos1, sin1 = np.cos(tau), np.sin(tau)
+    cosine, sine = 0.0 * cos1 + 1.0, 0.0 * cos1
+    for q in range(sums.shape[1]):
+        sums[ALONG_COS, q] += along * cosine
+        sums[ALONG_SIN, q] += along * sine
+        sums[ACROSS_COS, q] += across * cosine
+        sums[ACROSS_SIN, q] += across * sine
+        cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
+
+
+@compiled
+def _add_row(G: Real, column: int, psi: Real, factor: float, e: Real) -> None:
+    """Add factor · psi ⊗ e to the columns of G from `column`."""
+    for r in range(psi.size):
+        share = factor * psi[r]
+        for j in range(e.size):
+            G[r, column + j] += share * e[j]
+
+
+@apart
+def _stick_back(
+    waves: Real, kappa: float, ks: Integer, all_ks: Integer, row: Real, active: bool, weights: Real,
+    of_motion: Integer, psi: Real, sums: Real, F: Real, G: Real,
+) -> None:  # fmt: skip
+    """Go back over a stick: ψ at its begin from ψ at its end."""
+    m, n, dtype = psi.shape[1], of_motion.size, waves.dtype
+    size = all_ks.size * 2 - (1 if all_ks[0] == 0 else 0)
+    e, de, moment = np.empty(size, dtype), np.empty(size, dtype), np.empty(n, dtype)
+    at = np.empty(CURVES, dtype)
+    curves_at(waves, row[END], at)
+    basis_of(row[END], all_ks, e, de)
+    _add_row(G, 0, psi[0], 1.0, e)
+    _add_row(G, size, psi[1], 1.0 / kappa, e)
+    for r in range(m):
+        G[r, 3 * size] -= psi[1, r] * at[Y] / (kappa * kappa)
+    curves_at(waves, row[BEGIN], at)
+    basis_of(row[BEGIN], all_ks, e, de)
+    if active:
+        here = np.empty((2, sums.shape[1]), dtype)
+        _stick_moments(row[BEGIN], row[END], here[0], here[1])
+        moment_rows(here[0], here[1], ks, moment)
+        for q in range(sums.shape[1]):
+            sums[STUCK_COS, q] += here[0, q]
+            sums[STUCK_SIN, q] += here[1, q]
+        offset_x, offset_y = row[TX] - at[X], row[TY] - at[Y] / kappa
+        for i in range(n):
+            F[0, i] += offset_x * moment[i]
+            F[1, i] += offset_y * moment[i]
+        if weights.shape[0] == 0:
+            for i in range(n):
+                psi[0, i] += moment[i]
+                psi[1, n + i] += moment[i]
+        else:
+            for r in range(weights.shape[0]):
+                for i in range(n):
+                    psi[0, r] += weights[r, 0, i] * moment[i]
+                    psi[1, r] += weights[r, 1, i] * moment[i]
+    _add_row(G, 0, psi[0], -1.0, e)
+    _add_row(G, size, psi[1], -1.0 / kappa, e)
+    for r in range(m):
+        G[r, 3 * size] += psi[1, r] * at[Y] / (kappa * kappa)
+    if row[BEGAN] == AFTER_SEPARATION:
+        _add_row(G, 2 * size, psi[0], at[DX] / at[DLIMIT], e)
+        _add_row(G, 2 * size, psi[1], at[DY] / (kappa * at[DLIMIT]), e)
+
+
+@apart
+def _panel_back(
+    waves: Real, kappa: float, all_ks: Integer, panel: Real, weights: Real, of_motion: Integer, active: bool,
+    eta: Real, sums: Real, F: Real, table: Real, adjoint: Real,
+) -> None:  # fmt: skip
+    """Go back over a panel of a slip: η (of θ) at its begin from that at its end.
+
+    Fills the panel's rows of `table` (STAGES, 3·size + 1), −∂R/∂(X, Y, L, κ), and of `adjoint` (STAGES, m).
+    """
+    dtype, m, n = waves.dtype, eta.size, of_motion.size
+    size = (table.shape[1] - 1) // 3
+    e, de, at = np.empty(size, dtype), np.empty(size, dtype), np.empty(CURVES, dtype)
+    matrix, first = np.empty((STAGES, STAGES), dtype), np.empty(STAGES, dtype)
+    begin, h = panel[FROM], panel[TO] - panel[FROM]
+    for i in range(STAGES):
+        for r in range(m):
+            adjoint[i, r] = 0.0
+    for r in range(m):
+        adjoint[STAGES - 1, r] = eta[r]
+    for i in range(STAGES):
+        tau, theta = begin + h * NODES[i], panel[START + 1 + i]
+        curves_at(waves, tau, at)
+        basis_of(tau, all_ks, e, de)
+        _, slope, g, dg = turning(at, kappa, theta)
+        c, s = np.cos(theta), np.sin(theta)
+        rate = SLOPES[i, 0] * panel[START]
+        for j in range(STAGES):
+            rate += SLOPES[i, j + 1] * panel[START + 1 + j]
+        rate /= h
+        for j in range(STAGES):
+            matrix[j, i] = at[LIMIT] * g / h * SLOPES[i, j + 1]
+        matrix[i, i] += at[LIMIT] * dg * rate - slope
+        first[i] = at[LIMIT] * g / h * SLOPES[i, 0]
+        more = (kappa - 1.0) * s * c
+        for j in range(size):
+            table[i, j] = -s * de[j]
+            table[i, size + j] = c * de[j]
+            table[i, 2 * size + j] = -g * rate * e[j] - more * de[j]
+        table[i, 3 * size] = -at[LIMIT] * c * c * rate - s * c * at[DLIMIT]
+        if active:
+            share = h * WEIGHTS[i]
+            _slip_moments(tau, share * c, share * s, sums)
+            for j in range(n):
+                norm = share * at[LIMIT] / math.pi
+                if of_motion[j] == 0 and all_ks[0] == 0:
+                    norm *= 0.5
+                norm = norm * e[of_motion[j]]
+                F[0, j] += c * norm
+                F[1, j] += s * norm
+                if weights.shape[0] == 0:
+                    adjoint[i, j] -= s * norm
+                    adjoint[i, n + j] += c * norm
+                else:
+                    for r in range(weights.shape[0]):
+                        adjoint[i, r] += (c * weights[r, 1, j] - s * weights[r, 0, j]) * norm
+    solve_columns(matrix, adjoint)
+    for r in range(m):
+        total = -first[0] * adjoint[0, r]
+        for i in range(1, STAGES):
+            total -= first[i] * adjoint[i, r]
+        eta[r] = total
+
+
+@apart
+def _contact_back(waves: Real, kappa: float, all_ks: Integer, tau: float, theta: float, eta: Real, G: Real) -> None:
+    """Go back over the begin of a slip where contact begins: δθ of the regular solution."""
+    size = (G.shape[1] - 1) // 3
+    e, de = np.empty(size, waves.dtype), np.empty(size, waves.dtype)
+    at = np.empty(CURVES, waves.dtype)
+    curves_at(waves, tau, at)
+    basis_of(tau, all_ks, e, de)
+    _, slope, g, _ = turning(at, kappa, theta)
+    c, s = np.cos(theta), np.sin(theta)
+    more = (kappa - 1.0) * s * c
+    # L θ' g = F, differentiated where L = 0.
+    rate = (c * at[DDY] - s * at[DDX] - more * at[DDLIMIT]) / (at[DLIMIT] * g - slope)
+    _add_row(G, 0, eta, s / slope, de)
+    _add_row(G, size, eta, -c / slope, de)
+    _add_row(G, 2 * size, eta, g * rate / slope, e)
+    _add_row(G, 2 * size, eta, more / slope, de)
+    for r in range(eta.size):
+        G[r, 3 * size] += eta[r] * s * c * at[DLIMIT] / slope
+
+
+@apart
+def _slip_begin(
+    waves: Real, kappa: float, all_ks: Integer, tau: float, theta: float, after_stick: bool, eta: Real,
+    psi: Real, G: Real,
+) -> None:  # fmt: skip
+    """Turn η at the begin of a slip into ψ of the force before it."""
+    at = np.empty(CURVES, waves.dtype)
+    curves_at(waves, tau, at)
+    px, py, along = projection(kappa, theta)
+    if not after_stick:
+        px, py = -np.sin(theta), np.cos(theta)
+    for r in range(eta.size):
+        psi[0, r], psi[1, r] = px * eta[r] / at[LIMIT], py * eta[r] / at[LIMIT]
+    if after_stick and kappa != 1.0:
+        size = (G.shape[1] - 1) // 3
+        e, de = np.empty(size, waves.dtype), np.empty(size, waves.dtype)
+        basis_of(tau, all_ks, e, de)
+        _add_row(G, 2 * size, eta, along / at[LIMIT], e)
+
+
+@apart
+def _slip_end(
+    waves: Real, all_ks: Integer, tau: float, theta: float, psi: Real, eta: Real, G: Real
+) -> None:
+    """Turn ψ of the force L n at the end of a slip into η of its direction; L has its own part."""
+    size = (G.shape[1] - 1) // 3
+    e, de = np.empty(size, waves.dtype), np.empty(size, waves.dtype)
+    at = np.empty(CURVES, waves.dtype)
+    curves_at(waves, tau, at)
+    basis_of(tau, all_ks, e, de)
+    c, s = np.cos(theta), np.sin(theta)
+    for r in range(eta.size):
+        eta[r] = at[LIMIT] * (c * psi[1, r] - s * psi[0, r])
+    _add_row(G, 2 * size, psi[0], c, e)
+    _add_row(G, 2 * size, psi[1], s, e)
+
+
+@apart
+def _unloaded_back(waves: Real, kappa: float, all_ks: Integer, cut: bool, psi: Real, G: Real) -> None:
+    """Go back over τ = 0, where the force is that of the unloaded state, cut to the limit if it is beyond."""
+    size = (G.shape[1] - 1) // 3
+    e, de = np.empty(size, waves.dtype), np.empty(size, waves.dtype)
+    at = np.empty(CURVES, waves.dtype)
+    curves_at(waves, 0.0 * waves[0, 0, 0], at)
+    basis_of(0.0 * waves[0, 0, 0], all_ks, e, de)
+    tx, ty = at[X], at[Y] / kappa
+    if cut:
+        length = np.sqrt(tx * tx + ty * ty)
+        nx, ny = tx / length, ty / length
+        share = at[LIMIT] / length
+        for r in range(psi.shape[1]):
+            along = nx * psi[0, r] + ny * psi[1, r]
+            for j in range(size):
+                G[r, 2 * size + j] += along * e[j]
+            psi[0, r], psi[1, r] = share * (psi[0, r] - along * nx), share * (psi[1, r] - along * ny)
+    _add_row(G, 0, psi[0], 1.0, e)
+    _add_row(G, size, psi[1], 1.0 / kappa, e)
+    for r in range(psi.shape[1]):
+        G[r, 3 * size] -= psi[1, r] * at[Y] / (kappa * kappa)
+
+
+@compiled
+def _gather(adjoint: Real, table: Real, G: Real) -> None:
+    """Add adjointᵀ · table, four nodes at once."""
+    nodes, m, width = adjoint.shape[0], adjoint.shape[1], table.shape[1]
+    p = 0
+    while p + 3 < nodes:
+        for r in range(m):
+            a, b, c, d = adjoint[p, r], adjoint[p + 1, r], adjoint[p + 2, r], adjoint[p + 3, r]
+            for j in range(width):
+                G[r, j] += a * table[p, j] + b * table[p + 1, j] + c * table[p + 2, j] + d * table[p + 3, j]
+        p += 4
+    while p < nodes:
+        for r in range(m):
+            a = adjoint[p, r]
+            for j in range(width):
+                G[r, j] += a * table[p, j]
+        p += 1
+
+
+@apart
+def _linear_parts(
+    waves: Real, kappa: float, ks: Integer, all_ks: Integer, of_motion: Integer, weights: Real, sums: Real,
+    F: Real, G: Real,
+) -> None:  # fmt: skip
+    """Add what the sums give: X and Y in sticks, L n in slips."""
+    n, size, dtype = of_motion.size, (G.shape[1] - 1) // 3, waves.dtype
+    block, q = np.empty((n, size), dtype), np.zeros(size, dtype)
+    for part in range(3):
+        products(sums[2 * part], sums[2 * part + 1], ks, all_ks, 1.0, block)
+        if part > 0:
+            _add_block(block, weights, part - 1, 2 * size, 1.0, G)
+            continue
+        _add_block(block, weights, 0, 0, 1.0, G)
+        _add_block(block, weights, 1, size, 1.0 / kappa, G)
+        for x in range(2):
+            _pack(waves[x], all_ks, q)
+            for i in range(n):
+                total = block[i, 0] * q[0]
+                for j in range(1, size):
+                    total += block[i, j] * q[j]
+                F[x, i] += total if x == 0 else total / kappa
+                if x == 1 and weights.shape[0] == 0:
+                    G[n + i, 3 * size] -= total / (kappa * kappa)
+                elif x == 1:
+                    for r in range(weights.shape[0]):
+                        G[r, 3 * size] -= weights[r, 1, i] * total / (kappa * kappa)
+
+
+@compiled
+def _pack(wave: Real, ks: Integer, q: Real) -> None:
+    """Fill q with the coefficients for `ks` of a curve kept as cosines and sines."""
+    here = 0
+    for i in range(ks.size):
+        q[here] = wave[0, ks[i]]
+        here += 1
+        if ks[i] > 0:
+            q[here] = wave[1, ks[i]]
+            here += 1
+
+
+@compiled
+def _add_block(block: Real, weights: Real, component: int, column: int, factor: float, G: Real) -> None:
+    """Add factor · (weights of a component) · block to the columns of G from `column`."""
+    n, size = block.shape
+    if weights.shape[0] == 0:
+        for i in range(n):
+            for j in range(size):
+                G[component * n + i, column + j] += factor * block[i, j]
+        return
+    for r in range(weights.shape[0]):
+        for i in range(n):
+            share = factor * weights[r, component, i]
+            for j in range(size):
+                G[r, column + j] += share * block[i, j]
+
+
+@compiled
+def _close(psi: Real, rows: int, G: Real) -> None:
+    """Let ψ at the end of the period be ψ at its begin; the last two rows are of ψ = (1, 0) and (0, 1)."""
+    a, b = psi[0, rows], psi[0, rows + 1]
+    c, d = psi[1, rows], psi[1, rows + 1]
+    determinant = (1.0 - a) * (1.0 - d) - b * c
+    for r in range(rows):
+        x = ((1.0 - d) * psi[0, r] + b * psi[1, r]) / determinant
+        y = (c * psi[0, r] + (1.0 - a) * psi[1, r]) / determinant
+        for j in range(G.shape[1]):
+            G[r, j] += x * G[rows, j] + y * G[rows + 1, j]
+
+
+@apart
+def circle_gradient(
+    waves: Real, kappa: float, ks: Integer, all_ks: Integer, of_motion: Integer, found: Real, pieces: Real,
+    panels: Real, weights: Real, F: Real, G: Real,
+) -> None:  # fmt: skip
+    """Fill the force coefficients and their gradient from a path.
+
+    Parameters
+    ----------
+    waves, found, pieces, panels : as `solver.contacts.kernels.circle_state.find_path` leaves them.
+    ks : harmonics of the force; all_ks : those of X, Y and L together; of_motion : (n,) where the
+        coefficients of the first stand among the second.
+    weights : (m, 2, n) of the coefficients; with m = 0 every coefficient has a row of its own, first those of
+        the first direction.
+    F : (2, n), filled.
+    G : (rows + 2, 3·size + 1), filled: derivatives by the coefficients of X, Y and L and by κ; the last two
+        rows are scratch.
+    """
+    dtype, size = waves.dtype, (G.shape[1] - 1) // 3
+    rows, count, filled = G.shape[0] - 2, int(found[PIECES]), int(found[PANELS])
+    psi, eta = np.zeros((2, rows + 2), dtype), np.zeros(rows + 2, dtype)
+    sums = np.zeros((6, ks[-1] + all_ks[-1] + 1), dtype)
+    table, adjoint = np.empty((STAGES * filled, 3 * size + 1), dtype), np.empty((STAGES * filled, rows + 2), dtype)
+    G[:, :] = 0.0
+    F[:, :] = 0.0
+    if found[HOW] == CLOSES:
+        psi[0, rows], psi[1, rows + 1] = 1.0, 1.0
+    for index in range(count - 1, -1, -1):
+        row = pieces[index]
+        active = found[HOW] != SETTLES or index == count - 1
+        if index + 1 < count and pieces[index + 1, BEGIN] != row[END]:
+            psi[:, :] = 0.0
+        follows = index > 0 and pieces[index - 1, END] == row[BEGIN]
+        if row[MOTION] == STICK:
+            _stick_back(
+                waves, kappa, ks, all_ks, row, active, weights, of_motion, psi, sums, F, G
+            )
+            continue
+        last = int(row[FIRST].real) + int(row[COUNT].real) - 1
+        if last < int(row[FIRST].real):
+            continue
+        _slip_end(waves, all_ks, row[END], panels[last, START + STAGES], psi, eta, G)
+        for p in range(last, int(row[FIRST].real) - 1, -1):
+            begin, end = STAGES * p, STAGES * (p + 1)
+            _panel_back(
+                waves, kappa, all_ks, panels[p], weights, of_motion, active, eta, sums, F,
+                table[begin:end], adjoint[begin:end],
+            )  # fmt: skip
+        theta = panels[int(row[FIRST].real), START]
+        if not follows and row[BEGAN] == AFTER_SEPARATION:
+            _contact_back(waves, kappa, all_ks, row[BEGIN], theta, eta, G)
+            psi[:, :] = 0.0
+            continue
+        after_stick = follows and pieces[index - 1, MOTION] == STICK
+        _slip_begin(waves, kappa, all_ks, row[BEGIN], theta, after_stick, eta, psi, G)
+    _gather(adjoint, table, G)
+    _linear_parts(waves, kappa, ks, all_ks, of_motion, weights, sums, F, G)
+    if found[HOW] == CLOSES:
+        _close(psi, rows, G)
+    elif found[HOW] == SETTLES:
+        _unloaded_back(waves, kappa, all_ks, pieces[0, BEGAN] != UNLOADED, psi, G)
