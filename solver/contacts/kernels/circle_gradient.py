@@ -49,7 +49,7 @@ from solver.contacts.kernels.circle_path import (
     TY,
     projection,
 )
-from solver.contacts.kernels.circle_state import CLOSES, HOW, PANELS, PIECES, SETTLES
+from solver.contacts.kernels.circle_state import CLOSES, HOW, PIECES, SETTLES
 from solver.contacts.kernels.coulomb import moment_rows, products
 from solver.contacts.kernels.radau import NODES, SLOPES, STAGES, WEIGHTS
 from solver.contacts.kernels.stick_slip_events import AFTER_SEPARATION, SLIP, STICK, UNLOADED
@@ -164,11 +164,11 @@ def _stick_back(
 @apart
 def _panel_back(
     waves: Real, kappa: float, all_ks: Integer, panel: Real, weights: Real, of_motion: Integer, active: bool,
-    eta: Real, sums: Real, F: Real, table: Real, adjoint: Real,
+    eta: Real, sums: Real, F: Real, table: Real, adjoint: Real, G: Real,
 ) -> None:  # fmt: skip
     """Go back over a panel of a slip: η (of θ) at its begin from that at its end.
 
-    Fills the panel's rows of `table` (STAGES, 3·size + 1), −∂R/∂(X, Y, L, κ), and of `adjoint` (STAGES, m).
+    `table` (STAGES, 3·size + 1), −∂R/∂(X, Y, L, κ), and `adjoint` (STAGES, m) are scratch.
     """
     dtype, m, n = waves.dtype, eta.size, of_motion.size
     size = (table.shape[1] - 1) // 3
@@ -217,6 +217,7 @@ def _panel_back(
                     for r in range(weights.shape[0]):
                         adjoint[i, r] += (c * weights[r, 1, j] - s * weights[r, 0, j]) * norm
     solve_columns(matrix, adjoint)
+    _gather(adjoint, table, G)
     for r in range(m):
         total = -first[0] * adjoint[0, r]
         for i in range(1, STAGES):
@@ -308,21 +309,17 @@ def _unloaded_back(waves: Real, kappa: float, all_ks: Integer, cut: bool, psi: R
 
 @compiled
 def _gather(adjoint: Real, table: Real, G: Real) -> None:
-    """Add adjointᵀ · table, four nodes at once."""
-    nodes, m, width = adjoint.shape[0], adjoint.shape[1], table.shape[1]
-    p = 0
-    while p + 3 < nodes:
-        for r in range(m):
-            a, b, c, d = adjoint[p, r], adjoint[p + 1, r], adjoint[p + 2, r], adjoint[p + 3, r]
-            for j in range(width):
-                G[r, j] += a * table[p, j] + b * table[p + 1, j] + c * table[p + 2, j] + d * table[p + 3, j]
-        p += 4
-    while p < nodes:
-        for r in range(m):
-            a = adjoint[p, r]
-            for j in range(width):
-                G[r, j] += a * table[p, j]
-        p += 1
+    """Add adjointᵀ · table, five nodes of the panel at once."""
+    for r in range(adjoint.shape[1]):
+        for p in range(0, STAGES, 5):
+            a, b, c, d, e = (
+                adjoint[p, r], adjoint[p + 1, r], adjoint[p + 2, r], adjoint[p + 3, r], adjoint[p + 4, r],
+            )  # fmt: skip
+            for j in range(table.shape[1]):
+                G[r, j] += (
+                    a * table[p, j] + b * table[p + 1, j] + c * table[p + 2, j] + d * table[p + 3, j]
+                    + e * table[p + 4, j]
+                )  # fmt: skip
 
 
 @apart
@@ -414,10 +411,10 @@ def circle_gradient(
         rows are scratch.
     """
     dtype, size = waves.dtype, (G.shape[1] - 1) // 3
-    rows, count, filled = G.shape[0] - 2, int(found[PIECES]), int(found[PANELS])
+    rows, count = G.shape[0] - 2, int(found[PIECES])
     psi, eta = np.zeros((2, rows + 2), dtype), np.zeros(rows + 2, dtype)
     sums = np.zeros((6, ks[-1] + all_ks[-1] + 1), dtype)
-    table, adjoint = np.empty((STAGES * filled, 3 * size + 1), dtype), np.empty((STAGES * filled, rows + 2), dtype)
+    table, adjoint = np.empty((STAGES, 3 * size + 1), dtype), np.empty((STAGES, rows + 2), dtype)
     G[:, :] = 0.0
     F[:, :] = 0.0
     if found[HOW] == CLOSES:
@@ -438,11 +435,9 @@ def circle_gradient(
             continue
         _slip_end(waves, all_ks, row[END], panels[last, START + STAGES], psi, eta, G)
         for p in range(last, int(row[FIRST].real) - 1, -1):
-            begin, end = STAGES * p, STAGES * (p + 1)
             _panel_back(
-                waves, kappa, all_ks, panels[p], weights, of_motion, active, eta, sums, F,
-                table[begin:end], adjoint[begin:end],
-            )  # fmt: skip
+                waves, kappa, all_ks, panels[p], weights, of_motion, active, eta, sums, F, table, adjoint, G
+            )
         theta = panels[int(row[FIRST].real), START]
         if not follows and row[BEGAN] == AFTER_SEPARATION:
             _contact_back(waves, kappa, all_ks, row[BEGIN], theta, eta, G)
@@ -450,7 +445,6 @@ def circle_gradient(
             continue
         after_stick = follows and pieces[index - 1, MOTION] == STICK
         _slip_begin(waves, kappa, all_ks, row[BEGIN], theta, after_stick, eta, psi, G)
-    _gather(adjoint, table, G)
     _linear_parts(waves, kappa, ks, all_ks, of_motion, weights, sums, F, G)
     if found[HOW] == CLOSES:
         _close(psi, rows, G)

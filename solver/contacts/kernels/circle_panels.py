@@ -30,7 +30,7 @@ DX, DY, DLIMIT = 3, 4, 5
 DDX, DDY, DDLIMIT = 6, 7, 8
 CURVES = 9
 NEWTON_STEPS = 14
-SMALL_TURN = 1e-8  # rad: Newton's step after which what is left is its square
+SMALL_TURN = 3e-6  # rad: Newton's step after which what is left is its square
 
 
 @compiled
@@ -121,18 +121,36 @@ def panel_rows(
         right[i, 1] = -factor * SLOPES[i, 0]
 
 
+@compiled
+def _guess(nodes: Real, kappa: float, h: float, theta0: float, theta: Real) -> None:
+    """Fill `theta` with one linearly implicit step from node to node, backward where L is 0."""
+    before, rate, place = theta0, 0.0 * theta0, 0.0
+    for i in range(STAGES):
+        F, slope, g, _ = turning(nodes[i], kappa, before)
+        half = 0.5 * h * (NODES[i] - place)
+        scale = nodes[i, LIMIT] * g
+        if i == 0:
+            half *= 2.0
+        moved = half * (rate * scale + F) / (scale - half * slope) if slope < 0.0 else half * 0.0
+        rate = (F + slope * moved) / scale if scale > 0.0 else 0.0 * rate
+        before, place = before + moved, NODES[i]
+        theta[i] = before
+
+
 @apart
 def solve_panel(
-    waves: Real, kappa: float, begin: float, end: float, theta0: float, theta: Real, nodes: Real,
-    matrix: Real, right: Real,
+    waves: Real, kappa: float, begin: float, end: float, theta0: float, fresh: bool, theta: Real,
+    nodes: Real, matrix: Real, right: Real,
 ) -> bool:  # fmt: skip
-    """Solve R = 0 at the nodes of [begin, end] by Newton's method from the guess in `theta`.
+    """Solve R = 0 at the nodes of [begin, end] by Newton's method, from the guess in `theta` or a `fresh` one.
 
     On return `nodes` has the curves at the nodes and column 1 of `right` ∂θ/∂θ0. False if it fails.
     """
     h = end - begin
     for i in range(STAGES):
         curves_at(waves, begin + h * NODES[i], nodes[i])
+    if fresh:
+        _guess(nodes, kappa, h, theta0, theta)
     for _ in range(NEWTON_STEPS):
         panel_rows(nodes, kappa, h, theta0, theta, matrix, right)
         if not solve_columns(matrix, right):

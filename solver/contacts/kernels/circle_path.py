@@ -48,7 +48,7 @@ STATE_SIZE = 11
 # Numbers of a march: tolerance of force and of its rate, size of the limit, longest panel.
 TOL, TOL_RATE, SCALE, LONGEST = 0, 1, 2, 3
 
-SMALL_TAIL = 1e-7  # last Legendre terms of the direction; integrals over a panel are right to its square
+SMALL_TAIL = 3e-6  # last Legendre terms of the direction; integrals over a panel are right to its square
 LEAST_PANEL = 1e-13  # rad
 IDLE = 4  # pieces without length in a row, after which a slip is not asked whether it sticks at once
 BLIND = 1e-7  # rad, for so long
@@ -242,7 +242,7 @@ def _end_of_slip(
     """Move the end of a panel to where q is 0, solving it anew; return the end, or −1 if that fails."""
     end = guess
     for turn in range(12):
-        if not solve_panel(waves, kappa, begin, end, theta0, theta, nodes, matrix, right):
+        if not solve_panel(waves, kappa, begin, end, theta0, False, theta, nodes, matrix, right):
             return -1.0
         last = nodes[STAGES - 1]
         angle = theta[STAGES - 1]
@@ -279,21 +279,18 @@ def slip_on(
     """
     nodes, matrix = np.empty((STAGES, CURVES)), np.empty((STAGES, STAGES))
     right, theta, at = np.empty((STAGES, 2)), np.empty(STAGES), np.empty(CURVES)
-    tau, factor, slope = begin, 1.0, 0.0
+    tau, factor = begin, 1.0
     curves_at(waves, begin, at)
     _, stiff, g, _ = turning(at, kappa, theta0)
     first = slip_rate(at, kappa, theta0)
     h = numbers[LONGEST]
-    if at[LIMIT] > 0.0 and abs(stiff) * h > 3.0 * at[LIMIT] * g:
+    if at[LIMIT] > 1e-12 * numbers[SCALE] and abs(stiff) * h > 3.0 * at[LIMIT] * g:
         h = 3.0 * at[LIMIT] * g / abs(stiff)
     while tau < end:
         rest = end - tau
         share = rest if h > 0.95 * rest else (0.5 * rest if h > 0.5 * rest else h)
         to = end if share == rest else tau + share
-        for i in range(STAGES):
-            turn = slope * share * NODES[i]
-            theta[i] = theta0 + min(max(turn, -0.3), 0.3)
-        solved = solve_panel(waves, kappa, tau, to, theta0, theta, nodes, matrix, right)
+        solved = solve_panel(waves, kappa, tau, to, theta0, True, theta, nodes, matrix, right)
         if not solved and share > LEAST_PANEL:
             h = 0.2 * share
             continue
@@ -338,10 +335,6 @@ def slip_on(
         for i in range(STAGES):
             row[START + 1 + i] = theta[i]
         filled += 1
-        slope = SLOPES[STAGES - 1, 0] * theta0
-        for j in range(STAGES):
-            slope += SLOPES[STAGES - 1, j + 1] * theta[j]
-        slope /= to - tau
         tau, theta0 = to, theta[STAGES - 1]
         factor *= right[STAGES - 1, 1]
         first = slip_rate(nodes[STAGES - 1], kappa, theta0)

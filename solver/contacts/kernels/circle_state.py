@@ -55,7 +55,8 @@ from solver.jit.separate import apart
 from solver.jit.trig_polynomial import on_grid
 
 TURN = 2.0 * math.pi
-REPEATS = 1e-11  # change of the force over a period, relative to the largest limit, that counts as none
+FORGOTTEN = 24.0  # exponent of what is left of a difference, at which the exact march begins before its period
+REPEATS = 3e-9  # change of the force over a period, relative to the largest limit, that counts as none
 MOST_ROUNDS = 60
 MOST_TRANSIENT = 40  # periods after which a slider that still slips is taken to do so for ever
 WAVES_PER_PANEL = 9.0  # rad that the highest harmonic turns in one panel, at most
@@ -129,29 +130,69 @@ def _march_intervals(
     return LIFTING
 
 
-@apart
-def _rough(grid: Real, kappa: float, periods: int, force: Real) -> tuple[int, bool]:
-    """Go over the grid from the unloaded state; return a place in the last period that slips, if it slips.
+@compiled
+def _rough_step(force: Real, dx: float, dy: float, limit: float) -> float:
+    """Move a force by one straight step (dx, dy) under a limit; return what the step forgets, 0 if it sticks.
 
-    At each point the force that is too large is cut to the limit; `force` is that at the place returned.
+    In slip tan φ/2, φ the angle from the step, decays by exp(−|step|/limit): forgetting is the exponent.
+    """
+    tx, ty = force[0], force[1]
+    size, trial = math.hypot(tx, ty), math.hypot(tx + dx, ty + dy)
+    if trial <= limit:
+        force[0], force[1] = tx + dx, ty + dy
+        return 0.0
+    stuck = min(max((limit - size) / (trial - size), 0.0), 1.0) if trial > size else 0.0
+    tx, ty = tx + stuck * dx, ty + stuck * dy
+    size, length = math.hypot(tx, ty), math.hypot(dx, dy)
+    if size == 0.0 or length == 0.0:
+        share = limit / trial
+        force[0], force[1] = share * (force[0] + dx), share * (force[1] + dy)
+        return 0.0
+    nx, ny, wx, wy = tx / size, ty / size, dx / length, dy / length
+    c, exponent = nx * wx + ny * wy, (1.0 - stuck) * length / limit
+    q = math.exp(-exponent)
+    below = 1.0 + c + q * q * (1.0 - c)
+    along, kept = (1.0 + c - q * q * (1.0 - c) - 2.0 * q * c) / below, 2.0 * q / below
+    nx, ny = along * wx + kept * nx, along * wy + kept * ny
+    force[0], force[1] = limit * nx, limit * ny
+    return exponent * max(nx * wx + ny * wy, 0.0)
+
+
+@apart
+def _rough(grid: Real, kappa: float, force: Real, history: Real) -> tuple[int, int]:
+    """Go over the grid twice from the unloaded state; find places from where to go on exactly.
+
+    Returns
+    -------
+    (from, to) points of the grid: at `to` it slips most, and what happened before `from` is forgotten there;
+    −1 if it does not slip in the second period. `force` is that at `from`.
     """
     n = grid.shape[1]
-    tx, ty = grid[0, 0], grid[1, 0] / kappa
-    best, most = 0, 0.0
-    for period in range(periods):
+    force[0], force[1] = grid[0, 0], grid[1, 0] / kappa
+    size = math.hypot(force[0], force[1])
+    if size > grid[2, 0]:
+        force[0], force[1] = force[0] * grid[2, 0] / size, force[1] * grid[2, 0] / size
+    best, most = -1, 0.0
+    for period in range(2):
         for j in range(n):
             before = j - 1 if j > 0 else n - 1
+            forgets = 0.0
             if period > 0 or j > 0:
-                tx += grid[0, j] - grid[0, before]
-                ty += (grid[1, j] - grid[1, before]) / kappa
-            size, limit = math.hypot(tx, ty), grid[2, j]
-            if size > limit:
-                if period == periods - 1 and size - limit > most:
-                    best, most = j, size - limit
-                tx, ty = tx * limit / size, ty * limit / size
-                if best == j:
-                    force[0], force[1] = tx, ty
-    return best, most > 0.0
+                dx, dy = grid[0, j] - grid[0, before], (grid[1, j] - grid[1, before]) / kappa
+                forgets = _rough_step(force, dx, dy, grid[2, j])
+            history[0, j], history[1, j], history[2, j] = forgets, force[0], force[1]
+            if period > 0 and forgets > most:
+                best, most = j, forgets
+    if best < 0:
+        return -1, -1
+    total, back = 0.0, 0
+    while total < FORGOTTEN and back < n:
+        total += history[0, (best - back + n) % n]
+        back += 1
+    begin = best - back
+    at = begin % n
+    force[0], force[1] = history[1, at], history[2, at]
+    return begin, best
 
 
 @compiled
@@ -236,19 +277,28 @@ def _closed(
     waves: Real, kappa: float, grid: Real, numbers: Real, pieces: Real, panels: Real, found: Real
 ) -> int:
     """Find the path of a contact that never opens."""
-    force = np.zeros(2)
-    place, slips = _rough(grid, kappa, 2, force)
-    if slips:
-        begin = TURN * place / grid.shape[1]
-        state = _repeat(waves, kappa, grid, begin, force, numbers, pieces, panels, found)
-        if state != STUCK:
-            return state
-    state = _settle(waves, kappa, grid, numbers, pieces, panels, found, force)
-    if state == SLIPPING:
-        state = _repeat(waves, kappa, grid, 0.0, force, numbers, pieces, panels, found)
-        if state == STUCK:
+    force, history, n = np.zeros(2), np.empty((3, grid.shape[1])), grid.shape[1]
+    begin, place = _rough(grid, kappa, force, history)
+    if place >= 0:
+        at, state = np.empty(CURVES), np.empty(STATE_SIZE)
+        tau = TURN * begin / n
+        curves_at(waves, tau, at)
+        _start_at(at, kappa, force[0], force[1], True, state)
+        count, _ = march_path(
+            waves, kappa, grid, tau, TURN * place / n, state, numbers, pieces, panels, 0, 0
+        )
+        if count < 0:
+            return count
+        force[0], force[1] = state[S_TX], state[S_TY]
+        how = _repeat(waves, kappa, grid, TURN * place / n, force, numbers, pieces, panels, found)
+        if how != STUCK:
+            return how
+    how = _settle(waves, kappa, grid, numbers, pieces, panels, found, force)
+    if how == SLIPPING:
+        how = _repeat(waves, kappa, grid, 0.0, force, numbers, pieces, panels, found)
+        if how == STUCK:
             return FAILED
-    return state
+    return how
 
 
 @apart
