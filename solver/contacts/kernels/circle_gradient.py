@@ -79,7 +79,7 @@ def basis_of(tau: float, ks: Integer, e: Real, de: Real) -> None:
 
 
 @compiled
-def _stick_moments(begin: float, end: float, cosines: Real, sines: Real) -> None:
+def moments_between(begin: float, end: float, cosines: Real, sines: Real) -> None:
     """Set ∫cos qτ and ∫sin qτ over [begin, end]; see `solver.contacts.kernels.coulomb.add_moments`."""
     half, middle = 0.5 * (end - begin), 0.5 * (end + begin)
     cm1, sm1, ch1, sh1 = np.cos(middle), np.sin(middle), np.cos(half), np.sin(half)
@@ -134,7 +134,7 @@ def _stick_back(
     basis_of(row[BEGIN], all_ks, e, de)
     if active:
         here = np.empty((2, sums.shape[1]), dtype)
-        _stick_moments(row[BEGIN], row[END], here[0], here[1])
+        moments_between(row[BEGIN], row[END], here[0], here[1])
         moment_rows(here[0], here[1], ks, moment)
         for q in range(sums.shape[1]):
             sums[STUCK_COS, q] += here[0, q]

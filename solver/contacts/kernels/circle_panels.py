@@ -131,8 +131,8 @@ def _guess(nodes: Real, kappa: float, h: float, theta0: float, theta: Real) -> N
         scale = nodes[i, LIMIT] * g
         if i == 0:
             half *= 2.0
-        moved = half * (rate * scale + F) / (scale - half * slope) if slope < 0.0 else half * 0.0
-        rate = (F + slope * moved) / scale if scale > 0.0 else 0.0 * rate
+        moved = half * (rate * scale + F) / (scale - half * slope) if slope.real < 0.0 else half * 0.0
+        rate = (F + slope * moved) / scale if scale.real > 0.0 else 0.0 * rate
         before, place = before + moved, NODES[i]
         theta[i] = before
 

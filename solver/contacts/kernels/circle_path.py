@@ -45,10 +45,13 @@ S_MOTION, S_TX, S_TY, S_THETA, S_BEGAN, S_SLIPPED, S_FACTOR, S_PX, S_PY, S_MX, S
     0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
 )  # fmt: skip
 STATE_SIZE = 11
-# Numbers of a march: tolerance of force and of its rate, size of the limit, longest panel.
-TOL, TOL_RATE, SCALE, LONGEST = 0, 1, 2, 3
+# Numbers of a march: tolerance of force and of its rate, size of the limit, longest panel, and the largest last
+# Legendre terms of the direction in a panel.
+TOL, TOL_RATE, SCALE, LONGEST, TAIL_SIZE = 0, 1, 2, 3, 4
 
-SMALL_TAIL = 3e-6  # last Legendre terms of the direction; integrals over a panel are right to its square
+# How a march fails.
+TABLE_FULL, UNSOLVED = -1, -2
+SMALL_TAIL = 1e-6  # integrals over a panel are right to nearly the square of its last Legendre terms
 LEAST_PANEL = 1e-13  # rad
 IDLE = 4  # pieces without length in a row, after which a slip is not asked whether it sticks at once
 BLIND = 1e-7  # rad, for so long
@@ -274,8 +277,8 @@ def slip_on(
 
     Returns
     -------
-    (place, direction there, its derivative by theta0, panels filled, 1 if it sticks there, 0 at the end, −1
-    if the table is full, −2 if no panel can be solved).
+    (place, direction there, its derivative by theta0, panels filled, 1 if it sticks there, 0 at the end,
+    TABLE_FULL or UNSOLVED).
     """
     nodes, matrix = np.empty((STAGES, CURVES)), np.empty((STAGES, STAGES))
     right, theta, at = np.empty((STAGES, 2)), np.empty(STAGES), np.empty(CURVES)
@@ -283,7 +286,7 @@ def slip_on(
     curves_at(waves, begin, at)
     _, stiff, g, _ = turning(at, kappa, theta0)
     first = slip_rate(at, kappa, theta0)
-    h = numbers[LONGEST]
+    h, small = numbers[LONGEST], numbers[TAIL_SIZE]
     if at[LIMIT] > 1e-12 * numbers[SCALE] and abs(stiff) * h > 3.0 * at[LIMIT] * g:
         h = 3.0 * at[LIMIT] * g / abs(stiff)
     while tau < end:
@@ -295,13 +298,13 @@ def slip_on(
             h = 0.2 * share
             continue
         if not solved:
-            return tau, theta0, factor, filled, -2
+            return tau, theta0, factor, filled, UNSOLVED
         force = 0.0
         for i in range(STAGES):
             force = max(force, nodes[i, LIMIT])
         error = tail(theta0, theta) * min(force / numbers[SCALE], 1.0)
-        change = 3.0 if error == 0.0 else min(3.0, max(0.15, 0.9 * (SMALL_TAIL / error) ** (1.0 / STAGES)))
-        if error > 3.0 * SMALL_TAIL and share > LEAST_PANEL:
+        change = 3.0 if error == 0.0 else min(3.0, max(0.15, 0.9 * (small / error) ** (1.0 / STAGES)))
+        if error > 3.0 * small and share > LEAST_PANEL:
             h = change * share
             continue
         node = _falls(nodes, kappa, theta0, theta, first, numbers[TOL_RATE])
@@ -329,7 +332,7 @@ def slip_on(
                 h = 0.5 * share
                 continue
         if filled >= panels.shape[0]:
-            return tau, theta0, factor, filled, -1
+            return tau, theta0, factor, filled, TABLE_FULL
         row = panels[filled]
         row[FROM], row[TO], row[START] = tau, to, theta0
         for i in range(STAGES):
@@ -361,13 +364,13 @@ def march_path(
 
     Returns
     -------
-    Numbers of pieces and panels; (−1, 0) if a table is full, (−2, 0) if a panel cannot be solved.
+    Numbers of pieces and panels, or (TABLE_FULL, 0) or (UNSOLVED, 0).
     """
     tau, idle = begin, 0
     at = np.empty(CURVES)
     while tau < end:
         if count >= pieces.shape[0]:
-            return -1, 0
+            return TABLE_FULL, 0
         row = pieces[count]
         row[MOTION], row[BEGIN], row[BEGAN] = state[S_MOTION], tau, state[S_BEGAN]
         row[TX], row[TY], row[FIRST], row[COUNT] = state[S_TX], state[S_TY], filled, 0.0
@@ -400,7 +403,7 @@ def march_path(
         row[END] = tau
         idle = idle + 1 if tau - row[BEGIN] <= NO_LENGTH else 0
         if idle > 40:
-            return -2, 0
+            return UNSOLVED, 0
         count += 1
     return count, filled
 

@@ -30,7 +30,9 @@ from solver.contacts.kernels.circle_path import (
     S_TX,
     S_TY,
     SCALE,
+    SMALL_TAIL,
     STATE_SIZE,
+    TAIL_SIZE,
     TOL,
     TOL_RATE,
     march_path,
@@ -63,8 +65,10 @@ WAVES_PER_PANEL = 9.0  # rad that the highest harmonic turns in one panel, at mo
 # How the path was found, and so how its derivatives go on: each interval from no force, one period that
 # repeats, or from the unloaded state to a last period that sticks (or sticks from the first).
 OPENS, CLOSES, SETTLES = 0, 1, 2
-# Numbers of a path found.
-HOW, PIECES, PANELS = 0, 1, 2
+# Numbers of a path found: these, how many intervals of contact it has, and, where it closes, how a change of
+# the force at the begin comes back: (MX, MY)·FACTOR·(PX, PY)·δt.
+HOW, PIECES, PANELS, INTERVALS, FACTOR, PX, PY, MX, MY = 0, 1, 2, 3, 4, 5, 6, 7, 8
+FOUND_SIZE = 9
 
 
 @apart
@@ -189,18 +193,16 @@ def _rough(grid: Real, kappa: float, force: Real, history: Real) -> tuple[int, i
     while total < FORGOTTEN and back < n:
         total += history[0, (best - back + n) % n]
         back += 1
-    begin = best - back
-    at = begin % n
-    force[0], force[1] = history[1, at], history[2, at]
-    return begin, best
+    begin = best - back if best >= back else best - back + n
+    force[0], force[1] = history[1, begin % n], history[2, begin % n]
+    return begin, begin + back
 
 
 @compiled
-def _start_at(at: Real, kappa: float, tx: float, ty: float, slips: bool, state: Real) -> None:
+def _start_at(at: Real, kappa: float, tx: float, ty: float, state: Real) -> None:
     """Begin with the force (tx, ty), cut to the limit; it slips if it is there and the rate of slip says so."""
     size, theta = math.hypot(tx, ty), math.atan2(ty, tx)
-    outside = size > at[LIMIT] * (1.0 - 1e-12)
-    if (outside or slips) and slip_rate(at, kappa, theta) > 0.0:
+    if size > at[LIMIT] * (1.0 - 1e-12) and slip_rate(at, kappa, theta) > 0.0:
         _fresh(state, SLIP, at[LIMIT] * math.cos(theta), at[LIMIT] * math.sin(theta), theta, AFTER_SLIP)
         return
     share = at[LIMIT] / size if size > at[LIMIT] else 1.0
@@ -214,12 +216,12 @@ def _repeat(
 ) -> int:  # fmt: skip
     """Find the force at `begin` that is the same a period later; STUCK means that the slipping ended."""
     state, at = np.empty(STATE_SIZE), np.empty(CURVES)
-    tx, ty, slips = force[0], force[1], True
+    tx, ty = force[0], force[1]
     before, plain = np.inf, False
     curves_at(waves, begin, at)
     for _ in range(MOST_ROUNDS):
-        _start_at(at, kappa, tx, ty, slips, state)
-        tx, ty, slips = state[S_TX], state[S_TY], state[S_MOTION] == SLIP
+        _start_at(at, kappa, tx, ty, state)
+        tx, ty = state[S_TX], state[S_TY]
         count, filled = march_path(
             waves, kappa, grid, begin, begin + TURN, state, numbers, pieces, panels, 0, 0
         )
@@ -236,6 +238,8 @@ def _repeat(
         step = 0.0 if plain else along / (1.0 - memory)
         if math.hypot(rx + step * state[S_MX], ry + step * state[S_MY]) <= REPEATS * numbers[SCALE]:
             found[HOW], found[PIECES], found[PANELS] = CLOSES, count, filled
+            found[FACTOR], found[PX], found[PY] = state[S_FACTOR], state[S_PX], state[S_PY]
+            found[MX], found[MY] = state[S_MX], state[S_MY]
             return SLIPPING
         tx, ty = state[S_TX] + step * state[S_MX], state[S_TY] + step * state[S_MY]
     return FAILED
@@ -254,8 +258,10 @@ def _settle(
     if size <= at[LIMIT]:
         _fresh(state, STICK, tx, ty, 0.0, UNLOADED)
     else:
-        _start_at(at, kappa, tx, ty, True, state)
+        _start_at(at, kappa, tx, ty, state)
         state[S_SLIPPED] = 0.0
+    # What a transient leaves stays: it is not averaged over a period as a motion that repeats.
+    numbers[TAIL_SIZE] = 1e-2 * SMALL_TAIL
     count, filled = 0, 0
     for period in range(MOST_TRANSIENT):
         before = filled
@@ -283,7 +289,7 @@ def _closed(
         at, state = np.empty(CURVES), np.empty(STATE_SIZE)
         tau = TURN * begin / n
         curves_at(waves, tau, at)
-        _start_at(at, kappa, force[0], force[1], True, state)
+        _start_at(at, kappa, force[0], force[1], state)
         count, _ = march_path(
             waves, kappa, grid, tau, TURN * place / n, state, numbers, pieces, panels, 0, 0
         )
@@ -306,13 +312,12 @@ def find_path(
     waves: Real, kappa: float, cos_table: Real, sin_table: Real, pieces: Real, panels: Real, found: Real,
     intervals: Real,
 ) -> int:  # fmt: skip
-    """Find what the contact does; fill pieces, panels and `found` (HOW, PIECES, PANELS).
+    """Find what the contact does; fill pieces, panels and `found` (FOUND_SIZE,).
 
     Parameters
     ----------
     waves : (3, 2, degree + 1) X, Y and L, see `solver.contacts.kernels.circle_panels`.
-    intervals : (degree + 1, 2), filled with the intervals of contact of a contact that opens; their number
-        is in found[3].
+    intervals : (degree + 1, 2), filled with the intervals of contact of a contact that opens.
 
     Returns
     -------
@@ -328,7 +333,7 @@ def find_path(
         load = max(load, grid[2, j])
     if not math.isfinite(motion + load):
         return FAILED
-    found[3] = 0.0
+    found[INTERVALS] = 0.0
     if load <= 0.0:
         return SEPARATED
     top = 0
@@ -342,12 +347,13 @@ def find_path(
         n_intervals = contact_intervals(waves[LIMIT, 0], waves[LIMIT, 1], top, grid[2], grid[5], intervals)
     if n_intervals == 0:
         return SEPARATED
-    numbers = np.empty(4)
+    numbers = np.empty(5)
     numbers[TOL], numbers[TOL_RATE] = ROUNDING * (motion + load), 5.0 * ROUNDING * (rate + load)
+    numbers[TAIL_SIZE] = SMALL_TAIL
     numbers[SCALE], numbers[LONGEST] = load, min(WAVES_PER_PANEL / max(degree, 1), 1.6)
     if n_intervals < 0:
         return _closed(waves, kappa, grid, numbers, pieces, panels, found)
-    found[3] = n_intervals
+    found[INTERVALS] = n_intervals
     return _march_intervals(waves, kappa, grid, intervals, n_intervals, numbers, pieces, panels, found)
 
 

@@ -18,11 +18,29 @@ import numpy as np
 
 from solver.contacts.kernels.circle_gradient import circle_gradient
 from solver.contacts.kernels.circle_panels import LIMIT, X, Y
+from solver.contacts.kernels.circle_path import (
+    COUNT,
+    FIRST,
+    TABLE_FULL,
+    TX,
+    TY,
+)
 from solver.contacts.kernels.circle_path import BEGAN as PIECE_BEGAN
 from solver.contacts.kernels.circle_path import BEGIN as PIECE_BEGIN
 from solver.contacts.kernels.circle_path import END as PIECE_END
 from solver.contacts.kernels.circle_path import MOTION as PIECE_MOTION
-from solver.contacts.kernels.circle_state import CLOSES, HOW, PIECES, SETTLES, TURN, find_path, new_tables
+from solver.contacts.kernels.circle_state import (
+    CLOSES,
+    FOUND_SIZE,
+    HOW,
+    INTERVALS,
+    PANELS,
+    PIECES,
+    SETTLES,
+    TURN,
+    find_path,
+    new_tables,
+)
 from solver.contacts.kernels.columns import KT, MU, OWN
 from solver.contacts.kernels.coulomb import add_moments, contact_force, products
 from solver.contacts.kernels.elastic_normal import merged, positions
@@ -105,16 +123,28 @@ def plainly_stuck(waves: Real, kappa: float) -> bool:
 
 
 @apart
-def _path(
-    waves: Real, kappa: float, cos_table: Real, sin_table: Real, found: Real, intervals: Real, times: int
-) -> tuple[int, int]:
-    """Find the path with tables large enough; return the state and how many times the usual that is."""
-    while True:
-        pieces, panels = new_tables(waves.shape[2] - 1, times)
-        state = find_path(waves, kappa, cos_table, sin_table, pieces, panels, found, intervals)
-        if state != -1 or times >= MOST_TABLES:
-            return (state, times) if state >= 0 else (FAILED, times)
-        times *= 4
+def circle_path(
+    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, cos_table: Real, sin_table: Real,
+    pieces: Real, panels: Real, found: Real, intervals: Real,
+) -> int:  # fmt: skip
+    """Find what the contact does over a period; see `solver.contacts.kernels.circle_state.find_path`."""
+    all_ks = merged(ks, load_ks)
+    N = np.empty(coefficient_count(all_ks))
+    load_of(U, ks, load, load_ks, row[KN], all_ks, N)
+    waves = np.empty((3, 2, all_ks[-1] + 1))
+    curves_of(U, ks, N, all_ks, row[KT], row[MU], waves)
+    kappa = row[KT] / row[KT_SECOND]
+    if plainly_stuck(waves, kappa):
+        found[HOW], found[PIECES], found[PANELS], found[INTERVALS] = SETTLES, 1.0, 0.0, 0.0
+        first = pieces[0]
+        first[PIECE_MOTION], first[PIECE_BEGIN], first[PIECE_END] = STICK, 0.0, TURN
+        first[PIECE_BEGAN], first[FIRST], first[COUNT] = UNLOADED, 0.0, 0.0
+        first[TX], first[TY] = 0.0, 0.0
+        for k in range(waves.shape[2]):
+            first[TX] += waves[X, 0, k]
+            first[TY] += waves[Y, 0, k] / kappa
+        return STUCK
+    return find_path(waves, kappa, cos_table, sin_table, pieces, panels, found, intervals)
 
 
 @apart
@@ -123,55 +153,37 @@ def coulomb_circle(
     cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Fill the force of two or three ports, its Jacobian and its derivative by λ; circular limit."""
-    m, n = U.shape
-    kt, second, mu = row[KT], row[KT_SECOND], row[MU]
+    m = U.shape[0]
     all_ks = merged(ks, load_ks)
-    size = coefficient_count(all_ks)
-    of_motion = positions(ks, all_ks)
-    N, dN = np.empty(size), np.empty(size)
-    load_of(U, ks, load, load_ks, row[KN], all_ks, N)
-    load_of(U, ks, dload, load_ks, slope[KN], all_ks, dN)
-    waves = np.empty((3, 2, all_ks[-1] + 1))
-    curves_of(U, ks, N, all_ks, kt, mu, waves)
-    kappa = kt / second
     for block in range(m * m):
         fill_block(dF_dU[block], 0.0)
     fill_block(F, 0.0)
     fill_block(dF_dp, 0.0)
-    intervals = np.empty((all_ks[-1] + 2, 2))
-    found = np.zeros(4)
-    if plainly_stuck(waves, kappa):
-        state, piece = STUCK, 1
-        row0 = segments[0]
-        row0[MOTION], row0[BEGIN], row0[END] = STICK, 0.0, TURN
-        row0[DIRECTION], row0[ONSET], row0[BEGAN] = 1.0, 0.0, UNLOADED
-        _stuck(U, kt, second, slope, F, dF_dU, dF_dp)
-    else:
-        pieces, panels = new_tables(all_ks[-1], 1)
-        state = find_path(waves, kappa, cos_table, sin_table, pieces, panels, found, intervals)
-        times = 1
-        while state == -1 and times < MOST_TABLES:
-            times *= 4
-            pieces, panels = new_tables(all_ks[-1], times)
-            state = find_path(waves, kappa, cos_table, sin_table, pieces, panels, found, intervals)
-        if state < 0 or state == FAILED:
-            fill_block(F, np.nan)
-            return FAILED, 0
-        piece = _write_segments(state, found, pieces, segments)
-        if state == STUCK and pieces[0, PIECE_BEGAN] == UNLOADED and int(found[PIECES]) == 1:
-            _stuck(U, kt, second, slope, F, dF_dU, dF_dp)
-        elif state != SEPARATED:
-            _friction(
-                U, ks, all_ks, of_motion, N, dN, row, slope, waves, found, pieces, panels, F, dF_dU, dF_dp
-            )
+    intervals, found = np.empty((all_ks[-1] + 2, 2)), np.zeros(FOUND_SIZE)
+    times = 1
+    pieces, panels = new_tables(all_ks[-1], times)
+    state = circle_path(
+        U, ks, load, load_ks, row, cos_table, sin_table, pieces, panels, found, intervals
+    )
+    while state == TABLE_FULL and times < MOST_TABLES:
+        times *= 4
+        pieces, panels = new_tables(all_ks[-1], times)
+        state = circle_path(
+            U, ks, load, load_ks, row, cos_table, sin_table, pieces, panels, found, intervals
+        )
+    if state < 0 or state == FAILED:
+        fill_block(F, np.nan)
+        return FAILED, 0
+    if state == STUCK and pieces[0, PIECE_BEGAN] == UNLOADED and int(found[PIECES]) == 1:
+        _stuck(U, row[KT], row[KT_SECOND], slope, F, dF_dU, dF_dp)
+    elif state != SEPARATED:
+        _friction(U, ks, load, load_ks, row, slope, dload, found, pieces, panels, F, dF_dU, dF_dp)
     if m > 2:
         _press(
-            ks, all_ks, of_motion, N, dN, row[KN], state, intervals, int(found[3]), F[2], dF_dU[8], dF_dp[2]
-        )
-        if row[PRESTRESSED] > 0.0 and load[0] > 0.0 and ks[0] == 0:
-            F[2, 0] -= load[0]
-            dF_dp[2, 0] -= dload[0]
-    return state, piece
+            U, ks, load, load_ks, row, slope, dload, state, intervals[: int(found[INTERVALS])], F[2],
+            dF_dU[8], dF_dp[2],
+        )  # fmt: skip
+    return state, _write_segments(state, found, pieces, segments)
 
 
 @compiled
@@ -186,12 +198,18 @@ def _stuck(U: Real, kt: float, second: float, slope: Real, F: Real, dF_dU: Real,
 
 @apart
 def _friction(
-    U: Real, ks: Integer, all_ks: Integer, of_motion: Integer, N: Real, dN: Real, row: Real, slope: Real,
-    waves: Real, found: Real, pieces: Real, panels: Real, F: Real, dF_dU: Real, dF_dp: Real,
+    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real, found: Real,
+    pieces: Real, panels: Real, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> None:  # fmt: skip
     """Fill the two friction forces from the path."""
-    m, n, size = U.shape[0], U.shape[1], N.size
+    m, n = U.shape
     kt, second, mu, kn = row[KT], row[KT_SECOND], row[MU], row[KN]
+    all_ks = merged(ks, load_ks)
+    size, of_motion = coefficient_count(all_ks), positions(ks, all_ks)
+    N, dN, waves = np.empty(size), np.empty(size), np.empty((3, 2, all_ks[-1] + 1))
+    load_of(U, ks, load, load_ks, kn, all_ks, N)
+    load_of(U, ks, dload, load_ks, slope[KN], all_ks, dN)
+    curves_of(U, ks, N, all_ks, kt, mu, waves)
     G, weights = np.empty((2 * n + 2, 3 * size + 1)), np.empty((0, 2, n))
     circle_gradient(
         waves, kt / second, ks, all_ks, of_motion, found, pieces, panels, weights, F[:2], G
@@ -202,12 +220,10 @@ def _friction(
             line = G[a * n + i]
             total = line[3 * size] * dkappa
             for j in range(n):
-                by_u, by_w, by_load = (
-                    line[of_motion[j]], line[size + of_motion[j]], line[2 * size + of_motion[j]],
-                )  # fmt: skip
+                by_u, by_w = line[of_motion[j]], line[size + of_motion[j]]
                 dF_dU[a * m, i, j], dF_dU[a * m + 1, i, j] = kt * by_u, kt * by_w
                 if m > 2:
-                    dF_dU[a * m + 2, i, j] = mu * kn * by_load
+                    dF_dU[a * m + 2, i, j] = mu * kn * line[2 * size + of_motion[j]]
                 total += slope[KT] * (by_u * U[0, j] + by_w * U[1, j])
             for j in range(size):
                 total += line[2 * size + j] * (slope[MU] * N[j] + mu * dN[j])
@@ -216,15 +232,21 @@ def _friction(
 
 @apart
 def _press(
-    ks: Integer, all_ks: Integer, of_motion: Integer, N: Real, dN: Real, kn: float, state: int,
-    intervals: Real, n_intervals: int, P: Real, dP_dv: Real, dP_dp: Real,
+    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real, state: int,
+    intervals: Real, P: Real, dP_dv: Real, dP_dp: Real,
 ) -> None:  # fmt: skip
-    """Fill the normal force max(N, 0): nothing if separated, N if always closed, else from the intervals."""
-    n, size = of_motion.size, N.size
-    dP_dN = np.zeros((n, size))
+    """Fill the normal force max(N, 0): nothing if separated, N if always closed, else from the intervals.
+
+    Of a prestressed contact it counts from the state in which N0, if positive, is in equilibrium already.
+    """
+    all_ks = merged(ks, load_ks)
+    n, size, of_motion = U.shape[1], coefficient_count(all_ks), positions(ks, all_ks)
+    N, dN, dP_dN = np.empty(size), np.empty(size), np.zeros((n, size))
+    load_of(U, ks, load, load_ks, row[KN], all_ks, N)
+    load_of(U, ks, dload, load_ks, slope[KN], all_ks, dN)
     if state == LIFTING:
         cosines, sines = np.zeros(ks[-1] + all_ks[-1] + 1), np.zeros(ks[-1] + all_ks[-1] + 1)
-        for i in range(n_intervals):
+        for i in range(intervals.shape[0]):
             add_moments(intervals[i, 0], intervals[i, 1], 1.0, cosines, sines)
         products(cosines, sines, ks, all_ks, 1.0, dP_dN)
     elif state != SEPARATED:
@@ -235,7 +257,10 @@ def _press(
             P[i] += dP_dN[i, j] * N[j]
             dP_dp[i] += dP_dN[i, j] * dN[j]
         for j in range(n):
-            dP_dv[i, j] = kn * dP_dN[i, of_motion[j]]
+            dP_dv[i, j] = row[KN] * dP_dN[i, of_motion[j]]
+    if row[PRESTRESSED] > 0.0 and load[0] > 0.0 and ks[0] == 0:
+        P[0] -= load[0]
+        dP_dp[0] -= dload[0]
 
 
 @compiled
