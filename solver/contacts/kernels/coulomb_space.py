@@ -179,7 +179,7 @@ def coulomb_circle(
     elif state != SEPARATED:
         _friction(U, ks, load, load_ks, row, slope, dload, found, pieces, panels, F, dF_dU, dF_dp)
     if m > 2:
-        _press(
+        press(
             U, ks, load, load_ks, row, slope, dload, state, intervals[: int(found[INTERVALS])], F[2],
             dF_dU[8], dF_dp[2],
         )  # fmt: skip
@@ -231,7 +231,7 @@ def _friction(
 
 
 @apart
-def _press(
+def press(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real, state: int,
     intervals: Real, P: Real, dP_dv: Real, dP_dp: Real,
 ) -> None:  # fmt: skip
