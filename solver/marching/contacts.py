@@ -38,6 +38,7 @@ class Row:
     normal_ends: _Pair | None = None
     kn: float = 0.0
     rest: float = 0.0
+    presses: float = 1.0
     gap: float = 0.0
     powers: tuple[float, ...] = ()
 
@@ -93,7 +94,7 @@ def columns(found: tuple[Row, ...], index: dict[str, int]) -> dict[str, NDArray[
     powers = np.zeros((len(found), max(degree, 1)))
     for i, row in enumerate(found):
         powers[i, : len(row.powers)] = row.powers
-    scalars = ("kt", "mu", "N0", "N1", "N1_phase", "kn", "rest", "gap")
+    scalars = ("kt", "mu", "N0", "N1", "N1_phase", "kn", "rest", "presses", "gap")
     numbers = {name: np.array([getattr(row, name) for row in found], dtype=np.float64) for name in scalars}
     return {
         **numbers, "law": np.array([row.law for row in found], dtype=np.int64), "first": first,
