@@ -190,12 +190,14 @@ def balanced(matrices: tuple[np.ndarray, np.ndarray, np.ndarray], omega: float, 
         f[at, 1] += force["amplitude"] * math.cos(force["phase"])
         f[at, 2] -= force["amplitude"] * math.sin(force["phase"])
     Z = Z.reshape(3 * n, 3 * n)
-    row = row_of(contact["kt"], contact["kt"], contact["mu"], contact["kn"], float(contact["prestressed"]))
+    stiffness = contact["kt"], contact.get("kt_second", contact["kt"])
+    row = row_of(*stiffness, contact["mu"], contact["kn"], float(contact["prestressed"]))
     U = np.linalg.solve(Z + np.kron(np.diag(row[[KT, KT_SECOND, KN]]), np.eye(n)), f.ravel())
     # From a load that holds it all, walked down to its value.
     for factor in (30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.0):
         for _ in range(40):
-            element = Element(U=U.reshape(3, n), load=np.array([factor * contact["N0"], 0.0, 0.0]), row=row)
+            load = np.array([factor * contact["N0"], 0.0, 0.0])
+            element = Element(U=U.reshape(3, n), load=load, row=row, box=contact["limit"] == "box")
             force_here = evaluate(element)
             residual = Z @ U + force_here.F.ravel() - f.ravel()
             step = np.linalg.solve(Z + force_here.jacobian, residual)

@@ -47,6 +47,7 @@ def contact_rows(contact: dict[str, Any]) -> tuple[Row, ...]:
     rest = max(contact["N0"], 0.0) if contact["prestressed"] else 0.0
     laws = (kernel.ELASTIC_NORMAL, kernel.ELASTIC_NORMAL) if box else (kernel.CIRCLE, kernel.CIRCLE_SECOND)
     first = Row(name="rub", ends=pair("x"), law=laws[0], rest=rest, **given)
+    given["kt"] = contact.get("kt_second", contact["kt"])
     return first, Row(name="rub (second)", ends=pair("y"), law=laws[1], rest=rest, presses=0.0, **given)
 
 

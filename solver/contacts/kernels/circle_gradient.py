@@ -55,6 +55,7 @@ from solver.contacts.kernels.radau import NODES, SLOPES, STAGES, WEIGHTS
 from solver.contacts.kernels.stick_slip_events import AFTER_SEPARATION, SLIP, STICK, UNLOADED
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real
+from solver.jit.lapack import fill_block
 from solver.jit.separate import apart
 
 # Sums over sticks (1), and over slips weighted by cos θ and sin θ, of cos qτ and sin qτ.
@@ -161,68 +162,95 @@ def _stick_back(
         _add_row(G, 2 * size, psi[1], at[DY] / (kappa * at[DLIMIT]), e)
 
 
+@compiled
+def _curves_of_basis(packed: Real, e: Real, de: Real, at: Real) -> None:
+    """Fill `at` with L and the slopes of X, Y and L from the basis at a point."""
+    x, y, load, rise = 0.0 * packed[0, 0], 0.0 * packed[0, 0], 0.0 * packed[0, 0], 0.0 * packed[0, 0]
+    for j in range(e.size):
+        x += packed[X, j] * de[j]
+        y += packed[Y, j] * de[j]
+        load += packed[LIMIT, j] * e[j]
+        rise += packed[LIMIT, j] * de[j]
+    at[DX], at[DY], at[LIMIT], at[DLIMIT] = x, y, load, rise
+
+
+@compiled
+def _table_row(e: Real, de: Real, c: float, s: float, turn: float, more: float, row: Real) -> None:
+    """Fill −∂R/∂(X, Y, L) at a node; `turn` is gθ' and `more` (κ − 1) sin θ cos θ."""
+    size = e.size
+    for j in range(size):
+        row[j] = -s * de[j]
+    for j in range(size):
+        row[size + j] = c * de[j]
+    for j in range(size):
+        row[2 * size + j] = -turn * e[j] - more * de[j]
+
+
 @apart
 def _panel_back(
-    waves: Real, kappa: float, all_ks: Integer, panel: Real, weights: Real, of_motion: Integer, active: bool,
+    packed: Real, kappa: float, all_ks: Integer, panel: Real, weights: Real, of_motion: Integer, active: bool,
     eta: Real, sums: Real, F: Real, table: Real, adjoint: Real, G: Real,
 ) -> None:  # fmt: skip
     """Go back over a panel of a slip: η (of θ) at its begin from that at its end.
 
     `table` (STAGES, 3·size + 1), −∂R/∂(X, Y, L, κ), and `adjoint` (STAGES, m) are scratch.
     """
-    dtype, m, n = waves.dtype, eta.size, of_motion.size
-    size = (table.shape[1] - 1) // 3
-    e, de, at = np.empty(size, dtype), np.empty(size, dtype), np.empty(CURVES, dtype)
+    dtype, m, n = packed.dtype, eta.size, of_motion.size
+    size = packed.shape[1]
+    basis, at = np.empty((3, size), dtype), np.empty(CURVES, dtype)
+    e, de, kept = basis[0], basis[1], basis[2]
     matrix, first = np.empty((STAGES, STAGES), dtype), np.empty(STAGES, dtype)
     begin, h = panel[FROM], panel[TO] - panel[FROM]
     for i in range(STAGES):
-        for r in range(m):
-            adjoint[i, r] = 0.0
-    for r in range(m):
-        adjoint[STAGES - 1, r] = eta[r]
-    for i in range(STAGES):
         tau, theta = begin + h * NODES[i], panel[START + 1 + i]
-        curves_at(waves, tau, at)
         basis_of(tau, all_ks, e, de)
+        _curves_of_basis(packed, e, de, at)
         _, slope, g, dg = turning(at, kappa, theta)
         c, s = np.cos(theta), np.sin(theta)
         rate = SLOPES[i, 0] * panel[START]
         for j in range(STAGES):
             rate += SLOPES[i, j + 1] * panel[START + 1 + j]
         rate /= h
+        factor = at[LIMIT] * g / h
         for j in range(STAGES):
-            matrix[j, i] = at[LIMIT] * g / h * SLOPES[i, j + 1]
+            matrix[j, i] = factor * SLOPES[i, j + 1]
         matrix[i, i] += at[LIMIT] * dg * rate - slope
-        first[i] = at[LIMIT] * g / h * SLOPES[i, 0]
-        more = (kappa - 1.0) * s * c
-        for j in range(size):
-            table[i, j] = -s * de[j]
-            table[i, size + j] = c * de[j]
-            table[i, 2 * size + j] = -g * rate * e[j] - more * de[j]
+        first[i] = factor * SLOPES[i, 0]
+        _table_row(e, de, c, s, g * rate, (kappa - 1.0) * s * c, table[i])
         table[i, 3 * size] = -at[LIMIT] * c * c * rate - s * c * at[DLIMIT]
-        if active:
-            share = h * WEIGHTS[i]
-            _slip_moments(tau, share * c, share * s, sums)
+        line = adjoint[i]
+        for r in range(m):
+            line[r] = 0.0 * eta[r]
+        if not active:
+            continue
+        share = h * WEIGHTS[i]
+        _slip_moments(tau, share * c, share * s, sums)
+        norm = share * at[LIMIT] / math.pi
+        for j in range(n):
+            kept[j] = norm * e[of_motion[j]]
+        if all_ks[0] == 0 and of_motion[0] == 0:
+            kept[0] *= 0.5
+        for j in range(n):
+            F[0, j] += c * kept[j]
+            F[1, j] += s * kept[j]
+        if weights.shape[0] == 0:
             for j in range(n):
-                norm = share * at[LIMIT] / math.pi
-                if of_motion[j] == 0 and all_ks[0] == 0:
-                    norm *= 0.5
-                norm = norm * e[of_motion[j]]
-                F[0, j] += c * norm
-                F[1, j] += s * norm
-                if weights.shape[0] == 0:
-                    adjoint[i, j] -= s * norm
-                    adjoint[i, n + j] += c * norm
-                else:
-                    for r in range(weights.shape[0]):
-                        adjoint[i, r] += (c * weights[r, 1, j] - s * weights[r, 0, j]) * norm
+                line[j] = -s * kept[j]
+            for j in range(n):
+                line[n + j] = c * kept[j]
+        else:
+            for r in range(weights.shape[0]):
+                for j in range(n):
+                    line[r] += (c * weights[r, 1, j] - s * weights[r, 0, j]) * kept[j]
+    for r in range(m):
+        adjoint[STAGES - 1, r] += eta[r]
     solve_columns(matrix, adjoint)
     _gather(adjoint, table, G)
     for r in range(m):
-        total = -first[0] * adjoint[0, r]
-        for i in range(1, STAGES):
-            total -= first[i] * adjoint[i, r]
-        eta[r] = total
+        eta[r] = -first[0] * adjoint[0, r]
+    for i in range(1, STAGES):
+        for r in range(m):
+            eta[r] -= first[i] * adjoint[i, r]
 
 
 @apart
@@ -324,12 +352,12 @@ def _gather(adjoint: Real, table: Real, G: Real) -> None:
 
 @apart
 def _linear_parts(
-    waves: Real, kappa: float, ks: Integer, all_ks: Integer, of_motion: Integer, weights: Real, sums: Real,
+    packed: Real, kappa: float, ks: Integer, all_ks: Integer, of_motion: Integer, weights: Real, sums: Real,
     F: Real, G: Real,
 ) -> None:  # fmt: skip
     """Add what the sums give: X and Y in sticks, L n in slips."""
-    n, size, dtype = of_motion.size, (G.shape[1] - 1) // 3, waves.dtype
-    block, q = np.empty((n, size), dtype), np.zeros(size, dtype)
+    n, size = of_motion.size, packed.shape[1]
+    block = np.empty((n, size), packed.dtype)
     for part in range(3):
         products(sums[2 * part], sums[2 * part + 1], ks, all_ks, 1.0, block)
         if part > 0:
@@ -338,11 +366,10 @@ def _linear_parts(
         _add_block(block, weights, 0, 0, 1.0, G)
         _add_block(block, weights, 1, size, 1.0 / kappa, G)
         for x in range(2):
-            _pack(waves[x], all_ks, q)
             for i in range(n):
-                total = block[i, 0] * q[0]
+                total = block[i, 0] * packed[x, 0]
                 for j in range(1, size):
-                    total += block[i, j] * q[j]
+                    total += block[i, j] * packed[x, j]
                 F[x, i] += total if x == 0 else total / kappa
                 if x == 1 and weights.shape[0] == 0:
                     G[n + i, 3 * size] -= total / (kappa * kappa)
@@ -415,15 +442,18 @@ def circle_gradient(
     psi, eta = np.zeros((2, rows + 2), dtype), np.zeros(rows + 2, dtype)
     sums = np.zeros((6, ks[-1] + all_ks[-1] + 1), dtype)
     table, adjoint = np.empty((STAGES, 3 * size + 1), dtype), np.empty((STAGES, rows + 2), dtype)
-    G[:, :] = 0.0
-    F[:, :] = 0.0
+    packed = np.empty((3, size), dtype)
+    for x in range(3):
+        _pack(waves[x], all_ks, packed[x])
+    fill_block(G, 0.0)
+    fill_block(F, 0.0)
     if found[HOW] == CLOSES:
         psi[0, rows], psi[1, rows + 1] = 1.0, 1.0
     for index in range(count - 1, -1, -1):
         row = pieces[index]
         active = found[HOW] != SETTLES or index == count - 1
         if index + 1 < count and pieces[index + 1, BEGIN] != row[END]:
-            psi[:, :] = 0.0
+            fill_block(psi, 0.0)
         follows = index > 0 and pieces[index - 1, END] == row[BEGIN]
         if row[MOTION] == STICK:
             _stick_back(
@@ -436,16 +466,16 @@ def circle_gradient(
         _slip_end(waves, all_ks, row[END], panels[last, START + STAGES], psi, eta, G)
         for p in range(last, int(row[FIRST].real) - 1, -1):
             _panel_back(
-                waves, kappa, all_ks, panels[p], weights, of_motion, active, eta, sums, F, table, adjoint, G
+                packed, kappa, all_ks, panels[p], weights, of_motion, active, eta, sums, F, table, adjoint, G
             )
         theta = panels[int(row[FIRST].real), START]
         if not follows and row[BEGAN] == AFTER_SEPARATION:
             _contact_back(waves, kappa, all_ks, row[BEGIN], theta, eta, G)
-            psi[:, :] = 0.0
+            fill_block(psi, 0.0)
             continue
         after_stick = follows and pieces[index - 1, MOTION] == STICK
         _slip_begin(waves, kappa, all_ks, row[BEGIN], theta, after_stick, eta, psi, G)
-    _linear_parts(waves, kappa, ks, all_ks, of_motion, weights, sums, F, G)
+    _linear_parts(packed, kappa, ks, all_ks, of_motion, weights, sums, F, G)
     if found[HOW] == CLOSES:
         _close(psi, rows, G)
     elif found[HOW] == SETTLES:

@@ -160,23 +160,31 @@ def coulomb_circle(
     fill_block(F, 0.0)
     fill_block(dF_dp, 0.0)
     intervals, found = np.empty((all_ks[-1] + 2, 2)), np.zeros(FOUND_SIZE)
-    times = 1
+    rubs = row[MU] > 0.0 and row[KT] > 0.0 and row[KT_SECOND] > 0.0
+    motion, given = U, row
+    if not rubs:
+        # Without friction only the normal force is left: that of a contact that does not move.
+        motion, given = U.copy(), row.copy()
+        fill_block(motion[:2], 0.0)
+        given[MU], given[KT], given[KT_SECOND] = 1.0, 1.0, 1.0
+    state, times = int(TABLE_FULL), 1
     pieces, panels = new_tables(all_ks[-1], times)
-    state = circle_path(
-        U, ks, load, load_ks, row, cos_table, sin_table, pieces, panels, found, intervals
-    )
-    while state == TABLE_FULL and times < MOST_TABLES:
+    while True:
+        state = circle_path(
+            motion, ks, load, load_ks, given, cos_table, sin_table, pieces, panels, found, intervals
+        )
+        if state != TABLE_FULL or times >= MOST_TABLES:
+            break
         times *= 4
         pieces, panels = new_tables(all_ks[-1], times)
-        state = circle_path(
-            U, ks, load, load_ks, row, cos_table, sin_table, pieces, panels, found, intervals
-        )
     if state < 0 or state == FAILED:
         fill_block(F, np.nan)
         return FAILED, 0
-    if state == STUCK and pieces[0, PIECE_BEGAN] == UNLOADED and int(found[PIECES]) == 1:
+    if not rubs and state == STUCK:
+        state = SLIPPING
+    elif rubs and state == STUCK and pieces[0, PIECE_BEGAN] == UNLOADED and int(found[PIECES]) == 1:
         _stuck(U, row[KT], row[KT_SECOND], slope, F, dF_dU, dF_dp)
-    elif state != SEPARATED:
+    elif rubs and state != SEPARATED:
         _friction(U, ks, load, load_ks, row, slope, dload, found, pieces, panels, F, dF_dU, dF_dp)
     if m > 2:
         press(
