@@ -25,7 +25,7 @@ Random = np.random.Generator
 
 @dataclass(frozen=True, kw_only=True)
 class Element:
-    """Motions (2 or 3, n), a given load N0 + N1 cos(τ + φ) as coefficients, and a row of the contact table."""
+    """Motions (2 or 3, n), coefficients of a given load, and a row of the contact table."""
 
     U: np.ndarray
     load: np.ndarray
@@ -109,7 +109,8 @@ def second(element: Element, w: np.ndarray, direction: Element) -> np.ndarray:
     by_U, by_row, by_load = np.empty((m, n)), np.empty(COLUMNS), np.empty(3)
     circle_hessian.circle_second(
         element.U, element.ks, element.load, LOAD_KS, element.row, state, found, pieces, panels,
-        intervals[: int(found[INTERVALS])], w, direction.U, direction.row, direction.load, by_U, by_row, by_load,
+        intervals[: int(found[INTERVALS])], w, direction.U, direction.row, direction.load, by_U, by_row,
+        by_load,
     )  # fmt: skip
     return np.concatenate([by_U.ravel(), by_row[list(NUMBERS)], by_load])
 

@@ -27,7 +27,9 @@ def matrices(scene: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     M = np.diag([structure["masses"][dof] for dof in DOFS])
     C, K = np.zeros((3, 3)), np.zeros((3, 3))
     for spring in structure["springs"]:
-        row = np.array([float(dof == spring["between"][0]) - float(dof == spring["between"][1]) for dof in DOFS])
+        row = np.array(
+            [float(dof == spring["between"][0]) - float(dof == spring["between"][1]) for dof in DOFS]
+        )
         K += spring["k"] * np.outer(row, row)
         C += spring.get("c", 0.0) * np.outer(row, row)
     return M, C, K
@@ -90,7 +92,9 @@ def march_case(scene: dict[str, Any], frequency_hz: float, tolerance: float = 1e
     assert code == kernel.SETTLED
     half_pp, mean, work, change = np.empty(3), np.empty(3), 0.0, np.empty(1)
     for dof in range(3):
-        record = kernel.Record(np.empty(SAMPLES), np.empty(SAMPLES), *(np.empty((2, SAMPLES)) for _ in range(3)))
+        record = kernel.Record(
+            np.empty(SAMPLES), np.empty(SAMPLES), *(np.empty((2, SAMPLES)) for _ in range(3))
+        )
         run_periods(system, state, STEPS, 0.0, dof, record, change)
         fine = np.fft.irfft(np.fft.rfft(record.x), 32 * SAMPLES) * 32
         half_pp[dof], mean[dof] = 0.5 * (fine.max() - fine.min()), record.x.mean()

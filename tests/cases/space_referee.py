@@ -1,13 +1,16 @@
 """Friction in two directions under a circular limit, integrated by SciPy: shares nothing with the kernels.
 
 The motion is given; sticks end where a root finder on a fine grid says so, slips are an initial value problem
-of the force's direction (DOP853) that ends where its rate of slip is 0, and the Fourier integrals are part of it.
+of the force's direction (DOP853) that ends where its rate of slip is 0, Fourier integrals
+included.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -46,7 +49,9 @@ class Contact:
         v = self.U[2] @ self.basis(tau, order) if len(self.U) > 2 else 0.0
         shift = order * math.pi / 2.0
         mean = self.load[0] if order == 0 else 0.0
-        return mean + self.load[1] * math.cos(tau + shift) + self.load[2] * math.sin(tau + shift) + self.kn * v
+        return (
+            mean + self.load[1] * math.cos(tau + shift) + self.load[2] * math.sin(tau + shift) + self.kn * v
+        )
 
     @property
     def K(self) -> np.ndarray:
@@ -68,25 +73,24 @@ class _March:
             return float(np.hypot(*(offset + c.K * c.motion(tau))) - c.mu * c.normal(tau))
 
         places = begin + np.linspace(0.0, 1.0, max(int(GRID * (end - begin) / TURN), 60)) * (end - begin)
-        below, at, slips = -1.0, end, False
-        for a, b in zip(places[:-1], places[1:], strict=True):
-            if excess(b) > 1e-13 * c.mu * abs(c.load).sum():
-                if below < 0.0 and a == begin:
-                    a, slips, at = begin, True, begin
-                    inside = [begin + (b - begin) * 0.5**p for p in range(40)]
-                    inside = [x for x in inside if excess(x) < 0.0]
-                    if inside:
-                        at = brentq(excess, inside[-1] if len(inside) == 1 else max(inside), b, xtol=1e-15, rtol=1e-15)
-                else:
-                    at, slips = brentq(excess, a, b, xtol=1e-15, rtol=1e-15), True
-                break
+        at, slips = end, False
+        for a, b in pairwise(places):
+            if excess(b) <= 1e-13 * c.mu * abs(c.load).sum():
+                continue
+            at, slips = begin, True
+            # At the limit from the begin: it has to fall below before it can reach it again.
+            inside = [a] if a > begin else [begin + (b - begin) * 0.5**p for p in range(40)]
+            inside = [x for x in inside if excess(x) < 0.0]
+            if inside:
+                at = brentq(excess, max(inside), b, xtol=1e-15, rtol=1e-15)
+            break
         self.gather(begin, at, lambda tau: offset + c.K * c.motion(tau))
         return at, offset + c.K * c.motion(at), slips
 
-    def gather(self, begin: float, end: float, force) -> None:
+    def gather(self, begin: float, end: float, force: Callable[[float], np.ndarray]) -> None:
         parts = max(1, int((end - begin) / 0.3))
         edges = np.linspace(begin, end, parts + 1)
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in pairwise(edges):
             for x, w in zip(*GAUSS, strict=True):
                 tau = 0.5 * (a + b) + 0.5 * (b - a) * x
                 self.F += 0.5 * (b - a) * w / math.pi * np.outer(force(tau), self.contact.basis(tau))
@@ -117,7 +121,9 @@ class _March:
         self.F += done.y[1:, -1].reshape(2, n)
         return done.t[-1], done.y[0, -1], done.status == 1
 
-    def run(self, begin: float, end: float, t: np.ndarray, theta: float | None) -> tuple[np.ndarray, float | None]:
+    def run(
+        self, begin: float, end: float, t: np.ndarray, theta: float | None
+    ) -> tuple[np.ndarray, float | None]:
         c = self.contact
         tau = begin
         for _ in range(400):

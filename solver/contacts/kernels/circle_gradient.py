@@ -16,10 +16,15 @@ Real or complex as `solver.contacts.kernels.circle_panels`. Derivation by oursel
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
+from solver.contacts.kernels.circle_adjoint import (
+    STUCK_COS,
+    STUCK_SIN,
+    basis_of,
+    moments_between,
+    panel_back,
+)
 from solver.contacts.kernels.circle_panels import (
     CURVES,
     DDLIMIT,
@@ -29,10 +34,11 @@ from solver.contacts.kernels.circle_panels import (
     DX,
     DY,
     LIMIT,
+    Array,
+    Number,
     X,
     Y,
     curves_at,
-    solve_columns,
     turning,
 )
 from solver.contacts.kernels.circle_path import (
@@ -41,73 +47,24 @@ from solver.contacts.kernels.circle_path import (
     COUNT,
     END,
     FIRST,
-    FROM,
     MOTION,
     START,
-    TO,
     TX,
     TY,
     projection,
 )
 from solver.contacts.kernels.circle_state import CLOSES, HOW, PIECES, SETTLES
 from solver.contacts.kernels.coulomb import moment_rows, products
-from solver.contacts.kernels.radau import NODES, SLOPES, STAGES, WEIGHTS
-from solver.contacts.kernels.stick_slip_events import AFTER_SEPARATION, SLIP, STICK, UNLOADED
+from solver.contacts.kernels.radau import STAGES
+from solver.contacts.kernels.stick_slip_events import AFTER_SEPARATION, STICK, UNLOADED
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Integer, Real
+from solver.jit.fourier import Integer
 from solver.jit.lapack import fill_block
 from solver.jit.separate import apart
 
-# Sums over sticks (1), and over slips weighted by cos θ and sin θ, of cos qτ and sin qτ.
-STUCK_COS, STUCK_SIN, ALONG_COS, ALONG_SIN, ACROSS_COS, ACROSS_SIN = 0, 1, 2, 3, 4, 5
-
 
 @compiled
-def basis_of(tau: float, ks: Integer, e: Real, de: Real) -> None:
-    """Fill `e` with the basis for `ks` at `tau`, real or complex, and `de` with its slope."""
-    cos1, sin1 = np.cos(tau), np.sin(tau)
-    cosine, sine = 0.0 * cos1 + 1.0, 0.0 * cos1
-    k, here = 0, 0
-    for i in range(ks.size):
-        while k < ks[i]:
-            cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
-            k += 1
-        e[here], de[here] = cosine, -k * sine
-        here += 1
-        if k > 0:
-            e[here], de[here] = sine, k * cosine
-            here += 1
-
-
-@compiled
-def moments_between(begin: float, end: float, cosines: Real, sines: Real) -> None:
-    """Set ∫cos qτ and ∫sin qτ over [begin, end]; see `solver.contacts.kernels.coulomb.add_moments`."""
-    half, middle = 0.5 * (end - begin), 0.5 * (end + begin)
-    cm1, sm1, ch1, sh1 = np.cos(middle), np.sin(middle), np.cos(half), np.sin(half)
-    cm, sm, ch, sh = cm1, sm1, ch1, sh1
-    cosines[0], sines[0] = end - begin, 0.0
-    for q in range(1, cosines.size):
-        factor = 2.0 * sh / q
-        cosines[q], sines[q] = factor * cm, factor * sm
-        cm, sm = cm * cm1 - sm * sm1, sm * cm1 + cm * sm1
-        ch, sh = ch * ch1 - sh * sh1, sh * ch1 + ch * sh1
-
-
-@compiled
-def _slip_moments(tau: float, along: float, across: float, sums: Real) -> None:
-    """Add along·(cos qτ, sin qτ) and across·(…) to the sums over slips."""
-    cos1, sin1 = np.cos(tau), np.sin(tau)
-    cosine, sine = 0.0 * cos1 + 1.0, 0.0 * cos1
-    for q in range(sums.shape[1]):
-        sums[ALONG_COS, q] += along * cosine
-        sums[ALONG_SIN, q] += along * sine
-        sums[ACROSS_COS, q] += across * cosine
-        sums[ACROSS_SIN, q] += across * sine
-        cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
-
-
-@compiled
-def _add_row(G: Real, column: int, psi: Real, factor: float, e: Real) -> None:
+def _add_row(G: Array, column: int, psi: Array, factor: Number, e: Array) -> None:
     """Add factor · psi ⊗ e to the columns of G from `column`."""
     for r in range(psi.size):
         share = factor * psi[r]
@@ -117,8 +74,8 @@ def _add_row(G: Real, column: int, psi: Real, factor: float, e: Real) -> None:
 
 @apart
 def _stick_back(
-    waves: Real, kappa: float, ks: Integer, all_ks: Integer, row: Real, active: bool, weights: Real,
-    of_motion: Integer, psi: Real, sums: Real, F: Real, G: Real,
+    waves: Array, kappa: Number, ks: Integer, all_ks: Integer, row: Array, active: bool, weights: Array,
+    of_motion: Integer, psi: Array, sums: Array, F: Array, G: Array,
 ) -> None:  # fmt: skip
     """Go back over a stick: ψ at its begin from ψ at its end."""
     m, n, dtype = psi.shape[1], of_motion.size, waves.dtype
@@ -162,99 +119,10 @@ def _stick_back(
         _add_row(G, 2 * size, psi[1], at[DY] / (kappa * at[DLIMIT]), e)
 
 
-@compiled
-def _curves_of_basis(packed: Real, e: Real, de: Real, at: Real) -> None:
-    """Fill `at` with L and the slopes of X, Y and L from the basis at a point."""
-    x, y, load, rise = 0.0 * packed[0, 0], 0.0 * packed[0, 0], 0.0 * packed[0, 0], 0.0 * packed[0, 0]
-    for j in range(e.size):
-        x += packed[X, j] * de[j]
-        y += packed[Y, j] * de[j]
-        load += packed[LIMIT, j] * e[j]
-        rise += packed[LIMIT, j] * de[j]
-    at[DX], at[DY], at[LIMIT], at[DLIMIT] = x, y, load, rise
-
-
-@compiled
-def _table_row(e: Real, de: Real, c: float, s: float, turn: float, more: float, row: Real) -> None:
-    """Fill −∂R/∂(X, Y, L) at a node; `turn` is gθ' and `more` (κ − 1) sin θ cos θ."""
-    size = e.size
-    for j in range(size):
-        row[j] = -s * de[j]
-    for j in range(size):
-        row[size + j] = c * de[j]
-    for j in range(size):
-        row[2 * size + j] = -turn * e[j] - more * de[j]
-
-
 @apart
-def _panel_back(
-    packed: Real, kappa: float, all_ks: Integer, panel: Real, weights: Real, of_motion: Integer, active: bool,
-    eta: Real, sums: Real, F: Real, table: Real, adjoint: Real, G: Real,
-) -> None:  # fmt: skip
-    """Go back over a panel of a slip: η (of θ) at its begin from that at its end.
-
-    `table` (STAGES, 3·size + 1), −∂R/∂(X, Y, L, κ), and `adjoint` (STAGES, m) are scratch.
-    """
-    dtype, m, n = packed.dtype, eta.size, of_motion.size
-    size = packed.shape[1]
-    basis, at = np.empty((3, size), dtype), np.empty(CURVES, dtype)
-    e, de, kept = basis[0], basis[1], basis[2]
-    matrix, first = np.empty((STAGES, STAGES), dtype), np.empty(STAGES, dtype)
-    begin, h = panel[FROM], panel[TO] - panel[FROM]
-    for i in range(STAGES):
-        tau, theta = begin + h * NODES[i], panel[START + 1 + i]
-        basis_of(tau, all_ks, e, de)
-        _curves_of_basis(packed, e, de, at)
-        _, slope, g, dg = turning(at, kappa, theta)
-        c, s = np.cos(theta), np.sin(theta)
-        rate = SLOPES[i, 0] * panel[START]
-        for j in range(STAGES):
-            rate += SLOPES[i, j + 1] * panel[START + 1 + j]
-        rate /= h
-        factor = at[LIMIT] * g / h
-        for j in range(STAGES):
-            matrix[j, i] = factor * SLOPES[i, j + 1]
-        matrix[i, i] += at[LIMIT] * dg * rate - slope
-        first[i] = factor * SLOPES[i, 0]
-        _table_row(e, de, c, s, g * rate, (kappa - 1.0) * s * c, table[i])
-        table[i, 3 * size] = -at[LIMIT] * c * c * rate - s * c * at[DLIMIT]
-        line = adjoint[i]
-        for r in range(m):
-            line[r] = 0.0 * eta[r]
-        if not active:
-            continue
-        share = h * WEIGHTS[i]
-        _slip_moments(tau, share * c, share * s, sums)
-        norm = share * at[LIMIT] / math.pi
-        for j in range(n):
-            kept[j] = norm * e[of_motion[j]]
-        if all_ks[0] == 0 and of_motion[0] == 0:
-            kept[0] *= 0.5
-        for j in range(n):
-            F[0, j] += c * kept[j]
-            F[1, j] += s * kept[j]
-        if weights.shape[0] == 0:
-            for j in range(n):
-                line[j] = -s * kept[j]
-            for j in range(n):
-                line[n + j] = c * kept[j]
-        else:
-            for r in range(weights.shape[0]):
-                for j in range(n):
-                    line[r] += (c * weights[r, 1, j] - s * weights[r, 0, j]) * kept[j]
-    for r in range(m):
-        adjoint[STAGES - 1, r] += eta[r]
-    solve_columns(matrix, adjoint)
-    _gather(adjoint, table, G)
-    for r in range(m):
-        eta[r] = -first[0] * adjoint[0, r]
-    for i in range(1, STAGES):
-        for r in range(m):
-            eta[r] -= first[i] * adjoint[i, r]
-
-
-@apart
-def _contact_back(waves: Real, kappa: float, all_ks: Integer, tau: float, theta: float, eta: Real, G: Real) -> None:
+def _contact_back(
+    waves: Array, kappa: Number, all_ks: Integer, tau: Number, theta: Number, eta: Array, G: Array
+) -> None:
     """Go back over the begin of a slip where contact begins: δθ of the regular solution."""
     size = (G.shape[1] - 1) // 3
     e, de = np.empty(size, waves.dtype), np.empty(size, waves.dtype)
@@ -276,8 +144,8 @@ def _contact_back(waves: Real, kappa: float, all_ks: Integer, tau: float, theta:
 
 @apart
 def _slip_begin(
-    waves: Real, kappa: float, all_ks: Integer, tau: float, theta: float, after_stick: bool, eta: Real,
-    psi: Real, G: Real,
+    waves: Array, kappa: Number, all_ks: Integer, tau: Number, theta: Number, after_stick: bool, eta: Array,
+    psi: Array, G: Array,
 ) -> None:  # fmt: skip
     """Turn η at the begin of a slip into ψ of the force before it."""
     at = np.empty(CURVES, waves.dtype)
@@ -296,7 +164,7 @@ def _slip_begin(
 
 @apart
 def _slip_end(
-    waves: Real, all_ks: Integer, tau: float, theta: float, psi: Real, eta: Real, G: Real
+    waves: Array, all_ks: Integer, tau: Number, theta: Number, psi: Array, eta: Array, G: Array
 ) -> None:
     """Turn ψ of the force L n at the end of a slip into η of its direction; L has its own part."""
     size = (G.shape[1] - 1) // 3
@@ -312,7 +180,7 @@ def _slip_end(
 
 
 @apart
-def _unloaded_back(waves: Real, kappa: float, all_ks: Integer, cut: bool, psi: Real, G: Real) -> None:
+def _unloaded_back(waves: Array, kappa: Number, all_ks: Integer, cut: bool, psi: Array, G: Array) -> None:
     """Go back over τ = 0, where the force is that of the unloaded state, cut to the limit if it is beyond."""
     size = (G.shape[1] - 1) // 3
     e, de = np.empty(size, waves.dtype), np.empty(size, waves.dtype)
@@ -335,25 +203,10 @@ def _unloaded_back(waves: Real, kappa: float, all_ks: Integer, cut: bool, psi: R
         G[r, 3 * size] -= psi[1, r] * at[Y] / (kappa * kappa)
 
 
-@compiled
-def _gather(adjoint: Real, table: Real, G: Real) -> None:
-    """Add adjointᵀ · table, five nodes of the panel at once."""
-    for r in range(adjoint.shape[1]):
-        for p in range(0, STAGES, 5):
-            a, b, c, d, e = (
-                adjoint[p, r], adjoint[p + 1, r], adjoint[p + 2, r], adjoint[p + 3, r], adjoint[p + 4, r],
-            )  # fmt: skip
-            for j in range(table.shape[1]):
-                G[r, j] += (
-                    a * table[p, j] + b * table[p + 1, j] + c * table[p + 2, j] + d * table[p + 3, j]
-                    + e * table[p + 4, j]
-                )  # fmt: skip
-
-
 @apart
 def _linear_parts(
-    packed: Real, kappa: float, ks: Integer, all_ks: Integer, of_motion: Integer, weights: Real, sums: Real,
-    F: Real, G: Real,
+    packed: Array, kappa: Number, ks: Integer, all_ks: Integer, of_motion: Integer, weights: Array,
+    sums: Array, F: Array, G: Array,
 ) -> None:  # fmt: skip
     """Add what the sums give: X and Y in sticks, L n in slips."""
     n, size = of_motion.size, packed.shape[1]
@@ -379,7 +232,7 @@ def _linear_parts(
 
 
 @compiled
-def _pack(wave: Real, ks: Integer, q: Real) -> None:
+def _pack(wave: Array, ks: Integer, q: Array) -> None:
     """Fill q with the coefficients for `ks` of a curve kept as cosines and sines."""
     here = 0
     for i in range(ks.size):
@@ -391,7 +244,7 @@ def _pack(wave: Real, ks: Integer, q: Real) -> None:
 
 
 @compiled
-def _add_block(block: Real, weights: Real, component: int, column: int, factor: float, G: Real) -> None:
+def _add_block(block: Array, weights: Array, component: int, column: int, factor: Number, G: Array) -> None:
     """Add factor · (weights of a component) · block to the columns of G from `column`."""
     n, size = block.shape
     if weights.shape[0] == 0:
@@ -407,7 +260,7 @@ def _add_block(block: Real, weights: Real, component: int, column: int, factor: 
 
 
 @compiled
-def _close(psi: Real, rows: int, G: Real) -> None:
+def _close(psi: Array, rows: int, G: Array) -> None:
     """Let ψ at the end of the period be ψ at its begin; the last two rows are of ψ = (1, 0) and (0, 1)."""
     a, b = psi[0, rows], psi[0, rows + 1]
     c, d = psi[1, rows], psi[1, rows + 1]
@@ -421,8 +274,8 @@ def _close(psi: Real, rows: int, G: Real) -> None:
 
 @apart
 def circle_gradient(
-    waves: Real, kappa: float, ks: Integer, all_ks: Integer, of_motion: Integer, found: Real, pieces: Real,
-    panels: Real, weights: Real, F: Real, G: Real,
+    waves: Array, kappa: Number, ks: Integer, all_ks: Integer, of_motion: Integer, found: Array,
+    pieces: Array, panels: Array, weights: Array, F: Array, G: Array,
 ) -> None:  # fmt: skip
     """Fill the force coefficients and their gradient from a path.
 
@@ -456,16 +309,14 @@ def circle_gradient(
             fill_block(psi, 0.0)
         follows = index > 0 and pieces[index - 1, END] == row[BEGIN]
         if row[MOTION] == STICK:
-            _stick_back(
-                waves, kappa, ks, all_ks, row, active, weights, of_motion, psi, sums, F, G
-            )
+            _stick_back(waves, kappa, ks, all_ks, row, active, weights, of_motion, psi, sums, F, G)
             continue
         last = int(row[FIRST].real) + int(row[COUNT].real) - 1
         if last < int(row[FIRST].real):
             continue
         _slip_end(waves, all_ks, row[END], panels[last, START + STAGES], psi, eta, G)
         for p in range(last, int(row[FIRST].real) - 1, -1):
-            _panel_back(
+            panel_back(
                 packed, kappa, all_ks, panels[p], weights, of_motion, active, eta, sums, F, table, adjoint, G
             )
         theta = panels[int(row[FIRST].real), START]

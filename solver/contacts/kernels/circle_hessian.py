@@ -1,16 +1,17 @@
 """Second derivatives of the force under a circular limit, contracted with weights, along a direction.
 
-The gradient of `solver.contacts.kernels.circle_gradient` is a formula of the path: of the times of its events,
-the directions at its nodes and the curves. All of it is carried here into the complex plane, the direction as
-a tiny imaginary part: events and nodes follow by Newton's method, and the imaginary part of the gradient is
-its derivative, to rounding and without differences (W. Squire, G. Trapp, SIAM Rev. 40 (1998) 110).
+The gradient of `solver.contacts.kernels.circle_gradient` is a formula of the path: of the times of its
+events, the directions at its nodes and the curves. All of it is carried here into the complex plane, the
+direction as a tiny imaginary part: events and nodes follow by Newton's method, and the imaginary part of the
+gradient is its derivative, to rounding and without differences (W. Squire, G. Trapp, SIAM Rev. 40 (1998) 110).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from solver.contacts.kernels.circle_gradient import circle_gradient, moments_between
+from solver.contacts.kernels.circle_adjoint import moments_between
+from solver.contacts.kernels.circle_gradient import circle_gradient
 from solver.contacts.kernels.circle_panels import (
     CURVES,
     DDLIMIT,
@@ -20,6 +21,8 @@ from solver.contacts.kernels.circle_panels import (
     DX,
     DY,
     LIMIT,
+    Array,
+    Number,
     X,
     Y,
     curves_at,
@@ -53,7 +56,6 @@ from solver.contacts.kernels.circle_state import (
     PX,
     PY,
     SETTLES,
-    TURN,
 )
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.coulomb import products
@@ -62,7 +64,7 @@ from solver.contacts.kernels.elastic_normal import merged, positions
 from solver.contacts.kernels.radau import SLOPES, STAGES
 from solver.contacts.kernels.stick_slip_events import LIFTING, SEPARATED, SLIP, STICK, UNLOADED
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Complex, Integer, Real, coefficient_count
+from solver.jit.fourier import Integer, Real, coefficient_count
 from solver.jit.separate import apart
 
 TINY = 1e-30  # of the direction
@@ -70,7 +72,7 @@ ROUNDS = 4  # of Newton's method from a real solution, each of which all but squ
 
 
 @compiled
-def _zero_of_limit(waves: Complex, tau: complex, at: Complex) -> complex:
+def _zero_of_limit(waves: Array, tau: Number, at: Array) -> Number:
     """Move a time to where L is 0."""
     for _ in range(3):
         curves_at(waves, tau, at)
@@ -80,8 +82,8 @@ def _zero_of_limit(waves: Complex, tau: complex, at: Complex) -> complex:
 
 @compiled
 def _end_of_stick(
-    waves: Complex, kappa: complex, offset_x: complex, offset_y: complex, tau: complex, at: Complex
-) -> complex:
+    waves: Array, kappa: Number, offset_x: Number, offset_y: Number, tau: Number, at: Array
+) -> Number:
     """Move a time to where |t|² is L²."""
     for _ in range(ROUNDS):
         curves_at(waves, tau, at)
@@ -93,7 +95,7 @@ def _end_of_stick(
 
 
 @compiled
-def _direction(theta: float, tx: complex, ty: complex) -> complex:
+def _direction(theta: float, tx: Number, ty: Number) -> Number:
     """Return the direction of (tx, ty), whose real part is near `theta`."""
     c, s = np.cos(theta), np.sin(theta)
     return theta + (c * ty - s * tx) / (c * tx + s * ty)
@@ -101,7 +103,7 @@ def _direction(theta: float, tx: complex, ty: complex) -> complex:
 
 @apart
 def _carry_slip(
-    waves: Complex, kappa: complex, row: Complex, before: Real, panels: Complex, given: Real, sticks: bool
+    waves: Array, kappa: Number, row: Array, before: Real, panels: Array, given: Real, sticks: bool
 ) -> None:
     """Carry the panels of a slip, whose begin, first direction and first guess of the end are in place.
 
@@ -137,8 +139,8 @@ def _carry_slip(
 
 @apart
 def _carry(
-    waves: Complex, kappa: complex, found: Real, pieces: Complex, panels: Complex, given: Real, whole: Real,
-    start: Complex,
+    waves: Array, kappa: Number, found: Real, pieces: Array, panels: Array, given: Real, whole: Real,
+    start: Array,
 ) -> None:  # fmt: skip
     """Carry a path into the complex plane, the force at its begin `start` (2,); it ends as that at the end.
 
@@ -188,8 +190,8 @@ def _carry(
 
 @apart
 def _carried(
-    waves: Complex, kappa: complex, found: Real, pieces: Real, panels: Real, out_pieces: Complex,
-    out_panels: Complex,
+    waves: Array, kappa: Number, found: Real, pieces: Real, panels: Real, out_pieces: Array,
+    out_panels: Array,
 ) -> None:  # fmt: skip
     """Fill the complex pieces and panels of a path; where it closes, its begin goes with its end."""
     count, filled = int(found[PIECES]), int(found[PANELS])
@@ -262,8 +264,8 @@ def circle_second(
 
 @apart
 def _gradient_of(
-    U: Complex, ks: Integer, load: Complex, load_ks: Integer, row: Complex, state: int, found: Real,
-    pieces: Real, panels: Real, intervals: Real, w: Real, by_U: Complex, by_row: Complex, by_load: Complex,
+    U: Array, ks: Integer, load: Array, load_ks: Integer, row: Array, state: int, found: Real,
+    pieces: Real, panels: Real, intervals: Real, w: Real, by_U: Array, by_row: Array, by_load: Array,
 ) -> None:  # fmt: skip
     """Fill the gradient of w·F by motions, columns and load at complex numbers."""
     m, n = U.shape
@@ -310,13 +312,14 @@ def _gradient_of(
 
 @apart
 def _pressing(
-    waves: Complex, ks: Integer, all_ks: Integer, intervals: Real, w: Real, N: Complex, by_N: Complex
+    waves: Array, ks: Integer, all_ks: Integer, intervals: Real, w: Real, N: Array, by_N: Array
 ) -> None:
     """Add the gradient of the weighted normal force of a contact that opens."""
     n, size = w.shape[1], N.size
     at = np.empty(CURVES, np.complex128)
-    here, total = np.empty((2, ks[-1] + all_ks[-1] + 1), np.complex128), np.zeros(
-        (2, ks[-1] + all_ks[-1] + 1), np.complex128
+    here, total = (
+        np.empty((2, ks[-1] + all_ks[-1] + 1), np.complex128),
+        np.zeros((2, ks[-1] + all_ks[-1] + 1), np.complex128),
     )
     for i in range(intervals.shape[0]):
         begin = _zero_of_limit(waves, intervals[i, 0] + 0.0j, at)
@@ -325,7 +328,7 @@ def _pressing(
         for q in range(here.shape[1]):
             total[0, q] += here[0, q]
             total[1, q] += here[1, q]
-    block = np.zeros((n, size), np.complex128)
+    block: Array = np.zeros((n, size), np.complex128)
     products(total[0], total[1], ks, all_ks, 1.0, block)
     for i in range(n):
         for j in range(size):

@@ -17,12 +17,17 @@ direction (complex step: W. Squire, G. Trapp, SIAM Rev. 40 (1998) 110).
 
 from __future__ import annotations
 
+from typing import Any, TypeAlias
+
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.contacts.kernels.radau import NODES, SLOPES, STAGES
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Real
 from solver.jit.separate import apart
+
+Array: TypeAlias = NDArray[Any]  # of real or of complex numbers
+Number: TypeAlias = Any  # a real or a complex one
 
 # Rows of `waves`, and columns of what is evaluated at a point: values, slopes, curvatures.
 X, Y, LIMIT = 0, 1, 2
@@ -34,8 +39,8 @@ SMALL_TURN = 3e-6  # rad: Newton's step after which what is left is its square
 
 
 @compiled
-def curves_at(waves: Real, tau: float, out: Real) -> None:
-    """Fill `out` (CURVES,) with X, Y, L, their slopes and curvatures at `tau`; `waves` is (3, 2, degree+1)."""
+def curves_at(waves: Array, tau: Number, out: Array) -> None:
+    """Fill `out` (CURVES,) with X, Y, L, their slopes and curvatures; `waves` is (3, 2, degree + 1)."""
     cos1, sin1 = np.cos(tau), np.sin(tau)
     cosine, sine = cos1, sin1
     for x in range(3):
@@ -52,7 +57,7 @@ def curves_at(waves: Real, tau: float, out: Real) -> None:
 
 
 @compiled
-def turning(at: Real, kappa: float, theta: float) -> tuple[float, float, float, float]:
+def turning(at: Array, kappa: Number, theta: Number) -> tuple[Number, Number, Number, Number]:
     """Return F, ∂F/∂θ, g and ∂g/∂θ with the curves `at` a point."""
     c, s = np.cos(theta), np.sin(theta)
     more = (kappa - 1.0) * at[DLIMIT]
@@ -62,13 +67,13 @@ def turning(at: Real, kappa: float, theta: float) -> tuple[float, float, float, 
 
 
 @compiled
-def slip_rate(at: Real, kappa: float, theta: float) -> float:
+def slip_rate(at: Array, kappa: Number, theta: Number) -> Number:
     """Return q; the force slips on while it is positive."""
     return np.cos(theta) * at[DX] + np.sin(theta) * at[DY] / kappa - at[DLIMIT]
 
 
 @compiled
-def solve_columns(matrix: Real, right: Real) -> bool:
+def solve_columns(matrix: Array, right: Array) -> bool:
     """Solve matrix · x = right for all columns in place (elimination with partial pivoting)."""
     n, columns = matrix.shape[0], right.shape[1]
     for k in range(n):
@@ -104,7 +109,7 @@ def solve_columns(matrix: Real, right: Real) -> bool:
 
 @compiled
 def panel_rows(
-    nodes: Real, kappa: float, h: float, theta0: float, theta: Real, matrix: Real, right: Real
+    nodes: Array, kappa: Number, h: Number, theta0: Number, theta: Array, matrix: Array, right: Array
 ) -> None:
     """Fill ∂R/∂θ (STAGES, STAGES) and, as columns of `right`, −R and −∂R/∂θ0, from the curves at `nodes`."""
     inverse = 1.0 / h
@@ -122,7 +127,7 @@ def panel_rows(
 
 
 @compiled
-def _guess(nodes: Real, kappa: float, h: float, theta0: float, theta: Real) -> None:
+def _guess(nodes: Array, kappa: Number, h: Number, theta0: Number, theta: Array) -> None:
     """Fill `theta` with one linearly implicit step from node to node, backward where L is 0."""
     before, rate, place = theta0, 0.0 * theta0, 0.0
     for i in range(STAGES):
@@ -139,10 +144,10 @@ def _guess(nodes: Real, kappa: float, h: float, theta0: float, theta: Real) -> N
 
 @apart
 def solve_panel(
-    waves: Real, kappa: float, begin: float, end: float, theta0: float, fresh: bool, theta: Real,
-    nodes: Real, matrix: Real, right: Real,
+    waves: Array, kappa: Number, begin: Number, end: Number, theta0: Number, fresh: bool, theta: Array,
+    nodes: Array, matrix: Array, right: Array,
 ) -> bool:  # fmt: skip
-    """Solve R = 0 at the nodes of [begin, end] by Newton's method, from the guess in `theta` or a `fresh` one.
+    """Solve R = 0 at the nodes of [begin, end] by Newton's method from `theta`, or a `fresh` guess.
 
     On return `nodes` has the curves at the nodes and column 1 of `right` ∂θ/∂θ0. False if it fails.
     """

@@ -16,10 +16,10 @@ from solver.contacts.kernels.circle_panels import (
     DDLIMIT,
     DDX,
     DDY,
-    DLIMIT,
     DX,
     DY,
     LIMIT,
+    Number,
     X,
     Y,
     curves_at,
@@ -27,6 +27,7 @@ from solver.contacts.kernels.circle_panels import (
     solve_panel,
     turning,
 )
+from solver.contacts.kernels.circle_stick import leave_stick
 from solver.contacts.kernels.radau import NODES, SLOPES, STAGES, between, tail
 from solver.contacts.kernels.stick_slip_events import AFTER_SLIP, NO_LENGTH, SLIP, STICK
 from solver.jit.decorators import compiled
@@ -39,139 +40,27 @@ PIECE_COLUMNS = 8
 # Columns of the panels: begin, end, θ at the begin and at the nodes.
 FROM, TO, START = 0, 1, 2
 PANEL_COLUMNS = 3 + STAGES
-# The state a march begins with and ends in: motion, force, its direction, and what a stick began after. Once it
+# The state a march begins with and ends in: motion, force, its direction, what a stick began after. Once it
 # slipped, a change δt of the force at the begin is (S_MX, S_MY)·S_FACTOR·(S_PX, S_PY)·δt at the end.
 S_MOTION, S_TX, S_TY, S_THETA, S_BEGAN, S_SLIPPED, S_FACTOR, S_PX, S_PY, S_MX, S_MY = (
     0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
 )  # fmt: skip
 STATE_SIZE = 11
-# Numbers of a march: tolerance of force and of its rate, size of the limit, longest panel, and the largest last
-# Legendre terms of the direction in a panel.
+# Numbers of a march: tolerance of force and of its rate, size of the limit, longest panel, and the largest
+# last Legendre terms in a panel.
 TOL, TOL_RATE, SCALE, LONGEST, TAIL_SIZE = 0, 1, 2, 3, 4
 
 # How a march fails.
 TABLE_FULL, UNSOLVED = -1, -2
 SMALL_TAIL = 1e-6  # integrals over a panel are right to nearly the square of its last Legendre terms
-LEAST_PANEL = 1e-13  # rad
+LEAST_PANEL, SHORT_PANEL = 1e-13, 1e-9  # rad
+NOWHERE = 2.0  # no place in a panel, which is 0..1
 IDLE = 4  # pieces without length in a row, after which a slip is not asked whether it sticks at once
 BLIND = 1e-7  # rad, for so long
 
 
 @compiled
-def excess(waves: Real, kappa: float, offset_x: float, offset_y: float, tau: float, at: Real) -> float:
-    """Return |t| − L of a stick with t = offset + (X, Y/κ); fills `at` with the curves."""
-    curves_at(waves, tau, at)
-    return math.hypot(offset_x + at[X], offset_y + at[Y] / kappa) - at[LIMIT]
-
-
-@compiled
-def excess_slopes(at: Real, kappa: float, offset_x: float, offset_y: float) -> tuple[float, float]:
-    """Return slope and curvature of |t| − L from the curves `at` a point."""
-    tx, ty = offset_x + at[X], offset_y + at[Y] / kappa
-    size = math.hypot(tx, ty)
-    if size == 0.0:
-        return -at[DLIMIT], -at[DDLIMIT]
-    dx, dy = at[DX], at[DY] / kappa
-    along = (tx * dx + ty * dy) / size
-    bend = (dx * dx + dy * dy + tx * at[DDX] + ty * at[DDY] / kappa - along * along) / size
-    return along - at[DLIMIT], bend - at[DDLIMIT]
-
-
-@apart
-def _rising_root(
-    waves: Real, kappa: float, offset_x: float, offset_y: float, order: int, lo: float, hi: float, at: Real
-) -> float:
-    """Return where |t| − L (order 0), or minus its slope (order 1), crosses 0 upward inside [lo, hi]."""
-    x = 0.5 * (lo + hi)
-    for _ in range(100):
-        f = excess(waves, kappa, offset_x, offset_y, x, at)
-        slope, bend = excess_slopes(at, kappa, offset_x, offset_y)
-        if order == 1:
-            f, slope = -slope, -bend
-        if f > 0.0:
-            hi = x
-        else:
-            lo = x
-        step_to = x - f / slope if slope > 0.0 else lo - 1.0
-        if not lo <= step_to <= hi:
-            step_to = 0.5 * (lo + hi)
-        moved = abs(step_to - x)
-        x = step_to
-        if moved <= 4e-16 * (1.0 + abs(x)) or hi - lo <= 4e-16 * (1.0 + abs(x)):
-            break
-    return x
-
-
-@compiled
-def _inside(
-    waves: Real, kappa: float, offset_x: float, offset_y: float, lo: float, hi: float, tol: float, at: Real
-) -> float:
-    """Return a place soon after `lo` where |t| is below the limit, −1 if none is found before `hi`."""
-    width = (hi - lo) / 16.0
-    for part in range(1, 16):
-        if excess(waves, kappa, offset_x, offset_y, lo + part * width, at) < -tol:
-            return lo + part * width
-    for _ in range(30):
-        width *= 0.5
-        if excess(waves, kappa, offset_x, offset_y, lo + width, at) < -tol:
-            return lo + width
-    return -1.0
-
-
-@apart
-def leave_stick(
-    waves: Real, kappa: float, grid: Real, offset_x: float, offset_y: float, start: float, end: float,
-    tol: float,
-) -> tuple[float, bool]:  # fmt: skip
-    """Return when a stuck force reaches the limit, and whether it does before `end`.
-
-    `grid` (6, n) has X, Y, L and their slopes at τ_j = 2πj/n.
-    """
-    n = grid.shape[1]
-    delta = 2.0 * math.pi / n
-    at = np.empty(CURVES)
-    j = math.floor(start / delta) + 1
-    lo = start
-    low = excess(waves, kappa, offset_x, offset_y, start, at)
-    rate, _ = excess_slopes(at, kappa, offset_x, offset_y)
-    while lo < end:
-        hi = min(j * delta, end)
-        if hi == end:
-            high = excess(waves, kappa, offset_x, offset_y, end, at)
-            rate_high, _ = excess_slopes(at, kappa, offset_x, offset_y)
-        else:
-            g = j % n
-            tx, ty = offset_x + grid[0, g], offset_y + grid[1, g] / kappa
-            size = math.hypot(tx, ty)
-            high, rate_high = size - grid[2, g], -grid[5, g]
-            if size > 0.0:
-                rate_high += (tx * grid[3, g] + ty * grid[4, g] / kappa) / size
-        if high > tol or (rate > 0.0 and rate_high < 0.0) or low >= -tol:
-            begin = lo
-            if low >= -tol:
-                # The limit just left, or a touch: only after it was below can it reach it.
-                begin = _inside(waves, kappa, offset_x, offset_y, lo, hi, tol, at)
-                if begin < 0.0 and high > tol:
-                    return lo, True
-                if begin >= 0.0:
-                    excess(waves, kappa, offset_x, offset_y, begin, at)
-                    rate, _ = excess_slopes(at, kappa, offset_x, offset_y)
-            if begin >= 0.0:
-                top = hi
-                if high <= tol and rate > 0.0 and rate_high < 0.0:
-                    top = _rising_root(waves, kappa, offset_x, offset_y, 1, begin, hi, at)
-                    high = max(high, excess(waves, kappa, offset_x, offset_y, top, at))
-                if high > tol:
-                    return _rising_root(waves, kappa, offset_x, offset_y, 0, begin, top, at), True
-        lo, low, rate = hi, min(high, 0.0), rate_high
-        if hi < end and high < -tol:
-            low = high
-        j += 1
-    return end, False
-
-
-@compiled
-def _falls(nodes: Real, kappa: float, theta0: float, theta: Real, first: float, tol: float) -> int:
+def _falls(nodes: Real, kappa: float, theta: Real, first: float, tol: float) -> int:
     """Return the number of the node (from 1) at or before which the rate of slip q falls below 0, or 0."""
     before = first
     here = slip_rate(nodes[0], kappa, theta[0])
@@ -202,7 +91,7 @@ def _where_it_falls(
     waves: Real, kappa: float, begin: float, h: float, theta0: float, theta: Real, node: int, tol: float,
     at: Real,
 ) -> float:  # fmt: skip
-    """Return the place in [0, 1] where q falls below 0 before `node` (about it if negative), or 2."""
+    """Return the place in [0, 1] where q falls below 0 before `node` (about it if negative), or NOWHERE."""
     hi = NODES[abs(node) - 1]
     lo = NODES[abs(node) - 2] if abs(node) > 1 else 0.0
     if node < 0:
@@ -224,7 +113,7 @@ def _where_it_falls(
                 d = a + ratio * (b - a)
                 fd = _dense_rate(waves, kappa, begin, h, theta0, theta, d, at)
         if min(fc, fd) >= -tol:
-            return 2.0
+            return NOWHERE
         hi = c if fc < fd else d
     for _ in range(50):
         middle = 0.5 * (lo + hi)
@@ -268,6 +157,48 @@ def _end_of_slip(
     return end
 
 
+@compiled
+def _error_of(limit0: float, nodes: Real, theta0: float, theta: Real, scale: float, limits: Real) -> float:
+    """Return the last Legendre terms of a panel, of the direction weighted with the limit, or of the limit.
+
+    What the force is integrated with has waves of its own: its size counts as much as its direction.
+    """
+    most = 0.0
+    for i in range(STAGES):
+        limits[i] = nodes[i, LIMIT] / scale
+        most = max(most, limits[i])
+    return max(tail(theta0, theta) * min(most, 1.0), tail(limit0 / scale, limits))
+
+
+@apart
+def _stop_in(
+    waves: Real, kappa: float, begin: float, h: float, theta0: float, theta: Real, nodes: Real, first: float,
+    tol: float, at: Real,
+) -> float:  # fmt: skip
+    """Return the place in [0, 1] of a panel where the rate of slip falls below 0, or NOWHERE."""
+    node = _falls(nodes, kappa, theta, first, tol)
+    if node == 0:
+        return NOWHERE
+    return _where_it_falls(waves, kappa, begin, h, theta0, theta, node, tol, at)
+
+
+@compiled
+def _keep(panels: Real, filled: int, begin: float, end: float, theta0: float, theta: Real) -> None:
+    """Write a panel to the table."""
+    row = panels[filled]
+    row[FROM], row[TO], row[START] = begin, end, theta0
+    for i in range(STAGES):
+        row[START + 1 + i] = theta[i]
+
+
+@compiled
+def _shortened(theta0: float, theta: Real, place: float) -> None:
+    """Put the values at the nodes of [0, place] of a panel in the place of those at its nodes."""
+    old = theta.copy()
+    for i in range(STAGES):
+        theta[i] = between(theta0, old, NODES[i] * place)
+
+
 @apart
 def slip_on(
     waves: Real, kappa: float, begin: float, end: float, theta0: float, blind: float, numbers: Real,
@@ -282,65 +213,44 @@ def slip_on(
     """
     nodes, matrix = np.empty((STAGES, CURVES)), np.empty((STAGES, STAGES))
     right, theta, at = np.empty((STAGES, 2)), np.empty(STAGES), np.empty(CURVES)
-    tau, factor = begin, 1.0
+    tau, factor, tol, small = begin, 1.0, numbers[TOL_RATE], numbers[TAIL_SIZE]
     curves_at(waves, begin, at)
-    _, stiff, g, _ = turning(at, kappa, theta0)
-    first = slip_rate(at, kappa, theta0)
-    h, small = numbers[LONGEST], numbers[TAIL_SIZE]
-    if at[LIMIT] > 1e-12 * numbers[SCALE] and abs(stiff) * h > 3.0 * at[LIMIT] * g:
-        h = 3.0 * at[LIMIT] * g / abs(stiff)
+    first, limit0, limits = slip_rate(at, kappa, theta0), at[LIMIT], np.empty(STAGES)
+    h = _first_panel(at, kappa, theta0, numbers)
     while tau < end:
         rest = end - tau
         share = rest if h > 0.95 * rest else (0.5 * rest if h > 0.5 * rest else h)
         to = end if share == rest else tau + share
-        solved = solve_panel(waves, kappa, tau, to, theta0, True, theta, nodes, matrix, right)
-        if not solved and share > LEAST_PANEL:
+        if not solve_panel(waves, kappa, tau, to, theta0, True, theta, nodes, matrix, right):
+            if share <= LEAST_PANEL:
+                return tau, theta0, factor, filled, UNSOLVED
             h = 0.2 * share
             continue
-        if not solved:
-            return tau, theta0, factor, filled, UNSOLVED
-        force = 0.0
-        for i in range(STAGES):
-            force = max(force, nodes[i, LIMIT])
-        error = tail(theta0, theta) * min(force / numbers[SCALE], 1.0)
+        error = _error_of(limit0, nodes, theta0, theta, numbers[SCALE], limits)
         change = 3.0 if error == 0.0 else min(3.0, max(0.15, 0.9 * (small / error) ** (1.0 / STAGES)))
         if error > 3.0 * small and share > LEAST_PANEL:
             h = change * share
             continue
-        node = _falls(nodes, kappa, theta0, theta, first, numbers[TOL_RATE])
-        place = 2.0
-        if node != 0:
-            place = _where_it_falls(
-                waves, kappa, tau, share, theta0, theta, node, numbers[TOL_RATE], at
-            )
-        if place < 2.0 and tau + place * share < begin + blind:
-            place = 2.0
-        stops = place < 2.0
+        place = _stop_in(waves, kappa, tau, share, theta0, theta, nodes, first, tol, at)
+        stops = place < NOWHERE and tau + place * share >= begin + blind
+        if stops and place < 0.02 and first > tol and share > SHORT_PANEL:
+            h = 0.1 * share  # perhaps the solution against the motion
+            continue
+        if stops and place < 1e-5 and share <= SHORT_PANEL:
+            return tau, theta0, factor, filled, 1
         if stops:
-            if place < 0.02 and first > numbers[TOL_RATE] and share > 1e-9:
-                h = 0.1 * share  # perhaps the solution against the motion
-                continue
-            if place < 1e-5 and share <= 1e-9:
-                return tau, theta0, factor, filled, 1
-            old = theta.copy()
-            for i in range(STAGES):
-                theta[i] = between(theta0, old, NODES[i] * place)
-            to = _end_of_slip(
-                waves, kappa, tau, tau + place * share, theta0, theta, nodes, matrix, right
-            )
+            _shortened(theta0, theta, place)
+            to = _end_of_slip(waves, kappa, tau, tau + place * share, theta0, theta, nodes, matrix, right)
             if to < 0.0:
                 h = 0.5 * share
                 continue
         if filled >= panels.shape[0]:
             return tau, theta0, factor, filled, TABLE_FULL
-        row = panels[filled]
-        row[FROM], row[TO], row[START] = tau, to, theta0
-        for i in range(STAGES):
-            row[START + 1 + i] = theta[i]
+        _keep(panels, filled, tau, to, theta0, theta)
         filled += 1
         tau, theta0 = to, theta[STAGES - 1]
         factor *= right[STAGES - 1, 1]
-        first = slip_rate(nodes[STAGES - 1], kappa, theta0)
+        first, limit0 = slip_rate(nodes[STAGES - 1], kappa, theta0), nodes[STAGES - 1, LIMIT]
         if stops:
             return tau, theta0, factor, filled, 1
         h = min(change * share, numbers[LONGEST])
@@ -348,7 +258,17 @@ def slip_on(
 
 
 @compiled
-def projection(kappa: float, theta: float) -> tuple[float, float, float]:
+def _first_panel(at: Real, kappa: float, theta0: float, numbers: Real) -> float:
+    """Return the length of a slip's first panel: three times that in which the direction decays."""
+    _, stiff, g, _ = turning(at, kappa, theta0)
+    h, scale = numbers[LONGEST], at[LIMIT] * g
+    if at[LIMIT] > 1e-12 * numbers[SCALE] and abs(stiff) * h > 3.0 * scale:
+        h = 3.0 * scale / abs(stiff)
+    return float(h)
+
+
+@compiled
+def projection(kappa: Number, theta: Number) -> tuple[Number, Number, Number]:
     """Return (px, py, along): how L δθ follows from δt and along·(δL − n·δt) where a slip begins."""
     c, s = np.cos(theta), np.sin(theta)
     along = s * c * (1.0 - kappa) / (kappa * c * c + s * s)
@@ -377,9 +297,7 @@ def march_path(
         if state[S_MOTION] == STICK:
             curves_at(waves, tau, at)
             offset_x, offset_y = state[S_TX] - at[X], state[S_TY] - at[Y] / kappa
-            tau, leaves = leave_stick(
-                waves, kappa, grid, offset_x, offset_y, tau, end, numbers[TOL]
-            )
+            tau, leaves = leave_stick(waves, kappa, grid, offset_x, offset_y, tau, end, numbers[TOL])
             curves_at(waves, tau, at)
             state[S_TX], state[S_TY] = offset_x + at[X], offset_y + at[Y] / kappa
             if leaves:

@@ -57,7 +57,9 @@ from solver.jit.separate import apart
 from solver.jit.trig_polynomial import on_grid
 
 TURN = 2.0 * math.pi
-FORGOTTEN = 24.0  # exponent of what is left of a difference, at which the exact march begins before its period
+FORGOTTEN = (
+    24.0  # exponent of what is left of a difference, at which the exact march begins before its period
+)
 REPEATS = 3e-9  # change of the force over a period, relative to the largest limit, that counts as none
 MOST_ROUNDS = 60
 MOST_TRANSIENT = 40  # periods after which a slider that still slips is taken to do so for ever
@@ -200,7 +202,7 @@ def _rough(grid: Real, kappa: float, force: Real, history: Real) -> tuple[int, i
 
 @compiled
 def _start_at(at: Real, kappa: float, tx: float, ty: float, state: Real) -> None:
-    """Begin with the force (tx, ty), cut to the limit; it slips if it is there and the rate of slip says so."""
+    """Begin with the force (tx, ty), cut to the limit; there it slips if the rate of slip says so."""
     size, theta = math.hypot(tx, ty), math.atan2(ty, tx)
     if size > at[LIMIT] * (1.0 - 1e-12) and slip_rate(at, kappa, theta) > 0.0:
         _fresh(state, SLIP, at[LIMIT] * math.cos(theta), at[LIMIT] * math.sin(theta), theta, AFTER_SLIP)
@@ -290,9 +292,7 @@ def _closed(
         tau = TURN * begin / n
         curves_at(waves, tau, at)
         _start_at(at, kappa, force[0], force[1], state)
-        count, _ = march_path(
-            waves, kappa, grid, tau, TURN * place / n, state, numbers, pieces, panels, 0, 0
-        )
+        count, _ = march_path(waves, kappa, grid, tau, TURN * place / n, state, numbers, pieces, panels, 0, 0)
         if count < 0:
             return count
         force[0], force[1] = state[S_TX], state[S_TY]
@@ -326,12 +326,13 @@ def find_path(
     degree = waves.shape[2] - 1
     grid = np.empty((6, 2 * (cos_table.shape[1] - 1)))
     contact_grid(waves, degree, cos_table, sin_table, grid)
-    motion, rate, load = 0.0, 0.0, 0.0
+    motion, rate, load, total = 0.0, 0.0, 0.0, 0.0
     for j in range(grid.shape[1]):
+        total += grid[0, j] + grid[1, j] + grid[2, j]
         motion = max(motion, max(abs(grid[0, j]), abs(grid[1, j]) / kappa))
         rate = max(rate, max(max(abs(grid[3, j]), abs(grid[4, j]) / kappa), abs(grid[5, j])))
         load = max(load, grid[2, j])
-    if not math.isfinite(motion + load):
+    if not math.isfinite(total):
         return FAILED
     found[INTERVALS] = 0.0
     if load <= 0.0:

@@ -1,13 +1,14 @@
 """Elastic Coulomb friction in two tangential directions, |t| ≤ μN, under a load that may move.
 
-Ports: the tangential motions u and w and, if there is a third, the normal motion v, with N = N0 + N1 cos(τ + φ)
-+ kn v and the normal force max(N, 0). The arguments are those of `solver.contacts.kernels.laws`.
+Ports: the tangential motions u and w and, if there is a third, the normal motion v, with
+N = N0 + N1 cos(τ + φ) + kn v and the normal force max(N, 0). The arguments are those of
+`solver.contacts.kernels.laws`.
 
 Circle: `solver.contacts.kernels.circle_panels` has the law, `circle_state` and `circle_path` find the motion
 of the force, `circle_gradient` the coefficients and all derivatives. Box: each direction on its own, by
 `solver.contacts.kernels.coulomb`.
 
-Reference for the law with a moving load: Yang, Menq, J. Sound Vib. 217 (1998) 909, doi:10.1006/jsvi.1998.1740.
+Reference for a moving load: Yang, Menq, J. Sound Vib. 217 (1998) 909, doi:10.1006/jsvi.1998.1740.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ import math
 import numpy as np
 
 from solver.contacts.kernels.circle_gradient import circle_gradient
-from solver.contacts.kernels.circle_panels import LIMIT, X, Y
+from solver.contacts.kernels.circle_panels import LIMIT, Array, Number, X, Y
+from solver.contacts.kernels.circle_path import BEGAN as PIECE_BEGAN
+from solver.contacts.kernels.circle_path import BEGIN as PIECE_BEGIN
 from solver.contacts.kernels.circle_path import (
     COUNT,
     FIRST,
@@ -25,8 +28,6 @@ from solver.contacts.kernels.circle_path import (
     TX,
     TY,
 )
-from solver.contacts.kernels.circle_path import BEGAN as PIECE_BEGAN
-from solver.contacts.kernels.circle_path import BEGIN as PIECE_BEGIN
 from solver.contacts.kernels.circle_path import END as PIECE_END
 from solver.contacts.kernels.circle_path import MOTION as PIECE_MOTION
 from solver.contacts.kernels.circle_state import (
@@ -42,11 +43,10 @@ from solver.contacts.kernels.circle_state import (
     new_tables,
 )
 from solver.contacts.kernels.columns import KT, MU, OWN
-from solver.contacts.kernels.coulomb import add_moments, contact_force, products
+from solver.contacts.kernels.coulomb import add_moments, products
 from solver.contacts.kernels.elastic_normal import merged, positions
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SEPARATION,
-    AFTER_SLIP,
     BEGAN,
     BEGIN,
     DIRECTION,
@@ -62,7 +62,6 @@ from solver.contacts.kernels.stick_slip_events import (
     STICK,
     STUCK,
     UNLOADED,
-    piece_of,
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
@@ -78,7 +77,7 @@ MOST_TABLES = 64  # times the usual size of the tables of a path, at most
 
 @compiled
 def load_of(
-    U: Real, ks: Integer, load: Real, load_ks: Integer, kn: float, all_ks: Integer, N: Real
+    U: Array, ks: Integer, load: Array, load_ks: Integer, kn: Number, all_ks: Integer, N: Array
 ) -> None:
     """Fill N (for `all_ks`) with the given load and, where there is a third port, kn times its motion."""
     fill(N, 0.0)
@@ -92,9 +91,7 @@ def load_of(
 
 
 @compiled
-def curves_of(
-    U: Real, ks: Integer, N: Real, all_ks: Integer, kt: float, mu: float, waves: Real
-) -> None:
+def curves_of(U: Array, ks: Integer, N: Array, all_ks: Integer, kt: Number, mu: Number, waves: Array) -> None:
     """Fill `waves` with X = kt u, Y = kt w and L = μN."""
     for x in range(3):
         q = N if x == LIMIT else U[x]
@@ -219,9 +216,7 @@ def _friction(
     load_of(U, ks, dload, load_ks, slope[KN], all_ks, dN)
     curves_of(U, ks, N, all_ks, kt, mu, waves)
     G, weights = np.empty((2 * n + 2, 3 * size + 1)), np.empty((0, 2, n))
-    circle_gradient(
-        waves, kt / second, ks, all_ks, of_motion, found, pieces, panels, weights, F[:2], G
-    )
+    circle_gradient(waves, kt / second, ks, all_ks, of_motion, found, pieces, panels, weights, F[:2], G)
     dkappa = slope[KT] / second - slope[KT_SECOND] * kt / (second * second)
     for a in range(2):
         for i in range(n):

@@ -7,7 +7,7 @@ L = mu N, and the slider moves along it, t_i' = kt_i (u_i' − λ n_i). With λ 
     L G θ' = cos θ w' − sin θ u' − (f2 − f1) sin θ cos θ L',   G = f2 cos² θ + f1 sin² θ,   f_i = 1/kt_i,
 
 and it slips on while kt_1 u' cos θ + kt_2 w' sin θ − L' is positive. The series follows coefficient by
-coefficient (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I (1993), section I.8).
+coefficient (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, I.8).
 Where L is 0 the equation has a pole: below FROZEN of the load's size the direction stands still.
 """
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from solver.jit.decorators import compiled
 from solver.jit.separate import apart
-from solver.marching.kernels.event_roots import NONE, first_fall
+from solver.marching.kernels.event_roots import first_fall
 from solver.marching.kernels.state import (
     ORDER,
     SEPARATED,

@@ -29,9 +29,10 @@ RAN, SETTLED, CHATTER, NOT_FINITE = 0, 1, 2, 3
 class System(NamedTuple):
     """The equations in tau: x'' = W (force - L^T F) - A x - B x', with A, B and W as compressed sparse rows.
 
-    W is the inverse of the mass matrix times omega^-2. `kt` is also the stiffness of a gap spring. Of the laws
-    elastic-normal and circle: the ends of the normal motion, its stiffness, and the part of the normal force
-    that is in equilibrium at rest; `presses` is 0 where another row has that force already. `powers` (n_contacts, degree) are the coefficients of polynomial springs.
+    W is the inverse of the mass matrix times omega^-2. `kt` is also the stiffness of a gap spring. Of the
+    laws elastic-normal and circle: the ends of the normal motion, its stiffness, and the part of the normal
+    force that is in equilibrium at rest; `presses` is 0 where another row has that force already. `powers`
+    (n_contacts, degree) are the coefficients of polynomial springs.
     """
 
     A_start: Whole

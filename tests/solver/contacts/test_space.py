@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact_cases import central_difference
 from law_cases import Element as AnyElement
 from law_cases import evaluate as any_law
 from law_cases import row_of as any_row
 from space_elements import (
     NUMBERS,
     Element,
+    balanced,
     evaluate,
     extreme_elements,
     gradient,
@@ -24,7 +24,6 @@ from space_elements import (
     second,
 )
 from space_march import CASES, matrices
-from space_elements import balanced
 from space_referee import Contact, friction
 
 from solver.contacts.kernels import columns
@@ -43,7 +42,7 @@ def integrated(element: Element) -> np.ndarray:
 
 def test_force_is_that_of_the_integrated_law():
     seen: Counter[int] = Counter()
-    for element in random_elements(0, 12, top=5):
+    for element in random_elements(0, 8, top=4):
         here = evaluate(element)
         seen[here.state] += 1
         truth = integrated(element)
@@ -53,25 +52,25 @@ def test_force_is_that_of_the_integrated_law():
 
 def test_extremes_are_the_integrated_law_too():
     compared = 0
-    for kind, element in extreme_elements(3, 28):
+    for kind, element in extreme_elements(3, 14):
         if kind in ("line", "eight", "soft", "barely") and element.U.shape[1] < 16:
             truth = integrated(element)
             np.testing.assert_allclose(
                 evaluate(element).F[:2], truth, rtol=0.0, atol=1e-7 * np.abs(truth).max(), err_msg=kind
             )
             compared += 1
-    assert compared >= 6
+    assert compared >= 4
 
 
 def test_no_motion_is_too_extreme():
     states: Counter[int] = Counter()
-    for kind, element in extreme_elements(1, 700):
+    for kind, element in extreme_elements(1, 350):
         here = evaluate(element)
         assert here.state != FAILED, kind
         assert np.isfinite(here.F).all(), kind
         assert np.isfinite(here.jacobian).all(), kind
         states[here.state] += 1
-    assert min(states[state] for state in (STUCK, SLIPPING, LIFTING)) > 50, states
+    assert min(states[state] for state in (STUCK, SLIPPING, LIFTING)) > 25, states
 
 
 def padded(element: Element, times: int) -> Element:
@@ -127,7 +126,7 @@ def worst_slope(element: Element) -> float | None:
         for step in (1e-4, 1e-5, 1e-6):
             crude = difference(element, direction, step)
             if crude is not None:
-                tried.append(np.abs(crude - exact).max() / max(np.abs(exact).max(), 1e-2 * size))
+                tried.append(np.abs(crude - exact).max() / max(np.abs(exact).max(), 1e-2 * size, 1e-12))
         if not tried:
             return None
         errors.append(min(tried))
@@ -147,6 +146,7 @@ def test_every_derivative_in_every_state():
 def test_derivatives_on_both_sides_of_every_change():
     changes = 0
     for element in random_elements(12, 5, top=5):
+
         def under(factor: float, element: Element = element) -> Element:
             return replace(element, load=factor * element.load)
 
@@ -168,7 +168,7 @@ def test_derivatives_on_both_sides_of_every_change():
 def test_second_derivatives_in_every_state():
     rng = np.random.default_rng(9)
     seen: Counter[int] = Counter()
-    for element in random_elements(6, 25):
+    for element in random_elements(6, 30):
         w, direction = rng.normal(size=element.U.shape), random_direction(rng, element)
         here, piece = gradient(element, w)
         exact, errors = second(element, w, direction), []
@@ -176,11 +176,13 @@ def test_second_derivatives_in_every_state():
             at = [gradient(element.moved(share * step, direction), w) for share in (1.0, -1.0, 2.0, -2.0)]
             if all(each[1] == piece for each in at):
                 crude = (8.0 * (at[0][0] - at[1][0]) - (at[2][0] - at[3][0])) / (12.0 * step)
-                errors.append(np.abs(crude - exact).max() / max(np.abs(exact).max(), np.abs(here).max()))
+                errors.append(
+                    np.abs(crude - exact).max() / max(np.abs(exact).max(), np.abs(here).max(), 1e-12)
+                )
         if errors:
             assert min(errors) < 1e-5
             seen[evaluate(element).state] += 1
-    assert min(seen[state] for state in (SLIPPING, LIFTING)) >= 3, seen
+    assert min(seen[state] for state in (SLIPPING, LIFTING)) >= 2, seen
 
 
 def one_direction(element: Element, port: int) -> np.ndarray:
@@ -279,7 +281,12 @@ def test_balance_agrees_with_the_reference(name: str):
     contact = case["scene"]["contacts"][0]
     row = row_of(contact["kt"], contact["kt"], contact["mu"], contact["kn"])
     forces = evaluate(Element(U=U, load=np.array([contact["N0"], 0.0, 0.0]), row=row)).F
-    work = 2.0 * math.pi * sum(
-        0.5 * float(f[1:] @ rate[1:]) for f, rate in zip(forces[:2], fourier.derivative(U[:2]), strict=True)
+    work = (
+        2.0
+        * math.pi
+        * sum(
+            0.5 * float(f[1:] @ rate[1:])
+            for f, rate in zip(forces[:2], fourier.derivative(U[:2]), strict=True)
+        )
     )
     assert work == pytest.approx(case["work"], rel=1e-5)
