@@ -100,6 +100,24 @@ def _table_row(e: Array, de: Array, c: Number, s: Number, turn: Number, more: Nu
         row[2 * size + j] = -turn * e[j] - more * de[j]
 
 
+@compiled
+def _weigh(kept: Array, c: Number, s: Number, weights: Array, F: Array, line: Array) -> None:
+    """Add a node's part of the force to F, and fill its derivative by θ there for every integral."""
+    n = kept.size
+    for j in range(n):
+        F[0, j] += c * kept[j]
+        F[1, j] += s * kept[j]
+    if weights.shape[0] == 0:
+        for j in range(n):
+            line[j] = -s * kept[j]
+        for j in range(n):
+            line[n + j] = c * kept[j]
+        return
+    for r in range(weights.shape[0]):
+        for j in range(n):
+            line[r] += (c * weights[r, 1, j] - s * weights[r, 0, j]) * kept[j]
+
+
 @apart
 def panel_back(
     packed: Array, kappa: Number, all_ks: Integer, panel: Array, weights: Array, of_motion: Integer,
@@ -139,23 +157,11 @@ def panel_back(
             continue
         share = h * WEIGHTS[i]
         _slip_moments(tau, share * c, share * s, sums)
-        norm = share * at[LIMIT] / math.pi
         for j in range(n):
-            kept[j] = norm * e[of_motion[j]]
+            kept[j] = share * at[LIMIT] / math.pi * e[of_motion[j]]
         if all_ks[0] == 0 and of_motion[0] == 0:
             kept[0] *= 0.5
-        for j in range(n):
-            F[0, j] += c * kept[j]
-            F[1, j] += s * kept[j]
-        if weights.shape[0] == 0:
-            for j in range(n):
-                line[j] = -s * kept[j]
-            for j in range(n):
-                line[n + j] = c * kept[j]
-        else:
-            for r in range(weights.shape[0]):
-                for j in range(n):
-                    line[r] += (c * weights[r, 1, j] - s * weights[r, 0, j]) * kept[j]
+        _weigh(kept, c, s, weights, F, line)
     for r in range(m):
         adjoint[STAGES - 1, r] += eta[r]
     solve_columns(matrix, adjoint)

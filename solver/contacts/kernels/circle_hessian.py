@@ -3,7 +3,7 @@
 The gradient of `solver.contacts.kernels.circle_gradient` is a formula of the path: of the times of its
 events, the directions at its nodes and the curves. All of it is carried here into the complex plane, the
 direction as a tiny imaginary part: events and nodes follow by Newton's method, and the imaginary part of the
-gradient is its derivative, to rounding and without differences (W. Squire, G. Trapp, SIAM Rev. 40 (1998) 110).
+gradient is its derivative, to rounding, without differences (W. Squire, G. Trapp, SIAM Rev. 40 (1998) 110).
 """
 
 from __future__ import annotations
