@@ -1,4 +1,4 @@
-"""Force and Jacobian of one contact in space with a circular limit: time, and error against many more nodes."""
+"""Force and Jacobian of one contact in space, circular limit: time, and error against many more nodes."""
 
 from __future__ import annotations
 

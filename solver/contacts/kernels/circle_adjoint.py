@@ -157,8 +157,9 @@ def panel_back(
             continue
         share = h * WEIGHTS[i]
         _slip_moments(tau, share * c, share * s, sums)
+        norm = share * at[LIMIT] / math.pi
         for j in range(n):
-            kept[j] = share * at[LIMIT] / math.pi * e[of_motion[j]]
+            kept[j] = norm * e[of_motion[j]]
         if all_ks[0] == 0 and of_motion[0] == 0:
             kept[0] *= 0.5
         _weigh(kept, c, s, weights, F, line)
