@@ -27,6 +27,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         service_load,
         service_pruning,
         service_scale,
+        space_kernel,
         start,
         sweep_costs,
     )  # fmt: skip
@@ -48,6 +49,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "map": disk.disk_map,
         "beam": beam.beams,
         "savings": savings.savings,
+        "space-kernel": space_kernel.space_kernel,
         "stages": sweep_costs.stages,
         "two-hundred": large.two_hundred_contacts,
         "reduction": reduction.reduction,
