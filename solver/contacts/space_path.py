@@ -1,8 +1,8 @@
-"""What a contact with a circular limit does over a period: its friction force, the shares of its motions.
+"""What a contact with a circular limit does over a period: its force and the shares of its motions.
 
-From the sticks and slips with their exact ends that `solver.contacts.kernels.circle_state` finds: the force of
-a stick is that at its begin and the motion since then; in a slip it lies on the circle μN, in the direction
-of the collocation polynomial.
+From the sticks and slips with their exact ends that `solver.contacts.kernels.circle_state` finds: the
+force of a stick is that at its begin and the motion since then; in a slip it lies on the circle μN, in the
+direction of the collocation polynomial.
 """
 
 from __future__ import annotations
