@@ -11,6 +11,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.auth.authenticator import Doorkeeper
 from service.http import openapi
+from service.http.bodies import Turns
 from service.http.dependencies import HostCheck
 from service.http.head import Head
 from service.http.metrics import Measured, Metrics
@@ -77,6 +78,7 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     )
     app.state.service = service
     app.state.metrics = Metrics(service)
+    app.state.turns = Turns()
     # The last one added is the outermost.
     app.add_middleware(Head)
     app.add_middleware(Gate, doorkeeper=Doorkeeper(service.keys, service.settings, service.jobs.now))

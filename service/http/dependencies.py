@@ -9,7 +9,8 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import re
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
+from contextlib import asynccontextmanager
 from typing import Annotated, Any
 
 from fastapi import Body, Depends, Request, Response
@@ -27,8 +28,9 @@ from service.errors import (
     MalformedBodyError,
     UnsupportedMediaError,
 )
-from service.http.bodies import whole
+from service.http.bodies import SMALL_BYTES, Turns, whole
 from service.jobs import strict_json
+from service.jobs.strict_json import MOST_TOLD
 from service.jobs.validation import issues_of
 from service.queue.core import Service
 from service.queue.subscriptions import Event
@@ -61,8 +63,8 @@ def caller_of(request: Request) -> Caller:
 CallerDependency = Annotated[Caller, Depends(caller_of)]
 
 
-async def json_body(request: Request) -> dict[str, Any]:
-    """The body of a request as a JSON object, no larger than the settings allow.
+async def json_body(request: Request) -> AsyncIterator[dict[str, Any]]:
+    """The body of a request as a JSON object, no larger than the settings allow, until it is answered.
 
     Raises
     ------
@@ -73,12 +75,18 @@ async def json_body(request: Request) -> dict[str, Any]:
     if kind != "application/json" and not kind.endswith("+json"):
         raise UnsupportedMediaError(f"`Content-Type` must be application/json, got {kind or 'none'}")
     settings = service_of(request).settings
-    value = strict_json.loads(await whole(request, settings.max_body_bytes, settings.body_seconds))
-    if not isinstance(value, dict):
-        raise MalformedBodyError(f"the body must be a JSON object, got {type(value).__name__}")
-    return value
+    data = await whole(request, settings.max_body_bytes, settings.body_seconds)
+    turns: Turns = request.app.state.turns
+    async with turns.of(caller_of(request).owner, size := len(data)):
+        small = size <= SMALL_BYTES
+        value = strict_json.loads(data) if small else await run_in_threadpool(strict_json.loads, data)
+        del data
+        if not isinstance(value, dict):
+            raise MalformedBodyError(f"the body must be a JSON object, got {type(value).__name__}")
+        yield value
 
 
+reading = asynccontextmanager(json_body)
 JsonBody = Annotated[dict[str, Any], Depends(json_body)]
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -119,14 +127,16 @@ class TypedRoute(APIRoute):
         of_kinds = getattr(field.field_info, "discriminator", None) is not None
 
         async def read_and_handle(request: Request) -> Response:
-            value = await json_body(request)
-            try:
-                return await handle(_ReadRequest(request, value))
-            except RequestValidationError as error:
-                # The place of an error begins with "body" and, of several kinds, with the name of the kind.
-                found = [{**one, "loc": one["loc"][1:]} for one in error.errors()]
-                known = [{**one, "loc": one["loc"][1:]} if of_kinds else one for one in found]
-                raise InvalidRequestError(issues_of(known)) from error
+            async with reading(request) as value:
+                try:
+                    return await handle(_ReadRequest(request, value))
+                except RequestValidationError as error:
+                    # The place of an error begins with "body" and, of several kinds, with the name of the
+                    # kind.
+                    errors = error.errors()[:MOST_TOLD]
+                    found = [{**one, "loc": one["loc"][1:]} for one in errors]
+                    known = [{**one, "loc": one["loc"][1:]} if of_kinds else one for one in found]
+                    raise InvalidRequestError(issues_of(known)) from error
 
         return read_and_handle
 

@@ -56,6 +56,7 @@ def serve(settings: Settings, registry: Registry | None = None) -> None:
     listener = _bind(settings)
     try:
         service.open()
+        service.answers.begin()
         log.info("listening on http://%s:%d", settings.host, listener.getsockname()[1])
         server = _Server(_config(app, settings), service)
         spare_modules()

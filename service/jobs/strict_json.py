@@ -13,7 +13,6 @@ from typing import Any
 from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError
 from solver.errors import Issue
 
-
 _Way = Any  # None at the top, or a pair: the way to a container, and a key or an index in it
 
 
@@ -63,8 +62,20 @@ def loads(data: bytes) -> object:
         A number that is not finite (``NaN``, ``Infinity``, ``1e999``, an integer of 400 digits), with its
         pointer.
     """
-    _measure(data)
     numbers = _Numbers()
+    value = _parsed(data, numbers)
+    if numbers.wrong:
+        raise InvalidRequestError(issues_of_numbers(value))
+    return value
+
+
+def marked(data: bytes) -> object:
+    """The same, with numbers that are not finite as `Unreadable`, which `issues_of_numbers` finds."""
+    return _parsed(data, _Numbers())
+
+
+def _parsed(data: bytes, numbers: _Numbers) -> object:
+    _measure(data)
     try:
         text = data.decode("utf-8")
         value: object = json.loads(
@@ -81,8 +92,6 @@ def loads(data: bytes) -> object:
         raise MalformedBodyError("the body is nested too deeply") from error
     if _SURROGATE.search(text) and not _whole_characters(value):
         raise MalformedBodyError("the body holds half of a character: \\ud800 to \\udfff alone")
-    if numbers.wrong:
-        raise InvalidRequestError(issues_of_numbers(value))
     return value
 
 
@@ -147,7 +156,7 @@ class _Numbers:
 
 
 def issues_of_numbers(value: object) -> list[Issue]:
-    """The numbers that are not finite, in the order of their places; of many the first ones."""
+    """The numbers of a value that are not finite, in the order of their places; of many the first ones."""
     found = islice(_not_finite([value], None), MOST_TOLD)
     return [_issue_of_number(item, way) for item, way in found]
 

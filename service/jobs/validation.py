@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from service.errors import InvalidRequestError
-from service.jobs.strict_json import pointer
+from service.jobs.strict_json import MOST_TOLD, pointer
 from solver.errors import Issue
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
@@ -38,7 +38,7 @@ def validated(model: type[ModelT], body: object) -> ModelT:
     try:
         return model.model_validate(dict(body))
     except ValidationError as error:
-        raise InvalidRequestError(issues_of(error.errors(include_url=False))) from error
+        raise InvalidRequestError(issues_of(error.errors(include_url=False)[:MOST_TOLD])) from error
 
 
 def issues_of(errors: Sequence[Any]) -> list[Issue]:

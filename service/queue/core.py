@@ -31,12 +31,12 @@ from service.db.repositories import (
 )
 from service.db.repositories.keys import KeyRepository
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
-from service.jobs.common.sizes import work_limited
+from service.jobs import answering
+from service.jobs.answering import Prepared, prepared
 from service.jobs.kinds.registry.bodies import KIND
 from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.outputs import OnProgress
 from service.jobs.registry import JobKind, JobRequest, Registry
-from service.jobs.strict_json import digest
 from service.jobs.validation import validated
 from service.queue.queue import JobQueue
 from service.queue.retention import Retention
@@ -45,6 +45,7 @@ from service.queue.subscriptions import Event, Waiters
 from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
 from service.workers import executor_of
+from service.workers.answers import AnswerLimits, Answers
 from service.workers.preview_workers import Previews
 from solver.errors import Issue
 
@@ -73,6 +74,15 @@ class WholeDesign:
     result: dict[str, Any]
 
 
+def _answer_limits(settings: Settings) -> AnswerLimits:
+    return AnswerLimits(
+        workers=settings.answer_workers,
+        seconds=settings.answer_seconds,
+        memory_bytes=settings.answer_memory_bytes,
+        budget_seconds=settings.answer_budget_seconds,
+    )
+
+
 class Service:
     """Database, queue and workers of one service.
 
@@ -99,7 +109,10 @@ class Service:
         self.uploads = Uploads(UploadRepository(self.database), settings)
         self.scenes = SceneStore(SceneRepository(self.database), self.uploads)
         self.waiters = Waiters()
-        self.previews = Previews(settings.preview_seconds)
+        self.previews = Previews(settings.preview_seconds, memory_bytes=settings.answer_memory_bytes)
+        self.answers = Answers(
+            answering.runs(self.registry, self.previews.registry), answering.warm_up, _answer_limits(settings)
+        )
         self.queue = JobQueue(self.jobs, executor_of(settings, self.registry), settings, self.waiters)
         self.retention = Retention(self.database, settings, self.jobs.now)
         self._notices = None if self.database.exclusive else self._make_notices()
@@ -155,6 +168,7 @@ class Service:
         """End the workers, give running jobs back to the queue, close the database."""
         self.stop_waiting()
         self.previews.close()
+        self.answers.close()
         self.retention.stop()
         self.queue.stop()
         if self._notices is not None:
@@ -192,20 +206,29 @@ class Service:
         body: Mapping[str, Any],
         idempotency_key: str | None = None,
         caller: Caller = KEYLESS,
+        found: Prepared | None = None,
     ) -> tuple[JobRow, bool]:
-        """As `submit`, of a body that was checked: `request` is what it says, without its kind."""
+        """As `submit`, of a body that was checked: `request` is what it says, without its kind.
+
+        Parameters
+        ----------
+        found : what the request was resolved to, beside this process if it is a stranger's.
+        """
         seconds = self._seconds_limit(request, caller)
-        with work_limited(caller.limits.work):
-            resolved = kind.resolve(request, self.scenes.of(caller))
+        if found is None:
+            found = prepared(
+                kind.name, kind.resolve, request, body, self.scenes.of(caller),
+                work=caller.limits.work, version=SOLVER_VERSION,
+            )  # fmt: skip
         new = NewJob(
             kind=kind.name,
             request=dict(body),
-            spec=resolved.spec,
-            spec_hash=digest({"kind": kind.name, "spec": resolved.spec, "version": SOLVER_VERSION}),
-            request_hash=digest(body),
+            spec=found.spec,
+            spec_hash=found.spec_hash,
+            request_hash=found.request_hash,
             max_attempts=self.settings.max_attempts,
-            scene_name=resolved.scene_name,
-            scene_hash=resolved.scene_hash,
+            scene_name=found.scene_name,
+            scene_hash=found.scene_hash,
             priority=request.priority,
             fresh=request.fresh,
             idempotency_key=idempotency_key,

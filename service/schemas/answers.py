@@ -15,7 +15,7 @@ from service.db.models import JobState
 from service.db.repositories import DesignRepository, DesignRow, JobRow, SweepRepository, SweepRow
 from service.jobs.arrays import decode
 from service.jobs.outputs import ContactValues, VariableValues
-from service.queue.scene_store import KnownScene
+from service.queue.scene_store import KnownScene, WholeScene
 
 if TYPE_CHECKING:
     from service.queue.core import Results
@@ -350,15 +350,16 @@ class SceneDetail(SceneAnswer):
     scene: dict[str, Any]
 
     @classmethod
-    def of(cls, scene: KnownScene) -> Self:
+    def of_whole(cls, scene: WholeScene) -> Self:
         """The answer for a scene."""
         return cls(**cls.values(scene), scene=dict(scene.body))
 
 
 class SceneList(Answer):
-    """All scenes."""
+    """A page of the scenes."""
 
     items: list[SceneAnswer]
+    next: str | None = Field(description="Link to the next page; null on the last one.")
 
 
 def _listed(array: NDArray[Any]) -> list[Any]:

@@ -197,6 +197,39 @@ class Settings(BaseSettings):
         default=3.0, ge=0.05, le=60.0, description="Longest time a preview may be computed [s]."
     )
 
+    answer_workers: int = Field(
+        default=2,
+        ge=1,
+        le=64,
+        description="Processes that compute what is answered at once: plans, scenes from text, checks of "
+        "what is handed in. One of them is left for others whatever one owner asks for.",
+    )
+    answer_seconds: float = Field(
+        default=1.5,
+        ge=0.1,
+        le=600.0,
+        description="Processor time that one such computation may take [s]; more is answered 422.",
+    )
+    answer_memory_bytes: int = Field(
+        default=192 * 1024**2,
+        ge=16 * 1024**2,
+        le=1024**4,
+        description="Memory that one such computation, or a preview, may take [bytes]; more is answered 422.",
+    )
+    answer_budget_seconds: int = Field(
+        default=60,
+        ge=1,
+        le=1_000_000,
+        description="Processor time of such computations for one owner a minute [s]; more is answered 429.",
+    )
+    worker_memory_bytes: int = Field(
+        default=4 * 1024**3,
+        ge=0,
+        le=1024**5,
+        description="Memory that a job may take [bytes]; 0 for no limit. A job whose dense matrices need "
+        "more is refused with 422, one that meets the limit fails with `memory-limit`.",
+    )
+
     log_format: Literal["text", "json"] = Field(
         default="text", description="The log on standard error: lines for people, or JSON objects."
     )

@@ -59,9 +59,7 @@ def ending_signal(process: SpawnProcess) -> int | None:
 class Child:
     """One worker process and the parent's end of its pipe."""
 
-    def __init__(
-        self, runs: Mapping[str, RunOn], warm_up: WarmUp, pace: Pace, limits: ProcessLimits
-    ) -> None:
+    def __init__(self, runs: Mapping[str, RunOn], warm_up: WarmUp, pace: Pace, limits: ProcessLimits) -> None:
         context = mp.get_context("spawn")
         numbers: Array[ctypes.c_longlong] = context.RawArray(ctypes.c_longlong, Orders.SIZE)
         self.orders = Orders(numbers)

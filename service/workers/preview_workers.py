@@ -22,6 +22,7 @@ from service.jobs.outputs import FailureKind, Pace, Piece, Point
 from service.jobs.registry import Registry
 from service.workers.base import Failed, Finished, Lost, Outcome
 from service.workers.local import LocalExecutor
+from service.workers.process_limits import ProcessLimits
 from solver.errors import Issue
 
 log = logging.getLogger("stickslip.previews")
@@ -67,11 +68,16 @@ class Previews:
         Longest time one may take [s].
     registry : Registry
         The kinds of preview.
+    memory_bytes : int or None
+        Most memory one may take.
     """
 
-    def __init__(self, seconds: float, registry: Registry = PREVIEWS) -> None:
+    def __init__(
+        self, seconds: float, registry: Registry = PREVIEWS, memory_bytes: int | None = None
+    ) -> None:
         self.registry = registry
         self._seconds = seconds
+        self._limits = ProcessLimits(memory_bytes=memory_bytes, processor_seconds=seconds + _GRACE_SECONDS)
         self._lock = threading.RLock()
         self._waiting: deque[_Asked] = deque()
         self._running: _Asked | None = None
@@ -116,6 +122,7 @@ class Previews:
                 workers=1,
                 grace_seconds=_GRACE_SECONDS,
                 pace=_SILENT,
+                limits=self._limits,
             )
             self._executor.start(self)
 
@@ -203,6 +210,8 @@ def _answer(outcome: Outcome) -> bytes | Exception:
         return PreviewError(outcome.reason)
     if isinstance(outcome, Failed):
         failure = outcome.failure
+        if failure.kind is FailureKind.MEMORY_LIMIT:
+            return InvalidRequestError([Issue(pointer="/scene", message=f"`scene`: {failure.detail}")])
         if failure.kind in (FailureKind.SCENE, FailureKind.SETTING):
             issues = failure.issues or (Issue(pointer="", message=failure.detail),)
             return InvalidRequestError(issues)

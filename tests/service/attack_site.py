@@ -1,4 +1,4 @@
-"""A real service under attack: what one client sends, what it costs, and how long another one waits meanwhile."""
+"""A real service under attack: what one client sends, what it costs, and how another one fares."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import json
 import math
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -171,10 +172,10 @@ class Site:
             yield
 
     def bears(self, attacks: Sequence[Attack], at_once: int = 1) -> Figures:
-        """Assert that an attack is refused or answered within the limits; one of some tries keeps the time."""
+        """Assert that an attack is refused or answered within the limits; one of some tries is in time."""
         for left in reversed(range(TRIES)):
             figures = self.under(attacks, at_once)
-            print(figures.told())
+            sys.stdout.write(f"{figures.told()}\n")
             told = [(answer.status, answer.body[:300]) for answer in figures.answers]
             assert all(answer.status < 500 or answer.status == 503 for answer in figures.answers), told
             assert figures.memory <= MOST_MEMORY, figures.told()
@@ -229,7 +230,8 @@ def attacked(folder: Path, **settings: object) -> Iterator[Site]:
     revisions.upgrade(url)
     database = Database(url)
     tokens = [
-        keys.create(KeyRepository(database), owner, [Scope.SUBMIT], utc_now()).token for owner in ("eve", "ann")
+        keys.create(KeyRepository(database), owner, [Scope.SUBMIT], utc_now()).token
+        for owner in ("eve", "ann")
     ]
     database.close()
     limits = {"require_keys": True, "requests_per_minute": 1_000_000, **settings}

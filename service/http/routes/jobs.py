@@ -14,6 +14,7 @@ from starlette.concurrency import run_in_threadpool
 from service.auth.callers import Caller
 from service.db.models import JobState
 from service.db.repositories import JobRow
+from service.http.computed import prepared
 from service.http.dependencies import (
     CallerDependency,
     ServiceDependency,
@@ -182,7 +183,9 @@ async def _submit(
     service: Service, caller: Caller, asked: Asked, raw: dict[str, Any], body: JobRequest
 ) -> Response:
     kind = service.registry.get(raw[KIND])
-    row, _ = await run_in_threadpool(service.accept, kind, request_of(kind, body), raw, asked.key, caller)
+    found = await prepared(service, caller, kind, raw)
+    request = request_of(kind, body)
+    row, _ = await run_in_threadpool(service.accept, kind, request, raw, asked.key, caller, found)
     headers = {"Location": f"/v1/jobs/{row.id}"}
     if asked.seconds is not None:
         row = await wait_for_end(service, row.id, asked.seconds, caller)

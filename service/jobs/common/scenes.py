@@ -106,7 +106,7 @@ def _read(reference: object, source: SceneSource) -> Scene:
     if not isinstance(body, Mapping):
         message = f"`scene` {reference!r} is neither a shipped scene nor a stored one"
         raise InvalidRequestError([Issue(pointer=pointer("scene"), message=message)])
-    if body is reference and _refers_to_uploads(body):
+    if body is reference and refers_to_uploads(body):
         try:
             body = source.with_uploads(body)
         except InvalidRequestError as error:
@@ -114,7 +114,8 @@ def _read(reference: object, source: SceneSource) -> Scene:
     return read_scene(body, prefix=pointer("scene"))
 
 
-def _refers_to_uploads(body: Mapping[str, object]) -> bool:
+def refers_to_uploads(body: Mapping[str, object]) -> bool:
+    """Whether the structure of a scene names uploads."""
     structure = body.get("structure")
     return isinstance(structure, Mapping) and any(
         isinstance(item, str) and item.startswith(UPLOAD) for item in structure.values()
