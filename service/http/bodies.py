@@ -5,16 +5,18 @@ from __future__ import annotations
 import asyncio
 import hashlib
 from collections.abc import AsyncIterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from typing import BinaryIO
 
 from fastapi import Request
 
 from service.errors import BodyTooLargeError, SlowBodyError, UnsupportedMediaError
+from service.jobs import strict_json
 
 SMALL_BYTES = 32 * 1024
 """A body that is read in a millisecond, on the event loop."""
-_LARGE_AT_ONCE = 3
+_LARGE_AT_ONCE = 2
 
 
 async def chunks(request: Request, limit: int, seconds: float) -> AsyncIterator[bytes]:
@@ -59,12 +61,20 @@ async def whole(request: Request, limit: int, seconds: float) -> bytes:
 class Turns:
     """Large bodies take turns once they have arrived: parsed, each takes ten times its length.
 
-    One of an owner at a time, a few of all.
+    One of an owner at a time, a few of all. They are parsed in threads of their own: what a thread has freed
+    stays with it, and the many threads of the routes would keep the memory of one body each.
     """
 
     def __init__(self, at_once: int = _LARGE_AT_ONCE) -> None:
         self._all = asyncio.Semaphore(at_once)
+        self._threads = ThreadPoolExecutor(at_once, thread_name_prefix="stickslip body")
         self._owners: dict[str, tuple[asyncio.Lock, int]] = {}
+
+    async def parsed(self, data: bytes) -> object:
+        """A body as JSON; `service.jobs.strict_json.loads` lists the errors."""
+        if len(data) <= SMALL_BYTES:
+            return strict_json.loads(data)
+        return await asyncio.get_running_loop().run_in_executor(self._threads, strict_json.loads, data)
 
     @asynccontextmanager
     async def of(self, owner: str, size: int) -> AsyncIterator[None]:

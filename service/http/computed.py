@@ -9,7 +9,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.auth.callers import Caller
 from service.errors import InvalidRequestError
-from service.jobs.answering import KIND, RESOLVE, Prepared
+from service.jobs.answering import KIND, PREVIEW, RESOLVE, Prepared
 from service.jobs.registry import JobKind, SceneSource
 from service.jobs.strict_json import JsonText
 from service.queue.core import SOLVER_VERSION, Service
@@ -48,8 +48,11 @@ async def prepared(
     service: Service, caller: Caller, kind: JobKind, body: Mapping[str, Any], task: str = RESOLVE
 ) -> Prepared:
     """A request for a job or a preview, resolved; `computed` lists the errors."""
+    settings = service.settings
+    memory = settings.answer_memory_bytes if task == PREVIEW else settings.worker_memory_bytes or None
     words = {
-        KIND: kind.name, "body": dict(body), "work": caller.limits.work, "version": SOLVER_VERSION,
+        KIND: kind.name, "body": dict(body), "work": caller.limits.work, "memory": memory,
+        "version": SOLVER_VERSION,
     }  # fmt: skip
     found = await computed(service, caller, task, words)
     return Prepared(**{**found, "spec": JsonText(found["spec"])})

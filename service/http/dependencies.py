@@ -28,8 +28,7 @@ from service.errors import (
     MalformedBodyError,
     UnsupportedMediaError,
 )
-from service.http.bodies import SMALL_BYTES, Turns, whole
-from service.jobs import strict_json
+from service.http.bodies import Turns, whole
 from service.jobs.strict_json import MOST_TOLD
 from service.jobs.validation import issues_of
 from service.queue.core import Service
@@ -77,9 +76,8 @@ async def json_body(request: Request) -> AsyncIterator[dict[str, Any]]:
     settings = service_of(request).settings
     data = await whole(request, settings.max_body_bytes, settings.body_seconds)
     turns: Turns = request.app.state.turns
-    async with turns.of(caller_of(request).owner, size := len(data)):
-        small = size <= SMALL_BYTES
-        value = strict_json.loads(data) if small else await run_in_threadpool(strict_json.loads, data)
+    async with turns.of(caller_of(request).owner, len(data)):
+        value = await turns.parsed(data)
         del data
         if not isinstance(value, dict):
             raise MalformedBodyError(f"the body must be a JSON object, got {type(value).__name__}")

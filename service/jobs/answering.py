@@ -20,7 +20,7 @@ from service.jobs.common.scenes import (
     refers_to_uploads,
     resolve_scene,
 )
-from service.jobs.common.sizes import work_limited
+from service.jobs.common.sizes import memory_limited, work_limited
 from service.jobs.kinds.registry.bodies import KIND as KIND
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobRequest, Registry, Resolve, RunOn, SceneSource
@@ -96,6 +96,7 @@ def prepared(
     source: SceneSource,
     *,
     work: int | None,
+    memory: int | None,
     version: str,
 ) -> Prepared:
     """Resolve a request.
@@ -104,6 +105,7 @@ def prepared(
     ----------
     body : as it came, with its kind.
     work : limit of the caller's key.
+    memory : most that the dense matrices may take [bytes].
     version : of the solver, on which results depend.
 
     Raises
@@ -111,7 +113,7 @@ def prepared(
     InvalidRequestError
         Lists everything that is wrong.
     """
-    with work_limited(work):
+    with work_limited(work), memory_limited(memory):
         found = resolve(request, source)
     return Prepared(
         spec=encoded(found.spec),
@@ -137,7 +139,8 @@ class _Resolving:
         request, resolve = self.kinds[name]
         asked = validated(request, {key: value for key, value in body.items() if key != KIND})
         found = prepared(
-            name, resolve, asked, body, source, work=words["work"], version=words["version"]
+            name, resolve, asked, body, source,
+            work=words["work"], memory=words["memory"], version=words["version"],
         )  # fmt: skip
         return asdict(found)
 
@@ -147,7 +150,8 @@ def _plan(words: Words, source: SceneSource) -> dict[str, Any]:
     import solver
 
     request = HarmonicRequest.model_validate(words)
-    return solver.plan(resolve_scene(request, source), harmonics=request.harmonics).to_json()
+    scene = resolve_scene(request, source)
+    return solver.plan(scene, harmonics=request.harmonics).to_json()
 
 
 def _read(words: Words, source: SceneSource) -> JsonText:

@@ -218,7 +218,8 @@ class Service:
         if found is None:
             found = prepared(
                 kind.name, kind.resolve, request, body, self.scenes.of(caller),
-                work=caller.limits.work, version=SOLVER_VERSION,
+                work=caller.limits.work, memory=self.settings.worker_memory_bytes or None,
+                version=SOLVER_VERSION,
             )  # fmt: skip
         new = NewJob(
             kind=kind.name,

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import math
+import functools
+import gc
 import signal
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-_MEGABYTE = 1024**2
+_MATRICES = "solver.linear"
+"""The modules whose caches hold matrices and modes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,16 +32,27 @@ class ProcessLimits:
         """Limit the memory of this process, which is ready."""
         if self.memory_bytes is None or sys.platform != "linux":
             return
-        # Loaded here: there is none on Windows.
+        # Loaded here, as below: there is none on Windows.
         import resource
 
-        here = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
         hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-        limit = here + self.memory_bytes
+        limit = _address_space() + self.memory_bytes
         if hard != resource.RLIM_INFINITY:
             limit = min(limit, hard)
         resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+    def forget(self) -> None:
+        """Let go of the matrices that are kept for later tasks, if they take half of the memory."""
+        if self.memory_bytes is None or sys.platform != "linux":
+            return
+        import resource
+
+        if resource.getrlimit(resource.RLIMIT_AS)[0] - _address_space() > self.memory_bytes / 2:
+            return
+        for found in gc.get_objects():
+            if isinstance(found, functools._lru_cache_wrapper) and found.__module__.startswith(_MATRICES):
+                found.cache_clear()
 
     def begin(self) -> None:
         """A task begins: count its processor time from here."""
@@ -56,9 +69,11 @@ class ProcessLimits:
 
     def memory_told(self) -> str:
         """The limit of memory, for people."""
-        return "there is" if self.memory_bytes is None else f"{megabytes(self.memory_bytes)} MB"
+        return "there is" if self.memory_bytes is None else f"{self.memory_bytes / 1e6:.0f} MB"
 
 
-def megabytes(count: int) -> int:
-    """Bytes as whole megabytes, rounded up."""
-    return math.ceil(count / _MEGABYTE)
+def _address_space() -> int:
+    """Bytes of address space of this process."""
+    import resource
+
+    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()

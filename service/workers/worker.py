@@ -192,6 +192,7 @@ def main(
             limits.begin()
             done = _compute(runs, task, Throttle(reply, pace.progress_seconds), stop, kept, limits)
             limits.end()
+            limits.forget()
         try:
             connection.send(Reply(task.token, done))
         except (pickle.PicklingError, TypeError, AttributeError) as error:

@@ -45,6 +45,7 @@ class PlanAnswer(Answer):
     contacts: int
     n_harmonics: int
     estimated_seconds_a_point: float
+    estimated_dense_bytes: int
 
 
 @router.post("")
