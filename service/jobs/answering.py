@@ -174,7 +174,7 @@ def _store(words: Words, source: SceneSource) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Answering:
+class Answering:
     """A task as workers run it: what it finds, what is wrong, or what it needs, and the time it took."""
 
     task: Answer
@@ -182,6 +182,7 @@ class _Answering:
     def __call__(
         self, spec: Words, _progress: Progress, _should_stop: ShouldStop, _kept: object
     ) -> JobOutput:
+        """Do the task."""
         begin = time.process_time()
         result = self._result(spec["words"], LookedUp(spec["scenes"], spec["uploads"]))
         return JobOutput(result={**result, "seconds": time.process_time() - begin})
@@ -205,7 +206,7 @@ def runs(jobs: Registry, previews: Registry) -> dict[str, RunOn]:
         PLAN: _plan, READ: _read, TEXT: _text, STORE: _store, RESOLVE: _Resolving.of(jobs),
         PREVIEW: _Resolving.of(previews),
     }  # fmt: skip
-    return {name: _Answering(task) for name, task in tasks.items()}
+    return {name: Answering(task) for name, task in tasks.items()}
 
 
 def warm_up() -> None:

@@ -89,7 +89,8 @@ _NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobKind:
-    """A kind of job. `run` is sent to workers by name: a function at the top level of a module.
+    """A kind of job. `request`, `resolve` and `run` are sent to processes by name: they stand at the top level
+    of a module.
 
     Attributes
     ----------
@@ -100,8 +101,9 @@ class JobKind:
     request : type of JobRequest
         Validates what was asked; its docstring and the `examples` of its schema are those of the API.
     resolve : callable
-        From request to spec; raises InvalidRequestError for what does not fit or is too large. Runs in the
-        service.
+        From request to spec; raises InvalidRequestError for what does not fit or is too large. What comes by
+        HTTP is resolved in a process with limits (`service.jobs.answering`), to which the service sends the
+        scenes and uploads that are asked for.
     run : callable
         From spec to output; raises SolverError for what is wrong for good. Runs in a worker.
     parts : Parts or None

@@ -37,7 +37,7 @@ _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 MOST_DEPTH = 64
 """Lists and objects inside each other."""
 MOST_VALUES = 500_000
-MOST_KEYS = 50_000
+MOST_KEYS = 20_000
 MOST_TOLD = 100
 """Of what is wrong, so much is said."""
 _MOST_DIGITS = 308

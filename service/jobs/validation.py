@@ -13,6 +13,7 @@ from solver.errors import Issue
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
+_SHOWN = 80  # characters of what was given
 _MESSAGES = {
     "extra_forbidden": "is not a known key",
     "missing": "is missing",
@@ -51,7 +52,7 @@ def _issue(error: Mapping[str, Any]) -> Issue:
     kind = error["type"]
     if kind in ("union_tag_not_found", "union_tag_invalid"):
         return _unknown_tag(error, location)
-    key = str(location[-1]) if location else "body"
+    key = _cut(str(location[-1])) if location else "body"
     message = _MESSAGES.get(kind) or str(error["msg"]).removeprefix("Value error, ")
     if message.startswith("Input should be "):
         message = "must be " + message.removeprefix("Input should be ")
@@ -74,5 +75,11 @@ def _unknown_tag(error: Mapping[str, Any], location: Sequence[object]) -> Issue:
 
 
 def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else text[:77] + "..."
+    # What is large is not written out to be cut.
+    if isinstance(value, str | list | tuple | dict) and len(value) > _SHOWN:
+        value = value[:_SHOWN] if isinstance(value, str | list | tuple) else f"an object of {len(value)} keys"
+    return _cut(repr(value))
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."

@@ -98,6 +98,7 @@ class Answers:
         self._lock = threading.RLock()
         self._waiting: deque[_Asked] = deque()
         self._running: dict[str, _Asked] = {}
+        self._ended_one: set[str] = set()
         self._executor: LocalExecutor | None = None
         self._closed = False
 
@@ -137,6 +138,12 @@ class Answers:
         finally:
             self._drop(asked)
         return await self._found(outcome, owner, about)
+
+    @property
+    def ready(self) -> int:
+        """How many processes are up."""
+        executor = self._executor
+        return 0 if executor is None else executor.status().ready
 
     def begin(self) -> None:
         """Start the processes if they do not run."""
@@ -180,6 +187,10 @@ class Answers:
         """Tell the one who waits for it."""
         with self._lock:
             asked = self._running.pop(attempt.job_id, None)
+            if asked is not None and isinstance(outcome, Lost):
+                self._ended_one.add(asked.owner)
+            elif asked is not None:
+                self._ended_one.discard(asked.owner)
         if asked is not None:
             _settle(asked, outcome)
         self.room()
@@ -191,12 +202,16 @@ class Answers:
             if executor is None:
                 return
             # One to a process: what waits in the pipe of one would wait for a costly one before it.
-            free = executor.status().ready - len(self._running)
+            ready = executor.status().ready
+            free = ready - len(self._running)
             busy = Counter(asked.owner for asked in self._running.values())
             for asked in list(self._waiting):
                 if free <= 0:
                     return
                 if busy[asked.owner] >= self._limits.of_an_owner:
+                    continue
+                # While the process that it ended starts anew, the other one is not for the same owner.
+                if asked.owner in self._ended_one and ready < self._limits.workers:
                     continue
                 self._waiting.remove(asked)
                 self._running[asked.attempt.job_id] = asked

@@ -115,6 +115,7 @@ class Site:
         """Wait until all is loaded and quiet, and remember how much memory that is."""
         for _ in range(2):
             self.send(Attack.of("/v1/plan", {"scene": "two-dof"}))
+            self.send(Attack.of("/v1/previews", {"kind": "point", "scene": "two-dof", "frequency_hz": 1.05}))
         self._idle = self._memory()
 
     def under(self, attacks: Sequence[Attack], at_once: int = 1) -> Figures:

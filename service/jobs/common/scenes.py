@@ -20,6 +20,7 @@ from solver.errors import Issue, SceneError, SettingError
 from solver.scene.scene import Scene, load_scene, shipped_scenes
 
 MAX_HARMONICS = 200
+MOST_SET = 1000
 UPLOAD = "upload:"
 """What stands before the id of an upload where a scene file names a file."""
 
@@ -32,6 +33,13 @@ def _scene_reference(value: object) -> object:
     if isinstance(value, dict) or (isinstance(value, str) and _SCENE_NAME.fullmatch(value)):
         return value
     raise ValueError("must be the name of a shipped or stored scene, or a scene as an object")
+
+
+def _few(value: object) -> object:
+    """Too many are not looked at one by one, to be told what is wrong with each."""
+    if isinstance(value, dict) and len(value) > MOST_SET:
+        raise ValueError(f"must have at most {MOST_SET} values, got {len(value)}")
+    return value
 
 
 SceneReference = Annotated[
@@ -55,8 +63,8 @@ class SceneRequest(JobRequest):
     """
 
     scene: SceneReference = Field(description="Name of a shipped or stored scene, or the scene as an object.")
-    set: dict[ParameterPath, Number] = Field(
-        default={}, max_length=1000, description='Values of parameters, {"damper.N0": 100}.'
+    set: Annotated[dict[ParameterPath, Number], BeforeValidator(_few)] = Field(
+        default={}, max_length=MOST_SET, description='Values of parameters, {"damper.N0": 100}.'
     )
 
 
