@@ -89,8 +89,9 @@ _NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobKind:
-    """A kind of job. `request`, `resolve` and `run` are sent to processes by name: they stand at the top level
-    of a module.
+    """A kind of job.
+
+    `request`, `resolve` and `run` are sent to processes by name: they stand at the top level of a module.
 
     Attributes
     ----------

@@ -42,6 +42,8 @@ MOST_TOLD = 100
 """Of what is wrong, so much is said."""
 _MOST_DIGITS = 308
 """Of an integer: one of more is beyond the largest double."""
+_ENDLESS_DIGITS = 4300
+"""More are no number of JSON that anybody reads, Python neither."""
 
 
 def pointer(*parts: object) -> str:
@@ -55,7 +57,8 @@ def loads(data: bytes) -> object:
     Raises
     ------
     MalformedBodyError
-        Not UTF-8, not JSON, nested too deeply, a key given twice, or half a character (``"\\ud800"``).
+        Not UTF-8, not JSON, nested too deeply, a key given twice, half a character (``"\\ud800"``), an integer
+        of thousands of digits.
     BodyTooLargeError
         More values or keys than are read.
     InvalidRequestError
@@ -65,7 +68,10 @@ def loads(data: bytes) -> object:
     numbers = _Numbers()
     value = _parsed(data, numbers)
     if numbers.wrong:
-        raise InvalidRequestError(issues_of_numbers(value))
+        issues = issues_of_numbers(value)
+        if numbers.unending:
+            raise MalformedBodyError("; ".join(issue.message for issue in issues))
+        raise InvalidRequestError(issues)
     return value
 
 
@@ -140,6 +146,7 @@ class _Numbers:
 
     def __init__(self) -> None:
         self.wrong: dict[str, Unreadable] = {}
+        self.unending = False
 
     def fraction(self, text: str) -> object:
         """A number with a point or an exponent."""
@@ -148,6 +155,7 @@ class _Numbers:
 
     def integer(self, text: str) -> object:
         """A number without."""
+        self.unending |= len(text) > _ENDLESS_DIGITS
         return int(text) if len(text) <= _MOST_DIGITS else self.constant(text)
 
     def constant(self, text: str) -> Unreadable:
@@ -156,9 +164,9 @@ class _Numbers:
 
 
 def issues_of_numbers(value: object) -> list[Issue]:
-    """The numbers of a value that are not finite, in the order of their places; of many the first ones."""
+    """The numbers of a value that are not finite, in the order of their pointers; of many the first ones."""
     found = islice(_not_finite([value], None), MOST_TOLD)
-    return [_issue_of_number(item, way) for item, way in found]
+    return sorted((_issue_of_number(item, way) for item, way in found), key=lambda issue: issue.pointer)
 
 
 def _not_finite(items: Mapping[str, object] | list[object], way: _Way) -> Iterator[tuple[str | float, _Way]]:
