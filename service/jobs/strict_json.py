@@ -57,8 +57,8 @@ def loads(data: bytes) -> object:
     Raises
     ------
     MalformedBodyError
-        Not UTF-8, not JSON, nested too deeply, a key given twice, half a character (``"\\ud800"``), an integer
-        of thousands of digits.
+        Not UTF-8, not JSON, nested too deeply, a key given twice, half a character (``"\\ud800"``), an
+        integer of thousands of digits.
     BodyTooLargeError
         More values or keys than are read.
     InvalidRequestError

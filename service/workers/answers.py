@@ -38,6 +38,9 @@ _GRACE_SECONDS = 0.1
 _PATIENCE_SECONDS = 30.0
 """Of who waits, the computation included: the machine may be busy, a process may hang."""
 _INLINE_BYTES = 64 * 1024
+_AT_THE_TIME = ("SIGPROF", "SIGXCPU")
+_WITHOUT_MEMORY = ("SIGABRT", "SIGSEGV", "SIGBUS")
+"""How libraries end a process that gets no memory."""
 _SILENT = Pace(progress_seconds=3600.0, checkpoint_seconds=3600.0, checkpoint_bytes=0)
 
 
@@ -187,6 +190,10 @@ class Answers:
         """Tell the one who waits for it."""
         with self._lock:
             asked = self._running.pop(attempt.job_id, None)
+            if asked is not None and isinstance(outcome, Stopped) and not asked.outcome.done():
+                # Its process ended before it had begun: it is computed when there is another.
+                self._waiting.appendleft(asked)
+                return
             if asked is not None and isinstance(outcome, Lost):
                 self._ended_one.add(asked.owner)
             elif asked is not None:
@@ -259,12 +266,13 @@ class Answers:
     def _beyond(self, lost: Lost, about: str) -> Exception:
         """A process that ended did so at one of its limits, or at what it was given."""
         name = about.strip("/")
-        if lost.signal in (signal.SIGPROF, signal.SIGXCPU):
+        ended_by = "" if lost.signal is None else signal.Signals(lost.signal).name
+        if ended_by in _AT_THE_TIME:
             most = f"{self._limits.seconds:g} s of processor time"
             message = f"`{name}` takes more than {most} to be looked at, the limit of an answer"
             return InvalidRequestError([Issue(pointer=about, message=message)])
         log.warning("an answer was lost: %s", lost.reason)
-        if lost.signal in (signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS):
+        if ended_by in _WITHOUT_MEMORY:
             return self._too_much_memory(about)
         return QueueFullError(f"the answer was lost: {lost.reason}", _RETRY_SECONDS)
 

@@ -43,11 +43,18 @@ def look_up(_words: Words, source: SceneSource) -> Any:
     return source.scene_body("mine")
 
 
+def keep(words: Words, _source: SceneSource) -> int:
+    """Make a matrix that the solver keeps for later."""
+    from solver.linear import assembly
+
+    return int(assembly._nothing(words["size"]).nbytes)
+
+
 def mistaken(_words: Words, _source: SceneSource) -> Any:
     raise ZeroDivisionError("a mistake in the program")
 
 
-RUNS = {task.__name__: Answering(task) for task in (turn, compute, allocate, look_up, mistaken)}
+RUNS = {task.__name__: Answering(task) for task in (turn, compute, allocate, keep, look_up, mistaken)}
 
 
 def spec(**words: object) -> dict[str, Any]:
@@ -90,6 +97,12 @@ def test_what_takes_too_much_memory_is_refused_and_the_next_goes_on(answers: Ans
     assert isinstance(large, InvalidRequestError)
     assert "67 MB of memory" in large.issues[0].message
     assert small["found"] == 20 * 1024**2
+
+
+def test_matrices_that_are_kept_make_room_for_others(answers: Answers) -> None:
+    """Sixteen of them would take twice the memory there is."""
+    found = together(answers, *[("keep", {"size": 1000 + n}, "eve") for n in range(20)])
+    assert [one["found"] for one in found] == [8 * (1000 + n) ** 2 for n in range(20)]
 
 
 def test_one_owner_leaves_a_process_for_another(answers: Answers) -> None:
