@@ -72,8 +72,8 @@ ATTACKS: dict[str, Attack] = {
 
 
 LONG = {
-    "a plan of a thousand masses", "TOML with many dotted keys", "a plan of 8000 masses", "a sweep of 10 000 sectors", "TOML with a long dotted table",
-    "TOML of many tables",
+    "a plan of a thousand masses", "a plan of 8000 masses", "a sweep of 10 000 sectors",
+    "TOML with many dotted keys", "TOML with a long dotted table", "TOML of many tables",
     "TOML nested deeply", "JSON text nested deeply", "JSON text of 4 MB",
 }  # fmt: skip
 
