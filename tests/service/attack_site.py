@@ -226,7 +226,7 @@ class Site:
 
 @contextmanager
 def attacked(folder: Path, **settings: object) -> Iterator[Site]:
-    """A service as it stands by default, with one worker and keys."""
+    """A service as it stands by default, with one worker and keys; `Site.rest` has it load all it needs."""
     url = f"sqlite:///{folder}/jobs.db"
     revisions.upgrade(url)
     database = Database(url)
@@ -237,6 +237,4 @@ def attacked(folder: Path, **settings: object) -> Iterator[Site]:
     database.close()
     limits = {"require_keys": True, "requests_per_minute": 1_000_000, **settings}
     with serving(url, workers=1, log=folder / "log", **limits) as process:
-        site = Site(process, *tokens)
-        site.rest()
-        yield site
+        yield Site(process, *tokens)
