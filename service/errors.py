@@ -151,6 +151,18 @@ class QueueFullError(RetryLaterError):
     """The queue takes no more jobs at present."""
 
 
+class OverloadedError(RetryLaterError):
+    """The service has as much to do as it takes on at a time."""
+
+
+class StorageFullError(ServiceError):
+    """An owner stores as much as they may."""
+
+
+class DatabaseAwayError(RetryLaterError):
+    """The database did not take a write in time; nothing was written."""
+
+
 class TooManyRequestsError(RetryLaterError):
     """More requests, waiting jobs or wrong keys than are allowed."""
 

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 from fastapi import Body, Depends, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
-from starlette.concurrency import run_in_threadpool
+from pydantic import BaseModel
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -43,16 +43,22 @@ _KEY = re.compile(r"[\x21-\x7e]{1,200}")
 _LOOK_AGAIN_SECONDS = 2.0
 
 
-def service_of(request: Request) -> Service:
+def service_behind(request: Request) -> Service:
     """The service behind the app."""
     service: Service = request.app.state.service
     return service
 
 
+# Dependencies are asynchronous: others would be run in a thread each, which costs more than they do.
+async def service_of(request: Request) -> Service:
+    """The service behind the app."""
+    return service_behind(request)
+
+
 ServiceDependency = Annotated[Service, Depends(service_of)]
 
 
-def caller_of(request: Request) -> Caller:
+async def caller_of(request: Request) -> Caller:
     """Who asks: the gate has put them there."""
     caller: Caller = getattr(request.state, "caller", KEYLESS)
     return caller
@@ -72,7 +78,7 @@ async def json_body(request: Request) -> dict[str, Any]:
     kind = request.headers.get("content-type", "").split(";")[0].strip().lower()
     if kind != "application/json" and not kind.endswith("+json"):
         raise UnsupportedMediaError(f"`Content-Type` must be application/json, got {kind or 'none'}")
-    settings = service_of(request).settings
+    settings = service_behind(request).settings
     value = strict_json.loads(await whole(request, settings.max_body_bytes, settings.body_seconds))
     if not isinstance(value, dict):
         raise MalformedBodyError(f"the body must be a JSON object, got {type(value).__name__}")
@@ -185,6 +191,11 @@ def tagged(
     return Response(body, media_type=media_type, headers=kept)
 
 
+def as_json(answer: BaseModel, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
+    """An answer as JSON, written here, in the thread that made it: FastAPI would do it on the event loop."""
+    return Response(answer.__pydantic_serializer__.to_json(answer), status, headers, "application/json")
+
+
 def listing(request: Request, page: SweepPage | DesignPage | JobPage | UploadPage) -> Response:
     """A page of a list as JSON or CSV, with a link to the next one in its header too (RFC 8288)."""
     kind = chosen(request.headers.get("accept"), LIST_MEDIA)
@@ -208,7 +219,7 @@ async def wait_for_end(service: Service, job_id: str, seconds: float, caller: Ca
     end = loop.time() + seconds
     with service.waiters.listening(job_id, listen):
         while True:
-            row = await run_in_threadpool(service.job, job_id, caller)
+            row = await service.lanes.reads.run(caller.owner, service.job, job_id, caller)
             left = end - loop.time()
             if row.state.finished or service.stopping.is_set() or left <= 0.0:
                 return row

@@ -13,6 +13,8 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from service.auth.callers import KEYLESS, Caller, visible
+from service.auth.shares import highest_priority, share
+from service.auth.storage import Storage
 from service.db import revisions
 from service.db.clock import Clock
 from service.db.engine import Database
@@ -30,14 +32,16 @@ from service.db.repositories import (
     UploadRepository,
 )
 from service.db.repositories.keys import KeyRepository
+from service.db.repositories.storage import StorageRepository
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.jobs.common.sizes import work_limited
 from service.jobs.kinds.registry.bodies import KIND
 from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.outputs import OnProgress
 from service.jobs.registry import JobKind, JobRequest, Registry
-from service.jobs.strict_json import digest
+from service.jobs.strict_json import digest, encoded
 from service.jobs.validation import validated
+from service.queue.lanes import Lanes
 from service.queue.queue import JobQueue
 from service.queue.retention import Retention
 from service.queue.scene_store import SceneStore
@@ -91,14 +95,18 @@ class Service:
     ) -> None:
         self.settings = settings
         self.registry = registry_of(settings.kinds) if registry is None else registry
-        self.database = Database(settings.database, settings.database_connections)
+        self.database = Database(
+            settings.database, settings.database_connections, settings.database_seconds
+        )
         self.jobs = JobRepository(self.database, now)
         self.sweeps = SweepRepository(self.database)
         self.designs = DesignRepository(self.database)
         self.keys = KeyRepository(self.database)
-        self.uploads = Uploads(UploadRepository(self.database), settings)
+        self.storage = Storage(StorageRepository(self.database), settings)
+        self.uploads = Uploads(UploadRepository(self.database), settings, self.storage)
         self.scenes = SceneStore(SceneRepository(self.database), self.uploads)
         self.waiters = Waiters()
+        self.lanes = Lanes(settings.database_seconds)
         self.previews = Previews(settings.preview_seconds)
         self.queue = JobQueue(self.jobs, executor_of(settings, self.registry), settings, self.waiters)
         self.retention = Retention(self.database, settings, self.jobs.now)
@@ -195,6 +203,8 @@ class Service:
     ) -> tuple[JobRow, bool]:
         """As `submit`, of a body that was checked: `request` is what it says, without its kind."""
         seconds = self._seconds_limit(request, caller)
+        self._require_priority(request, caller)
+        self.storage.require(caller)
         with work_limited(caller.limits.work):
             resolved = kind.resolve(request, self.scenes.of(caller))
         new = NewJob(
@@ -211,13 +221,21 @@ class Service:
             idempotency_key=idempotency_key,
             owner=caller.owner,
             seconds_limit=seconds,
+            stored_bytes=len(encoded(resolved.spec)) + len(encoded(body)),
         )
-        row, inserted = self.jobs.submit(new, self.settings.queue_limit, caller.limits.waiting)
+        waiting = None if caller.key_id is None else share(caller, self.settings, "waiting")
+        row, inserted = self.jobs.submit(new, self.settings.queue_limit, waiting)
         if row.state is JobState.ACCEPTED:
             self.queue.wake()
             if self._notices is not None:
                 self._notices.tell_accepted()
         return row, inserted
+
+    def _require_priority(self, request: JobRequest, caller: Caller) -> None:
+        most = highest_priority(caller, self.settings)
+        if request.priority > most:
+            message = f"`priority` must be at most {most} with this key, got {request.priority}"
+            raise InvalidRequestError([Issue(pointer="/priority", message=message)])
 
     def _seconds_limit(self, request: JobRequest, caller: Caller) -> float | None:
         """The longest time an attempt may take, if the request or the key says so [s]."""

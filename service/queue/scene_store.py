@@ -12,7 +12,7 @@ from service.db.models import NOBODY
 from service.db.repositories import SceneRepository, SceneRow
 from service.errors import ConflictError, NotFoundError
 from service.jobs.common.scenes import read_scene
-from service.jobs.strict_json import digest
+from service.jobs.strict_json import digest, encoded
 from service.uploads.uploads import Uploads
 from solver.scene.scene import load_scene, shipped_scenes
 
@@ -99,6 +99,7 @@ class SceneStore:
         if scene.name in shipped_scenes():
             known, added = _shipped(scene.name), False
         else:
+            self.uploads.storage.require(self.caller, len(encoded(tables)))
             row, added = self.repository.add(self.caller.owner, scene.name, scene_hash, tables)
             known = _stored(row)
         if known.scene_hash != scene_hash:

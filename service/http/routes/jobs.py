@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Depends, Query, Request, Response
-from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
-from starlette.concurrency import run_in_threadpool
 
 from service.auth.callers import Caller
 from service.db.models import JobState
@@ -18,12 +17,14 @@ from service.http.dependencies import (
     CallerDependency,
     ServiceDependency,
     TypedRoute,
+    as_json,
     idempotency_key,
     listing,
     preferred_wait,
     takes_body,
     wait_for_end,
 )
+from service.http.in_lane import reading
 from service.http.routes.described import LISTED
 from service.jobs.kinds.registry.bodies import (
     DESIGN,
@@ -69,6 +70,7 @@ class JobQuery(BaseModel):
 
 
 @router.get("/jobs", response_model=JobPage, responses=LISTED)
+@reading
 def list_jobs(
     request: Request,
     service: ServiceDependency,
@@ -94,16 +96,17 @@ def list_jobs(
     return listing(request, JobPage(items=items, next=following))
 
 
-@router.get("/jobs/{job_id}")
-def get_job(job_id: str, service: ServiceDependency, caller: CallerDependency) -> JobAnswer:
+@router.get("/jobs/{job_id}", response_model=JobAnswer)
+@reading
+def get_job(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
     """A job."""
-    return _answer(service, service.job(job_id, caller))
+    return as_json(_answer(service, service.job(job_id, caller)))
 
 
 @router.delete("/jobs/{job_id}")
 async def dismiss(job_id: str, service: ServiceDependency, caller: CallerDependency) -> JobAnswer:
     """Dismiss a job. A running one is stopped within the grace; the answer waits for that."""
-    row = await run_in_threadpool(service.dismiss, job_id, caller)
+    row = await service.lanes.writes.run(caller.owner, service.dismiss, job_id, caller)
     if not row.state.finished:
         row = await wait_for_end(
             service, job_id, service.settings.grace_seconds + _STOP_MARGIN_SECONDS, caller
@@ -111,19 +114,21 @@ async def dismiss(job_id: str, service: ServiceDependency, caller: CallerDepende
     return _answer(service, row)
 
 
-@router.get("/jobs/{job_id}/scene")
-def scene_of(job_id: str, service: ServiceDependency, caller: CallerDependency) -> JobScene:
+@router.get("/jobs/{job_id}/scene", response_model=JobScene)
+@reading
+def scene_of(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
     """The scene of a job as it is computed: with its values set, and what its uploads held.
 
     It stays what it was when the stored scene or the upload it was made of is replaced or deleted.
     """
-    return JobScene(job=job_id, scene=service.scene_of(job_id, caller))
+    return as_json(JobScene(job=job_id, scene=service.scene_of(job_id, caller)))
 
 
-@router.get("/jobs/{job_id}/results")
-def results(job_id: str, service: ServiceDependency, caller: CallerDependency) -> ResultsAnswer:
+@router.get("/jobs/{job_id}/results", response_model=ResultsAnswer)
+@reading
+def results(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
     """What a job computed."""
-    return ResultsAnswer.of(service.results(job_id, caller), service.sweeps)
+    return as_json(ResultsAnswer.of(service.results(job_id, caller), service.sweeps))
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +139,7 @@ class Asked:
     seconds: float | None
 
 
-def asked(request: Request, service: ServiceDependency) -> Asked:
+async def asked(request: Request, service: ServiceDependency) -> Asked:
     """Read the headers of a submission; `idempotency_key` lists the errors."""
     return Asked(
         key=idempotency_key(request.headers),
@@ -182,25 +187,27 @@ async def _submit(
     service: Service, caller: Caller, asked: Asked, raw: dict[str, Any], body: JobRequest
 ) -> Response:
     kind = service.registry.get(raw[KIND])
-    row, _ = await run_in_threadpool(service.accept, kind, request_of(kind, body), raw, asked.key, caller)
+    row, _ = await service.lanes.writes.run(
+        caller.owner, service.accept, kind, request_of(kind, body), raw, asked.key, caller
+    )
     headers = {"Location": f"/v1/jobs/{row.id}"}
     if asked.seconds is not None:
         row = await wait_for_end(service, row.id, asked.seconds, caller)
         headers["Preference-Applied"] = f"wait={asked.seconds:g}"
     if not row.state.finished:
-        return JSONResponse(_answer(service, row).model_dump(mode="json"), 202, headers)
-    finished = await run_in_threadpool(_finished, service, row)
-    return JSONResponse(finished.model_dump(mode="json"), 200, headers)
+        return as_json(_answer(service, row), 202, headers)
+    return await service.lanes.reads.run(caller.owner, _finished, service, row, headers)
 
 
 def _answer(service: Service, row: JobRow) -> JobAnswer:
     return JobAnswer.of(row, None if row.state.finished else service.queue.live_progress(row.id))
 
 
-def _finished(service: Service, row: JobRow) -> FinishedJob:
+def _finished(service: Service, row: JobRow, headers: Mapping[str, str]) -> Response:
     source = row.result_of or row.id
-    return FinishedJob(
+    finished = FinishedJob(
         **JobAnswer.of(row).model_dump(),
         result=service.jobs.result(source),
         sweeps=SweepAnswer.of_rows(service.sweeps.of_job(source), service.sweeps),
     )
+    return as_json(finished, 200, headers)

@@ -5,18 +5,21 @@ from __future__ import annotations
 from fastapi import APIRouter, Response
 
 from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
+from service.http.in_lane import reading, writing
 from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
 
 
 @router.get("")
+@reading
 def list_scenes(service: ServiceDependency, caller: CallerDependency) -> SceneList:
     """Shipped and stored scenes."""
     return SceneList(items=[SceneAnswer.of(scene) for scene in service.scenes.of(caller).all()])
 
 
 @router.get("/{name}")
+@reading
 def get_scene(name: str, service: ServiceDependency, caller: CallerDependency) -> SceneDetail:
     """A scene with its tables: a shipped one, or one of one's own."""
     return SceneDetail.of(service.scenes.of(caller).get(name))
@@ -27,6 +30,7 @@ def get_scene(name: str, service: ServiceDependency, caller: CallerDependency) -
     status_code=201,
     responses={200: {"model": SceneDetail, "description": "The same scene was stored before."}},
 )
+@writing
 def store_scene(
     body: JsonBody, service: ServiceDependency, caller: CallerDependency, response: Response
 ) -> SceneDetail:
