@@ -26,6 +26,10 @@ class DatabaseError(ServiceError):
     """A database the service must not or cannot use: wrong revision, in use, damaged."""
 
 
+class DamagedDatabaseError(DatabaseError):
+    """A database that cannot be read."""
+
+
 class DatabaseInUseError(DatabaseError):
     """Another service holds this SQLite file."""
 

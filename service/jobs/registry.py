@@ -180,7 +180,7 @@ class Registry:
         """
         if isinstance(name, str) and name in self._kinds:
             return self._kinds[name]
-        message = f"`kind` must be one of {', '.join(self._kinds)}, got {name!r}"
+        message = f"`kind` must be one of {', '.join(self._kinds)}, got {name!r:.80}"
         raise InvalidRequestError([Issue(pointer=pointer("kind"), message=message)])
 
     def extended(self, *kinds: JobKind) -> Registry:

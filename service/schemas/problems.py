@@ -204,12 +204,16 @@ async def _http_error(request: Request, error: Exception) -> JSONResponse:
 def _allowed(request: Request) -> list[str]:
     """The methods of every route at the path of a request; Starlette names those of the first one only."""
     methods = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
+    path = request.url.path.rstrip("/")
+    routes = request.app.routes
+    # A path that is a route's own, such as /v1/scenes/read, is not one that a parameter of another would fit.
+    own = [route for route in routes if getattr(route, "path", None) == path]
     return [
         method
         for method in methods
         if any(
             route.matches({**request.scope, "method": "GET" if method == "HEAD" else method})[0] is Match.FULL
-            for route in request.app.routes
+            for route in own or routes
         )
     ]
 

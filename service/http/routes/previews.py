@@ -6,6 +6,7 @@ from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.auth.callers import Caller
+from service.auth.shares import share
 from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute, takes_body
 from service.jobs.common.sizes import work_limited
 from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
@@ -30,7 +31,8 @@ async def preview(
     kind = service.previews.registry[(await request.json())[KIND]]
     resolved = await run_in_threadpool(_resolved, service, caller, kind, body)
     asking = f"{caller.owner} {body.client}" if body.client else ""
-    answer = await service.previews.compute(kind.name, resolved.spec, asking)
+    most = share(caller, service.settings, "previews")
+    answer = await service.previews.compute(kind.name, resolved.spec, asking, caller.owner, most)
     return Response(answer, media_type="application/json", headers={"Cache-Control": "no-store"})
 
 
