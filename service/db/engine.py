@@ -208,9 +208,7 @@ class Database:
         Longest time for a statement, for a lock, for a connection [s].
     """
 
-    def __init__(
-        self, url: str, connections: int = CONNECTIONS, seconds: float = DATABASE_SECONDS
-    ) -> None:
+    def __init__(self, url: str, connections: int = CONNECTIONS, seconds: float = DATABASE_SECONDS) -> None:
         self.url = url
         self._seconds = seconds
         self.name = database_name(url)

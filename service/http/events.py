@@ -180,7 +180,9 @@ async def job_events(
             elsewhere = live is None and not service.database.exclusive
             look_after = _LOOK_ELSEWHERE_SECONDS if elsewhere else _LOOK_AGAIN_SECONDS
             now = loop.time()
-            changed = await bell.rung(looks.least_seconds, max(min(looked + look_after, said + heartbeat) - now, 0.0))
+            changed = await bell.rung(
+                looks.least_seconds, max(min(looked + look_after, said + heartbeat) - now, 0.0)
+            )
             now = loop.time()
             if changed or now - looked >= look_after:
                 row = await looks.row(job_id, caller)

@@ -95,9 +95,7 @@ class Service:
     ) -> None:
         self.settings = settings
         self.registry = registry_of(settings.kinds) if registry is None else registry
-        self.database = Database(
-            settings.database, settings.database_connections, settings.database_seconds
-        )
+        self.database = Database(settings.database, settings.database_connections, settings.database_seconds)
         self.jobs = JobRepository(self.database, now)
         self.sweeps = SweepRepository(self.database)
         self.designs = DesignRepository(self.database)

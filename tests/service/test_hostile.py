@@ -335,7 +335,13 @@ def test_the_limit_holds_for_every_loop(loop: Any) -> None:
     pytest.importorskip(loop)
     connections = Connections(most=100, header_seconds=0.8, write_seconds=60.0, unsent_bytes=1_000_000)
     config = uvicorn.Config(
-        answer, http=connections.protocol, loop=loop, port=0, log_config=None, lifespan="off", timeout_keep_alive=60
+        answer,
+        http=connections.protocol,
+        loop=loop,
+        port=0,
+        log_config=None,
+        lifespan="off",
+        timeout_keep_alive=60,
     )
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run)

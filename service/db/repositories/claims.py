@@ -40,9 +40,7 @@ NEXT_PRIORITY = select(func.max(_C.priority)).where(
 )
 NEXT_JOBS = (
     select(*(_C[name] for name in TAKEN))
-    .where(
-        _C.state == JobState.ACCEPTED, _C.owner == bindparam("of"), _C.priority == bindparam("priority")
-    )
+    .where(_C.state == JobState.ACCEPTED, _C.owner == bindparam("of"), _C.priority == bindparam("priority"))
     .order_by(_C.id)
     .limit(bindparam("most"))
     .with_for_update(skip_locked=True)

@@ -32,9 +32,7 @@ SEVERAL = select(*(_C[name] for name in ROW)).where(_C.id.in_(bindparam("jobs", 
 RESULT = select(_RESULT.c.body).where(_RESULT.c.job_id == bindparam("job"))
 RESULT_TEXT = select(cast(_RESULT.c.body, Text)).where(_RESULT.c.job_id == bindparam("job"))
 ADD_STORED = (
-    update(_JOB)
-    .where(_C.id == bindparam("job"))
-    .values(stored_bytes=_C.stored_bytes + bindparam("more"))
+    update(_JOB).where(_C.id == bindparam("job")).values(stored_bytes=_C.stored_bytes + bindparam("more"))
 )
 
 # Not ordered by the bare `id`: SQLite would walk all jobs of an owner by the index (owner, id).

@@ -22,5 +22,7 @@ class StorageRepository:
     def of(self, owner: str) -> int:
         """Bytes of an owner's jobs with results and sweeps, of their uploads and of their scenes."""
         with self._db.reading() as connection:
-            counted = (connection.execute(one, {"owner": owner}) for one in (OF_JOBS, _OF_UPLOADS, _OF_SCENES))
+            counted = (
+                connection.execute(one, {"owner": owner}) for one in (OF_JOBS, _OF_UPLOADS, _OF_SCENES)
+            )
             return sum(int(one.scalar_one()) for one in counted)

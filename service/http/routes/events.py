@@ -49,7 +49,9 @@ async def _watched(
     row = await service.lanes.reads.run(caller.owner, service.job, job_id, caller)
     if last_event_id == END and row.state.finished:
         raise _ToldEverything
-    return _Watched(service, request.app.state.looks, caller, job_id, last_event_id, HEADERS_ONLY in request.scope)
+    return _Watched(
+        service, request.app.state.looks, caller, job_id, last_event_id, HEADERS_ONLY in request.scope
+    )
 
 
 @router.get(

@@ -135,6 +135,10 @@ def test_a_key_has_so_many_requests_at_a_time(tmp_path: Path) -> None:
                     client.post("/v1/jobs", json=QUICK, headers={"Prefer": "wait=2"})
 
         with running(waiting, waiting):
-            until(lambda: httpx.get(f"{service.base}/v1/jobs", headers=service.headers("ann")).status_code == 429)
+            until(
+                lambda: (
+                    httpx.get(f"{service.base}/v1/jobs", headers=service.headers("ann")).status_code == 429
+                )
+            )
             with service.client("bob") as client:
                 assert client.get("/v1/jobs").status_code == 200
