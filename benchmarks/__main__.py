@@ -8,7 +8,10 @@ from collections.abc import Callable
 
 from benchmarks.harness import WrongResultError
 
-GROUPS = {"chains": ("chain-8", "chain-32", "one-slider"), "service": ("load", "latency", "requests", "lists", "scale")}
+GROUPS = {
+    "chains": ("chain-8", "chain-32", "one-slider"),
+    "service": ("load", "latency", "requests", "lists", "scale"),
+}
 
 
 def _cases() -> dict[str, Callable[[], None]]:

@@ -58,8 +58,8 @@ class Storage:
             stored, at = self._repository.of(caller.owner), self._steady()
         if stored + more > most or stored >= most:
             raise StorageFullError(
-                f"{stored} bytes are in storage and {more} would come, {most} are allowed: delete uploads, or "
-                "ask the keeper of the service to delete old jobs (`stickslip db prune`)"
+                f"{stored} bytes are in storage and {more} would come, {most} are allowed: delete uploads, "
+                "or ask the keeper of the service to delete old jobs (`stickslip db prune`)"
             )
         with self._lock:
             self._counted[caller.owner] = (stored + more, at)

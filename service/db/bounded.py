@@ -1,7 +1,7 @@
 """Connections to PostgreSQL that wait for their server for a limited time.
 
-The server ends a statement that takes long by itself, if it runs. One that is frozen, or behind a network that
-swallows everything, says nothing at all, and TCP notices that late or never: then the client must give up.
+The server ends a statement that takes long by itself, if it runs. One that is frozen, or behind a network
+that swallows everything, says nothing at all, and TCP notices that late or never: the client must give up.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import shutil
 import sqlite3
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -211,6 +212,7 @@ class Database:
     def __init__(self, url: str, connections: int = CONNECTIONS, seconds: float = DATABASE_SECONDS) -> None:
         self.url = url
         self._seconds = seconds
+        self._here = threading.local()
         self.name = database_name(url)
         self._lock = FileLock(database_path(url)) if is_sqlite(url) else None
         self._write = write_engine(url, connections, seconds)
@@ -255,9 +257,17 @@ class Database:
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
-        """A transaction that sees one snapshot of the database."""
+        """A transaction that sees one snapshot; inside another one of the same thread, that one."""
+        known: Connection | None = getattr(self._here, "connection", None)
+        if known is not None:
+            yield known
+            return
         with self._read.begin() as connection:
-            yield connection
+            self._here.connection = connection
+            try:
+                yield connection
+            finally:
+                self._here.connection = None
 
     def settle(self) -> None:
         """Move what was committed from the log of SQLite into its file; nobody waits for it."""

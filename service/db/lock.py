@@ -102,7 +102,7 @@ class FileLock:
         self._file = file
 
     def _lock_itself(self) -> None:
-        """Lock the database too: the file beside it can be deleted, and a hard link has another one beside it.
+        """Lock the database too: the file beside it can be deleted, a hard link has another one beside it.
 
         SQLite's own locks are of another kind (fcntl), but a process loses those of a file when it closes
         any descriptor of it: so this one stays open until the last connection is closed, and a file that

@@ -83,7 +83,8 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     app.state.metrics = Metrics(service)
     app.state.probe = Probe(service)
     app.state.looks = Looks(service)
-    app.state.connections = _connections(service.settings)
+    app.state.connections = connections = _connections(service.settings)
+    service.lanes.guard(connections.require_taken)
     # The last one added is the outermost.
     app.add_middleware(Head)
     doorkeeper = Doorkeeper(service.keys, service.settings, service.jobs.now)

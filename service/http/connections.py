@@ -15,6 +15,8 @@ from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from service.errors import TooManyRequestsError
+
 log = logging.getLogger("stickslip.http")
 
 KEY = "stickslip.connection"
@@ -26,6 +28,7 @@ _TOO_SLOW = (
 _LOOKS = 4
 _LONGEST_LOOK_SECONDS = 1.0
 _STALLED_SECONDS = 0.5
+_RETRY_SECONDS = 5
 
 
 class Connections:
@@ -51,6 +54,8 @@ class Connections:
         self._open: set[Connection] = set()
         # Those without a request, the one that has been so for longest first.
         self._idle: dict[Connection, None] = {}
+        # Those whose clients take less than they are sent.
+        self._paused: set[Connection] = set()
         self._look_at: asyncio.TimerHandle | None = None
 
     def protocol(self, **values: Any) -> Connection:
@@ -75,6 +80,14 @@ class Connections:
         """A connection ended."""
         self._open.discard(gone)
         self._idle.pop(gone, None)
+        self._paused.discard(gone)
+
+    def paused(self, one: Connection, *, now: bool) -> None:
+        """A connection's client takes less than it is sent, or has caught up."""
+        if now and one in self._open:
+            self._paused.add(one)
+        else:
+            self._paused.discard(one)
 
     def busy(self, one: Connection) -> None:
         """A connection has a request."""
@@ -85,18 +98,26 @@ class Connections:
         if one in self._open:
             self._idle[one] = None
 
-    def full(self, owner: str) -> int | None:
-        """How much an owner's clients have not taken, if that is too much: those who stall are disconnected."""
-        held = [one for one in self._open if one.paused and one.owner == owner]
+    def require_taken(self, owner: str) -> None:
+        """Refuse an owner whose clients leave too much untaken; those of them who stall are disconnected.
+
+        Raises
+        ------
+        TooManyRequestsError
+            If it is too much all the same.
+        """
+        held = [one for one in self._paused if one.owner == owner]
         unsent = sum(one.unsent() for one in held)
         if unsent <= self._unsent_bytes:
-            return None
+            return
         for one in sorted(held, key=lambda one: one.since):
-            if one.stalled() < _STALLED_SECONDS or unsent <= self._unsent_bytes:
-                break
-            unsent -= one.unsent()
-            self._end(one)
-        return unsent if unsent > self._unsent_bytes else None
+            if one.stalled() >= _STALLED_SECONDS and unsent > self._unsent_bytes:
+                unsent -= one.unsent()
+                self._end(one)
+        if unsent > self._unsent_bytes:
+            raise TooManyRequestsError(
+                f"{unsent} bytes of answers were not taken yet: read them, then ask again", _RETRY_SECONDS
+            )
 
     def _look_later(self, loop: asyncio.AbstractEventLoop) -> None:
         seconds = min(self._write_seconds / _LOOKS, _LONGEST_LOOK_SECONDS)
@@ -130,7 +151,6 @@ class Connection(H11Protocol):
         super().__init__(**values)
         self.app_state = {**self.app_state, KEY: self}
         self.owner = ""
-        self.paused = False
         self.since = 0.0
         self.all_of_them = all_of_them
         self._left = 0
@@ -170,12 +190,12 @@ class Connection(H11Protocol):
     def pause_writing(self) -> None:
         """The client takes less than it is sent."""
         super().pause_writing()
-        self.paused = True
+        self.all_of_them.paused(self, now=True)
 
     def resume_writing(self) -> None:
         """It has taken most of it."""
         super().resume_writing()
-        self.paused = False
+        self.all_of_them.paused(self, now=False)
 
     def unsent(self) -> int:
         """Bytes the client has not taken."""

@@ -9,8 +9,8 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import re
-from collections.abc import Callable, Coroutine, Mapping
-from typing import Annotated, Any
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from typing import Annotated, Any, TypeVar
 
 from fastapi import Body, Depends, Request, Response
 from fastapi.exceptions import RequestValidationError
@@ -41,6 +41,8 @@ from solver.errors import Issue
 _PREFER_WAIT = re.compile(r"(?:^|[,;\s])wait\s*=\s*\"?(\d{1,6})\"?(?:$|[,;\s])", re.IGNORECASE)
 _KEY = re.compile(r"[\x21-\x7e]{1,200}")
 _LOOK_AGAIN_SECONDS = 2.0
+
+AnswerT = TypeVar("AnswerT")
 
 
 def service_behind(request: Request) -> Service:
@@ -196,6 +198,17 @@ def as_json(answer: BaseModel, status: int = 200, headers: Mapping[str, str] | N
     return Response(answer.__pydantic_serializer__.to_json(answer), status, headers, "application/json")
 
 
+def with_raw(answer: BaseModel, **raw: bytes) -> bytes:
+    """An answer as JSON with further keys whose JSON there is already."""
+    more = b"".join(b',"%s":%s' % (name.encode(), value) for name, value in raw.items())
+    return bytes(answer.__pydantic_serializer__.to_json(answer))[:-1] + more + b"}"
+
+
+def raw_list(answers: Sequence[BaseModel]) -> bytes:
+    """Answers as a JSON list."""
+    return b"[" + b",".join(one.__pydantic_serializer__.to_json(one) for one in answers) + b"]"
+
+
 def listing(request: Request, page: SweepPage | DesignPage | JobPage | UploadPage) -> Response:
     """A page of a list as JSON or CSV, with a link to the next one in its header too (RFC 8288)."""
     kind = chosen(request.headers.get("accept"), LIST_MEDIA)
@@ -207,8 +220,22 @@ def listing(request: Request, page: SweepPage | DesignPage | JobPage | UploadPag
     return Response(csv_of_items(page.model_dump(mode="json")["items"]), media_type=kind, headers=headers)
 
 
-async def wait_for_end(service: Service, job_id: str, seconds: float, caller: Caller = KEYLESS) -> JobRow:
-    """The job when it has ended, the time is over or the service stops; holds no thread meanwhile."""
+async def wait_for_end(
+    service: Service,
+    job_id: str,
+    seconds: float,
+    caller: Caller,
+    answer: Callable[[JobRow], AnswerT],
+    known: JobRow | None = None,
+) -> AnswerT:
+    """Wait until a job has ended, the time is over or the service stops; holds no thread meanwhile.
+
+    Parameters
+    ----------
+    service, job_id, seconds, caller : where to look, for which job, how long [s], as whom.
+    answer : makes of the row what is wanted, in the same transaction.
+    known : the row as it was a moment ago: it is not looked at before something happens.
+    """
     loop = asyncio.get_running_loop()
     changed = asyncio.Event()
 
@@ -216,13 +243,22 @@ async def wait_for_end(service: Service, job_id: str, seconds: float, caller: Ca
         if event.ended:
             loop.call_soon_threadsafe(changed.set)
 
+    def look() -> tuple[bool, AnswerT]:
+        with service.database.reading():
+            row = service.job(job_id, caller)
+            return row.state.finished, answer(row)
+
     end = loop.time() + seconds
     with service.waiters.listening(job_id, listen):
+        waits = known is not None and not known.state.finished and not service.waiters.ended_lately(job_id)
         while True:
-            row = await service.lanes.reads.run(caller.owner, service.job, job_id, caller)
             left = end - loop.time()
-            if row.state.finished or service.stopping.is_set() or left <= 0.0:
-                return row
+            over = service.stopping.is_set() or left <= 0.0
+            if over or not waits:
+                finished, found = await service.lanes.reads.run(caller.owner, look)
+                if finished or over or service.stopping.is_set():
+                    return found
+            waits = False
             try:
                 await asyncio.wait_for(changed.wait(), min(left, _LOOK_AGAIN_SECONDS))
             except TimeoutError:

@@ -15,7 +15,7 @@ _Decorator = Callable[[Callable[..., _T]], Callable[..., Awaitable[_T]]]
 
 
 def _in(lane_of: Callable[[Lanes], Lane]) -> _Decorator[Any]:
-    """Have a function with the parameters `service` and `caller` run in a lane when it is its owner's turn."""
+    """Have a function with parameters `service` and `caller` run in a lane when it is its owner's turn."""
 
     def decorate(endpoint: Callable[..., _T]) -> Callable[..., Awaitable[_T]]:
         @wraps(endpoint)

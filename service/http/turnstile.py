@@ -10,13 +10,11 @@ from starlette.types import Scope
 
 from service.auth.callers import Caller
 from service.auth.shares import AtATime, share
-from service.errors import TooManyRequestsError
 from service.http.connections import KEY, Connection
 from service.settings.settings import Settings
 
 _STREAM = re.compile(r"/v1/jobs/[^/]+/events/?")
 _UPLOAD = "/v1/uploads"
-_RETRY_SECONDS = 5
 
 
 class Turnstile:
@@ -47,11 +45,7 @@ class Turnstile:
         connection: Connection | None = scope.get("state", {}).get(KEY)
         if connection is not None:
             connection.owner = owner
-            unsent = connection.all_of_them.full(owner)
-            if unsent is not None:
-                raise TooManyRequestsError(
-                    f"{unsent} bytes of answers were not taken yet: read them, then ask again", _RETRY_SECONDS
-                )
+            connection.all_of_them.require_taken(owner)
         if _STREAM.fullmatch(scope["path"]):
             with self._streams.taken(owner, share(caller, self._settings, "streams")):
                 yield

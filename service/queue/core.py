@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import math
 import threading
@@ -39,7 +40,7 @@ from service.jobs.kinds.registry.bodies import KIND
 from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.outputs import OnProgress
 from service.jobs.registry import JobKind, JobRequest, Registry
-from service.jobs.strict_json import digest, encoded
+from service.jobs.strict_json import digest
 from service.jobs.validation import validated
 from service.queue.lanes import Lanes
 from service.queue.queue import JobQueue
@@ -61,11 +62,17 @@ _LOOK_AGAIN_SECONDS = 2.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Results:
-    """What a finished job left."""
+    """What a finished job left; `text` is the JSON of its result."""
 
     job: JobRow
-    result: dict[str, Any]
+    text: str
     sweeps: list[SweepRow]
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """The result."""
+        found: dict[str, Any] = json.loads(self.text)
+        return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -219,7 +226,6 @@ class Service:
             idempotency_key=idempotency_key,
             owner=caller.owner,
             seconds_limit=seconds,
-            stored_bytes=len(encoded(resolved.spec)) + len(encoded(body)),
         )
         waiting = None if caller.key_id is None else share(caller, self.settings, "waiting")
         row, inserted = self.jobs.submit(new, self.settings.queue_limit, waiting)
@@ -314,9 +320,9 @@ class Service:
         """
         row = self.job(job_id, caller)
         source = row.result_of or row.id
-        result = self.jobs.result(source)
-        if result is not None:
-            return Results(job=row, result=result, sweeps=self.sweeps.of_job(source))
+        text = self.jobs.result_text(source)
+        if text is not None:
+            return Results(job=row, text=text, sweeps=self.sweeps.of_job(source))
         if row.state is JobState.FAILED:
             error = row.error or {}
             raise JobFailedError(f"job {job_id} failed: {error.get('detail', 'for no known reason')}", error)

@@ -13,7 +13,6 @@ from service.db import revisions
 from service.db.engine import sqlite_note
 from service.queue.core import SOLVER_VERSION, Service
 
-
 _PROBE_SECONDS = 2.0
 
 

@@ -23,6 +23,10 @@ _LONG = 3.0
 _RETRY_SECONDS = 2
 
 
+def _everybody(_owner: str) -> None:
+    """Nobody is refused."""
+
+
 class Lane:
     """Some threads. All but the work itself happens on one event loop, so nothing here needs a lock.
 
@@ -35,6 +39,7 @@ class Lane:
     """
 
     def __init__(self, threads: int, seconds: float) -> None:
+        self.require: Callable[[str], None] = _everybody
         self._seconds = seconds
         self._free = threads
         self._threads = threads
@@ -51,6 +56,8 @@ class Lane:
         """
         await self._enter(owner)
         try:
+            # Once more: many may have come before the first of them had its answer.
+            self.require(owner)
             if self._limiter is None:
                 self._limiter = CapacityLimiter(self._threads)
             return await to_thread.run_sync(partial(work, *args, **values), limiter=self._limiter)
@@ -106,3 +113,8 @@ class Lanes:
         self.files = Lane(_FILES, _LONG * seconds)
         self.pictures = Lane(_DRAWING, _LONG * seconds)
         self.uploads = Lane(_UPLOADS, _LONG * seconds)
+
+    def guard(self, require: Callable[[str], None]) -> None:
+        """Have `require` refuse owners (by what it raises) before anything is done for them."""
+        for lane in (self.reads, self.writes, self.files, self.pictures, self.uploads):
+            lane.require = require

@@ -1,7 +1,7 @@
 """What clients may take of a service: limits of all together, and of each owner by default.
 
-A key may have limits of its own (`service.auth.callers.KeyLimits`) in place of those that begin with `owner_`.
-Where no keys are needed, everybody is one owner.
+A key may have limits of its own (`service.auth.callers.KeyLimits`) in place of those that begin with
+`owner_`. Where no keys are needed, everybody is one owner.
 """
 
 from __future__ import annotations

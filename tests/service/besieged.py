@@ -1,4 +1,4 @@
-"""A service in a process of its own under attack: its memory, another client's latency, its end by SIGTERM."""
+"""A service in a process of its own under attack: its memory, the latency of others, its end by SIGTERM."""
 
 from __future__ import annotations
 

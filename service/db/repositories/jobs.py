@@ -152,6 +152,11 @@ class JobRepository:
         with self._db.reading() as connection:
             return connection.execute(statements.RESULT, {"job": job_id}).scalar_one_or_none()
 
+    def result_text(self, job_id: str) -> str | None:
+        """The result of a job as its JSON, None if it has none."""
+        with self._db.reading() as connection:
+            return connection.execute(statements.RESULT_TEXT, {"job": job_id}).scalar_one_or_none()
+
     def spec(self, job_id: str) -> dict[str, Any]:
         """What a job computes; empty if there is none of this id."""
         with self._db.reading() as connection:
@@ -353,7 +358,9 @@ class JobRepository:
         if source is not None:
             values |= {"state": JobState.SUCCESSFUL, "started": now, "finished": now, "progress": 1.0}
         written: dict[str, Any] = statements.INITIAL | values
-        connection.execute(statements.INSERT_JOB, written)
+        request, spec = encoded(new.request), encoded(new.spec)
+        stored = {"request": request, "spec": spec, "stored_bytes": len(request) + len(spec)}
+        connection.execute(statements.INSERT_JOB, written | stored)
         return JobRow(**{name: written[name] for name in statements.ROW})
 
     @staticmethod

@@ -55,7 +55,6 @@ class NewJob:
     idempotency_key: str | None = None
     owner: str = NOBODY
     seconds_limit: float | None = None
-    stored_bytes: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any
 from urllib.parse import urlencode
 
@@ -21,8 +22,10 @@ from service.http.dependencies import (
     idempotency_key,
     listing,
     preferred_wait,
+    raw_list,
     takes_body,
     wait_for_end,
+    with_raw,
 )
 from service.http.in_lane import reading
 from service.http.routes.described import LISTED
@@ -38,7 +41,15 @@ from service.jobs.kinds.registry.bodies import (
 from service.jobs.registry import JobRequest, Registry
 from service.queue import cursors
 from service.queue.core import Service
-from service.schemas.answers import FinishedJob, JobAnswer, JobPage, JobScene, ResultsAnswer, SweepAnswer
+from service.schemas.answers import (
+    FinishedJob,
+    JobAnswer,
+    JobPage,
+    JobScene,
+    ResultsAnswer,
+    ResultsHead,
+    SweepAnswer,
+)
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 
@@ -108,9 +119,8 @@ async def dismiss(job_id: str, service: ServiceDependency, caller: CallerDepende
     """Dismiss a job. A running one is stopped within the grace; the answer waits for that."""
     row = await service.lanes.writes.run(caller.owner, service.dismiss, job_id, caller)
     if not row.state.finished:
-        row = await wait_for_end(
-            service, job_id, service.settings.grace_seconds + _STOP_MARGIN_SECONDS, caller
-        )
+        patience = service.settings.grace_seconds + _STOP_MARGIN_SECONDS
+        row = await wait_for_end(service, job_id, patience, caller, lambda found: found)
     return _answer(service, row)
 
 
@@ -128,7 +138,12 @@ def scene_of(job_id: str, service: ServiceDependency, caller: CallerDependency) 
 @reading
 def results(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
     """What a job computed."""
-    return as_json(ResultsAnswer.of(service.results(job_id, caller), service.sweeps))
+    with service.database.reading():
+        found = service.results(job_id, caller)
+        sweeps = SweepAnswer.of_rows(found.sweeps, service.sweeps)
+    about = ResultsHead(job=found.job.id, status=found.job.state)
+    body = with_raw(about, result=found.text.encode(), sweeps=raw_list(sweeps))
+    return Response(body, media_type="application/json")
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,23 +206,27 @@ async def _submit(
         caller.owner, service.accept, kind, request_of(kind, body), raw, asked.key, caller
     )
     headers = {"Location": f"/v1/jobs/{row.id}"}
+    answer = partial(_job_or_result, service, headers)
     if asked.seconds is not None:
-        row = await wait_for_end(service, row.id, asked.seconds, caller)
         headers["Preference-Applied"] = f"wait={asked.seconds:g}"
+        return await wait_for_end(service, row.id, asked.seconds, caller, answer, row)
+    if row.state.finished:
+        return await service.lanes.reads.run(caller.owner, answer, row)
+    return answer(row)
+
+
+def _job_or_result(service: Service, headers: Mapping[str, str], row: JobRow) -> Response:
+    """A submitted job; with what it computed if it has ended."""
     if not row.state.finished:
         return as_json(_answer(service, row), 202, headers)
-    return await service.lanes.reads.run(caller.owner, _finished, service, row, headers)
+    with service.database.reading():
+        source = row.result_of or row.id
+        text = service.jobs.result_text(source)
+        sweeps = SweepAnswer.of_rows(service.sweeps.of_job(source), service.sweeps)
+    result = b"null" if text is None else text.encode()
+    body = with_raw(JobAnswer.of(row), result=result, sweeps=raw_list(sweeps))
+    return Response(body, 200, headers, "application/json")
 
 
 def _answer(service: Service, row: JobRow) -> JobAnswer:
     return JobAnswer.of(row, None if row.state.finished else service.queue.live_progress(row.id))
-
-
-def _finished(service: Service, row: JobRow, headers: Mapping[str, str]) -> Response:
-    source = row.result_of or row.id
-    finished = FinishedJob(
-        **JobAnswer.of(row).model_dump(),
-        result=service.jobs.result(source),
-        sweeps=SweepAnswer.of_rows(service.sweeps.of_job(source), service.sweeps),
-    )
-    return as_json(finished, 200, headers)

@@ -20,13 +20,10 @@ EXIT_SECONDS = 10.0
 
 
 @contextmanager
-def locked(file: Path, how: str) -> Iterator[None]:
-    """A lock that keeps writers out, or one that keeps everybody out."""
+def locked(file: Path) -> Iterator[None]:
+    """A lock that keeps writers out."""
     connection = sqlite3.connect(file, isolation_level=None, timeout=30.0)
     try:
-        if how == "everybody":
-            connection.execute("PRAGMA locking_mode = EXCLUSIVE")
-            # Readers hold the file open: what keeps them out is the write lock on its log's index.
         connection.execute("BEGIN IMMEDIATE")
         yield
     finally:
@@ -47,7 +44,7 @@ def test_a_foreign_lock_is_answered_in_time(tmp_path: Path) -> None:
     job = {"kind": "iteration", "fresh": True}
     with besieged(tmp_path, database_seconds=DATABASE_SECONDS) as service:
         known = in_time(service, "POST", "/v1/jobs?", 202, json=job).json()["id"]
-        with locked(tmp_path / "jobs.db", "writers"):
+        with locked(tmp_path / "jobs.db"):
             is_problem(in_time(service, "POST", "/v1/jobs", 503, json=job), 503)
             in_time(service, "GET", f"/v1/jobs/{known}", 200)
             in_time(service, "GET", "/v1/sweeps", 200)
@@ -64,7 +61,7 @@ def test_many_writers_behind_a_lock_are_answered_in_time(tmp_path: Path) -> None
     with (
         besieged(tmp_path, database_seconds=DATABASE_SECONDS) as service,
         ThreadPoolExecutor(64) as pool,
-        locked(tmp_path / "jobs.db", "writers"),
+        locked(tmp_path / "jobs.db"),
     ):
         asked = [pool.submit(in_time, service, "POST", "/v1/jobs", 503, json=job) for _ in range(64)]
         for one in asked:
@@ -76,5 +73,5 @@ def test_a_lock_does_not_hold_up_the_end(tmp_path: Path, busy: bool) -> None:
     with besieged(tmp_path, database_seconds=DATABASE_SECONDS) as service:
         if busy:
             in_time(service, "POST", "/v1/jobs", 202, json={"kind": "iteration", "seconds": 600.0})
-        with locked(tmp_path / "jobs.db", "writers"):
+        with locked(tmp_path / "jobs.db"):
             assert service.terminate() < EXIT_SECONDS
