@@ -108,7 +108,8 @@ def _on_connect(
 
 def _overdue(info: dict[str, Any]) -> bool:
     """Whether the transaction of an SQLite connection takes too long."""
-    return time.monotonic() > info.get(_DEADLINE, math.inf)
+    deadline: float = info.get(_DEADLINE, math.inf)
+    return time.monotonic() > deadline
 
 
 def _begin_with(statement: str, seconds: float | None = None) -> Callable[[Connection], None]:

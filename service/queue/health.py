@@ -81,8 +81,8 @@ class Probe:
             found = self._looks[look] = loop.create_future()
             found.add_done_callback(lambda _: self._looks.pop(look, None))
             # No pool: a look that hangs must neither keep others out nor hold up the end of the process.
-            words = {"target": self._look, "args": (look, loop, found), "name": "stickslip probe"}
-            threading.Thread(**words, daemon=True).start()
+            told = (look, loop, found)
+            threading.Thread(target=self._look, args=told, name="stickslip probe", daemon=True).start()
         try:
             return await asyncio.wait_for(asyncio.shield(found), self._seconds)
         except TimeoutError:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from sqlalchemy import bindparam, func, select
+from sqlalchemy import BindParameter, bindparam, func, select
 
 from service.db.engine import Database
 from service.db.models import Job, Scene, Upload
 
-_OWNER = bindparam("owner")
+_OWNER: BindParameter[str] = bindparam("owner")
 OF_JOBS = select(func.coalesce(func.sum(Job.stored_bytes), 0)).where(Job.owner == _OWNER)
 _OF_UPLOADS = select(func.coalesce(func.sum(Upload.size), 0)).where(Upload.owner == _OWNER)
 _OF_SCENES = select(func.coalesce(func.sum(Scene.size), 0)).where(Scene.owner == _OWNER)

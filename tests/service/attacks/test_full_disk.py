@@ -56,7 +56,8 @@ def test_a_full_disk_is_told_by_readiness(tmp_path: Path, small_disk: Path) -> N
 
 
 def test_a_full_disk_does_not_hold_up_the_end(tmp_path: Path, small_disk: Path) -> None:
-    with besieged(tmp_path, url=f"sqlite:///{small_disk}/jobs.db") as service:
+    url = f"sqlite:///{small_disk}/jobs.db"
+    with besieged(tmp_path, url=url, least_free_bytes=1_000_000) as service:
         httpx.post(f"{service.base}/v1/jobs", json={"kind": "iteration", "seconds": 600.0})
         filler = fill(small_disk)
         assert service.terminate() < EXIT_SECONDS
