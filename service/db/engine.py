@@ -35,9 +35,6 @@ from service.errors import DatabaseError
 from service.jobs import strict_json
 
 BUSY_TIMEOUT_SECONDS = 30.0
-"""How long commands wait for another program's lock [s]."""
-DATABASE_SECONDS = 10.0
-"""How long a service waits: for a lock, for a connection, for a statement [s]."""
 SQLITE_WITHOUT_WAL_BUG = (3, 51, 3)
 CONNECTIONS = 16
 # Of the transactions that threads share: PostgreSQL runs several at a time, and each of these collects what
@@ -122,7 +119,7 @@ def _begin_with(statement: str, seconds: float | None = None) -> Callable[[Conne
     return begin
 
 
-def write_engine(url: str, connections: int = CONNECTIONS, seconds: float = DATABASE_SECONDS) -> Engine:
+def write_engine(url: str, connections: int = CONNECTIONS, seconds: float = BUSY_TIMEOUT_SECONDS) -> Engine:
     """An engine whose transactions may write.
 
     Those of SQLite take the write lock when they begin, and the pool holds one connection: the threads of a
@@ -210,7 +207,9 @@ class Database:
         Longest time for a statement, for a lock, for a connection [s].
     """
 
-    def __init__(self, url: str, connections: int = CONNECTIONS, seconds: float = DATABASE_SECONDS) -> None:
+    def __init__(
+        self, url: str, connections: int = CONNECTIONS, seconds: float = BUSY_TIMEOUT_SECONDS
+    ) -> None:
         self.url = url
         self._seconds = seconds
         self._here = threading.local()

@@ -43,7 +43,9 @@ class JobRequest(BaseModel):
     fresh: bool = Field(
         default=False, strict=True, description="Compute again even if a stored result exists."
     )
-    priority: int = Field(default=0, strict=True, ge=-100, le=100, description="Of one's own jobs, higher ones run first.")
+    priority: int = Field(
+        default=0, strict=True, ge=-100, le=100, description="Of one's own jobs, higher ones run first."
+    )
     max_seconds: float | None = Field(
         default=None,
         strict=True,

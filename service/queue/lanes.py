@@ -18,7 +18,7 @@ from service.errors import OverloadedError
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
-_READING, _WRITING, _FILES, _DRAWING, _UPLOADS = 16, 16, 4, 2, 4
+_READING, _WRITING, _FILES, _DRAWING, _UPLOADS = 16, 16, 4, 2, 2
 _LONG = 3.0
 _RETRY_SECONDS = 2
 

@@ -11,7 +11,7 @@ from pydantic_settings import SettingsConfigDict
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError
 
-from service.db.engine import CONNECTIONS, DATABASE_SECONDS
+from service.db.engine import CONNECTIONS
 from service.db.postgresql import DRIVER
 from service.errors import ConfigurationError
 from service.jobs.outputs import Pace
@@ -75,7 +75,7 @@ class Settings(Limits):
         default=CONNECTIONS, ge=2, le=1000, description="Connections to PostgreSQL at most."
     )
     database_seconds: float = Field(
-        default=DATABASE_SECONDS,
+        default=10.0,
         ge=0.1,
         le=3600.0,
         description="Longest time for a statement of the database, for its lock, for a connection to it [s]: "

@@ -72,7 +72,8 @@ def test_a_key_stores_so_much(tmp_path: Path) -> None:
         assert "storage" in is_problem(again, 507)["detail"]
         job = client.post("/v1/jobs", json={**QUICK, "sweeps": 3}, headers={"Prefer": "wait=20"})
         assert job.status_code == 200, "what is stored was below the limit"
-        is_problem(client.post("/v1/jobs", json=QUICK), 507)
+        # What a job stored is counted within some seconds.
+        until(lambda: client.post("/v1/jobs", json=QUICK).status_code == 507)
         assert client.delete(first.headers["location"]).status_code == 204
 
 
@@ -87,7 +88,7 @@ def uploading(service: Besieged, owner: str) -> object:
                 number += 1
                 body = file.replace(b"\n", f"\n% {number} {threading.get_ident()}\n".encode(), 1)
                 answer = client.post("/v1/uploads", content=body, params={"name": "K.mtx"})
-                assert answer.status_code in (201, 429), answer.text
+                assert answer.status_code in (201, 429, 503), answer.text
 
     return attack
 
