@@ -99,7 +99,9 @@ class Besieged:
         begun = time.monotonic()
         self.process.send_signal(signal.SIGTERM)
         self.process.wait(120.0)
-        return time.monotonic() - begun
+        took = time.monotonic() - begun
+        print(f"ended {took:.1f} s after SIGTERM")
+        return took
 
 
 def make_keys(url: str, owners: tuple[str, ...], limits: KeyLimits) -> dict[str, str]:
@@ -185,6 +187,7 @@ def others_are_served(service: Besieged, path: str, owner: str = "") -> None:
             took = sorted(_timed(client, path) for _ in range(_WINDOW))
             slowest.append(took[int(0.99 * _WINDOW) - 1])
             if slowest[-1] <= LATENCY:
+                print(f"another client: 99 % within {1e3 * slowest[-1]:.0f} ms")
                 return
     pytest.fail(f"of {_WINDOWS} times {_WINDOW} requests the 99th of 100 took {slowest} s")
 
@@ -199,4 +202,6 @@ def _timed(client: httpx.Client, path: str) -> float:
 
 def no_more_memory(service: Besieged) -> None:
     """The attack added less than `MEMORY_MB`."""
-    assert service.added() <= MEMORY_MB, f"{service.added():.0f} MB more than idle"
+    added = service.added()
+    print(f"memory: {added:.0f} MB more than {service.idle:.0f}")
+    assert added <= MEMORY_MB
