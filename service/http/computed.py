@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from starlette.concurrency import run_in_threadpool
-
 from service.auth.callers import Caller
 from service.errors import InvalidRequestError
 from service.jobs.answering import KIND, PREVIEW, RESOLVE, Prepared
@@ -40,7 +38,7 @@ async def computed(
         told = await service.answers.ask(task, spec, caller.owner, about)
         if "needs" not in told:
             return told["found"]
-        await run_in_threadpool(_look_up, told["needs"], source, spec)
+        await service.lanes.reads.run(caller.owner, _look_up, told["needs"], source, spec)
     raise RuntimeError(f"the task {task!r} looks up more than {_MOST_LOOKED_UP} scenes")
 
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import re
-from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping, Sequence
 from contextlib import asynccontextmanager
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from fastapi import Body, Depends, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
-from starlette.concurrency import run_in_threadpool
+from pydantic import BaseModel
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -43,17 +43,25 @@ _PREFER_WAIT = re.compile(r"(?:^|[,;\s])wait\s*=\s*\"?(\d{1,6})\"?(?:$|[,;\s])",
 _KEY = re.compile(r"[\x21-\x7e]{1,200}")
 _LOOK_AGAIN_SECONDS = 2.0
 
+AnswerT = TypeVar("AnswerT")
 
-def service_of(request: Request) -> Service:
+
+def service_behind(request: Request) -> Service:
     """The service behind the app."""
     service: Service = request.app.state.service
     return service
 
 
+# Dependencies are asynchronous: others would be run in a thread each, which costs more than they do.
+async def service_of(request: Request) -> Service:
+    """The service behind the app."""
+    return service_behind(request)
+
+
 ServiceDependency = Annotated[Service, Depends(service_of)]
 
 
-def caller_of(request: Request) -> Caller:
+async def caller_of(request: Request) -> Caller:
     """Who asks: the gate has put them there."""
     caller: Caller = getattr(request.state, "caller", KEYLESS)
     return caller
@@ -73,10 +81,10 @@ async def json_body(request: Request) -> AsyncIterator[dict[str, Any]]:
     kind = request.headers.get("content-type", "").split(";")[0].strip().lower()
     if kind != "application/json" and not kind.endswith("+json"):
         raise UnsupportedMediaError(f"`Content-Type` must be application/json, got {kind or 'none'}")
-    settings = service_of(request).settings
+    settings = service_behind(request).settings
     data = await whole(request, settings.max_body_bytes, settings.body_seconds)
     turns: Turns = request.app.state.turns
-    async with turns.of(caller_of(request).owner, len(data)):
+    async with turns.of((await caller_of(request)).owner, len(data)):
         value = await turns.parsed(data)
         del data
         if not isinstance(value, dict):
@@ -193,6 +201,22 @@ def tagged(
     return Response(body, media_type=media_type, headers=kept)
 
 
+def as_json(answer: BaseModel, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
+    """An answer as JSON, written here, in the thread that made it: FastAPI would do it on the event loop."""
+    return Response(answer.__pydantic_serializer__.to_json(answer), status, headers, "application/json")
+
+
+def with_raw(answer: BaseModel, **raw: bytes) -> bytes:
+    """An answer as JSON with further keys whose JSON there is already."""
+    more = b"".join(b',"%s":%s' % (name.encode(), value) for name, value in raw.items())
+    return bytes(answer.__pydantic_serializer__.to_json(answer))[:-1] + more + b"}"
+
+
+def raw_list(answers: Sequence[BaseModel]) -> bytes:
+    """Answers as a JSON list."""
+    return b"[" + b",".join(one.__pydantic_serializer__.to_json(one) for one in answers) + b"]"
+
+
 def listing(request: Request, page: SweepPage | DesignPage | JobPage | UploadPage) -> Response:
     """A page of a list as JSON or CSV, with a link to the next one in its header too (RFC 8288)."""
     kind = chosen(request.headers.get("accept"), LIST_MEDIA)
@@ -204,8 +228,22 @@ def listing(request: Request, page: SweepPage | DesignPage | JobPage | UploadPag
     return Response(csv_of_items(page.model_dump(mode="json")["items"]), media_type=kind, headers=headers)
 
 
-async def wait_for_end(service: Service, job_id: str, seconds: float, caller: Caller = KEYLESS) -> JobRow:
-    """The job when it has ended, the time is over or the service stops; holds no thread meanwhile."""
+async def wait_for_end(
+    service: Service,
+    job_id: str,
+    seconds: float,
+    caller: Caller,
+    answer: Callable[[JobRow], AnswerT],
+    known: JobRow | None = None,
+) -> AnswerT:
+    """Wait until a job has ended, the time is over or the service stops; holds no thread meanwhile.
+
+    Parameters
+    ----------
+    service, job_id, seconds, caller : where to look, for which job, how long [s], as whom.
+    answer : makes of the row what is wanted, in the same transaction.
+    known : the row as it was a moment ago: it is not looked at before something happens.
+    """
     loop = asyncio.get_running_loop()
     changed = asyncio.Event()
 
@@ -213,13 +251,22 @@ async def wait_for_end(service: Service, job_id: str, seconds: float, caller: Ca
         if event.ended:
             loop.call_soon_threadsafe(changed.set)
 
+    def look() -> tuple[bool, AnswerT]:
+        with service.database.reading():
+            row = service.job(job_id, caller)
+            return row.state.finished, answer(row)
+
     end = loop.time() + seconds
     with service.waiters.listening(job_id, listen):
+        waits = known is not None and not known.state.finished and not service.waiters.ended_lately(job_id)
         while True:
-            row = await run_in_threadpool(service.job, job_id, caller)
             left = end - loop.time()
-            if row.state.finished or service.stopping.is_set() or left <= 0.0:
-                return row
+            over = service.stopping.is_set() or left <= 0.0
+            if over or not waits:
+                finished, found = await service.lanes.reads.run(caller.owner, look)
+                if finished or over or service.stopping.is_set():
+                    return found
+            waits = False
             try:
                 await asyncio.wait_for(changed.wait(), min(left, _LOOK_AGAIN_SECONDS))
             except TimeoutError:

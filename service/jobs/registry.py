@@ -33,7 +33,7 @@ class JobRequest(BaseModel):
     fresh : bool
         Compute again even if the same thing was computed before.
     priority : int
-        Jobs of a higher priority run first; equal ones in the order they came.
+        Of one owner's jobs those of a higher priority run first; equal ones in the order they came.
     max_seconds : float or None
         Longest time an attempt at it may take [s]; that of the service if left out.
     """
@@ -43,7 +43,9 @@ class JobRequest(BaseModel):
     fresh: bool = Field(
         default=False, strict=True, description="Compute again even if a stored result exists."
     )
-    priority: int = Field(default=0, strict=True, ge=-100, le=100, description="Higher ones run first.")
+    priority: int = Field(
+        default=0, strict=True, ge=-100, le=100, description="Of one's own jobs, higher ones run first."
+    )
     max_seconds: float | None = Field(
         default=None,
         strict=True,
@@ -183,7 +185,7 @@ class Registry:
         """
         if isinstance(name, str) and name in self._kinds:
             return self._kinds[name]
-        message = f"`kind` must be one of {', '.join(self._kinds)}, got {name!r}"
+        message = f"`kind` must be one of {', '.join(self._kinds)}, got {name!r:.80}"
         raise InvalidRequestError([Issue(pointer=pointer("kind"), message=message)])
 
     def extended(self, *kinds: JobKind) -> Registry:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import math
 import threading
@@ -13,6 +14,8 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from service.auth.callers import KEYLESS, Caller, visible
+from service.auth.shares import highest_priority, share
+from service.auth.storage import Storage
 from service.db import revisions
 from service.db.clock import Clock
 from service.db.engine import Database
@@ -30,6 +33,7 @@ from service.db.repositories import (
     UploadRepository,
 )
 from service.db.repositories.keys import KeyRepository
+from service.db.repositories.storage import StorageRepository
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.jobs import answering
 from service.jobs.answering import Prepared, prepared
@@ -38,6 +42,7 @@ from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.outputs import OnProgress
 from service.jobs.registry import JobKind, JobRequest, Registry
 from service.jobs.validation import validated
+from service.queue.lanes import Lanes
 from service.queue.queue import JobQueue
 from service.queue.retention import Retention
 from service.queue.scene_store import SceneStore
@@ -58,11 +63,17 @@ _LOOK_AGAIN_SECONDS = 2.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Results:
-    """What a finished job left."""
+    """What a finished job left; `text` is the JSON of its result."""
 
     job: JobRow
-    result: dict[str, Any]
+    text: str
     sweeps: list[SweepRow]
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """The result."""
+        found: dict[str, Any] = json.loads(self.text)
+        return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,14 +112,16 @@ class Service:
     ) -> None:
         self.settings = settings
         self.registry = registry_of(settings.kinds) if registry is None else registry
-        self.database = Database(settings.database, settings.database_connections)
+        self.database = Database(settings.database, settings.database_connections, settings.database_seconds)
         self.jobs = JobRepository(self.database, now)
         self.sweeps = SweepRepository(self.database)
         self.designs = DesignRepository(self.database)
         self.keys = KeyRepository(self.database)
-        self.uploads = Uploads(UploadRepository(self.database), settings)
+        self.storage = Storage(StorageRepository(self.database), settings)
+        self.uploads = Uploads(UploadRepository(self.database), settings, self.storage)
         self.scenes = SceneStore(SceneRepository(self.database), self.uploads)
         self.waiters = Waiters()
+        self.lanes = Lanes(settings.database_seconds)
         self.previews = Previews(settings.preview_seconds, memory_bytes=settings.answer_memory_bytes)
         self.answers = Answers(
             answering.runs(self.registry, self.previews.registry), answering.warm_up, _answer_limits(settings)
@@ -215,6 +228,8 @@ class Service:
         found : what the request was resolved to, beside this process if it is a stranger's.
         """
         seconds = self._seconds_limit(request, caller)
+        self._require_priority(request, caller)
+        self.storage.require(caller)
         if found is None:
             found = prepared(
                 kind.name, kind.resolve, request, body, self.scenes.of(caller),
@@ -236,12 +251,19 @@ class Service:
             owner=caller.owner,
             seconds_limit=seconds,
         )
-        row, inserted = self.jobs.submit(new, self.settings.queue_limit, caller.limits.waiting)
+        waiting = None if caller.key_id is None else share(caller, self.settings, "waiting")
+        row, inserted = self.jobs.submit(new, self.settings.queue_limit, waiting)
         if row.state is JobState.ACCEPTED:
             self.queue.wake()
             if self._notices is not None:
                 self._notices.tell_accepted()
         return row, inserted
+
+    def _require_priority(self, request: JobRequest, caller: Caller) -> None:
+        most = highest_priority(caller, self.settings)
+        if request.priority > most:
+            message = f"`priority` must be at most {most} with this key, got {request.priority}"
+            raise InvalidRequestError([Issue(pointer="/priority", message=message)])
 
     def _seconds_limit(self, request: JobRequest, caller: Caller) -> float | None:
         """The longest time an attempt may take, if the request or the key says so [s]."""
@@ -322,9 +344,9 @@ class Service:
         """
         row = self.job(job_id, caller)
         source = row.result_of or row.id
-        result = self.jobs.result(source)
-        if result is not None:
-            return Results(job=row, result=result, sweeps=self.sweeps.of_job(source))
+        text = self.jobs.result_text(source)
+        if text is not None:
+            return Results(job=row, text=text, sweeps=self.sweeps.of_job(source))
         if row.state is JobState.FAILED:
             error = row.error or {}
             raise JobFailedError(f"job {job_id} failed: {error.get('detail', 'for no known reason')}", error)

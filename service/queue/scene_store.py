@@ -13,7 +13,7 @@ from service.db.repositories import SceneRepository
 from service.db.repositories.rows import WholeSceneRow
 from service.errors import ConflictError, NotFoundError
 from service.jobs.common.scenes import read_scene
-from service.jobs.strict_json import digest
+from service.jobs.strict_json import digest, encoded
 from service.uploads.uploads import Uploads
 from solver.scene.scene import load_scene, shipped_scenes
 
@@ -131,6 +131,7 @@ class SceneStore:
         if name in shipped_scenes():
             known, added = _shipped(name), False
         else:
+            self.uploads.storage.require(self.caller, len(encoded(tables)))
             row, added = self.repository.add(self.caller.owner, name, scene_hash, tables)
             known = _stored(row)
         if known.scene_hash != scene_hash:

@@ -218,11 +218,16 @@ class JobScene(Answer):
     scene: dict[str, Any]
 
 
-class ResultsAnswer(Answer):
-    """What a job computed."""
+class ResultsHead(Answer):
+    """What a job computed, without it."""
 
     job: str
     status: JobState
+
+
+class ResultsAnswer(ResultsHead):
+    """What a job computed."""
+
     result: dict[str, Any]
     sweeps: list[SweepAnswer]
 

@@ -11,6 +11,7 @@ from service.db.clock import utc_now
 from service.db.engine import Database
 from service.db.models import Scene
 from service.db.repositories.rows import SceneRow, WholeSceneRow
+from service.jobs.strict_json import encoded
 
 __all__ = ["SceneRepository", "SceneRow", "WholeSceneRow"]
 
@@ -26,6 +27,7 @@ class SceneRepository:
 
     def add(self, owner: str, name: str, scene_hash: str, body: dict[str, Any]) -> tuple[WholeSceneRow, bool]:
         """Store a scene, or find the one of this owner and name; whether it was stored."""
+        text = encoded(body)
 
         def find_or_add(connection: Connection) -> tuple[WholeSceneRow, bool]:
             query = select(*_WHOLE).where(Scene.owner == owner, Scene.name == name)
@@ -33,7 +35,8 @@ class SceneRepository:
             if known is not None:
                 return WholeSceneRow(**known), False
             row = WholeSceneRow(owner=owner, name=name, scene_hash=scene_hash, created=utc_now(), body=body)
-            connection.execute(insert(Scene).values(**asdict(row)))
+            values = {**asdict(row), "body": text, "size": len(text)}
+            connection.execute(insert(Scene).values(values))
             return row, True
 
         return self._db.grouped(find_or_add)

@@ -6,6 +6,7 @@ import json
 
 from fastapi import APIRouter, Request, Response
 
+from service.auth.shares import share
 from service.http.computed import prepared
 from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute, takes_body
 from service.jobs.answering import PREVIEW
@@ -29,7 +30,9 @@ async def preview(
     kind = service.previews.registry[(await request.json())[KIND]]
     found = await prepared(service, caller, kind, await request.json(), PREVIEW)
     asking = f"{caller.owner} {body.client}" if body.client else ""
-    answer = await service.previews.compute(kind.name, json.loads(found.spec), asking)
+    most = share(caller, service.settings, "previews")
+    spec = json.loads(found.spec)
+    answer = await service.previews.compute(kind.name, spec, asking, caller.owner, most)
     return Response(answer, media_type="application/json", headers={"Cache-Control": "no-store"})
 
 

@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field
-from starlette.concurrency import run_in_threadpool
 
 from service.auth.callers import Caller
 from service.http.computed import computed
 from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
+from service.http.in_lane import reading
 from service.jobs.answering import STORE
 from service.queue import cursors
 from service.queue.core import Service
@@ -31,6 +31,7 @@ class SceneQuery(BaseModel):
 
 
 @router.get("")
+@reading
 def list_scenes(
     service: ServiceDependency, caller: CallerDependency, query: Annotated[SceneQuery, Query()]
 ) -> SceneList:
@@ -43,6 +44,7 @@ def list_scenes(
 
 
 @router.get("/{name}")
+@reading
 def get_scene(name: str, service: ServiceDependency, caller: CallerDependency) -> SceneDetail:
     """A scene with its tables: a shipped one, or one of one's own."""
     return SceneDetail.of_whole(service.scenes.of(caller).get(name))
@@ -58,7 +60,7 @@ async def store_scene(
 ) -> SceneDetail:
     """Store a scene under its `name`; a name keeps its meaning for ever."""
     found = await computed(service, caller, STORE, body, about="")
-    scene, added = await run_in_threadpool(_keep, service, caller, found)
+    scene, added = await service.lanes.writes.run(caller.owner, _keep, service, caller, found)
     response.status_code = 201 if added else 200
     response.headers["Location"] = f"/v1/scenes/{scene.name}"
     return SceneDetail.of_whole(scene)
