@@ -2,11 +2,32 @@
 
 from __future__ import annotations
 
+from solver.errors import Place
+
 
 class DesignError(Exception):
-    """A design problem that cannot be posed; the message names the argument and what would be right."""
+    """A design problem that cannot be posed; the message names the argument and what would be right.
 
-    def __init__(self, name: str, value: object, wanted: str) -> None:
-        self.name = name
+    Parameters
+    ----------
+    name : the argument, or the keys and indices that lead to a part of it: ``("cases", 0, "band")`` is called
+        ``cases[0].band``.
+    value : what was given.
+    wanted : what would be right.
+    place : where that stands, if not where the name says.
+    """
+
+    def __init__(
+        self, name: str | Place, value: object, wanted: str, *, place: Place | None = None
+    ) -> None:  # fmt: skip
+        steps = (name,) if isinstance(name, str) else name
+        self.name = written(steps)
         self.value = value
-        super().__init__(f"`{name}` {wanted}, got {value!r}")
+        self.place: Place = steps if place is None else place
+        super().__init__(f"`{self.name}` {wanted}, got {value!r}")
+
+
+def written(place: Place) -> str:
+    """Return a place as text, ``cases[0].band``."""
+    steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in place)
+    return "".join(steps).removeprefix(".")

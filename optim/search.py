@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,64 +16,32 @@ from optim.methods.eased import Eased
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.global_look import WholeRange
 from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
-from optim.methods.peak_tracking import Tracked, tracked_optimum
+from optim.problem.keys import ROBUST, DesignKeys
+from optim.problem.keywords import keywords
 from optim.problem.problem import Method, Problem, pose
 from optim.problem.watch import OnProgress, ShouldStop
-from optim.results.basins import Basin
+from optim.results.basins import SAME_PLACE, Basin
 from optim.results.design import DesignResult, DesignStatus
 from solver.scene.scene import Scene
 
+if TYPE_CHECKING:
+    from optim.methods.peak_tracking import Tracked
+
 SAME_HEIGHT = 1e-9  # relative, of two levels that are one
-SAME_PLACE = 1e-3  # scaled distance within which two optima are one
 
 
+@keywords(DesignKeys, without=ROBUST)
 def design(
-    scene: Scene,
-    *,
-    variables: Mapping[str, tuple[float, float]] | None = None,
-    scaling: Mapping[str, str] | None = None,
-    cases: Sequence[Mapping[str, object]] | None = None,
-    limit: float | None = None,
-    weights: Mapping[str, float] | None = None,
-    max_peak: float | None = None,
-    max_band_hz: float | None = None,
-    forbidden_hz: Sequence[Sequence[float]] | None = None,
-    speeds_rpm: Sequence[Sequence[float]] | None = None,
-    max_friction_work: Mapping[str, float] | float | None = None,
-    contact_states: Mapping[str, str] | None = None,
-    harmonics: int = 11,
-    start: Mapping[str, float] | None = None,
-    method: str | Method = Method.AUTO,
-    basins: int = 2,
-    on_progress: OnProgress = None,
-    should_stop: ShouldStop = None,
-    **limits: Any,
+    scene: Scene, *, on_progress: OnProgress = None, should_stop: ShouldStop = None, **problem: Any
 ) -> DesignResult:
     """Choose parameters within bounds so that the highest peak over the scene's band is least.
 
     Parameters
     ----------
     scene : the scene; `observe` says which DOF and which band.
-    variables : parameter path to (low, high), paths that share a value separated by commas; the N0 of the
-        contact with a tied N1 if left out.
-    scaling : variable to ``linear`` or ``logarithmic``; by the bounds if left out.
-    cases : the responses that count, see `optim.problem.cases.read_cases`; the scene as it is if left out.
-    limit : amplitude [m] above which the resonance band is measured; half power of the peak if left out.
-    weights : of ``peak`` [1/m], ``band`` [1/Hz] and further criteria in what is minimised; the peak alone if
-        left out.
-    max_peak : largest amplitude allowed [m].
-    max_band_hz : largest width of the resonance band allowed [Hz].
-    forbidden_hz : ranges [Hz] in which the amplitude must stay below `limit`.
-    speeds_rpm : ranges of running speeds [1/min]: forbidden ranges by the order of each case.
-    max_friction_work : largest friction work in a cycle [J], of every contact or by contact.
-    contact_states : contact to ``never-separates``.
-    harmonics : highest harmonic kept.
-    start : a design to start from, variable to value; it is tried along with those of the coarse stage.
-    method : ``auto``, ``tracked``, ``minimax`` or ``ipopt``; ``auto`` tracks the peak where that is enough.
-    basins : how many local optima are looked for.
     on_progress : called with (share done, evaluations so far).
     should_stop : asked between responses and within them.
-    limits : keys of further criteria (`optim.criteria.registry`).
+    **problem : the keys of a problem.
 
     Returns
     -------
@@ -83,14 +51,10 @@ def design(
     ------
     SettingError, SceneError, DesignError
         Bad paths, bounds, cases, limits or start.
+    TypeError
+        An argument that is no key.
     """
-    problem = pose(
-        scene, variables=variables, scaling=scaling, cases=cases, limit=limit, weights=weights,
-        max_peak=max_peak, max_band_hz=max_band_hz, forbidden_hz=forbidden_hz, speeds_rpm=speeds_rpm,
-        max_friction_work=max_friction_work, contact_states=contact_states, harmonics=harmonics, start=start,
-        method=method, basins=basins, **limits,
-    )  # fmt: skip
-    return solve_problem(problem, on_progress=on_progress, should_stop=should_stop)
+    return solve_problem(pose(scene, **problem), on_progress=on_progress, should_stop=should_stop)
 
 
 def solve_problem(
@@ -106,6 +70,8 @@ def _solved(problem: Problem, on_progress: OnProgress, should_stop: ShouldStop) 
     begun = time.perf_counter()
     trackable = problem.method in (Method.AUTO, Method.TRACKED) and problem.why_not_tracked is None
     if trackable:
+        from optim.methods.peak_tracking import tracked_optimum
+
         tracked = tracked_optimum(problem, on_progress=on_progress, should_stop=should_stop)
         if problem.method is Method.TRACKED or tracked.status is not DesignStatus.NOT_TRACKED:
             return _of_tracked(problem, tracked, time.perf_counter() - begun)

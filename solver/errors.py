@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+
+Place = tuple[str | int, ...]
+"""Keys and indices that lead to a field of nested tables and lists."""
 
 
 class SolverError(Exception):
-    """Root of every error the solver raises on purpose."""
+    """Root of every error the solver raises on purpose.
+
+    Attributes
+    ----------
+    place : tuple of str and int
+        Where the cause stands in a description; empty where none was read. See `at`.
+    """
+
+    place: Place = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +56,21 @@ class SettingError(SolverError):
         self.name = name
         self.value = value
         super().__init__(f"`{name}` {wanted}, got {value!r}{hint}")
+
+
+@contextmanager
+def at(*place: str | int) -> Iterator[None]:
+    """Say of what the solver refuses meanwhile where in a description its cause stands."""
+    try:
+        yield
+    except SolverError as error:
+        error.place = error.place or place
+        raise
+
+
+def pointer(*steps: object) -> str:
+    """Return the JSON pointer (RFC 6901) of keys and indices."""
+    return "".join("/" + str(step).replace("~", "~0").replace("/", "~1") for step in steps)
 
 
 class MissingExtraError(SolverError):

@@ -1,4 +1,4 @@
-"""Formats, criteria and the like from outside the package, named by the environment.
+"""Laws, formats, criteria and the like from outside the package, named by the environment.
 
 ``STICKSLIP_EXTENSIONS='["module:NAME", …]'`` names objects that every process imports, the command, the
 service and its workers alike; each registry takes those of its own kind.
@@ -34,6 +34,13 @@ def extensions(kind: type[T]) -> tuple[T, ...]:
         The variable is no list of ``module:NAME``, or there is no such module or name.
     """
     return tuple(one for one in _named(os.environ.get(VARIABLE, "")) if isinstance(one, kind))
+
+
+def extension_classes(kind: type[T]) -> tuple[type[T], ...]:
+    """The classes made from a class that the environment names, in order; errors as of `extensions`."""
+    return tuple(
+        one for one in _named(os.environ.get(VARIABLE, "")) if isinstance(one, type) and issubclass(one, kind)
+    )
 
 
 @cache

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from optim.criteria.criterion import Criterion
-from optim.criteria.judged import Judged
+from optim.criteria.criterion import Criterion, Judged, Row
 from optim.criteria.response_gradients import Sensitivity
-from optim.criteria.rows import Row
 from optim.problem.variables import Real
 from solver.continuation.branch import Peak
 

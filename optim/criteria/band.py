@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from optim.criteria.criterion import Criterion, Form, Key
+from optim.criteria.criterion import Criterion, Form, Judged, Key, Row
 from optim.criteria.json_types import FrequencyHz
 
 if TYPE_CHECKING:
-    from optim.criteria.judged import Judged
-    from optim.criteria.rows import Row
     from optim.problem.variables import Real
 
 

@@ -14,8 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from optim.criteria.criterion import Row
 from optim.criteria.linearised import Model
-from optim.criteria.rows import Row
 from optim.problem.variables import Real
 
 ROUNDING = 1e-9  # relative, of a row between two evaluations

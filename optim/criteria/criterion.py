@@ -1,85 +1,31 @@
 """What a criterion of a design says of itself: words, units, values with gradients, and limits.
 
 The methods, problem files, REST bodies, options of the command, results, reports and the docs follow from
-it. A module of a criterion imports what computes inside its functions: a service that only lists loads none
-of it.
+it. What it judges (`Judged`) and what it gives (`Row`) stand here too: each speaks of the others. A module of
+a criterion imports what computes inside its functions: a service that only lists loads none of it.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from enum import Enum
+import math
+from collections.abc import Callable, Container, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from optim.criteria.key import WORD
+from optim.criteria.key import Form as Form  # with `Criterion` and `Key` all that a criterion is made of
+from optim.criteria.key import Key as Key
+
 if TYPE_CHECKING:
-    from optim.criteria.judged import Judged
-    from optim.criteria.rows import Row
+    from optim.criteria.response_gradients import Sensitivity
     from optim.problem.cases import Case
-    from solver.scene.scene import Scene
+    from optim.problem.variables import Real, Variable
+    from solver.continuation.branch import Branch
+    from solver.response.wear import WearSensitivity
+    from solver.scene.scene import AnyContact, Scene
 
 Ranges = tuple[tuple[float, float], ...]
-_KEY = re.compile(r"[a-z][a-z0-9_]*")
-_FLAG = re.compile(r"--[a-z][a-z0-9-]*")
-
-
-class Form(Enum):
-    """How the option of a key is written."""
-
-    NUMBER = "one number"
-    RANGES = "LO HI, repeatable"
-    NUMBER_OR_TABLE = "one number, or NAME=NUMBER, repeatable"
-    NAMES = "NAME, repeatable"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Key:
-    """A key of problem files, REST bodies and `optim.design`, with its option of the command.
-
-    Attributes
-    ----------
-    name : str
-        The key.
-    help : str
-        What it means, with its unit; a sentence.
-    annotation : type
-        Its values in a body: a type that pydantic understands, without None.
-    form : Form
-        How the option is written.
-    flag : str
-        The option.
-    metavar : str
-        What stands behind the option in its help.
-    option_help : str
-        Help of the option; `help` if empty.
-    word : str
-        What each name of an option of `Form.NAMES` stands for in the table of the key.
-    example : str
-        Of the option's text.
-    examples : tuple
-        Values of the key.
-    needs_limit : bool
-        Whether it is refused without the key ``limit``.
-    """
-
-    name: str
-    help: str
-    annotation: Any
-    form: Form
-    flag: str
-    metavar: str
-    option_help: str = ""
-    word: str = ""
-    example: str = ""
-    examples: tuple[Any, ...] = ()
-    needs_limit: bool = False
-
-    def __post_init__(self) -> None:
-        if not _KEY.fullmatch(self.name):
-            raise ValueError(f"`name` of a key must be such as max_peak, got {self.name!r}")
-        if not _FLAG.fullmatch(self.flag):
-            raise ValueError(f"`flag` of {self.name} must be such as --max-peak, got {self.flag!r}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,7 +62,7 @@ def positive_limit(asked: Asked) -> object:
     DesignError
         It is none.
     """
-    from optim.problem.cases import positive
+    from optim.problem.numbers import positive
 
     ((name, value),) = asked.values.items()
     return positive(name, value)
@@ -183,7 +129,7 @@ class Criterion:
             raise ValueError(f"the criterion {self.name!r} must have `keys` of a limit or a `weight`")
         if self.weight and not self.smaller_is_better:
             raise ValueError(f"the criterion {self.name!r} is minimised by its `weight`: smaller is better")
-        if self.weight and not _KEY.fullmatch(self.weight):
+        if self.weight and not WORD.fullmatch(self.weight):
             raise ValueError(f"`weight` of {self.name!r} must be a word such as peak, got {self.weight!r}")
 
     def __repr__(self) -> str:
@@ -194,3 +140,193 @@ class Criterion:
         bound = row.bound if row.bound is None or self.smaller_is_better else 0.0 - row.bound
         where = f" ({row.what})" if self.with_place else ""
         return f"{self.limit_name or f'{self.name} limit'} of {bound:g} {self.unit}{where}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What a design must keep.
+
+    Attributes
+    ----------
+    read : mapping of Criterion to object
+        What the keys of each criterion that is limited came to.
+    """
+
+    read: Mapping[Criterion, Any] = field(default_factory=dict)
+
+    def of(self, criterion: Criterion) -> Any:
+        """Return what the keys of a criterion came to; None if none was given."""
+        return self.read.get(criterion)
+
+    def including(self, criterion: Criterion, read: object) -> Limits:
+        """Return the limits with another one of a criterion."""
+        return Limits(read={**self.read, criterion: read})
+
+    @property
+    def any(self) -> bool:
+        """Whether there is a limit at all."""
+        return bool(self.read)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Goals:
+    """What a design is to reach, and by what.
+
+    Attributes
+    ----------
+    variables : tuple of Variable
+        What may be chosen.
+    limit : float or None
+        Amplitude [m] above which the resonance band is measured; half power of the highest peak if None.
+    weights : mapping of Criterion to float
+        What is minimised: of each the largest value times its weight, summed.
+    limits : Limits
+        What must be kept.
+    """
+
+    variables: tuple[Variable, ...]
+    limit: float | None
+    weights: Mapping[Criterion, float]
+    limits: Limits
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Every parameter path of every variable."""
+        return tuple(path for variable in self.variables for path in variable.paths)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One smooth number of a design.
+
+    Attributes
+    ----------
+    quantity : Criterion
+        What it measures.
+    case : str
+        Name of the load case.
+    what : str
+        In words, for example ``peak at 753.28 Hz``.
+    value : float
+        In the unit of its criterion; the negative where larger is better.
+    gradient : (n_variables,) array
+        By each variable, per unit of it; NaN where it does not exist.
+    at_hz : float
+        Its frequency; NaN for what has none.
+    weight : float
+        Multiplies it in what is minimised; 0 if it is only limited.
+    bound : float or None
+        The most it may be.
+    second : callable or None
+        Computes the exact second derivatives by the variables, (n_variables, n_variables), NaN where they do
+        not exist; None where the solver has none.
+    """
+
+    quantity: Criterion
+    case: str
+    what: str
+    value: float
+    gradient: Real
+    at_hz: float
+    weight: float
+    bound: float | None
+    second: Callable[[], Real] | None = field(default=None, compare=False, repr=False)
+
+    def excess(self, scale: float) -> float:
+        """Return how far it is above its bound, relative to the bound (to `scale` if that is 0)."""
+        if self.bound is None:
+            return -math.inf
+        return (self.value - self.bound) / self.unit_of(scale)
+
+    def unit_of(self, scale: float) -> float:
+        """Return what an excess is relative to."""
+        return abs(self.bound) if self.bound else scale
+
+
+def of_sector(contact: AnyContact) -> str:
+    """Return the name a contact has in one sector: that of ``shroud@3`` is ``shroud``."""
+    return contact.name.partition("@")[0]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """The response of a case of a problem.
+
+    Attributes
+    ----------
+    problem, case : what is judged.
+    branch : the response, which covers its range and has a peak.
+    gradients : compute them (otherwise they are NaN).
+    hertz : (low, high) [Hz] of a response beyond the band; None for that over the band.
+    """
+
+    problem: Goals
+    case: Case
+    branch: Branch
+    gradients: bool
+    hertz: tuple[float, float] | None = None
+
+    @cached_property
+    def sensitivity(self) -> Sensitivity | None:
+        """Derivatives of amplitudes by the parameter paths; None without gradients."""
+        from optim.criteria.response_gradients import Sensitivity
+
+        return Sensitivity(self.branch.balance, self.problem.paths) if self.gradients else None
+
+    @cached_property
+    def wear(self) -> WearSensitivity | None:
+        """Derivatives of what contacts go through by the parameter paths; None without gradients."""
+        from solver.response.wear import WearSensitivity
+
+        return WearSensitivity(self.branch.balance, self.problem.paths) if self.gradients else None
+
+    def contacts(self, names: Container[str]) -> list[AnyContact]:
+        """Return the contacts of these names, those of every sector of a disk that is written out."""
+        return [one for one in self.branch.balance.scene.contacts if of_sector(one) in names]
+
+    def limit(self, criterion: Criterion) -> Any:
+        """Return what the keys of a criterion came to; None if none was given."""
+        return self.problem.limits.of(criterion)
+
+    def weight(self, criterion: Criterion) -> float:
+        """Return the weight of a criterion in what is minimised."""
+        return self.problem.weights.get(criterion, 0.0)
+
+    def row(
+        self, criterion: Criterion, what: str, value: float, by_paths: Real | None, *,
+        at_hz: float = math.nan, bound: float | None = None, weight: float | None = None,
+        second: Callable[[], Real] | None = None,
+    ) -> Row:  # fmt: skip
+        """Return a row of a criterion.
+
+        Parameters
+        ----------
+        what : in words, for example ``peak at 753.28 Hz``.
+        value : of the quantity itself, in the unit of the criterion.
+        by_paths : its derivatives by the parameter paths, (n_paths,); None without gradients.
+        at_hz : its frequency, if it has one.
+        bound : the most it may be, or the least where larger is better.
+        weight : in what is minimised; that of the criterion if left out.
+        second : computes its second derivatives by the parameter paths, (n_paths, n_paths).
+        """
+        import numpy as np
+
+        from optim.problem.variables import by_variables, by_variables_twice
+
+        variables = self.problem.variables
+        gradient = np.full(len(variables), np.nan)
+        if by_paths is not None:
+            gradient = by_variables(variables, by_paths)
+        twice = None if second is None else lambda: by_variables_twice(variables, second())
+        weight = self.weight(criterion) if weight is None else weight
+        if criterion.smaller_is_better:
+            return Row(
+                quantity=criterion, case=self.case.name, what=what, value=value, gradient=gradient,
+                at_hz=at_hz, weight=weight, bound=bound, second=twice,
+            )  # fmt: skip
+        # Kept from above like all rows; 0.0 − 0.0 is 0.0, −0.0 would show its sign.
+        return Row(
+            quantity=criterion, case=self.case.name, what=f"-{what}", value=0.0 - value,
+            gradient=-gradient, at_hz=at_hz, weight=0.0, bound=None if bound is None else 0.0 - bound,
+            second=None if twice is None else lambda: -twice(),
+        )  # fmt: skip

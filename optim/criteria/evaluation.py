@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from optim.criteria.criterion import Criterion
-from optim.criteria.judged import Judged
+from optim.criteria.criterion import Criterion, Judged, Row
 from optim.criteria.registry import criteria
-from optim.criteria.rows import Evaluation, Response, Row
+from optim.criteria.rows import Evaluation, Response
 from optim.problem.cases import Case
 from optim.problem.problem import Problem
 from optim.problem.variables import parameter_values

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from optim.criteria.criterion import Asked, Criterion, Form, Key, Ranges
+from optim.criteria.criterion import Asked, Criterion, Form, Judged, Key, Ranges, Row
 from optim.criteria.json_types import Ranges as RangesInBodies
 
 if TYPE_CHECKING:
-    from optim.criteria.judged import Judged
-    from optim.criteria.rows import Row
     from optim.problem.cases import Case
 
 
@@ -40,16 +38,16 @@ def _read(asked: Asked) -> Mapping[str, Ranges]:
 
 def _ranges(name: str, ranges: object) -> Ranges:
     from optim.errors import DesignError
-    from optim.problem.cases import number_pair
+    from optim.problem.numbers import number_pair
 
     if ranges is None:
         return ()
     if not isinstance(ranges, Sequence) or isinstance(ranges, str) or not ranges:
         raise DesignError(name, ranges, "must be a list of ranges, [[low, high], …]")
-    found = tuple(number_pair(f"{name}[{i}]", pair) for i, pair in enumerate(ranges))
+    found = tuple(number_pair((name, i), pair) for i, pair in enumerate(ranges))
     for i, (low, high) in enumerate(found):
         if not 0.0 < low < high:
-            raise DesignError(f"{name}[{i}]", [low, high], "must have 0 < low < high")
+            raise DesignError((name, i), [low, high], "must have 0 < low < high")
     return found
 
 

@@ -7,22 +7,17 @@ The worst over a response is a maximum over the frequency, so its gradient is th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, WithJsonSchema
 
-from optim.criteria.criterion import Asked, Criterion, Form, Key
-
-if TYPE_CHECKING:
-    from optim.criteria.judged import Judged
-    from optim.criteria.rows import Row
+from optim.criteria.criterion import Asked, Criterion, Form, Judged, Key, Row, of_sector
 
 _KEY = "max_friction_work"
 
 
 def _rows(judged: Judged) -> list[Row]:
     """A row for every local maximum that competes, of every contact that is limited."""
-    from optim.criteria.judged import of_sector
     from solver.response.wear_nonsmooth import worst_slopes
     from solver.response.worst_wear import Measure, worst_wear
 
@@ -41,18 +36,17 @@ def _rows(judged: Judged) -> list[Row]:
 def _read(asked: Asked) -> Mapping[str, float]:
     """The limit of every contact named; a single number is that of every friction contact."""
     from optim.errors import DesignError
-    from optim.problem.cases import positive
-    from solver.scene.scene import FrictionContact
+    from optim.problem.numbers import positive
 
     limits = asked.values[_KEY]
     names = [contact.name for contact in asked.scene.contacts]
     if not isinstance(limits, Mapping):
-        rubbing = [contact.name for contact in asked.scene.contacts if isinstance(contact, FrictionContact)]
+        rubbing = [contact.name for contact in asked.scene.contacts if contact.RUBBING]
         return dict.fromkeys(rubbing, positive(_KEY, limits))
     for name in limits:
         if name not in names:
-            raise DesignError(_KEY, name, f"must name contacts: {', '.join(names)}")
-    return {name: positive(f"{_KEY}.{name}", value) for name, value in limits.items()}
+            raise DesignError(_KEY, name, f"must name contacts: {', '.join(names)}", place=(_KEY, name))
+    return {name: positive((_KEY, name), value) for name, value in limits.items()}
 
 
 def _work(value: object) -> object:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from optim.criteria.criterion import Criterion
-from optim.criteria.rows import Evaluation, Row
+from optim.criteria.criterion import Criterion, Row
+from optim.criteria.rows import Evaluation
 from optim.problem.variables import Real, Variable, scaled, slopes
 
 PENALTY = 1e4  # the largest exact penalty on the largest relative excess over a bound

@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from optim.criteria.criterion import Criterion, Form, Key
+from optim.criteria.criterion import Criterion, Form, Judged, Key, Row
 from optim.criteria.json_types import PositiveNumber
-
-if TYPE_CHECKING:
-    from optim.criteria.judged import Judged
-    from optim.criteria.rows import Row
 
 
 def _rows(judged: Judged) -> list[Row]:

@@ -9,7 +9,8 @@ from __future__ import annotations
 from functools import cache
 from importlib import import_module
 
-from optim.criteria.criterion import Criterion, Key
+from optim.criteria.criterion import Criterion
+from optim.criteria.key import Key
 from solver.extensions import extensions
 
 SHIPPED = (

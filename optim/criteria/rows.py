@@ -7,62 +7,13 @@ each is smooth, only the largest of them is not. That is what the methods of thi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from optim.criteria.band import BAND
-from optim.criteria.criterion import Criterion
+from optim.criteria.criterion import Criterion, Row
 from optim.criteria.peak import PEAK
-from optim.problem.variables import Real
 from solver.continuation.branch import Branch
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
-    """One smooth number of a design.
-
-    Attributes
-    ----------
-    quantity : Criterion
-        What it measures.
-    case : str
-        Name of the load case.
-    what : str
-        In words, for example ``peak at 753.28 Hz``.
-    value : float
-        In the unit of its criterion; the negative where larger is better.
-    gradient : (n_variables,) array
-        By each variable, per unit of it; NaN where it does not exist.
-    at_hz : float
-        Its frequency; NaN for what has none.
-    weight : float
-        Multiplies it in what is minimised; 0 if it is only limited.
-    bound : float or None
-        The most it may be.
-    second : callable or None
-        Computes the exact second derivatives by the variables, (n_variables, n_variables), NaN where they do
-        not exist; None where the solver has none.
-    """
-
-    quantity: Criterion
-    case: str
-    what: str
-    value: float
-    gradient: Real
-    at_hz: float
-    weight: float
-    bound: float | None
-    second: Callable[[], Real] | None = field(default=None, compare=False, repr=False)
-
-    def excess(self, scale: float) -> float:
-        """Return how far it is above its bound, relative to the bound (to `scale` if that is 0)."""
-        if self.bound is None:
-            return -math.inf
-        return (self.value - self.bound) / self.unit_of(scale)
-
-    def unit_of(self, scale: float) -> float:
-        """Return what an excess is relative to."""
-        return abs(self.bound) if self.bound else scale
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

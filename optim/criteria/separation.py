@@ -6,19 +6,16 @@ a minimum over the frequency, whose gradient is the one at that frequency (envel
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from optim.criteria.criterion import Asked, Criterion, Form, Key
+from optim.criteria.criterion import Asked, Criterion, Form, Judged, Key, Row
 from optim.criteria.json_types import Name
 
 if TYPE_CHECKING:
-    from optim.criteria.judged import Judged
-    from optim.criteria.rows import Row
-    from solver.scene.scene import AnyContact, FrictionContact, Scene
+    from solver.scene.scene import AnyContact, Scene
 
 NEVER_SEPARATES = "never-separates"
 _KEY = "contact_states"
@@ -33,14 +30,13 @@ def _of(judged: Judged, contact: AnyContact) -> list[Row]:
 
     from solver.response.wear_nonsmooth import worst_slopes
     from solver.response.worst_wear import Measure, worst_wear
-    from solver.scene.scene import ElasticNormalContact, FrictionContact
 
     what = f"least load of {contact.name}"
-    if isinstance(contact, FrictionContact) and not isinstance(contact, ElasticNormalContact):
+    if contact.load is not None and contact.load_is_given:
         slope = None
         if judged.gradients:
             slope = np.array([_load_slope(contact, path) for path in judged.problem.paths])
-        return [judged.row(SEPARATION, what, contact.N0 - abs(contact.N1_value), slope, bound=0.0)]
+        return [judged.row(SEPARATION, what, contact.load.least, slope, bound=0.0)]
     least = Measure.LEAST_LOAD
     return [
         judged.row(
@@ -54,39 +50,33 @@ def _of(judged: Judged, contact: AnyContact) -> list[Row]:
     ]  # fmt: skip
 
 
-def _load_slope(contact: FrictionContact, path: str) -> float:
-    """Return d(N0 − |N1|)/dp of a given load."""
+def _load_slope(contact: AnyContact, path: str) -> float:
+    """Return the derivative of the least load of a given one by a parameter."""
     owner, _, key = path.rpartition(".")
-    if owner not in (contact.name, contact.group):
-        return 0.0
-    sign = math.copysign(1.0, contact.N1_value)
-    by_key = {"N0": 1.0 - sign * (contact.N1_ratio or 0.0), "N1": -sign, "N1_ratio": -sign * contact.N0}
-    return by_key.get(key, 0.0)
+    return contact.least_load_slope(key) if owner in (contact.name, contact.group) else 0.0
 
 
 def _read(asked: Asked) -> tuple[str, ...]:
     """The contacts that must never separate."""
     from optim.errors import DesignError
-    from solver.scene.scene import FrictionContact
 
     states = asked.values[_KEY]
     if not isinstance(states, Mapping):
         raise DesignError(_KEY, states, f'must be a table such as {{"damper": "{NEVER_SEPARATES}"}}')
-    names = [contact.name for contact in asked.scene.contacts if isinstance(contact, FrictionContact)]
+    names = [contact.name for contact in asked.scene.contacts if contact.load is not None]
     for name, state in states.items():
         if name not in names:
-            raise DesignError(_KEY, name, f"must name friction contacts: {', '.join(names)}")
+            wanted = f"must name friction contacts: {', '.join(names)}"
+            raise DesignError(_KEY, name, wanted, place=(_KEY, name))
         if state != NEVER_SEPARATES:
-            raise DesignError(f"{_KEY}.{name}", state, f"must be {NEVER_SEPARATES}")
+            raise DesignError((_KEY, name), state, f"must be {NEVER_SEPARATES}")
     return tuple(states)
 
 
 def _load(scene: Scene) -> float:
     """The largest normal load of the scene."""
-    from solver.scene.scene import FrictionContact
-
-    loads = [c.N0 for c in scene.contacts if isinstance(c, FrictionContact) and c.N0 > 0.0]
-    return max(loads, default=1.0)
+    loads = [contact.load.mean for contact in scene.contacts if contact.load is not None]
+    return max((load for load in loads if load > 0.0), default=1.0)
 
 
 SEPARATION = CRITERION = Criterion(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from optim.criteria.criterion import Criterion, Key
+from optim.criteria.criterion import Criterion
+from optim.criteria.key import Key
 from optim.criteria.registry import criteria
 
 

@@ -6,11 +6,15 @@ Where that of a single case keeps all limits it is the optimum with them as well
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
+from optim.criteria.criterion import Limits
 from optim.methods.evaluator import Search, StoppedError
-from optim.methods.peak_tracking import Tracked, tracked_optimum
-from optim.problem.problem import Limits, Method, Problem
+from optim.problem.problem import Method, Problem
 from optim.results.design import DesignStatus
+
+if TYPE_CHECKING:
+    from optim.methods.peak_tracking import Tracked
 
 NO_LIMITS = Limits()
 MOST_CASES = 4
@@ -38,6 +42,9 @@ class Eased:
         starts = [] if problem.start is None else [dict(problem.start)]
         if problem.method is not Method.AUTO or len(problem.cases) > MOST_CASES:
             return cls(starts=tuple(starts))
+        # Loaded here: problems that cannot be tracked do without it.
+        from optim.methods.peak_tracking import tracked_optimum
+
         for eased in _cases(problem):
             tracked = tracked_optimum(eased, should_stop=search.should_stop)
             search.scouted += tracked.sweeps

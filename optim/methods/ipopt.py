@@ -22,8 +22,9 @@ from typing import Any
 import casadi
 import numpy as np
 
+from optim.criteria.criterion import Row
 from optim.criteria.linearised import Model
-from optim.criteria.rows import Evaluation, Row, nearest
+from optim.criteria.rows import Evaluation, nearest
 from optim.methods.kkt import KKT_TOLERANCE, Evaluate, Local, ModelOf, ended
 from optim.problem.variables import SNAP, Real, Variable, snapped, unscaled
 

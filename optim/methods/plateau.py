@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from optim.criteria.criterion import Row
 from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.peak import PEAK
-from optim.criteria.rows import Evaluation, Row
+from optim.criteria.rows import Evaluation
 from optim.methods.evaluator import StoppedError
 from optim.methods.kkt import KEPT
 from optim.problem.problem import Problem

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from optim.errors import DesignError
+from optim.problem.numbers import number_pair, positive, whole
+from solver.errors import Place, SettingError, at
 from solver.scene.scene import Observe, Scene
 
 _KEYS = ("name", "set", "band", "observe", "engine_order", "order", "weight")
@@ -72,104 +73,89 @@ def read_cases(scene: Scene, cases: Sequence[Mapping[str, object]] | None) -> tu
         return (Case(name=scene.name, scene=scene, weight=1.0, order=max(scene.engine_order, 1)),)
     if not isinstance(cases, Sequence) or isinstance(cases, str) or not cases:
         raise DesignError("cases", cases, "must be a list of at least one table")
-    read = [case for i, table in enumerate(cases) for case in _read(scene, f"cases[{i}]", i, table)]
-    names = [case.name for case in read]
-    for name in names:
-        if names.count(name) > 1:
-            raise DesignError("cases", name, "must have names of their own, this one is there twice")
+    read = [case for i, table in enumerate(cases) for case in read_case(scene, i, table)]
+    check_names(read)
     return tuple(read)
 
 
-def _read(scene: Scene, where: str, index: int, table: object) -> list[Case]:
+def check_names(cases: Sequence[Case]) -> None:
+    """Raise DesignError if two cases have one name."""
+    names = [case.name for case in cases]
+    for name in names:
+        if names.count(name) > 1:
+            raise DesignError("cases", name, "must have names of their own, this one is there twice")
+
+
+def read_case(scene: Scene, index: int, table: object) -> list[Case]:
+    """Return the load cases of one table, one for each DOF it observes; raises like `read_cases`."""
+    where: Place = ("cases", index)
     if not isinstance(table, Mapping):
         raise DesignError(where, table, "must be a table")
     for key in table:
         if key not in _KEYS:
-            raise DesignError(f"{where}.{key}", table[key], f"is not known; a case has {', '.join(_KEYS)}")
+            raise DesignError((*where, key), table[key], f"is not known; a case has {', '.join(_KEYS)}")
     name = table.get("name", scene.name if index == 0 else f"case {index + 1}")
     if not isinstance(name, str) or not name:
-        raise DesignError(f"{where}.name", name, "must be a text")
+        raise DesignError((*where, "name"), name, "must be a text")
     here = _engine_order(scene, where, table.get("engine_order"))
     values = table.get("set", {})
     if not isinstance(values, Mapping):
-        raise DesignError(f"{where}.set", values, "must be a table of parameter paths and values")
-    here = here.with_values(values)
+        raise DesignError((*where, "set"), values, "must be a table of parameter paths and values")
+    here = _with_values(here, where, values)
     band = _band(where, table.get("band"))
-    order = _whole(f"{where}.order", table.get("order", max(here.engine_order, 1)), least=1)
-    weight = positive(f"{where}.weight", table.get("weight", 1.0))
+    order = whole((*where, "order"), table.get("order", max(here.engine_order, 1)), least=1)
+    weight = positive((*where, "weight"), table.get("weight", 1.0))
     observed = table.get("observe", here.observe.dof)
     dofs = [observed] if isinstance(observed, str) else observed
     if not isinstance(dofs, Sequence) or not dofs or not all(isinstance(dof, str) for dof in dofs):
-        raise DesignError(f"{where}.observe", observed, "must be the name of a DOF, or a list of them")
+        raise DesignError((*where, "observe"), observed, "must be the name of a DOF, or a list of them")
     names = [name if len(dofs) == 1 else f"{name}, {dof}" for dof in dofs]
     # A DOF of another sector may call for the whole annulus: it gets a response of its own.
     first = next((i for i, dof in enumerate(dofs) if "@" not in dof), None)
     return [
         Case(
-            name=names[i], scene=_observing(here, dof, band), weight=weight, order=order,
+            name=names[i], scene=_observing(here, where, dof, band), weight=weight, order=order,
             beside=names[first] if first is not None and i > first and "@" not in dof else None,
         )
         for i, dof in enumerate(dofs)
     ]  # fmt: skip
 
 
-def _engine_order(scene: Scene, where: str, wanted: object) -> Scene:
+def _with_values(scene: Scene, where: Place, values: Mapping[str, float]) -> Scene:
+    """Return the scene with the case's own values; what is refused is told at its path."""
+    try:
+        return scene.with_values(values)
+    except SettingError:
+        for path, value in values.items():
+            with at(*where, "set", path):
+                scene.with_values({path: value})
+        raise
+
+
+def _engine_order(scene: Scene, where: Place, wanted: object) -> Scene:
     if wanted is None:
         return scene
     if scene.structure.kind != "cyclic":
-        raise DesignError(f"{where}.engine_order", wanted, "needs a cyclic structure; `order` fits any")
-    return with_engine_order(scene, _whole(f"{where}.engine_order", wanted, least=0))
+        raise DesignError((*where, "engine_order"), wanted, "needs a cyclic structure; `order` fits any")
+    with at(*where, "engine_order"):
+        return with_engine_order(scene, whole((*where, "engine_order"), wanted, least=0))
 
 
-def _observing(scene: Scene, dof: str, band: tuple[float, float] | None) -> Scene:
+def _observing(scene: Scene, where: Place, dof: str, band: tuple[float, float] | None) -> Scene:
     """Return the scene with another observed DOF and band."""
     observe = Observe(dof=dof, band=scene.observe.band if band is None else band)
     changed = scene.model_copy(update={"observe": observe})
     # Only another DOF can fail to fit the structure; a large structure is not read again for a band.
-    return changed if dof == scene.observe.dof else Scene.from_dict(changed.to_dict())
+    if dof == scene.observe.dof:
+        return changed
+    with at(*where, "observe"):
+        return Scene.from_dict(changed.to_dict())
 
 
-def _band(where: str, band: object) -> tuple[float, float] | None:
+def _band(where: Place, band: object) -> tuple[float, float] | None:
     if band is None:
         return None
-    low, high = number_pair(f"{where}.band", band)
+    low, high = number_pair((*where, "band"), band)
     if not 0.0 < low < high:
-        raise DesignError(f"{where}.band", band, "must have 0 < low < high [Hz]")
+        raise DesignError((*where, "band"), band, "must have 0 < low < high [Hz]")
     return low, high
-
-
-def number_pair(name: str, pair: object) -> tuple[float, float]:
-    """Return two finite numbers.
-
-    Raises
-    ------
-    DesignError
-        Anything else.
-    """
-    if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
-        raise DesignError(name, pair, "must be two numbers, low and high")
-    for value in pair:
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not math.isfinite(value):
-            raise DesignError(name, pair, "must be two finite numbers, low and high")
-    return float(pair[0]), float(pair[1])
-
-
-def _whole(name: str, value: object, *, least: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise DesignError(name, value, f"must be a whole number >= {least}")
-    return value
-
-
-def positive(name: str, value: object) -> float:
-    """Return a finite number above 0.
-
-    Raises
-    ------
-    DesignError
-        Anything else.
-    """
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not number or not math.isfinite(value) or value <= 0.0:  # type: ignore[arg-type,operator]
-        raise DesignError(name, value, "must be a number > 0")
-    return float(value)  # type: ignore[arg-type]

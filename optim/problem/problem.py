@@ -2,97 +2,33 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from enum import Enum
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from optim.criteria.band import BAND
-from optim.criteria.criterion import Asked, Criterion, Ranges
-from optim.criteria.forbidden import FORBIDDEN
+from optim.criteria.criterion import Asked, Criterion, Goals, Limits
 from optim.criteria.peak import PEAK
-from optim.criteria.registry import by_weight, criteria, weight_words
+from optim.criteria.registry import by_weight, criteria, limit_keys, weight_words
 from optim.errors import DesignError
-from optim.problem.cases import Case, positive, read_cases
+from optim.problem.cases import Case, read_cases
+from optim.problem.keys import BASINS, HARMONICS, MOST_BASINS
+from optim.problem.numbers import is_number, positive
 from optim.problem.variables import Variable, check_variables
+from optim.problem.words import Method as Method
 from solver.balance.balance import check_harmonics
-from solver.scene.scene import Contact, Scene
-
-MOST_BASINS = 20
-
-
-class Method(Enum):
-    """How the optimum is searched; the value is the word users write."""
-
-    AUTO = "auto"
-    TRACKED = "tracked"
-    MINIMAX = "minimax"
-    IPOPT = "ipopt"
+from solver.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
-    """What a design must keep.
-
-    Attributes
-    ----------
-    read : mapping of Criterion to object
-        What the keys of each criterion that is limited came to.
-    """
-
-    read: Mapping[Criterion, Any] = field(default_factory=dict)
-
-    def of(self, criterion: Criterion) -> Any:
-        """Return what the keys of a criterion came to; None if none was given."""
-        return self.read.get(criterion)
-
-    def including(self, criterion: Criterion, read: object) -> Limits:
-        """Return the limits with another one of a criterion."""
-        return Limits(read={**self.read, criterion: read})
-
-    @property
-    def any(self) -> bool:
-        """Whether there is a limit at all."""
-        return bool(self.read)
-
-    @property
-    def peak(self) -> float | None:
-        """Largest amplitude over the band of any case [m]."""
-        found: float | None = self.of(PEAK)
-        return found
-
-    @property
-    def band_hz(self) -> float | None:
-        """Widest resonance band of any case [Hz]."""
-        found: float | None = self.of(BAND)
-        return found
-
-    @property
-    def forbidden_hz(self) -> Mapping[str, Ranges]:
-        """Frequencies [Hz] by case in which the amplitude must not exceed the limit that defines the band."""
-        found: Mapping[str, Ranges] = self.of(FORBIDDEN) or {}
-        return found
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Problem:
+class Problem(Goals):
     """A design problem, checked.
 
     Attributes
     ----------
     scene : Scene
         What is designed.
-    variables : tuple of Variable
-        What may be chosen.
     cases : tuple of Case
         The responses it is judged by.
-    limit : float or None
-        Amplitude [m] above which the resonance band is measured; half power of the highest peak if None.
-    weights : mapping of Criterion to float
-        What is minimised: of each the largest value times its weight, summed.
-    limits : Limits
-        What must be kept.
     harmonics : int
         Highest harmonic kept.
     start : mapping or None
@@ -104,20 +40,11 @@ class Problem:
     """
 
     scene: Scene
-    variables: tuple[Variable, ...]
     cases: tuple[Case, ...]
-    limit: float | None
-    weights: Mapping[Criterion, float]
-    limits: Limits
     harmonics: int
     start: Mapping[str, float] | None
     method: Method
     basins: int
-
-    @property
-    def paths(self) -> tuple[str, ...]:
-        """Every parameter path of every variable."""
-        return tuple(path for variable in self.variables for path in variable.paths)
 
     @property
     def plain(self) -> bool:
@@ -136,53 +63,44 @@ class Problem:
             return "tracked is for the highest peak of one case alone, without limits"
         if len(self.paths) != 1:
             return "tracked takes one variable with one parameter path"
-        others = [contact.name for contact in self.scene.contacts if not isinstance(contact, Contact)]
+        others = [contact.name for contact in self.scene.contacts if not contact.JENKINS]
         if others:
             return f"tracked knows the law coulomb alone, not that of {', '.join(others)}"
         return None
 
 
-def pose(
-    scene: Scene,
-    *,
-    variables: Mapping[str, tuple[float, float]] | None = None,
-    scaling: Mapping[str, str] | None = None,
-    cases: Sequence[Mapping[str, object]] | None = None,
-    limit: float | None = None,
-    weights: Mapping[str, float] | None = None,
-    harmonics: int = 11,
-    start: Mapping[str, float] | None = None,
-    method: str | Method = Method.AUTO,
-    basins: int = 2,
-    **limits: object,
-) -> Problem:
-    """Check a design problem and put it together; the arguments are those of `optim.design`.
+def pose(scene: Scene, **given: Any) -> Problem:
+    """Check a design problem and put it together.
 
     Parameters
     ----------
-    limits : keys of the criteria.
+    given : keys of `optim.problem.keys.DesignKeys` but those of an uncertainty; None stands for left out.
 
     Raises
     ------
     SettingError, SceneError, DesignError
         What is wrong: the argument, the value, and what would be right.
     TypeError
-        An argument that is no key of a criterion.
+        An argument that is no key of a problem.
     """
-    chosen = check_variables(scene, variables, scaling)
-    read = read_cases(scene, cases)
+    known = {*WITH_OTHERS, *READERS, *(key.name for key in limit_keys())}
+    unknown = next((name for name in given if name not in known), None)
+    if unknown is not None:
+        raise TypeError(f"there is no argument {unknown!r}; there are {', '.join(sorted(known))}")
+    keys: dict[str, Any] = {name: given.get(name) for name in known}
+    chosen = check_variables(scene, keys["variables"], keys["scaling"])
+    cases, limit = read_cases(scene, keys["cases"]), keys["limit"]
     if limit is not None:
         positive("limit", limit)
-    kept = _limits(scene, read, limit, limits)
-    if isinstance(basins, bool) or not isinstance(basins, int) or not 1 <= basins <= MOST_BASINS:
-        raise DesignError("basins", basins, f"must be a whole number from 1 to {MOST_BASINS}")
+    limits = _limits(scene, cases, limit, keys)
+    basins = _basins(keys["basins"])
     problem = Problem(
-        scene=scene, variables=chosen, cases=read, limit=limit, weights=_weights(weights), limits=kept,
-        harmonics=check_harmonics(harmonics), start=_start(chosen, start), method=_method(method),
-        basins=basins,
+        scene=scene, variables=chosen, cases=cases, limit=limit, weights=_weights(keys["weights"]),
+        limits=limits, harmonics=_harmonics(keys["harmonics"]), start=read_start(chosen, keys["start"]),
+        method=_method(keys["method"]), basins=basins,
     )  # fmt: skip
     if problem.method is Method.TRACKED and problem.why_not_tracked is not None:
-        raise DesignError("method", method, f"must be another one: {problem.why_not_tracked}")
+        raise DesignError("method", keys["method"], f"must be another one: {problem.why_not_tracked}")
     return problem
 
 
@@ -198,10 +116,9 @@ def _weights(weights: Mapping[str, float] | None) -> dict[Criterion, float]:
         if criterion is None:
             *others, last = (f"`{word}`" for word in weight_words())
             known = f"{', '.join(others)} and {last}"
-            raise DesignError(f"weights.{name}", value, f"is not known; {known} can be minimised")
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not math.isfinite(value) or value < 0.0:
-            raise DesignError(f"weights.{name}", value, "must be a number >= 0")
+            raise DesignError(("weights", name), value, f"is not known; {known} can be minimised")
+        if not is_number(value) or value < 0.0:
+            raise DesignError(("weights", name), value, "must be a number >= 0")
         found[criterion] = float(value)
     if not any(found.values()):
         raise DesignError("weights", dict(weights), "must have at least one number > 0")
@@ -212,10 +129,6 @@ def _limits(
     scene: Scene, cases: tuple[Case, ...], limit: float | None, given: Mapping[str, object]
 ) -> Limits:  # fmt: skip
     """Return what the keys of the criteria come to."""
-    known = {key.name for one in criteria() for key in one.keys}
-    unknown = next((name for name in given if name not in known), None)
-    if unknown is not None:
-        raise TypeError(f"there is no argument {unknown!r}; limits are {', '.join(sorted(known))}")
     read: dict[Criterion, Any] = {}
     for one in criteria():
         values = {key.name: given[key.name] for key in one.keys if given.get(key.name) is not None}
@@ -224,8 +137,8 @@ def _limits(
     return Limits(read=read)
 
 
-def _start(variables: tuple[Variable, ...], start: Mapping[str, float] | None) -> dict[str, float] | None:
-    """Return the start with every variable in it, or None."""
+def read_start(variables: tuple[Variable, ...], start: Mapping[str, float] | None) -> dict[str, float] | None:
+    """Return the start with every variable in it, or None; DesignError if one is out of its bounds."""
     if start is None:
         return None
     if not isinstance(start, Mapping):
@@ -233,21 +146,41 @@ def _start(variables: tuple[Variable, ...], start: Mapping[str, float] | None) -
     names = [variable.name for variable in variables]
     for name in start:
         if name not in names:
-            raise DesignError("start", name, f"must name the variables {', '.join(names)}")
+            wanted = f"must name the variables {', '.join(names)}"
+            raise DesignError("start", name, wanted, place=("start", name))
     for variable in variables:
         value = start.get(variable.name)
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not number or not variable.low <= value <= variable.high:  # type: ignore[operator]
-            raise DesignError(
-                f"start.{variable.name}", value, f"must be from {variable.low} to {variable.high}"
-            )
+            wanted = f"must be from {variable.low} to {variable.high}"
+            raise DesignError(("start", variable.name), value, wanted)
     return {name: float(start[name]) for name in names}
 
 
+def _harmonics(harmonics: int | None) -> int:
+    return check_harmonics(HARMONICS if harmonics is None else harmonics)
+
+
 def _method(method: object) -> Method:
-    if isinstance(method, Method):
-        return method
+    if method is None or isinstance(method, Method):
+        return method or Method.AUTO
     known = [one.value for one in Method]
     if method not in known:
         raise DesignError("method", method, f"must be one of {', '.join(known)}")
     return Method(method)
+
+
+def _basins(basins: object) -> int:
+    if basins is None:
+        return BASINS
+    if isinstance(basins, bool) or not isinstance(basins, int) or not 1 <= basins <= MOST_BASINS:
+        raise DesignError("basins", basins, f"must be a whole number from 1 to {MOST_BASINS}")
+    return basins
+
+
+READERS: Mapping[str, Callable[[Any], object]] = {
+    "weights": _weights, "harmonics": _harmonics, "method": _method, "basins": _basins,
+}  # fmt: skip
+"""The keys whose values stand alone, with what reads them."""
+WITH_OTHERS = ("variables", "scaling", "cases", "limit", "start")
+"""The keys whose values depend on the scene or on other keys."""

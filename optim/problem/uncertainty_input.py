@@ -9,16 +9,19 @@ import numpy as np
 from scipy.stats import chi2
 
 from optim.errors import DesignError
-from optim.problem.uncertainty_set import Coordinate, Disk, How, Scenario, Shape, UncertainSet, is_number
+from optim.problem.numbers import is_number
+from optim.problem.uncertainty_set import Coordinate, Disk, How, Scenario, Shape, UncertainSet
 from optim.problem.variables import Real, Variable
 from solver.balance.parameter import Kind, resolve
-from solver.scene.scene import FrictionContact, Scene
+from solver.errors import Place, at
+from solver.scene.scene import Scene
 
 ELLIPSOID = ("centre", "relative", "paths", "half_axes", "shape", "covariance", "confidence", "mistuning")
 MISTUNING = ("of", "spread", "seeds", "values")
 CONFIDENCE = 0.95
 _DEVIATIONS = {"deviation": How.RELATIVE, "absolute_deviation": How.OFFSET}
 _INTERVAL = 'must be [low, high], {"deviation": 0.1} or {"absolute_deviation": 5.0}'
+_WHERE: Place = ("uncertain",)
 _FORM = "must be a table of intervals, a table of an ellipsoid, or a list of samples"
 
 
@@ -49,7 +52,7 @@ def read_uncertain(scene: Scene, variables: Sequence[Variable], uncertain: objec
     """
     chosen = {path for variable in variables for path in variable.paths}
     if isinstance(uncertain, Mapping) and uncertain:
-        disks = _disks(scene, uncertain.get("mistuning"))
+        disks = _disks(scene, uncertain.get("mistuning"), _WHERE)
         ellipsoid = any(key in uncertain for key in ("half_axes", "shape", "covariance", "centre"))
         found = (_ellipsoid if ellipsoid else _intervals)(scene, chosen, uncertain, disks)
     elif isinstance(uncertain, Sequence) and not isinstance(uncertain, str) and uncertain:
@@ -61,24 +64,27 @@ def read_uncertain(scene: Scene, variables: Sequence[Variable], uncertain: objec
     return found
 
 
-def _coordinate(scene: Scene, chosen: set[str], name: object, how: How) -> Coordinate:
+def _coordinate(scene: Scene, chosen: set[str], name: object, how: How, where: Place = _WHERE) -> Coordinate:
     """Return a coordinate whose paths exist and may be given in this way."""
     paths = tuple(part.strip() for part in str(name).split(","))
     tied = {
         f"{owner}.N1"
         for contact in scene.contacts
-        if isinstance(contact, FrictionContact) and contact.N1_ratio is not None
+        if contact.load is not None and contact.load.ratio is not None
         for owner in (contact.name, contact.group)
     }
     for path in paths:
-        if resolve(scene, path).kind is Kind.FREQUENCY:
-            raise DesignError("uncertain", path, "cannot be the frequency: the band of the scene is searched")
+        with at(*where, str(name)):
+            kind = resolve(scene, path).kind
+        if kind is Kind.FREQUENCY:
+            wanted = "cannot be the frequency: the band of the scene is searched"
+            raise DesignError("uncertain", path, wanted, place=(*where, str(name)))
         if how is How.VALUE and path in chosen:
             wanted = 'is a variable: give a deviation from the design, {"deviation": 0.1}'
-            raise DesignError(f"uncertain.{name}", path, wanted)
+            raise DesignError((*_WHERE, str(name)), path, wanted, place=(*where, str(name)))
         if how is not How.VALUE and path in tied:
             wanted = f"is tied to N0: give the deviation of {path}_ratio instead"
-            raise DesignError(f"uncertain.{name}", path, wanted)
+            raise DesignError((*_WHERE, str(name)), path, wanted, place=(*where, str(name)))
     return Coordinate(name=str(name), paths=paths, how=how)
 
 
@@ -89,7 +95,7 @@ def _intervals(
     for name, given in table.items():
         if name == "mistuning":
             continue
-        how, both = _interval(f"uncertain.{name}", given)
+        how, both = _interval((*_WHERE, str(name)), given)
         coordinates.append(_coordinate(scene, chosen, name, how))
         ends.append(both)
     _no_path_twice(coordinates)
@@ -100,7 +106,7 @@ def _intervals(
     )  # fmt: skip
 
 
-def _interval(where: str, given: object) -> tuple[How, tuple[float, float]]:
+def _interval(where: Place, given: object) -> tuple[How, tuple[float, float]]:
     """Return what an interval means and its ends."""
     if not isinstance(given, Mapping):
         return How.VALUE, _ends(where, given)
@@ -109,12 +115,12 @@ def _interval(where: str, given: object) -> tuple[How, tuple[float, float]]:
     (key, wide), *_ = given.items()
     if is_number(wide):
         if wide <= 0.0:
-            raise DesignError(f"{where}.{key}", wide, "must be > 0, or [low, high]")
+            raise DesignError((*where, key), wide, "must be > 0, or [low, high]")
         return _DEVIATIONS[key], (-float(wide), float(wide))
-    return _DEVIATIONS[key], _ends(f"{where}.{key}", wide)
+    return _DEVIATIONS[key], _ends((*where, key), wide)
 
 
-def _ends(where: str, given: object) -> tuple[float, float]:
+def _ends(where: Place, given: object) -> tuple[float, float]:
     if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != 2:
         raise DesignError(where, given, _INTERVAL)
     if not all(is_number(value) for value in given) or not given[0] < given[1]:
@@ -127,26 +133,28 @@ def _ellipsoid(
 ) -> UncertainSet:
     for key in table:
         if key not in ELLIPSOID:
-            raise DesignError(f"uncertain.{key}", table[key], f"is not known of an ellipsoid: {ELLIPSOID}")
+            raise DesignError((*_WHERE, key), table[key], f"is not known of an ellipsoid: {ELLIPSOID}")
     form = [key for key in ("half_axes", "shape", "covariance") if key in table]
     if len(form) != 1:
         raise DesignError("uncertain", dict(table), "must have one of half_axes, shape, covariance")
     relative = table.get("relative", False)
     if not isinstance(relative, bool) or (relative and "centre" in table):
-        raise DesignError("uncertain.relative", relative, "must be true or false, and has no centre")
+        raise DesignError((*_WHERE, "relative"), relative, "must be true or false, and has no centre")
     how = How.RELATIVE if relative else How.VALUE if "centre" in table else How.OFFSET
     names = _names(table)
     coordinates = tuple(_coordinate(scene, chosen, name, how) for name in names)
     _no_path_twice(coordinates)
-    centre = _numbers("uncertain.centre", table["centre"]) if "centre" in table else dict.fromkeys(names, 0.0)
+    centre = (
+        _numbers((*_WHERE, "centre"), table["centre"]) if "centre" in table else dict.fromkeys(names, 0.0)
+    )
     if form == ["half_axes"]:
-        lengths = _numbers("uncertain.half_axes", table["half_axes"])
+        lengths = _numbers((*_WHERE, "half_axes"), table["half_axes"])
         if set(lengths) != set(names) or min(lengths.values()) <= 0.0:
-            raise DesignError("uncertain.half_axes", lengths, f"must be numbers > 0 for {', '.join(names)}")
+            raise DesignError((*_WHERE, "half_axes"), lengths, f"must be numbers > 0 for {', '.join(names)}")
         axes, reach = np.diag([lengths[name] for name in names]), 1.0
     else:
         reach = _confidence(table, len(names))
-        axes = reach * _root(f"uncertain.{form[0]}", table[form[0]], len(names))
+        axes = reach * _root((*_WHERE, form[0]), table[form[0]], len(names))
     return UncertainSet(
         shape=Shape.NORMAL if form == ["covariance"] else Shape.BALL, coordinates=coordinates,
         centre=tuple(centre[name] for name in names), axes=_nested(axes), deviations=reach, disks=disks,
@@ -157,19 +165,19 @@ def _names(table: Mapping[str, object]) -> list[str]:
     """Return the order of the coordinates of an ellipsoid."""
     for key in ("centre", "half_axes"):
         if key in table:
-            return list(_numbers(f"uncertain.{key}", table[key]))
+            return list(_numbers((*_WHERE, key), table[key]))
     names = table.get("paths")
     if not isinstance(names, Sequence) or isinstance(names, str) or not names:
-        raise DesignError("uncertain.paths", names, "must list the paths in the order of the matrix")
+        raise DesignError((*_WHERE, "paths"), names, "must list the paths in the order of the matrix")
     return [str(name) for name in names]
 
 
-def _numbers(where: str, table: object) -> dict[str, float]:
+def _numbers(where: Place, table: object) -> dict[str, float]:
     if not isinstance(table, Mapping) or not table:
         raise DesignError(where, table, "must be a table of parameter paths and numbers")
     for name, value in table.items():
         if not is_number(value):
-            raise DesignError(f"{where}.{name}", value, "must be a finite number")
+            raise DesignError((*where, name), value, "must be a finite number")
     return {str(name): float(value) for name, value in table.items()}
 
 
@@ -177,15 +185,15 @@ def _confidence(table: Mapping[str, object], n: int) -> float:
     """Return the radius of the ellipsoid in standard deviations; 1 for a shape matrix."""
     if "covariance" not in table:
         if "confidence" in table:
-            raise DesignError("uncertain.confidence", table["confidence"], "needs a covariance")
+            raise DesignError((*_WHERE, "confidence"), table["confidence"], "needs a covariance")
         return 1.0
     share = table.get("confidence", CONFIDENCE)
-    if not is_number(share) or not 0.0 < share < 1.0:  # type: ignore[operator]
-        raise DesignError("uncertain.confidence", share, "must be a number between 0 and 1")
+    if not is_number(share) or not 0.0 < share < 1.0:
+        raise DesignError((*_WHERE, "confidence"), share, "must be a number between 0 and 1")
     return math.sqrt(float(chi2.ppf(share, n)))
 
 
-def _root(where: str, given: object, n: int) -> Real:
+def _root(where: Place, given: object, n: int) -> Real:
     """Return A with A Aᵀ = the matrix."""
     try:
         matrix = np.array(given, dtype=np.float64)
@@ -204,12 +212,12 @@ def _root(where: str, given: object, n: int) -> Real:
 
 
 def _sample(scene: Scene, chosen: set[str], index: int, table: object) -> Scenario:
-    where = f"uncertain[{index}]"
+    where: Place = (*_WHERE, index)
     if not isinstance(table, Mapping):
         raise DesignError(where, table, "must be a table of parameter paths and values")
     disks = _disks(scene, table.get("mistuning"), where)
     if len(disks) > 1:
-        raise DesignError(f"{where}.mistuning", table["mistuning"], "must be one disk in a sample")
+        raise DesignError((*where, "mistuning"), table["mistuning"], "must be one disk in a sample")
     settings = []
     for name, given in table.items():
         if name == "mistuning":
@@ -218,43 +226,46 @@ def _sample(scene: Scene, chosen: set[str], index: int, table: object) -> Scenar
         if isinstance(given, Mapping):
             key = next(iter(given), None)
             if len(given) != 1 or key not in _DEVIATIONS:
-                raise DesignError(f"{where}.{name}", given, 'must be a number or {"deviation": 0.1}')
+                raise DesignError((*where, name), given, 'must be a number or {"deviation": 0.1}')
             how, value = _DEVIATIONS[key], given[key]
         if not is_number(value):
-            raise DesignError(f"{where}.{name}", given, "must be a finite number")
-        settings.append((_coordinate(scene, chosen, name, how), float(value)))
+            raise DesignError((*where, name), given, "must be a finite number")
+        settings.append((_coordinate(scene, chosen, name, how, where), float(value)))
     _no_path_twice([coordinate for coordinate, _ in settings])
     return Scenario(settings=tuple(settings), disk=disks[0] if disks else None)
 
 
-def _disks(scene: Scene, table: object, where: str = "uncertain") -> tuple[Disk, ...]:
+def _disks(scene: Scene, table: object, where: Place) -> tuple[Disk, ...]:
     """Return the mistuned disks of a table, each tried on the scene."""
     if table is None:
         return ()
-    where = f"{where}.mistuning"
+    where = (*where, "mistuning")
     if not isinstance(table, Mapping) or "of" not in table:
         raise DesignError(
             where, table, 'must be a table such as {"of": "tip", "spread": 0.01, "seeds": [1, 2]}'
         )
     for key in table:
         if key not in MISTUNING:
-            raise DesignError(f"{where}.{key}", table[key], f"is not known; there are {', '.join(MISTUNING)}")
+            raise DesignError((*where, key), table[key], f"is not known; there are {', '.join(MISTUNING)}")
     of = (table["of"],) if isinstance(table["of"], str) else tuple(table["of"])
     if "values" in table:
         rows = table["values"]
         if not isinstance(rows, Sequence) or isinstance(rows, str) or not rows or "spread" in table:
-            raise DesignError(f"{where}.values", rows, "must be a list of factors, and goes without a spread")
+            raise DesignError(
+                (*where, "values"), rows, "must be a list of factors, and goes without a spread"
+            )
         lists = rows if isinstance(rows[0], Sequence) else [rows]
         disks = tuple(Disk(of=of, values=tuple(float(x) for x in row)) for row in lists)
     else:
         spread, seeds = table.get("spread"), table.get("seeds", [1])
-        if not is_number(spread) or spread <= 0.0:  # type: ignore[operator]
-            raise DesignError(f"{where}.spread", spread, "must be a number > 0")
+        if not is_number(spread) or spread <= 0.0:
+            raise DesignError((*where, "spread"), spread, "must be a number > 0")
         if not isinstance(seeds, Sequence) or isinstance(seeds, str) or not seeds:
-            raise DesignError(f"{where}.seeds", seeds, "must be a list of whole numbers")
-        disks = tuple(Disk(of=of, spread=float(spread), seed=seed) for seed in seeds)  # type: ignore[arg-type]
+            raise DesignError((*where, "seeds"), seeds, "must be a list of whole numbers")
+        disks = tuple(Disk(of=of, spread=float(spread), seed=seed) for seed in seeds)
     for disk in disks:
-        disk.on(scene)
+        with at(*where):
+            disk.on(scene)
     return disks
 
 
@@ -263,7 +274,8 @@ def _no_path_twice(coordinates: Sequence[Coordinate]) -> None:
     for coordinate in coordinates:
         for path in coordinate.paths:
             if path in seen:
-                raise DesignError("uncertain", path, "must stand in one place, it is there twice")
+                wanted = "must stand in one place, it is there twice"
+                raise DesignError("uncertain", path, wanted, place=(*_WHERE, seen[path]))
             seen[path] = coordinate.name
 
 
@@ -298,5 +310,6 @@ def check_settings(
             nominal = scene.value(path)
             for base in bounds.get(path, (nominal, nominal)):
                 value = coordinate.value(base, delta)
-                resolve(scene, path).check(f"uncertain.{coordinate.name}", value)
-                scene.with_values({path: value})
+                with at("uncertain", coordinate.name):
+                    resolve(scene, path).check(f"uncertain.{coordinate.name}", value)
+                    scene.with_values({path: value})

@@ -7,7 +7,6 @@ ball: δ = centre + axes ξ, where δ is the value of a parameter or its deviati
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -312,8 +311,3 @@ class UncertainSet:
         if self.disks:
             answer["disks"] = [disk.table() for disk in self.disks]
         return answer
-
-
-def is_number(value: object) -> bool:
-    """Return whether a value is a finite number."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

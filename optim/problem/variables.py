@@ -5,26 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from optim.errors import DesignError
+from optim.problem.numbers import is_number
+from optim.problem.words import Scaling
 from solver.balance.parameter import Kind, resolve
-from solver.scene.scene import FrictionContact, Scene
+from solver.errors import at
+from solver.scene.scene import Scene
 
 Real = NDArray[np.float64]
 SNAP = 1e-7  # scaled distance within which a variable is put on its bound
 LOGARITHMIC_FROM = 5.0  # ratio of the bounds from which a variable is scaled logarithmically
-
-
-class Scaling(Enum):
-    """Whether equal steps or equal ratios of a variable count equally; AUTO chooses by the bounds."""
-
-    AUTO = "auto"
-    LINEAR = "linear"
-    LOGARITHMIC = "logarithmic"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,18 +142,19 @@ def check_variables(
     scaling = {} if scaling is None else scaling
     for name in scaling:
         if name not in variables:
-            raise DesignError("scaling", name, f"must name the variables {', '.join(variables)}")
+            wanted = f"must name the variables {', '.join(variables)}"
+            raise DesignError("scaling", name, wanted, place=("scaling", name))
     taken: dict[str, str] = {}
     checked = []
     for name, bounds in variables.items():
         paths = tuple(part.strip() for part in str(name).split(","))
         low, high = _bounds(name, bounds)
         for path in paths:
-            _check_path(scene, path, low, high)
+            with at("variables", name):
+                _check_path(scene, path, low, high)
             if path in taken:
-                raise DesignError(
-                    "variables", path, f"must stand in one variable, it is in {taken[path]} too"
-                )
+                wanted = f"must stand in one variable, it is in {taken[path]} too"
+                raise DesignError("variables", path, wanted, place=("variables", path))
             taken[path] = name
         how = _scaling(name, scaling.get(name, Scaling.AUTO.value), low, high)
         checked.append(Variable(name=name, paths=paths, low=low, high=high, logarithmic=how))
@@ -169,7 +164,8 @@ def check_variables(
 def _check_path(scene: Scene, path: str, low: float, high: float) -> None:
     parameter = resolve(scene, path)
     if parameter.kind is Kind.FREQUENCY:
-        raise DesignError("variables", path, "cannot be the frequency: the band of the scene is searched")
+        wanted = "cannot be the frequency: the band of the scene is searched"
+        raise DesignError("variables", path, wanted)
     parameter.check(f"variables.{path} (low)", low)
     parameter.check(f"variables.{path} (high)", high)
 
@@ -178,23 +174,22 @@ def _scaling(name: str, wanted: object, low: float, high: float) -> bool:
     """Return whether a variable is scaled logarithmically."""
     known = ", ".join(scaling.value for scaling in Scaling)
     if wanted not in [scaling.value for scaling in Scaling]:
-        raise DesignError(f"scaling.{name}", wanted, f"must be one of {known}")
+        raise DesignError(("scaling", name), wanted, f"must be one of {known}")
     how = Scaling(wanted)
     if how is Scaling.LOGARITHMIC and low <= 0.0:
-        raise DesignError(f"scaling.{name}", wanted, f"needs a lower bound > 0, which is {low:g}")
+        raise DesignError(("scaling", name), wanted, f"needs a lower bound > 0, which is {low:g}")
     return how is Scaling.LOGARITHMIC or (
         how is Scaling.AUTO and low > 0.0 and high / low >= LOGARITHMIC_FROM
     )
 
 
 def _bounds(path: str, bounds: object) -> tuple[float, float]:
-    name = f"variables.{path}"
+    name = ("variables", path)
     if not isinstance(bounds, Sequence) or isinstance(bounds, str) or len(bounds) != 2:
         raise DesignError(name, bounds, "must be two numbers, low and high")
     low, high = bounds
     for value in (low, high):
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not math.isfinite(value):
+        if not is_number(value):
             raise DesignError(name, bounds, "must be two finite numbers, low and high")
     if not low < high:
         raise DesignError(name, bounds, "must have low < high")
@@ -203,11 +198,11 @@ def _bounds(path: str, bounds: object) -> tuple[float, float]:
 
 def _default(scene: Scene) -> dict[str, tuple[float, float]]:
     """Return N0 of the first contact with a tied load (else of the first), a tenth to 15 times its value."""
-    rubbing = [contact for contact in scene.contacts if isinstance(contact, FrictionContact)]
+    rubbing = [(contact, contact.load) for contact in scene.contacts if contact.load is not None]
     if not rubbing:
         raise DesignError("variables", None, "must be given: the scene has no friction contact to design")
-    tied = [contact for contact in rubbing if contact.N1_ratio is not None]
-    contact = (tied or rubbing)[0]
-    if contact.N0 <= 0.0:
+    tied = [(contact, load) for contact, load in rubbing if load.ratio is not None]
+    contact, load = (tied or rubbing)[0]
+    if load.mean <= 0.0:
         raise DesignError("variables", None, f"must be given: {contact.name}.N0 is 0, it suggests no range")
-    return {f"{contact.group or contact.name}.N0": (contact.N0 / 10.0, contact.N0 * 15.0)}
+    return {f"{contact.group or contact.name}.N0": (load.mean / 10.0, load.mean * 15.0)}

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+SAME_PLACE = 1e-3  # scaled distance within which two optima are one
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Basin:

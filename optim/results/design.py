@@ -9,9 +9,10 @@ from enum import Enum
 from typing import ClassVar
 
 from optim.criteria.band import BAND
+from optim.criteria.criterion import Row
 from optim.criteria.linearised import Conditions
 from optim.criteria.peak import PEAK
-from optim.criteria.rows import Evaluation, Row
+from optim.criteria.rows import Evaluation
 from optim.problem.problem import Method, Problem
 from optim.results.basins import Basin, Checked
 from optim.results.doubts import doubts_of

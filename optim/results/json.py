@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
+from optim.criteria.criterion import Row
 from optim.criteria.linearised import Conditions
-from optim.criteria.rows import Evaluation, Row
+from optim.criteria.rows import Evaluation
 from optim.results.basins import Basin, Checked
 from solver.continuation.branch import Branch
 

@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 
 from optim.criteria.band import BAND
+from optim.criteria.criterion import Row
 from optim.criteria.peak import PEAK
-from optim.criteria.rows import Row
 from optim.methods.kkt import KEPT
 from optim.problem.uncertainty_set import Scenario
+from optim.problem.words import Aim
 from optim.robust.result import Side, Spread
-from optim.robust.risk_measure import Aim, rank_of
+from optim.robust.risk_measure import rank_of
 from optim.robust.scenarios import Outcome
 from optim.robust.search import RobustSearch
 from optim.robust.worst_case import Aspect, UnknownScenarioError, pessimise

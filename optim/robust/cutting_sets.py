@@ -12,12 +12,12 @@ from optim.methods.kkt import Local, is_flat
 from optim.methods.multistart import coarse
 from optim.problem.uncertainty_set import Scenario
 from optim.problem.variables import scaled
+from optim.results.basins import SAME_PLACE
 from optim.results.design import DesignResult
 from optim.robust.result import Cut, RobustStatus
 from optim.robust.scenarios import Outcome, number_of
 from optim.robust.search import RobustSearch
 from optim.robust.worst_case import Aspect, Finding, UnknownScenarioError, pessimise
-from optim.search import SAME_PLACE
 
 CLOSED = (
     1e-6  # relative excess of the worst scenario found over the master problem's, up to which it is solved

@@ -14,8 +14,9 @@ from optim.criteria.linearised import Conditions
 from optim.criteria.peak import PEAK
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet
+from optim.problem.words import Aim
 from optim.results.design import DesignResult
-from optim.robust.risk_measure import Aim, rank_of
+from optim.robust.risk_measure import rank_of
 from optim.robust.scenarios import Outcome
 from solver.results.base import Drawn
 from solver.results.views import Views

@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from enum import Enum
 
 import numpy as np
 
@@ -25,16 +24,8 @@ from optim.criteria.criterion import Criterion
 from optim.criteria.linearised import PENALTY, Model, model_of
 from optim.criteria.rows import Evaluation
 from optim.problem.variables import Variable
+from optim.problem.words import Aim
 from optim.robust.scenarios import number_of
-
-
-class Aim(Enum):
-    """Over the uncertainty, what is minimised; the value is the word users write."""
-
-    WORST_CASE = "worst-case"
-    MEAN = "mean"
-    QUANTILE = "quantile"
-
 
 Scales = Mapping[Criterion, float]
 

@@ -14,56 +14,45 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from optim.criteria.peak import PEAK
 from optim.errors import DesignError
 from optim.methods.evaluator import StoppedError
-from optim.problem.problem import Method, pose
+from optim.problem.keys import FEWEST_SAMPLES, QUANTILE, SEED, DesignKeys
+from optim.problem.keywords import keywords
+from optim.problem.numbers import is_number, whole
+from optim.problem.problem import pose
 from optim.problem.uncertainty_input import check_settings, read_uncertain
-from optim.problem.uncertainty_set import Scenario, is_number
+from optim.problem.uncertainty_set import Scenario
+from optim.problem.watch import OnProgress, ShouldStop
+from optim.problem.words import Aim
 from optim.results.design import DesignResult, DesignStatus
 from optim.robust.assessment import side_of
 from optim.robust.cutting_sets import CLOSED, Progress, cutting_sets, sampled
 from optim.robust.result import RobustResult, RobustStatus, Side
-from optim.robust.risk_measure import Aim
 from optim.robust.search import RobustSearch
 from optim.robust.worst_case import Aspect, UnknownScenarioError
 from optim.search import solve_problem
 from solver.scene.scene import Scene
 
 SAMPLES = {Aim.WORST_CASE: 32, Aim.MEAN: 64, Aim.QUANTILE: 64}
-FEWEST_SAMPLES = 2
 
 
+@keywords(DesignKeys)
 def robust_design(
     scene: Scene,
     *,
     uncertain: object,
     aim: str | Aim = Aim.WORST_CASE,
-    quantile: float = 0.95,
+    quantile: float = QUANTILE,
     samples: int | None = None,
-    seed: int = 0,
-    variables: Mapping[str, tuple[float, float]] | None = None,
-    scaling: Mapping[str, str] | None = None,
-    cases: Sequence[Mapping[str, object]] | None = None,
-    limit: float | None = None,
-    weights: Mapping[str, float] | None = None,
-    max_peak: float | None = None,
-    max_band_hz: float | None = None,
-    forbidden_hz: Sequence[Sequence[float]] | None = None,
-    speeds_rpm: Sequence[Sequence[float]] | None = None,
-    max_friction_work: Mapping[str, float] | float | None = None,
-    contact_states: Mapping[str, str] | None = None,
-    harmonics: int = 11,
-    start: Mapping[str, float] | None = None,
-    method: str | Method = Method.AUTO,
-    basins: int = 2,
-    on_progress: Callable[[float, int], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    **limits: Any,
+    seed: int = SEED,
+    on_progress: OnProgress = None,
+    should_stop: ShouldStop = None,
+    **problem: Any,
 ) -> RobustResult:
     """Choose parameters so that the peak is least over an uncertainty, and compare with the nominal optimum.
 
@@ -79,10 +68,9 @@ def robust_design(
     seed : of the random numbers.
     on_progress : called with (share done, responses so far).
     should_stop : asked between responses and within them.
-    method : of the search without uncertainty; the robust one is always the cone programme.
-    basins : how many local optima are looked for, without and with uncertainty.
+    **problem : the keys of a problem.
 
-    All other arguments are those of `optim.design`.
+    `method` is that of the search without uncertainty: the robust one is always the cone programme.
 
     Returns
     -------
@@ -92,20 +80,17 @@ def robust_design(
     ------
     SettingError, SceneError, DesignError
         Bad paths, bounds, uncertainty, cases, limits or start.
+    TypeError
+        An argument that is no key.
     """
     begun = time.perf_counter()
-    problem = pose(
-        scene, variables=variables, scaling=scaling, cases=cases, limit=limit, weights=weights,
-        max_peak=max_peak, max_band_hz=max_band_hz, forbidden_hz=forbidden_hz, speeds_rpm=speeds_rpm,
-        max_friction_work=max_friction_work, contact_states=contact_states, harmonics=harmonics, start=start,
-        method=method, basins=basins, **limits,
-    )  # fmt: skip
-    over = read_uncertain(scene, problem.variables, uncertain)
-    search = RobustSearch(problem, over, _aim(aim), _quantile(quantile), on_progress, should_stop)
-    wanted = SAMPLES[search.aim] if samples is None else _count("samples", samples, FEWEST_SAMPLES)
-    drawn = over.draw(wanted, _count("seed", seed, 0))
+    posed = pose(scene, **problem)
+    over = read_uncertain(scene, posed.variables, uncertain)
+    search = RobustSearch(posed, over, _aim(aim), _quantile(quantile), on_progress, should_stop)
+    wanted = SAMPLES[search.aim] if samples is None else whole("samples", samples, least=FEWEST_SAMPLES)
+    drawn = over.draw(wanted, whole("seed", seed, least=0))
     for scenario in drawn:
-        check_settings(scene, problem.variables, scenario.settings)
+        check_settings(scene, posed.variables, scenario.settings)
     found = _run(search, drawn, should_stop)
     if on_progress is not None:
         on_progress(1.0, search.responses)
@@ -122,15 +107,9 @@ def _aim(aim: object) -> Aim:
 
 
 def _quantile(share: object) -> float:
-    if not is_number(share) or not 0.0 < share < 1.0:  # type: ignore[operator]
+    if not is_number(share) or not 0.0 < share < 1.0:
         raise DesignError("quantile", share, "must be a number between 0 and 1")
-    return float(share)  # type: ignore[arg-type]
-
-
-def _count(name: str, value: object, least: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise DesignError(name, value, f"must be a whole number >= {least}")
-    return value
+    return float(share)
 
 
 @dataclass(slots=True, kw_only=True)

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from optim.criteria.criterion import Criterion
+from optim.criteria.criterion import Criterion, Row
 from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
-from optim.criteria.rows import Evaluation, Row
+from optim.criteria.rows import Evaluation
 from optim.problem.cases import Case
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Coordinate, Scenario

@@ -13,8 +13,9 @@ from optim.methods.minimax import REMEMBERED, minimax_search
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet
 from optim.problem.variables import Variable
+from optim.problem.words import Aim
 from optim.results.design import DesignStatus
-from optim.robust.risk_measure import Aim, aim_model
+from optim.robust.risk_measure import aim_model
 from optim.robust.scenarios import Outcome, outcome, together
 from optim.robust.socp import solve_cone
 from optim.robust.worst_case import Aspect

@@ -19,8 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from optim.criteria.criterion import Criterion
-from optim.criteria.rows import Row
+from optim.criteria.criterion import Criterion, Row
 from optim.methods.multistart import places
 from optim.methods.surrogate import Taylor, candidates, promising
 from optim.problem.uncertainty_set import Disk, Scenario, Shape, UncertainSet

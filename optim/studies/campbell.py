@@ -14,7 +14,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from optim.errors import DesignError
-from optim.problem.cases import number_pair, with_engine_order
+from optim.problem.cases import with_engine_order
+from optim.problem.numbers import number_pair
 from optim.studies.crossings import CampbellDiagram, CampbellStatus, Crossing, OrderResponse, Ranges
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -25,15 +25,16 @@ from optim.criteria.rows import Evaluation
 from optim.errors import DesignError
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.kkt import Local
+from optim.problem.keys import FEWEST_POINTS, POINTS, FrontKeys
+from optim.problem.keywords import keywords
 from optim.problem.problem import Method, Problem, pose
 from optim.problem.variables import Variable, scaled, unscaled
+from optim.problem.watch import OnProgress, ShouldStop
 from optim.results.design import DesignResult, DesignStatus
 from optim.search import judge, local_search_of, solve_problem
 from optim.studies.pareto_result import ParetoPoint, ParetoResult, ParetoStatus, front_of
 from solver.scene.scene import Scene
 
-POINTS = 9
-FEWEST = 3
 FAR_APART = 0.02  # scaled distance from which the optima of two neighbours are both searched from
 JUMP = 0.01  # share of the band's range within which two neighbours need no point between them
 RESIDUAL = 1e-6  # of the first-order conditions, relative objective per scaled variable
@@ -42,39 +43,26 @@ MOST_EVALUATIONS = 5000
 FOUND = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK, DesignStatus.LOCAL)
 
 
+@keywords(FrontKeys)
 def pareto_front(
     scene: Scene,
     *,
-    variables: Mapping[str, tuple[float, float]] | None = None,
-    limit: float | None = None,
     points: int = POINTS,
-    scaling: Mapping[str, str] | None = None,
-    cases: Sequence[Mapping[str, object]] | None = None,
-    max_peak: float | None = None,
-    forbidden_hz: Sequence[Sequence[float]] | None = None,
-    speeds_rpm: Sequence[Sequence[float]] | None = None,
-    max_friction_work: Mapping[str, float] | float | None = None,
-    contact_states: Mapping[str, str] | None = None,
-    harmonics: int = 11,
-    start: Mapping[str, float] | None = None,
-    method: str | Method = Method.AUTO,
-    on_progress: Callable[[float, int], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    **limits: Any,
+    on_progress: OnProgress = None,
+    should_stop: ShouldStop = None,
+    **problem: Any,
 ) -> ParetoResult:
     """Return the designs of which none has both a lower peak and a narrower band than another.
+
+    What is minimised and the limit on the band are the front's own.
 
     Parameters
     ----------
     scene : the scene; `observe` says which DOF and which band.
-    variables : parameter path to (low, high); see `optim.design`.
-    limit : amplitude [m] above which the resonance band is measured; half power of the peak if left out.
     points : how many, both ends included.
     on_progress : called with (share done, designs evaluated so far).
     should_stop : asked between responses and within them.
-
-    All other arguments are those of `optim.design`; what is minimised and the limit on the band are the
-    front's own.
+    **problem : the keys of a problem.
 
     Returns
     -------
@@ -84,22 +72,20 @@ def pareto_front(
     ------
     SettingError, SceneError, DesignError
         Bad paths, bounds, cases, limits, start or number of points.
+    TypeError
+        An argument that is no key.
     """
     begun = time.perf_counter()
-    problem = pose(
-        scene, variables=variables, scaling=scaling, cases=cases, limit=limit, max_peak=max_peak,
-        forbidden_hz=forbidden_hz, speeds_rpm=speeds_rpm, max_friction_work=max_friction_work,
-        contact_states=contact_states, harmonics=harmonics, start=start, method=method, **limits,
-    )  # fmt: skip
-    if isinstance(points, bool) or not isinstance(points, int) or points < FEWEST:
-        raise DesignError("points", points, f"must be a whole number >= {FEWEST}")
-    front = _Front(problem, points, on_progress, should_stop)
+    posed = pose(scene, **problem)
+    if isinstance(points, bool) or not isinstance(points, int) or points < FEWEST_POINTS:
+        raise DesignError("points", points, f"must be a whole number >= {FEWEST_POINTS}")
+    front = _Front(posed, points, on_progress, should_stop)
     status = front.run()
     if on_progress is not None:
         on_progress(1.0, max(front.reported, front.evaluations))
     kept, dominated = front_of(front.found)
     return ParetoResult(
-        problem=problem, status=status, ends=tuple(front.ends), points=kept, dominated=dominated,
+        problem=posed, status=status, ends=tuple(front.ends), points=kept, dominated=dominated,
         missed=tuple(front.missed), evaluations=front.evaluations, seconds=time.perf_counter() - begun,
     )  # fmt: skip
 

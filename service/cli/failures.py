@@ -59,6 +59,12 @@ class ShortfallError(Exception):
     """The computation did not reach its goal; the message is its status, with what to try."""
 
 
+def end(reached: bool, status: str) -> None:
+    """Raise ShortfallError if the goal of a computation was not reached."""
+    if not reached:
+        raise ShortfallError(status)
+
+
 REPORTED = (SolverError, DesignError, errors.ServiceError, errors.InputError, ShortfallError)
 
 

@@ -43,7 +43,7 @@ COMMANDS = (
     Entry("import", "commands.import_matrices.import_scene", "Make a scene of matrices or modes in files."),
 )  # fmt: skip
 
-SUBMIT = Entry("submit", "commands.submit_group.SubmitGroup", "Hand a job to a running service.")
+SUBMIT = Entry("submit", "submit_group.SubmitGroup", "Hand a job to a running service.")
 
 DATABASE = (
     Entry("upgrade", "commands.service.upgrade", "Bring a database to this version's revision."),

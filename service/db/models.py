@@ -222,7 +222,7 @@ class Scene(Base):
 
 
 class Sweep(Base):
-    """One branch that a job computed: what people filter by."""
+    """One branch that a job computed, without its contacts and arrays: what people filter by."""
 
     __tablename__ = "sweep"
 
@@ -251,6 +251,11 @@ class Sweep(Base):
     completed: Mapped[bool]
     status: Mapped[str] = mapped_column(Text())
     created: Mapped[datetime]
+
+    @property
+    def key(self) -> str:
+        """Its id."""
+        return self.id
 
     __table_args__ = (
         Index(None, "job_id", "id"),
@@ -302,7 +307,7 @@ class SweepArray(Base):
 
 
 class Design(Base):
-    """What a design job found: what people filter by. Its id is its job's; the job's result is the whole."""
+    """What a design job found, without its variables: what people filter by. Its id is its job's."""
 
     __tablename__ = "design"
 
@@ -327,6 +332,11 @@ class Design(Base):
     work: Mapped[float | None]
     seconds: Mapped[float]
     created: Mapped[datetime]
+
+    @property
+    def key(self) -> str:
+        """Its id."""
+        return self.job_id
 
     __table_args__ = (
         Index(None, "owner", "job_id"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 from service.jobs.strict_json import JsonText
 from solver.errors import Issue
@@ -79,8 +79,8 @@ class Pace:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SweepValues:
-    """What is stored of a branch beside its arrays: the columns people filter by."""
+class SweepRecord:
+    """A branch to be stored: the columns people filter by, and its parts."""
 
     scene_name: str
     scene_hash: str
@@ -102,12 +102,6 @@ class SweepValues:
     status: str
     error_estimate: float | None = None
     peaks_known: bool | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SweepRecord(SweepValues):
-    """A branch to be stored."""
-
     contacts: tuple[ContactValues, ...] = ()
     arrays: Mapping[str, StoredArray] = field(default_factory=dict)
 
@@ -123,8 +117,8 @@ class VariableValues:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DesignValues:
-    """What is stored of a design beside its variables: the columns people filter by."""
+class DesignRecord:
+    """A design to be stored: the columns people filter by, and its parts."""
 
     scene_name: str
     scene_hash: str
@@ -142,13 +136,18 @@ class DesignValues:
     evaluations: int
     work: float | None
     seconds: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignRecord(DesignValues):
-    """A design to be stored."""
-
     variables: tuple[VariableValues, ...] = ()
+
+
+class Found(Protocol):
+    """A result of a computation."""
+
+    @property
+    def status(self) -> enum.Enum:
+        """How it ended; the value is a sentence that says what to try."""
+
+    def to_json(self) -> dict[str, Any]:
+        """The result as JSON."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,6 +174,22 @@ class JobOutput:
     encoded: JsonText | None = None
     design: DesignRecord | None = None
     shortfall: str | None = None
+
+    @classmethod
+    def of(
+        cls, found: Found, *, reached: bool, sweeps: tuple[SweepRecord, ...] = (),
+        design: DesignRecord | None = None,
+    ) -> Self:  # fmt: skip
+        """Return the output of a computation that says of itself how it ended.
+
+        Parameters
+        ----------
+        found : its result.
+        reached : whether that is what was asked for.
+        sweeps, design : to be stored.
+        """
+        shortfall = None if reached else str(found.status.value)
+        return cls(result=found.to_json(), sweeps=sweeps, design=design, shortfall=shortfall)
 
 
 class FailureKind(enum.StrEnum):

@@ -17,8 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from service.errors import InvalidRequestError
 from service.jobs.kind_view import KindView
 from service.jobs.outputs import JobOutput, Progress, Run, ShouldStop
-from service.jobs.strict_json import pointer
-from solver.errors import Issue
+from solver.errors import Issue, pointer
 
 if TYPE_CHECKING:
     from service.jobs.checkpoints import Checkpoints

@@ -11,7 +11,7 @@ from itertools import islice
 from typing import Any
 
 from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError
-from solver.errors import Issue
+from solver.errors import Issue, pointer
 
 _Way = Any  # None at the top, or a pair: the way to a container, and a key or an index in it
 
@@ -44,11 +44,6 @@ _MOST_DIGITS = 308
 """Of an integer: one of more is beyond the largest double."""
 _ENDLESS_DIGITS = 4300
 """More are no number of JSON that anybody reads, Python neither."""
-
-
-def pointer(*parts: object) -> str:
-    """RFC 6901 pointer from keys and indices."""
-    return "".join("/" + str(part).replace("~", "~0").replace("/", "~1") for part in parts)
 
 
 def loads(data: bytes) -> object:

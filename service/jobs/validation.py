@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from service.errors import InvalidRequestError
-from service.jobs.strict_json import MOST_TOLD, pointer
-from solver.errors import Issue
+from service.jobs.strict_json import MOST_TOLD
+from solver.errors import Issue, pointer
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 

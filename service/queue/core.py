@@ -19,17 +19,15 @@ from service.auth.storage import Storage
 from service.db import revisions
 from service.db.clock import Clock
 from service.db.engine import Database
-from service.db.models import JobState
+from service.db.models import Design, JobState, Sweep
 from service.db.pg_notify import Notices
 from service.db.repositories import (
     DesignRepository,
-    DesignRow,
     JobRepository,
     JobRow,
     NewJob,
     SceneRepository,
     SweepRepository,
-    SweepRow,
     UploadRepository,
 )
 from service.db.repositories.keys import KeyRepository
@@ -67,7 +65,7 @@ class Results:
 
     job: JobRow
     text: str
-    sweeps: list[SweepRow]
+    sweeps: list[Sweep]
 
     @property
     def result(self) -> dict[str, Any]:
@@ -80,7 +78,7 @@ class Results:
 class WholeDesign:
     """A stored design with the job that found it and the result of that job."""
 
-    row: DesignRow
+    row: Design
     job: JobRow
     result: dict[str, Any]
 
@@ -285,7 +283,7 @@ class Service:
         """
         return visible(self.jobs.get(job_id), caller, f"there is no job {job_id!r}")
 
-    def sweep(self, sweep_id: str, caller: Caller = KEYLESS) -> SweepRow:
+    def sweep(self, sweep_id: str, caller: Caller = KEYLESS) -> Sweep:
         """A stored sweep.
 
         Raises

@@ -10,11 +10,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from optim.criteria.table import criteria_table
+from service.rendering.problem_table import problem_table
 from service.settings.table import settings_table
+from solver.contacts.laws.table import laws_table
 from solver.matrices.readers.table import formats_table
 
 TABLES: Mapping[str, Mapping[str, Callable[[], str]]] = {
-    "design.md": {"criteria": criteria_table},
+    "design.md": {"keys": problem_table, "criteria": criteria_table},
+    "laws.md": {"laws": laws_table},
     "matrices.md": {"formats": formats_table},
     "operations.md": {"settings": settings_table},
 }

@@ -7,7 +7,8 @@ import threading
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from service.db.repositories import SweepRepository, SweepRow
+from service.db.models import Sweep
+from service.db.repositories import SweepRepository
 from service.errors import NotAcceptableError
 from service.rendering.negotiation import preferred
 from service.rendering.sweep_datasets import sweep_dataset
@@ -51,7 +52,7 @@ def chosen(accept: str | None, media: Sequence[str]) -> str:
 
 
 def sweep_body(
-    row: SweepRow, media: str, repository: SweepRepository, scene: Mapping[str, Any] | None = None
+    row: Sweep, media: str, repository: SweepRepository, scene: Mapping[str, Any] | None = None
 ) -> bytes:
     """A stored sweep in a media type of `SWEEP_MEDIA`: the files are those that `solver.save` writes.
 
@@ -64,7 +65,7 @@ def sweep_body(
     return written(sweep_dataset(row, repository, scene), f".{SUFFIXES[media]}")
 
 
-def sweep_picture(row: SweepRow, suffix: str, repository: SweepRepository) -> bytes:
+def sweep_picture(row: Sweep, suffix: str, repository: SweepRepository) -> bytes:
     """The curve of a stored sweep as `svg` or `png`; its peak is marked, its band shaded."""
     from service.jobs.stored_curves import response_of
     from solver.views.plots import style

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from service.db.repositories import SweepRepository, SweepRow
+from service.db.models import Sweep
+from service.db.repositories import SweepRepository
 from service.jobs.arrays import decode
 from service.jobs.strict_json import digest
 from solver.results.dataset import Dataset
@@ -16,9 +17,7 @@ from solver.views.to_dataset import attributes, point_variables
 _COLUMNS = ("parameter", "amplitude", "half_peak_to_peak", "mean", "residual")
 
 
-def sweep_dataset(
-    row: SweepRow, repository: SweepRepository, scene: Mapping[str, Any] | None = None
-) -> Dataset:
+def sweep_dataset(row: Sweep, repository: SweepRepository, scene: Mapping[str, Any] | None = None) -> Dataset:
     """A stored sweep, a point a row.
 
     Sweeps that an earlier version stored have no column `residual` and none of the states.
@@ -28,7 +27,7 @@ def sweep_dataset(
     scene : that of its job; it is told only if it is the one that was swept.
     """
     arrays = {name: decode(stored) for name, stored in repository.arrays(row.id).items()}
-    names = [contact.name for contact in repository.contacts([row.id])[row.id]]
+    names = [contact.name for contact in repository.parts([row.id])[row.id]]
     states = arrays.get("states")
     variables = point_variables(
         row.parameter, "SI" if row.parameter.startswith("structure.") else parameter_unit(row.parameter),

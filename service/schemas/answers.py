@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, Self
 
@@ -11,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.db.models import JobState
-from service.db.repositories import DesignRepository, DesignRow, JobRow, SweepRepository, SweepRow
+from service.db.models import Design, JobState, Sweep
+from service.db.repositories import JobRow, SweepRepository
+from service.db.repositories.stored import StoredRepository
 from service.jobs.arrays import decode
 from service.jobs.outputs import ContactValues, VariableValues
 from service.queue.scene_store import KnownScene, WholeScene
@@ -22,8 +24,9 @@ if TYPE_CHECKING:
 
 
 # What an answer has under the name of its column; a peak stands there with its place.
-_OF_SWEEPS = frozenset(one.name for one in fields(SweepRow)) - {"peak"}
-_OF_DESIGNS = frozenset(one.name for one in fields(DesignRow)) - {"peak"}
+_COLUMNS: dict[type[Any], frozenset[str]] = {
+    table: frozenset(table.__mapper__.columns.keys()) - {"peak"} for table in (Sweep, Design)
+}
 
 
 class Answer(BaseModel):
@@ -118,6 +121,31 @@ class Peak(Answer):
     at: float
 
 
+class StoredAnswer(Answer, ABC):
+    """What the answers for a stored sweep and a stored design share."""
+
+    @classmethod
+    def shared(cls, row: Sweep | Design) -> dict[str, Any]:
+        """The fields that both have: what is named like its column, the scene, and a peak with its place."""
+        peak = None
+        if row.peak is not None and row.peak_at is not None:
+            peak = Peak(value=row.peak, at=row.peak_at)
+        columns = _COLUMNS[type(row)]
+        same = {name: getattr(row, name) for name in cls.model_fields if name in columns}
+        return {**same, "scene": row.scene_name, "peak": peak}
+
+    @classmethod
+    @abstractmethod
+    def values(cls, row: Any, parts: Sequence[Any]) -> dict[str, Any]:
+        """The fields of the answer for a row with its parts."""
+
+    @classmethod
+    def of_rows(cls, rows: Sequence[Any], repository: StoredRepository[Any, Any]) -> list[Self]:
+        """The answers for several rows."""
+        parts = repository.parts([row.key for row in rows])
+        return [cls(**cls.values(row, parts[row.key])) for row in rows]
+
+
 class ContactAnswer(Answer):
     """Values of a contact during a sweep; null where the value was swept."""
 
@@ -128,7 +156,7 @@ class ContactAnswer(Answer):
     N1_phase: float | None
 
 
-class SweepAnswer(Answer):
+class SweepAnswer(StoredAnswer):
     """A stored sweep."""
 
     model_config = ConfigDict(frozen=True, validate_by_name=True, serialize_by_alias=True)
@@ -166,27 +194,16 @@ class SweepAnswer(Answer):
     links: dict[str, str]
 
     @classmethod
-    def values(cls, row: SweepRow, contacts: Sequence[ContactValues]) -> dict[str, Any]:
+    def values(cls, row: Sweep, contacts: Sequence[ContactValues]) -> dict[str, Any]:
         """The fields of the answer for a row."""
-        peak = None
-        if row.peak is not None and row.peak_at is not None:
-            peak = Peak(value=row.peak, at=row.peak_at)
         return {
-            **{name: getattr(row, name) for name in cls.model_fields if name in _OF_SWEEPS},
+            **cls.shared(row),
             "job": row.job_id,
-            "scene": row.scene_name,
             "from_": row.from_value,
             "to": row.to_value,
-            "peak": peak,
             "contacts": {contact.name: _contact(contact) for contact in contacts},
             "links": {"self": f"/v1/sweeps/{row.id}", "job": f"/v1/jobs/{row.job_id}"},
         }
-
-    @classmethod
-    def of_rows(cls, rows: Sequence[SweepRow], repository: SweepRepository) -> list[Self]:
-        """The answers for several rows."""
-        contacts = repository.contacts([row.id for row in rows])
-        return [cls(**cls.values(row, contacts[row.id])) for row in rows]
 
 
 class SweepDetail(SweepAnswer):
@@ -195,11 +212,11 @@ class SweepDetail(SweepAnswer):
     arrays: dict[str, list[Any]]
 
     @classmethod
-    def load(cls, row: SweepRow, repository: SweepRepository) -> Self:
+    def load(cls, row: Sweep, repository: SweepRepository) -> Self:
         """The sweep of a row."""
         stored = repository.arrays(row.id)
         return cls(
-            **cls.values(row, repository.contacts([row.id])[row.id]),
+            **cls.values(row, repository.parts([row.id])[row.id]),
             arrays={name: _listed(decode(array)) for name, array in stored.items()},
         )
 
@@ -250,7 +267,7 @@ class VariableAnswer(Answer):
     high: float
 
 
-class DesignAnswer(Answer):
+class DesignAnswer(StoredAnswer):
     """A stored design; its id is that of its job."""
 
     id: str
@@ -275,16 +292,11 @@ class DesignAnswer(Answer):
     links: dict[str, str]
 
     @classmethod
-    def values(cls, row: DesignRow, variables: Sequence[VariableValues]) -> dict[str, Any]:
+    def values(cls, row: Design, variables: Sequence[VariableValues]) -> dict[str, Any]:
         """The fields of the answer for a row."""
-        peak = None
-        if row.peak is not None and row.peak_at is not None:
-            peak = Peak(value=row.peak, at=row.peak_at)
         return {
-            **{name: getattr(row, name) for name in cls.model_fields if name in _OF_DESIGNS},
+            **cls.shared(row),
             "id": row.job_id,
-            "scene": row.scene_name,
-            "peak": peak,
             "variables": {v.name: VariableAnswer(value=v.value, low=v.low, high=v.high) for v in variables},
             "links": {
                 "self": f"/v1/designs/{row.job_id}",
@@ -292,12 +304,6 @@ class DesignAnswer(Answer):
                 "sweeps": f"/v1/sweeps?job={row.job_id}",
             },
         }
-
-    @classmethod
-    def of_rows(cls, rows: Sequence[DesignRow], repository: DesignRepository) -> list[Self]:
-        """The answers for several rows."""
-        variables = repository.variables([row.job_id for row in rows])
-        return [cls(**cls.values(row, variables[row.job_id])) for row in rows]
 
 
 class DesignDetail(DesignAnswer):

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from service.db.models import NOBODY
-from service.db.repositories import SWEEP_SORTS, SweepFilter, SweepRepository, SweepRow
-from service.queue import cursors
+from service.db.repositories import SweepRepository
 from service.schemas.answers import SweepAnswer, SweepPage
+from service.schemas.stored_queries import Bound, StoredQuery, rows_of_page
 from service.settings.settings import Settings
 
-Bound = Annotated[float | None, Field(ge=-1e30, le=1e30)]
 Name = Annotated[str | None, Field(max_length=210)]
 Count = Annotated[int | None, Field(ge=0, le=10**9)]
 Sort = Literal[
@@ -20,23 +20,25 @@ Sort = Literal[
     "points", "-points", "harmonics", "-harmonics", "seconds", "-seconds",
 ]  # fmt: skip
 
-_RANGES = ("peak", "peak_at", "band_hz", "points", "seconds")
-_CONTACT_RANGES = ("N0", "N1", "kt", "mu")
-_EQUAL = {
-    "owner": "owner",
-    "scene": "scene_name",
-    "scene_hash": "scene_hash",
-    "parameter": "parameter",
-    "harmonics": "harmonics",
-    "job": "job_id",
-    "completed": "completed",
-}
 
-
-class SweepQuery(BaseModel):
+class SweepQuery(StoredQuery):
     """Which sweeps to list. `…_min` and `…_max` are inclusive; `-` before a sort means largest first."""
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+    path: ClassVar[str] = "/v1/sweeps"
+    equal: ClassVar[Mapping[str, str]] = {
+        "owner": "owner",
+        "scene": "scene_name",
+        "scene_hash": "scene_hash",
+        "parameter": "parameter",
+        "harmonics": "harmonics",
+        "job": "job_id",
+        "completed": "completed",
+    }
+    ranges: ClassVar[Mapping[str, str]] = {
+        name: name for name in ("peak", "peak_at", "band_hz", "points", "seconds")
+    }
+    part: ClassVar[str] = "contact"
+    part_ranges: ClassVar[Mapping[str, str]] = {name: name for name in ("N0", "N1", "kt", "mu")}
 
     owner: Name = Field(default=None, description="For keys with the scope admin: whose.")
     scene: Name = None
@@ -68,22 +70,6 @@ class SweepQuery(BaseModel):
     limit: int = Field(default=100, ge=1, le=10_000)
     cursor: str | None = Field(default=None, max_length=500)
 
-    def to_filter(self, sees: str | None = NOBODY) -> SweepFilter:
-        """The query of the repository; of what belongs to `sees`, or to everybody (None)."""
-        equal = {column: getattr(self, name) for name, column in _EQUAL.items()}
-        return SweepFilter(
-            owner=sees,
-            equal={column: value for column, value in equal.items() if value is not None},
-            ranges={name: self._range(name) for name in _RANGES},
-            contact_ranges={n: self._range(n) for n in _CONTACT_RANGES if self._range(n) != (None, None)},
-            contact=self.contact,
-            sort=self.sort.removeprefix("-"),
-            descending=self.sort.startswith("-"),
-        )
-
-    def _range(self, name: str) -> tuple[float | None, float | None]:
-        return getattr(self, f"{name}_min"), getattr(self, f"{name}_max")
-
 
 def sweep_page(
     repository: SweepRepository, query: SweepQuery, settings: Settings, sees: str | None = NOBODY
@@ -95,17 +81,5 @@ def sweep_page(
     InvalidRequestError
         If the cursor is not one of this service.
     """
-    limit = min(query.limit, settings.page_limit)
-    after = None if query.cursor is None else cursors.decode(query.cursor)
-    rows = repository.page(query.to_filter(sees), limit + 1, after)
-    shown, more = rows[:limit], len(rows) > limit
-    return SweepPage(
-        items=SweepAnswer.of_rows(shown, repository),
-        next=_next_link(query, shown[-1]) if more else None,
-    )
-
-
-def _next_link(query: SweepQuery, last: SweepRow) -> str:
-    name = query.sort.removeprefix("-")
-    value = getattr(last, name) if name in SWEEP_SORTS else None
-    return cursors.next_link("/v1/sweeps", query, value, last.id)
+    rows, following = rows_of_page(repository, query, settings, sees)
+    return SweepPage(items=SweepAnswer.of_rows(rows, repository), next=following)

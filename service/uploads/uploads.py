@@ -16,10 +16,10 @@ from service.auth.storage import Storage
 from service.db.repositories.uploads import UploadRepository, UploadRow
 from service.errors import InvalidRequestError, NotFoundError, UnreadableUploadError
 from service.jobs.common.scenes import UPLOAD
-from service.jobs.strict_json import digest, pointer
+from service.jobs.strict_json import digest
 from service.settings.settings import Settings
 from service.uploads.inspection import contents, look_at, resolved_structure
-from solver.errors import Issue
+from solver.errors import Issue, pointer
 
 _KEYS = ("M", "K", "C", "modes", "mapping")
 _KEPT = 4

@@ -15,13 +15,7 @@ from solver.jit.fourier import Integer
 from solver.jit.trig_polynomial import grid_size, grid_tables
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import reduce_model
-from solver.linear.contact_table import (
-    contact_table,
-    enough_samples,
-    law_numbers,
-    port_counts,
-    port_stiffnesses,
-)
+from solver.linear.contact_table import contact_set, contact_table, port_stiffnesses
 from solver.scene.annulus import check_in_annulus, written_out
 from solver.scene.harmonics import MOST_HARMONICS, forced_harmonics, kept_harmonics
 from solver.scene.scene import Scene
@@ -163,7 +157,7 @@ def for_parameter(balance: Balance, path: str, frequency_hz: float) -> Balance:
         system = _system(balance.scene, parameter, balance.system.ks, omega, balance.effects)
     else:
         system = balance.system._replace(
-            kind=int(parameter.kind), active=parameter.active, omega=omega,
+            kind=parameter.code, active=parameter.active, omega=omega,
             level_reference=_level(balance.scene), phase_reference=balance.scene.value("excitation.phase"),
         )  # fmt: skip
     return replace(balance, parameter=parameter, system=system)
@@ -203,21 +197,18 @@ def _system(
     """Put the arrays of the compiled loops together."""
     model = linear_model(scene)
     derivative = structure_derivative(scene, parameter.name) if parameter.kind is Kind.STRUCTURE else None
-    contacts = enough_samples(contact_table(scene), law_numbers(scene), int(ks[-1]))
     reduced = reduce_model(
         model, ks, port_stiffnesses(scene, model), derivative, whole_matrices=effects.whole_matrices
     )  # fmt: skip
     highest = max(int(ks[-1]), 1)
     cos_table, sin_table = grid_tables(grid_size(highest), highest)
-    ports = port_counts(scene)
     return System(
         ks=ks, load_ks=np.arange(2, dtype=np.int64), which=reduced.which, cos_table=cos_table,
-        sin_table=sin_table, laws=law_numbers(scene), first_port=np.append(0, np.cumsum(ports)),
-        first_block=np.append(0, np.cumsum(ports**2)), owner=np.repeat(np.arange(ports.size), ports),
-        contacts=contacts, samples=0, condense=0 if effects.every_contact else 1,
+        sin_table=sin_table, **contact_set(scene)._asdict(), contacts=contact_table(scene, int(ks[-1])),
+        samples=0, condense=0 if effects.every_contact else 1,
         least_size=reduced.least_size,
         active=parameter.active, shift=reduced.shift, loose=reduced.loose, hold=0,
-        kind=int(parameter.kind), omega=omega,
+        kind=parameter.code, omega=omega,
         level_reference=_level(scene), phase_reference=scene.value("excitation.phase"),
         parameter_reference=scene.value(parameter.path) if derivative is not None else 0.0,
         form=reduced.form, eigenvalues=reduced.eigenvalues, dampings=reduced.dampings,

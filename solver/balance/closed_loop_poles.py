@@ -16,17 +16,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.balance.balance import Balance
 from solver.balance.kernels.poles import spring_poles
 from solver.balance.parameter import Kind
-from solver.contacts.kernels.columns import COULOMB
 from solver.contacts.kernels.system import DENSE, MODES, POLES, System, by_reference
 from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
+
+if TYPE_CHECKING:
+    from solver.balance.balance import Balance
 
 # Modes that are kept of a large structure: those nearest to the frequencies looked at.
 MOST_MODES = 160
@@ -109,7 +111,7 @@ class ClosedLoop:
         """
         free, stuck = self.free, self.stuck
         half_width = np.minimum(free.half_width, stuck.half_width)
-        if not np.all(self.system.laws == COULOMB):
+        if not np.all(self.system.jenkins == 1):
             return np.zeros_like(free.at), np.full_like(free.at, np.inf), half_width
         return free.at, np.maximum(stuck.at, free.at), half_width
 

@@ -13,15 +13,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Parameter
-from solver.contacts.kernels.columns import COULOMB
+from solver.contacts.kernels.columns import KT, MU, N0, N1, PHASE, RATIO
 from solver.contacts.kernels.coulomb import contact_force
 from solver.contacts.kernels.coulomb_hessian import second_along
 from solver.contacts.kernels.stick_slip_events import FAILED, SEGMENT_COLUMNS, segment_capacity
-from solver.contacts.kernels.system import KT, LOAD_COEFFICIENTS, MU, N0, N1, PHASE, RATIO, System
+from solver.contacts.kernels.system import LOAD_COEFFICIENTS, System
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Integer, Real
-from solver.linear.contact_table import law_numbers
 from solver.scene.scene import Scene
 
 
@@ -80,8 +80,7 @@ def contact_forces(system: System, u: Real) -> ContactForces:
     """
     nc, n, m = system.laws.size, u.size // max(system.laws.size, 1), LOAD_COEFFICIENTS
     rows, U = system.contacts, u.reshape(nc, n)
-    cosine, sine = np.cos(rows[:, PHASE]), np.sin(rows[:, PHASE])
-    load = np.stack([rows[:, N0], rows[:, N1] * cosine, -rows[:, N1] * sine], axis=1)
+    _, load, _, _ = contact_values(system, 0.0, 0.0)
     F, dF_dU, dF_dN = np.empty((nc, n)), np.empty((nc, n, n)), np.empty((nc, n, m))
     dF_dkt, dF_dmu = np.empty((nc, n)), np.empty((nc, n))
     states, counts = np.zeros(nc, np.int64), np.zeros(nc, np.int64)
@@ -101,8 +100,7 @@ def contact_forces(system: System, u: Real) -> ContactForces:
 
 def check_laws(scene: Scene) -> None:
     """Raise SettingError if a contact is not elastic Coulomb friction under a given load."""
-    laws = law_numbers(scene)
-    others = [contact.name for contact, law in zip(scene.contacts, laws, strict=True) if law != COULOMB]
+    others = [contact.name for contact in scene.contacts if not contact.JENKINS]
     if others:
         wanted = f"has contacts with another law than coulomb ({', '.join(others)})"
         raise SettingError("scene", scene.name, f"{wanted}, so only its gradient is exact here")

@@ -12,7 +12,7 @@ from solver.balance.balance import Balance, build, with_harmonics
 from solver.contacts.kernels.system import System
 from solver.jit.fourier import Complex, Integer, Real
 from solver.jit.trig_polynomial import grid_size, grid_tables
-from solver.linear.contact_table import enough_samples
+from solver.linear.contact_table import contact_table
 from solver.scene.harmonics import MULTIPLES, kept_harmonics, spread
 from solver.scene.parts import CyclicStructure
 
@@ -28,7 +28,7 @@ def more_harmonics(balance: Balance, top: int, *, multiples: int = MULTIPLES) ->
     if system is None:
         return _rebuilt(balance, top)
     cos_table, sin_table = _tables(max(int(ks[-1]), 1))
-    contacts = enough_samples(system.contacts, system.laws, int(ks[-1]))
+    contacts = contact_table(balance.scene, int(ks[-1]))
     system = system._replace(cos_table=cos_table, sin_table=sin_table, contacts=contacts)
     return replace(balance, system=system, n_harmonics=top)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -13,58 +13,23 @@ from solver.contacts.kernels import system as kernel
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.scene.parameter_paths import has_parameter
-from solver.scene.scene import ElasticNormalContact, Scene
+from solver.scene.scene import Scene
 
 
 class Kind(IntEnum):
-    """What a parameter changes; the numbers are those of `solver.contacts.kernels.system` and `laws_columns`.
+    """What a parameter changes; the numbers are those of `solver.contacts.kernels.system`.
 
-    OWN_1 … OWN_9 are the columns of the contact table that each law uses as it likes.
+    CONTACTS stands for any column of the contact table, which `Parameter.column` says.
     """
 
     FREQUENCY = kernel.FREQUENCY
     LEVEL = kernel.LEVEL
     FORCE_PHASE = kernel.FORCE_PHASE
     STRUCTURE = kernel.STRUCTURE
-    NORMAL_LOAD = kernel.NORMAL_LOAD
-    LOAD_AMPLITUDE = kernel.LOAD_AMPLITUDE
-    LOAD_RATIO = kernel.LOAD_RATIO
-    LOAD_PHASE = kernel.LOAD_PHASE
-    STIFFNESS = kernel.STIFFNESS
-    FRICTION = kernel.FRICTION
-    OWN_1 = columns.OWN_KIND
-    OWN_2 = columns.OWN_KIND + 1
-    OWN_3 = columns.OWN_KIND + 2
-    OWN_4 = columns.OWN_KIND + 3
-    OWN_5 = columns.OWN_KIND + 4
-    OWN_6 = columns.OWN_KIND + 5
-    OWN_7 = columns.OWN_KIND + 6
-    OWN_8 = columns.OWN_KIND + 7
-    OWN_9 = columns.OWN_KIND + 8
+    CONTACTS = columns.COLUMN_KIND
 
 
-_CONTACT_KINDS = {
-    "N0": Kind.NORMAL_LOAD,
-    "N1": Kind.LOAD_AMPLITUDE,
-    "N1_ratio": Kind.LOAD_RATIO,
-    "N1_phase": Kind.LOAD_PHASE,
-    "kt": Kind.STIFFNESS,
-    "mu": Kind.FRICTION,
-    "kn": Kind(columns.OWN_KIND + columns.KN - columns.OWN),
-    "k": Kind(columns.OWN_KIND + columns.K_GAP - columns.OWN),
-    "gap": Kind(columns.OWN_KIND + columns.GAP - columns.OWN),
-    **{
-        f"a{j + 1}": Kind(columns.OWN_KIND + columns.A_1 + j - columns.OWN)
-        for j in range(columns.MOST_DEGREE)
-    },
-}
-_UNITS = {
-    "frequency": "Hz", "excitation.amplitude": "N", "excitation.phase": "rad", "N0": "N", "N1": "N",
-    "N1_ratio": "", "N1_phase": "rad", "kt": "N/m", "mu": "", "kn": "N/m", "k": "N/m", "gap": "m",
-    "a1": "N/m", **{f"a{j}": f"N/m^{j}" for j in range(2, columns.MOST_DEGREE + 1)},
-}  # fmt: skip
-# What means nothing below 0; a load amplitude may be negative (it is then in antiphase).
-_NOT_NEGATIVE = ("excitation.amplitude", "N0", "kt", "mu", "kn", "k")
+_UNITS = {"frequency": "Hz", "excitation.amplitude": "N", "excitation.phase": "rad"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,6 +44,8 @@ class Parameter:
         What it changes.
     active : (n_contacts,) array
         1.0 for the contacts it acts on, else 0.0.
+    column : int
+        Of the contact table, if it is a parameter of contacts.
     name : str
         Name of the structural parameter, else empty.
     unit : str
@@ -93,6 +60,12 @@ class Parameter:
     name: str
     unit: str
     least: float
+    column: int = 0
+
+    @property
+    def code(self) -> int:
+        """What λ is, as a number of the compiled loops."""
+        return int(self.kind) + self.column
 
     def inside(self, value: float) -> float:
         """Convert a user value to the one inside (Hz to rad/s)."""
@@ -138,26 +111,25 @@ def resolve(scene: Scene, path: str) -> Parameter:
     scene.check_path(path)
     nobody = np.zeros(len(scene.contacts))
     if path == "frequency":
-        return _parameter(path, Kind.FREQUENCY, nobody, path)
+        return _parameter(path, Kind.FREQUENCY, nobody)
     owner, _, key = path.rpartition(".")
     if owner == "excitation":
-        return _parameter(path, Kind.LEVEL if key == "amplitude" else Kind.FORCE_PHASE, nobody, path)
+        return _parameter(path, Kind.LEVEL if key == "amplitude" else Kind.FORCE_PHASE, nobody)
     if owner == "structure":
-        return _parameter(path, Kind.STRUCTURE, nobody, key, structural=True)
-    members = [contact for contact in scene.contacts if has_parameter(contact, owner, key)]
-    active = np.array([float(has_parameter(contact, owner, key)) for contact in scene.contacts])
-    # A rubbing contact may stand apart at rest.
-    apart = key == "N0" and all(isinstance(contact, ElasticNormalContact) for contact in members)
-    parameter = _parameter(path, _CONTACT_KINDS[key], active, key)
-    return replace(parameter, least=-math.inf) if apart else parameter
-
-
-def _parameter(path: str, kind: Kind, active: Real, key: str, *, structural: bool = False) -> Parameter:
+        return Parameter(
+            path=path, kind=Kind.STRUCTURE, active=nobody, name=key, unit="SI", least=0.0
+        )  # fmt: skip
+    acts = [has_parameter(contact, owner, key) for contact in scene.contacts]
+    members = [contact.PARAMETERS[key] for contact, mine in zip(scene.contacts, acts, strict=True) if mine]
+    if len({member.column for member in members}) > 1:
+        raise SettingError("path", path, "must be of contacts whose laws mean the same by it")
     return Parameter(
-        path=path,
-        kind=kind,
-        active=active,
-        name=key if structural else "",
-        unit="SI" if structural else _UNITS[key],
-        least=0.0 if structural or key in _NOT_NEGATIVE else -math.inf,
-    )
+        path=path, kind=Kind.CONTACTS, active=np.array(acts, dtype=np.float64), name="", unit=members[0].unit,
+        least=max(member.least for member in members), column=members[0].column,
+    )  # fmt: skip
+
+
+def _parameter(path: str, kind: Kind, active: Real) -> Parameter:
+    """A parameter of the run or the forces; an amplitude means nothing below 0."""
+    least = 0.0 if kind is Kind.LEVEL else -math.inf
+    return Parameter(path=path, kind=kind, active=active, name="", unit=_UNITS[path], least=least)

@@ -10,8 +10,8 @@ import numpy as np
 from solver.balance.balance import Balance
 from solver.balance.parameter import Kind, Parameter, resolve
 from solver.balance.simplifications import even_harmonics_reason
-from solver.contacts.kernels.columns import COLUMNS, OWN, OWN_KIND
-from solver.contacts.kernels.system import KT, LOAD_COEFFICIENTS, MODES, MU, N0, N1, PHASE, RATIO
+from solver.contacts.kernels.columns import COLUMNS, N0, N1, PHASE, RATIO
+from solver.contacts.kernels.system import LOAD_COEFFICIENTS, MODES
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model, structure_derivative
@@ -19,11 +19,6 @@ from solver.linear.condensation import reduce_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.scene.parameter_paths import PROPORTIONAL
 from solver.scene.scene import MatricesStructure
-
-_COLUMNS = {
-    Kind.NORMAL_LOAD: N0, Kind.LOAD_AMPLITUDE: N1, Kind.LOAD_RATIO: RATIO, Kind.LOAD_PHASE: PHASE,
-    Kind.STIFFNESS: KT, Kind.FRICTION: MU,
-}  # fmt: skip
 
 
 def resolved(balance: Balance, paths: Sequence[str]) -> tuple[Parameter, ...]:
@@ -59,14 +54,13 @@ def contact_slopes(balance: Balance, parameters: Sequence[Parameter]) -> tuple[R
     loads = np.zeros((len(parameters), rows.shape[0], LOAD_COEFFICIENTS))
     for slope, load, parameter in zip(slopes, loads, parameters, strict=True):
         acts = parameter.active > 0.0
-        kind = parameter.kind
         if not acts.any():
             continue
-        column = _COLUMNS[kind] if kind < OWN_KIND else OWN + kind - OWN_KIND
+        column = parameter.column
         slope[acts, column] = 1.0
-        if kind is Kind.NORMAL_LOAD:
+        if column == N0:
             slope[:, N1] = np.nan_to_num(rows[:, RATIO]) * slope[:, N0]
-        elif kind is Kind.LOAD_RATIO:
+        elif column == RATIO:
             slope[:, N1] = rows[:, N0] * slope[:, RATIO]
         cosine, sine = np.cos(rows[:, PHASE]), np.sin(rows[:, PHASE])
         load[:, 0] = slope[:, N0]

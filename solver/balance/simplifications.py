@@ -14,16 +14,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 
 from solver.errors import SettingError
-from solver.scene.scene import (
-    AnyContact,
-    ElasticNormalContact,
-    FrictionContact,
-    GapSpring,
-    PolynomialSpring,
-    Scene,
-)
-
-_POWERS = tuple(f"a{power}" for power in range(1, 10))
+from solver.scene.parameter_paths import changed_quantities
+from solver.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +74,7 @@ def even_harmonics_reason(scene: Scene, paths: Iterable[str] = ()) -> str | None
     paths : parameters that will be changed or differentiated by; a load amplitude breaks the symmetry.
     """
     for contact in scene.contacts:
-        reason = _breaks_symmetry(contact) or _not_the_only_one(contact)
+        reason = contact.answers_unlike or contact.several_responses
         if reason is not None:
             return reason
     for force in scene.excitation:
@@ -90,10 +82,9 @@ def even_harmonics_reason(scene: Scene, paths: Iterable[str] = ()) -> str | None
             kind = "static" if force.harmonic == 0 else f"of harmonic {force.harmonic}"
             return f"the force on {force.dof} is {kind}"
     for path in paths:
-        if path.endswith((".N1", ".N1_ratio")):
-            return f"{path} changes the variation of a normal load"
-        if path.rpartition(".")[2] in _POWERS:
-            return f"{path} changes a power of the motion"
+        for quantity in changed_quantities(scene, path):
+            if quantity.unlike_half_waves:
+                return f"{path} {quantity.unlike_half_waves}"
     return None
 
 
@@ -102,36 +93,8 @@ def breaks_symmetry(scene: Scene, paths: Iterable[str] = ()) -> bool:
 
     Without that a half-wave symmetric response is always one of the responses, if perhaps not the only one.
     """
-    if any(_breaks_symmetry(contact) is not None for contact in scene.contacts):
+    if any(contact.answers_unlike is not None for contact in scene.contacts):
         return True
     if any(force.harmonic % 2 == 0 for force in scene.excitation):
         return True
-    return any(path.endswith((".N1", ".N1_ratio", ".a2", ".a4", ".a6", ".a8")) for path in paths)
-
-
-def _not_the_only_one(contact: AnyContact) -> str | None:
-    """Return why a half-wave symmetric response need not be the only one, or None.
-
-    Friction and springs of a constant stiffness never let two responses move apart. A spring that stiffens
-    or softens does, with the inertia, though its force is odd: m = k = a3 = 1, c = 0.2, F = 15 has at
-    ω = 1.6 rad/s a symmetric response that is not stable, and two with a mean that are.
-    """
-    if not isinstance(contact, PolynomialSpring):
-        return None
-    first, *others = contact.coefficients
-    if any(others):
-        return f"the stiffness of {contact.name} changes with its motion, so other responses are possible"
-    return f"the stiffness of {contact.name} is negative" if first < 0.0 else None
-
-
-def _breaks_symmetry(contact: AnyContact) -> str | None:
-    """Return why a contact answers a motion and its negative differently, or None."""
-    if isinstance(contact, ElasticNormalContact):
-        return f"the normal load of {contact.name} moves with the parts"
-    if isinstance(contact, FrictionContact) and contact.N1_value != 0.0:
-        return f"the normal load of {contact.name} varies by {abs(contact.N1_value):g} N"
-    if isinstance(contact, GapSpring):
-        return f"{contact.name} pushes on one side only"
-    if isinstance(contact, PolynomialSpring) and any(contact.coefficients[1::2]):
-        return f"{contact.name} has an even power of the motion"
-    return None
+    return any(quantity.breaks_symmetry for path in paths for quantity in changed_quantities(scene, path))

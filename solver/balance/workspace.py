@@ -13,7 +13,6 @@ from solver.balance.kernels.locate import slope_by_parameter
 from solver.balance.kernels.newton import from_stuck, ladder, newton
 from solver.balance.kernels.output import MEASURES
 from solver.balance.kernels.residual import evaluate
-from solver.contacts.kernels.columns import ELASTIC_NORMAL, GAP_SPRING
 from solver.contacts.kernels.system import (
     UNHELD,
     Evaluation,
@@ -188,7 +187,7 @@ class Workspace:
         beyond = point.elastic * u[::n] - point.F[:, 0]
         away = bool(np.all((forces @ system.loose)[full] * beyond[full] <= 0.0))
         # A contact that opens and closes with the parts may hold the part elsewhere.
-        touches = np.isin(system.laws, (ELASTIC_NORMAL, GAP_SPRING))[system.owner]
+        touches = np.array([contact.OPENS for contact in self.balance.scene.contacts])[system.owner]
         away &= not np.any(system.loose[:, touches])
         return Drive(relative=relative, unheld=away and bool(full.any() or point.counts[UNHELD]))
 

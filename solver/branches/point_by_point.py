@@ -20,7 +20,6 @@ import numpy as np
 
 from solver.balance.balance import Balance
 from solver.balance.workspace import Workspace
-from solver.contacts.kernels.columns import COULOMB, COULOMB_BOX, COULOMB_PLANE
 from solver.contacts.kernels.system import DENSE, MODES
 from solver.continuation.branch import BranchStatus
 from solver.continuation.segment import Stretch
@@ -40,7 +39,7 @@ _STRETCH = 64
 def is_unique(balance: Balance) -> bool:
     """Return whether every value of the parameter has one response: given loads, nothing that feeds it."""
     system = balance.system
-    if not {COULOMB, COULOMB_BOX, COULOMB_PLANE}.issuperset(system.laws.tolist()):
+    if not all(contact.load_is_given for contact in balance.scene.contacts):
         return False
     if system.form == DENSE:
         return all(_dissipates(C) for C in system.C)

@@ -17,6 +17,7 @@ from solver.contacts.kernels.stick_slip_events import (
     SLIP,
     segment_capacity,
 )
+from solver.contacts.laws.parts import Motion
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.jit.trig_polynomial import grid_size, grid_tables
@@ -64,6 +65,15 @@ def shares_of(*found: Segments) -> Shares:
             slipping |= inside & (row[MOTION] == SLIP)
     slip, contact = float(lengths[slipping].sum()), float(lengths[touching].sum())
     return Shares(stick=contact - slip, slip=slip, separation=1.0 - contact)
+
+
+def motion_at(found: Segments, tau: Real) -> list[Motion]:
+    """Return what a slider does at every angle."""
+    motion = np.full(tau.size, Motion.SEPARATION)
+    for row in found.rows:
+        inside = (tau - row[BEGIN]) % _TURN <= row[END] - row[BEGIN]
+        motion[inside] = Motion.SLIP if row[MOTION] == SLIP else Motion.STICK
+    return motion.tolist()
 
 
 def sampled_shares(motions: Real, load: Real, kt: float, mu: float, samples: int) -> Shares:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.balance.workspace import Workspace
-from solver.contacts.kernels.system import KT
+from solver.contacts.kernels.columns import KT
 from solver.continuation.kernels import state as walk_states
 from solver.continuation.kernels.pseudo_arclength import begin_walk
 from solver.continuation.kernels.state import Control, walk_by_value

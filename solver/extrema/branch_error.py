@@ -23,7 +23,6 @@ from solver.balance.kernels.output import MAX_ABS
 from solver.balance.more_harmonics import more_harmonics, pad
 from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
-from solver.contacts.kernels.columns import COULOMB
 from solver.contacts.kernels.system import DENSE, MODES
 from solver.continuation.branch import Peak
 from solver.extrema.driven import Way, may_exceed
@@ -199,7 +198,7 @@ class _Look:
     def _suspects(self, reached: float) -> list[int]:
         """Return the numbers of the harmonics that may reach above `reached` at a resonance."""
         system, points = self._loop.system, self._points
-        if system.form == DENSE or not bool(np.all(system.laws == COULOMB)):
+        if system.form == DENSE or not bool(np.all(system.jenkins == 1)):
             return [int(i) for i in self._beyond]
         larger, nc = self._larger, self._larger.balance.n_ports
         rows = self._wide_rows(_chosen(points, _FEW_SAMPLES))

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.balance.kernels.linearised_contacts import forces_at, linearise
-from solver.extrema.nodes import Node, NodeSolver
 from solver.jit.fourier import Complex, Integer, Real, cosine_position
+
+if TYPE_CHECKING:
+    from solver.extrema.nodes import Node, NodeSolver
 
 _UNKNOWN = -2  # row of a node whose stiffness was not asked for
 

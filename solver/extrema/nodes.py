@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,6 @@ from solver.balance.kernels.output import (
     SLOPE,
     measure,
 )
-from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import evaluation_by_value
 from solver.continuation.folds import OnBranch
 from solver.extrema.kernels import intervals
@@ -32,6 +31,9 @@ from solver.extrema.kernels.intervals import look_between, middles_between
 from solver.extrema.kernels.state_changes import locate_change
 from solver.extrema.node_table import NodeTable
 from solver.jit.fourier import Integer, Real
+
+if TYPE_CHECKING:
+    from solver.balance.workspace import Workspace
 
 MOST_ITERATIONS = 12
 MOST_TRIALS = 120

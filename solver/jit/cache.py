@@ -3,7 +3,8 @@
 Numba looks only at the file a function stands in, so a caller would go on using the old machine code of a
 callee that changed in another file. The folder is therefore named by a hash of every kernel source: change
 one and all are compiled anew. Nothing else is asked of them, so that all copies of the same sources, wherever
-they lie and whenever they were written, share one folder.
+they lie and whenever they were written, share one folder. The machine code of kernels from outside the
+package lies there too; it is that of one state of the file they stand in.
 
 Numba writes its index without a lock: of two processes that save at once, one may lose its entry, or find the
 machine code of the other under its own. Here one saves at a time, and none reads meanwhile.
@@ -82,20 +83,23 @@ def _locked(*, alone: bool) -> Iterator[None]:
 
 
 class _Locator(caching._CacheLocator):
-    """Tells Numba the folder, and that the machine code there is never out of date."""
+    """Tells Numba the folder, and when the machine code there is out of date."""
 
-    def __init__(self, line: int) -> None:
-        self._line = line
+    def __init__(self, line: int, stamp: str) -> None:
+        self._line, self._stamp = line, stamp
 
     @classmethod
-    def from_function(cls, function: Any, _file: str) -> _Locator:
-        return cls(function.__code__.co_firstlineno)
+    def from_function(cls, function: Any, file: str) -> _Locator:
+        stamp = "named by its sources"
+        if not function.__module__.startswith("solver."):
+            stamp = hashlib.sha256(Path(file).read_bytes()).hexdigest()
+        return cls(function.__code__.co_firstlineno, stamp)
 
     def get_cache_path(self) -> str:
         return CACHE_FOLDER
 
     def get_source_stamp(self) -> str:
-        return "named by its sources"
+        return self._stamp
 
     def get_disambiguator(self) -> str:
         return str(self._line)

@@ -66,8 +66,11 @@ class _Apart:
 
     def name(self, form: Any) -> bytes:
         """Return a name for the kernel with these types, by which any process finds it."""
-        function = self._kernel.py_func
-        return pickle.dumps((function.__module__, function.__name__, tuple(form.args), form.return_type))
+        return kernel_name(self, form)
+
+    def under(self, form: Any) -> tuple[bytes, ...]:
+        """Return the names of the kernels that a call of it may need: its own."""
+        return (self.name(form),)
 
     def result_of(self, arguments: tuple[types.Type, ...]) -> types.Type:
         """Return the type of the result; the kernel is compiled only where its annotation does not say."""
@@ -119,10 +122,15 @@ def apart(function: _Function) -> _Function:
 
 
 def _call(context: Any, builder: Any, form: Any, arguments: Any, kernel: _Apart) -> Any:
-    """Emit the call of a kernel by the address in its slot, which is filled if it is empty."""
-    name = kernel.name(form)
-    if _watcher is not None:
-        _watcher.called(name)
+    """Emit the call of a kernel by the address in its slot."""
+    return call_at(context, builder, loaded(context, builder, kernel, form), form, arguments)
+
+
+def loaded(context: Any, builder: Any, kernel: Any, form: Any) -> Any:
+    """Emit the load of the address in a kernel's slot, which is filled if it is empty."""
+    name = kernel_name(kernel, form)
+    for called in kernel.under(form):
+        announce(called)
     slot = _slot(builder.module, f"{kernel.__name__}.{zlib.crc32(name):08x}")
     address = builder.load_atomic(slot, "acquire", 8)
     filled = cgutils.alloca_once_value(builder, address)
@@ -133,12 +141,28 @@ def _call(context: Any, builder: Any, form: Any, arguments: Any, kernel: _Apart)
             context.call_conv.return_user_exc(builder, RuntimeError, (reason,))
         builder.store_atomic(found, slot, "release", 8)
         builder.store(found, filled)
+    return builder.load(filled)
+
+
+def call_at(context: Any, builder: Any, address: Any, form: Any, arguments: Any) -> Any:
+    """Emit the call of the kernel at an address; what it raises is raised on."""
     made = context.call_conv.get_function_type(form.return_type, form.args)
-    callee = builder.inttoptr(builder.load(filled), made.as_pointer())
+    callee = builder.inttoptr(address, made.as_pointer())
     status, result = context.call_conv.call_function(builder, callee, form.return_type, form.args, arguments)
     with cgutils.if_unlikely(builder, status.is_error):
         context.call_conv.return_status_propagate(builder, status)
     return result
+
+
+def kernel_name(kernel: Any, form: Any) -> bytes:
+    """Return a name for a kernel with these types, by which any process finds it."""
+    return pickle.dumps((kernel.__module__, kernel.__name__, tuple(form.args), form.return_type))
+
+
+def announce(name: bytes) -> None:
+    """Tell who watches that a call of a kernel was compiled."""
+    if _watcher is not None:
+        _watcher.called(name)
 
 
 def _slot(module: Any, name: str) -> Any:
@@ -185,14 +209,18 @@ def make(name: bytes) -> int:
     return _addresses[name]
 
 
+def made_address(name: bytes) -> int:
+    """Return the address of a kernel about to be called; as `make`, but whoever makes it is awaited."""
+    if _watcher is not None and name not in _addresses:
+        _watcher.needed(name)
+    return make(name)
+
+
 @ctypes.CFUNCTYPE(ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64)
 def _address_of(text: int, size: int) -> int:
     """Return the address that machine code asks for, or 0 after the reason was printed."""
     try:
-        name = ctypes.string_at(text, size)
-        if _watcher is not None and name not in _addresses:
-            _watcher.needed(name)
-        return make(name)
+        return made_address(ctypes.string_at(text, size))
     except KeyboardInterrupt:
         # Nothing can be raised through machine code: its caller gets an error, and the interrupt with it.
         _thread.interrupt_main()

@@ -1,31 +1,53 @@
-"""The contacts of a scene as the compiled loops read them: a law's number and a row of numbers each."""
+"""The contacts of a scene as the compiled loops read them: rows of numbers, kernels, ports."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from solver.contacts.kernels import columns
-from solver.contacts.kernels.system import KT, MU, N0, N1, PHASE, RATIO
+from solver.contacts.kernels.laws import law_number
 from solver.jit.fourier import Integer, Real
 from solver.linear.assembly import LinearModel
-from solver.scene.scene import (
-    AnyContact,
-    ElasticNormalContact,
-    FrictionContact,
-    GapSpring,
-    PlanarContact,
-    PolynomialSpring,
-    Scene,
-)
-
-DEFAULT_SAMPLES = 512
+from solver.scene.scene import Scene
 
 
-def law_numbers(scene: Scene) -> Integer:
-    """Return the law of every contact, (n_contacts,), as `solver.contacts.kernels.columns` numbers them."""
-    return np.array([_law(contact) for contact in scene.contacts], dtype=np.int64)
+class ContactSet(NamedTuple):
+    """What the contacts of a scene are to the compiled loops; see `solver.contacts.kernels.system.System`."""
+
+    laws: Integer
+    jenkins: Integer
+    normal_port: Integer
+    first_port: Integer
+    first_block: Integer
+    owner: Integer
+    rubs: Integer
+    held: Integer
+
+
+def contact_set(scene: Scene) -> ContactSet:
+    """Return the kernels and ports of all contacts; a kernel that never ran in this process is loaded."""
+    contacts, ports = scene.contacts, port_counts(scene)
+    first = np.append(0, np.cumsum(ports))
+    normal = [
+        -1 if contact.NORMAL_PORT is None else begin + contact.NORMAL_PORT
+        for contact, begin in zip(contacts, first.tolist(), strict=False)
+    ]
+    rubs = np.zeros(first[-1], dtype=np.int64)
+    for contact, (begin, _) in zip(contacts, pairwise(first.tolist()), strict=True):
+        if contact.friction is not None:
+            rubs[[begin + port for port in contact.RUBBING]] = 1
+    held = [tuple(port) for contact in contacts for port in contact.HELD]
+    return ContactSet(
+        laws=np.array([law_number(contact.kernel) for contact in contacts], dtype=np.int64),
+        jenkins=np.array([contact.JENKINS for contact in contacts], dtype=np.int64),
+        normal_port=np.array(normal, dtype=np.int64), first_port=first,
+        first_block=np.append(0, np.cumsum(ports**2)), owner=np.repeat(np.arange(ports.size), ports),
+        rubs=rubs, held=np.array(held, dtype=np.int64).reshape(-1, 3),
+    )  # fmt: skip
 
 
 def port_counts(scene: Scene) -> Integer:
@@ -33,12 +55,15 @@ def port_counts(scene: Scene) -> Integer:
     return np.array([len(contact.pairs) for contact in scene.contacts], dtype=np.int64)
 
 
-def contact_table(scene: Scene) -> Real:
-    """Return the rows of all contacts, (n_contacts, COLUMNS); a load that is not tied has a ratio NaN."""
+def contact_table(scene: Scene, highest: int) -> Real:
+    """Return the rows of all contacts, (n_contacts, COLUMNS), for harmonics up to `highest`.
+
+    A load that is not tied has a ratio NaN.
+    """
     table = np.zeros((len(scene.contacts), columns.COLUMNS))
-    table[:, RATIO] = math.nan
+    table[:, columns.RATIO] = math.nan
     for row, contact in zip(table, scene.contacts, strict=True):
-        _fill(row, contact)
+        contact.fill(row, highest)
     return table
 
 
@@ -47,42 +72,3 @@ def port_stiffnesses(scene: Scene, model: LinearModel) -> Real:
     own = np.array([k for contact in scene.contacts for k in contact.stiffnesses], dtype=np.float64)
     largest = float(np.abs(model.K0).max(initial=0.0))
     return np.where(own > 0.0, own, largest if largest > 0.0 else 1.0)
-
-
-def _law(contact: AnyContact) -> int:
-    if isinstance(contact, PlanarContact):
-        return columns.COULOMB_BOX if contact.limit == "box" else columns.COULOMB_PLANE
-    known: dict[type[AnyContact], int] = {
-        ElasticNormalContact: columns.ELASTIC_NORMAL,
-        GapSpring: columns.GAP_SPRING,
-        PolynomialSpring: columns.POLYNOMIAL,
-    }
-    return known.get(type(contact), columns.COULOMB)
-
-
-def _fill(row: Real, contact: AnyContact) -> None:
-    if isinstance(contact, FrictionContact):
-        row[KT], row[MU], row[N0], row[N1] = contact.kt, contact.mu, contact.N0, contact.N1_value
-        row[RATIO] = math.nan if contact.N1_ratio is None else contact.N1_ratio
-        row[PHASE] = contact.N1_phase
-    if isinstance(contact, ElasticNormalContact):
-        row[columns.KN], row[columns.PRESTRESSED] = contact.kn, float(contact.prestressed)
-    elif isinstance(contact, PlanarContact):
-        row[columns.SAMPLES] = contact.samples or DEFAULT_SAMPLES
-    elif isinstance(contact, GapSpring):
-        row[columns.K_GAP], row[columns.GAP] = contact.k, contact.gap
-    elif isinstance(contact, PolynomialSpring):
-        row[columns.A_1 : columns.A_1 + columns.MOST_DEGREE] = contact.coefficients
-
-
-def enough_samples(table: Real, laws: Integer, highest: int) -> Real:
-    """Return the contact table with as many samples of circular limits as `highest` harmonics need.
-
-    Four for the shortest wave: with fewer it would be taken for a longer one.
-    """
-    few = (laws == columns.COULOMB_PLANE) & (table[:, columns.SAMPLES] < 4 * highest)
-    if not np.any(few):
-        return table
-    table = table.copy()
-    table[few, columns.SAMPLES] = 4 * highest
-    return table

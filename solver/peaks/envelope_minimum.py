@@ -13,13 +13,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
 
 from solver.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, Z
 from solver.jit.fourier import Real
-from solver.peaks.tracker import Tracker
+
+if TYPE_CHECKING:
+    from solver.peaks.tracker import Tracker
 
 NEAR_THE_TOP = 0.95  # share of the envelope from which a line may be the highest within a bracket
 SHARP = 1e-12  # of the range, where the search ends

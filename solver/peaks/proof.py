@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, OMEGA, Z
 from solver.jit.fourier import Real
 from solver.peaks.envelope_minimum import Lowest, flat, rows_at
-from solver.peaks.plateau import Plateau
 from solver.peaks.results import ActivePeak, Basin, ChosenBy, LeastPeak, TrackStatus
 from solver.peaks.track import Look
 from solver.peaks.tracker import Tracker
+
+if TYPE_CHECKING:
+    from solver.peaks.plateau import Plateau
 
 HIGHER = 1e-7  # relative height by which a sweep must exceed the lines to count as higher
 EQUAL = 1e-7  # relative distance within which peaks count as equally high

@@ -15,7 +15,6 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance.simplifications import Effects
-from solver.contacts.kernels.columns import COULOMB
 from solver.contacts.kernels.system import System, by_reference
 from solver.continuation.branch import Peak
 from solver.errors import SettingError
@@ -34,7 +33,6 @@ from solver.extrema.kernels.peak_continuation import (
 )
 from solver.extrema.kernels.peak_state import PAUSE, SIGN, SPENT, Summit, new_summit, summit_numbers
 from solver.jit.fourier import Integer, Real
-from solver.linear.contact_table import law_numbers
 from solver.peaks.seeds import CROSSING, Crossing, Seed, crossings, entries, fitted, leavings, nearest, passes
 from solver.peaks.survey import SAME, Looking
 from solver.peaks.track import EVERYWHERE, Glance, Line, LineEnd, Look, Pace
@@ -71,8 +69,7 @@ def check_laws(scene: Scene) -> None:
     SettingError
         A contact that is not elastic Coulomb friction under a given load.
     """
-    laws = law_numbers(scene)
-    others = [contact.name for contact, law in zip(scene.contacts, laws, strict=True) if law != COULOMB]
+    others = [contact.name for contact in scene.contacts if not contact.JENKINS]
     if others:
         wanted = (
             f"has contacts with another law than coulomb ({', '.join(others)}), so its peaks are not tracked"

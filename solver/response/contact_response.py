@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
 
-import numpy as np
-
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import CLOSED, DEFORMING, TOUCHING
 from solver.contacts.kernels.stick_slip_events import LIFTING, SEPARATED, SLIPPING, STUCK
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.results.told import Piece
-from solver.scene.scene import AnyContact, ElasticNormalContact, FrictionContact, PlanarContact
+from solver.scene.scene import AnyContact
 
 
 class ContactState(Enum):
@@ -68,6 +66,8 @@ class ContactResponse(Piece):
     second_motion, second_force : (2H + 1,) array or None
         The other relative motion of the contact [m] and the force along it [N]: the normal one of a rubbing
         contact, or the second direction it slides in.
+    third_motion, third_force : (2H + 1,) array or None
+        Those of a law with three relative motions.
     utilisation : float
         max|f| / (μ N) of a stuck contact, 1 for one that slips, NaN for one that is separated throughout.
     """
@@ -80,16 +80,20 @@ class ContactResponse(Piece):
     utilisation: float
     second_motion: Real | None = None
     second_force: Real | None = None
+    third_motion: Real | None = None
+    third_force: Real | None = None
 
     @property
     def motions(self) -> tuple[Real, ...]:
         """Coefficients of all its relative motions [m]."""
-        return (self.slip,) if self.second_motion is None else (self.slip, self.second_motion)
+        every = (self.slip, self.second_motion, self.third_motion)
+        return tuple(motion for motion in every if motion is not None)
 
     @property
     def forces(self) -> tuple[Real, ...]:
         """Coefficients of the forces along them [N]."""
-        return (self.force,) if self.second_force is None else (self.force, self.second_force)
+        every = (self.force, self.second_force, self.third_force)
+        return tuple(force for force in every if force is not None)
 
 
 def contact_responses(workspace: Workspace, u: Real, p: float) -> tuple[ContactResponse, ...]:
@@ -106,31 +110,10 @@ def contact_responses(workspace: Workspace, u: Real, p: float) -> tuple[ContactR
     )
 
 
-def _load(contact: AnyContact, motions: Real) -> Real:
-    """Return the coefficients of N0 + N1 cos(τ + phase), and of kn v where the load moves with the parts."""
-    if not isinstance(contact, FrictionContact):
-        return np.zeros(3)
-    N1, phase = contact.N1_value, contact.N1_phase
-    load = np.array([contact.N0, N1 * math.cos(phase), -N1 * math.sin(phase)])
-    if isinstance(contact, ElasticNormalContact):
-        moving = contact.kn * motions[1]
-        load = np.pad(load, (0, max(moving.size - load.size, 0)))
-        load[: moving.size] += moving
-    return load
-
-
 def _contact(contact: AnyContact, state: int, motions: Real, forces: Real) -> ContactResponse:
-    load, utilisation = _load(contact, motions), 1.0
-    if state == STUCK and isinstance(contact, FrictionContact):
-        tau = np.linspace(0.0, 2.0 * np.pi, max(360, 8 * motions.shape[1]), endpoint=False)
-        limit = contact.mu * (fourier.basis(tau, (load.size - 1) // 2) @ load)
-        parts = np.abs(forces @ fourier.basis(tau, (motions.shape[1] - 1) // 2).T)
-        carried = parts[0]
-        if isinstance(contact, PlanarContact):
-            carried = parts.max(axis=0) if contact.limit == "box" else np.hypot(*parts)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            shares = np.where(carried > 0.0, carried / limit, 0.0)
-        utilisation = float(min(shares.max(), 1.0))
+    load, utilisation = contact.normal_load(motions), 1.0
+    if state == STUCK:
+        utilisation = contact.utilisation(forces, load)
     elif state == SEPARATED:
         utilisation = math.nan
     return ContactResponse(
@@ -138,4 +121,6 @@ def _contact(contact: AnyContact, state: int, motions: Real, forces: Real) -> Co
         utilisation=utilisation,
         second_motion=motions[1] if len(motions) > 1 else None,
         second_force=forces[1] if len(forces) > 1 else None,
+        third_motion=motions[2] if len(motions) > 2 else None,
+        third_force=forces[2] if len(forces) > 2 else None,
     )  # fmt: skip

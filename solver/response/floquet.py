@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,28 +10,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.contacts.kernels.state_durations import find_segments
-from solver.contacts.kernels.stick_slip_events import (
-    BEGIN,
-    END,
-    FAILED,
-    MOTION,
-    SEGMENT_COLUMNS,
-    STICK,
-    segment_capacity,
-)
+from solver.contacts.laws.parts import Piece
 from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
-from solver.jit.trig_polynomial import grid_size, grid_tables
 from solver.linear.assembly import linear_model
-from solver.response.monodromy import PERIOD, SHORTEST, Element, Monodromy, Piece, Structure, monodromy
+from solver.response.monodromy import PERIOD, Element, Monodromy, Structure, monodromy
 from solver.response.solution import Solution
 from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.annulus import annulus
-from solver.scene.scene import Contact, CyclicStructure, Scene
+from solver.scene.scene import CyclicStructure, Scene
 
 GROWS = 1e-9  # a multiplier's modulus beyond 1 that is more than rounding
 REAL = 1e-7  # imaginary part, relative to the modulus, that counts as none
@@ -185,12 +174,13 @@ def scene_monodromy(scene: Scene, frequency_hz: float, slips: Real) -> Monodromy
 
 def _pieces(scene: Scene, slips: Real) -> dict[str, tuple[Piece, ...]]:
     """The states of every contact; those of the next sector are the same a part of a period earlier."""
-    for contact in scene.contacts:
-        if not isinstance(contact, Contact):
+    own: dict[str, tuple[Piece, ...]] = {}
+    for contact, slip in zip(scene.contacts, slips, strict=True):
+        pieces = contact.pieces(slip)
+        if pieces is None:
             wanted = "must have contacts of the law coulomb only: the stability of others is not computed"
             raise SettingError("solution", contact.name, wanted)
-    coulomb = [contact for contact in scene.contacts if isinstance(contact, Contact)]
-    own = {c.name: coulomb_pieces(c, slip) for c, slip in zip(coulomb, slips, strict=True)}
+        own[contact.name] = pieces
     structure = scene.structure
     if not isinstance(structure, CyclicStructure):
         return own
@@ -209,34 +199,4 @@ def _earlier(piece: Piece, turn: float) -> Piece:
         tangent=piece.tangent,
         grip=piece.grip,
         catch=piece.catch,
-    )
-
-
-def coulomb_pieces(contact: Contact, slip: Real) -> tuple[Piece, ...]:
-    """The states of an elastic Coulomb contact in a given motion (full coefficients of its slip [m])."""
-    ks = fourier.all_harmonics((slip.size - 1) // 2)
-    top = max(int(ks[-1]), 1)
-    load = np.array(
-        [
-            contact.N0,
-            contact.N1_value * math.cos(contact.N1_phase),
-            -contact.N1_value * math.sin(contact.N1_phase),
-        ]
-    )
-    segments = np.zeros((segment_capacity(top), SEGMENT_COLUMNS))
-    tables = grid_tables(grid_size(top), top)
-    state, count = find_segments(
-        slip, ks, load, fourier.all_harmonics(1), contact.kt, contact.mu, *tables, segments
-    )
-    if state == FAILED:
-        raise SettingError(
-            "solution", contact.name, "must have a motion of every contact that can be followed"
-        )
-    stiff, none = np.array([[contact.kt]]), np.zeros((1, 1))
-    return tuple(
-        Piece(begin=row[BEGIN], end=row[END], tangent=stiff, grip=-stiff[0], catch=np.ones(1))
-        if row[MOTION] == STICK
-        else Piece(begin=row[BEGIN], end=row[END], tangent=none)
-        for row in segments[:count]
-        if row[END] - row[BEGIN] > SHORTEST
     )

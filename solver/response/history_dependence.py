@@ -34,6 +34,7 @@ from itertools import pairwise
 import numpy as np
 
 from solver.balance.workspace import Workspace
+from solver.contacts.laws.parts import Slider
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import LinearModel, linear_model
@@ -41,11 +42,9 @@ from solver.linear.contact_table import port_counts, port_stiffnesses
 from solver.linear.rigid_body_modes import CANCELLED
 from solver.matrices.normal_modes import least_stiffness
 from solver.response.contact_response import ContactResponse, ContactState
-from solver.response.force_history import force_at
 from solver.response.solution import Solution
 from solver.response.start_from_rest import Start, keeps_sticking
 from solver.response.time_history import all_coordinates
-from solver.scene.scene import AnyContact, ElasticNormalContact, FrictionContact, PlanarContact
 
 _TURN = 2.0 * math.pi
 # A force with a circular limit that differs from kt u + c by less, relative to it, has not slipped.
@@ -81,23 +80,13 @@ class History:
 class _Contact:
     """A contact that sticks all the time, its answer, and where it stands among the ports."""
 
-    given: FrictionContact
+    given: Slider
     found: ContactResponse
     ports: slice
 
-    @property
-    def moves_load(self) -> bool:
-        """Whether its normal motion changes its load."""
-        return isinstance(self.given, ElasticNormalContact)
-
-    @property
-    def boxed(self) -> bool:
-        """Whether each direction has its own limit."""
-        return isinstance(self.given, PlanarContact) and self.given.limit == "box"
-
     def forces(self, tau: Real) -> Real:
         """Return the friction force [N], (directions, n)."""
-        parts = self.found.forces[:1] if self.moves_load else self.found.forces
+        parts = [self.found.forces[port] for port in self.given.ports]
         return np.array([fourier.basis(tau, (part.size - 1) // 2) @ part for part in parts])
 
     def limit(self, tau: Real) -> Real:
@@ -108,19 +97,17 @@ class _Contact:
     def lost(self, moved: Real) -> float:
         """Return the most that motions of all ports up to `moved` [m] take of the room to the limit [N]."""
         away = moved[self.ports]
-        if isinstance(self.given, ElasticNormalContact):
-            return float(self.given.kt * away[0] + self.given.mu * self.given.kn * away[1])
-        return float(self.given.kt * self.size(away))
-
-    def size(self, forces: Real) -> Real:
-        """Return what counts against the limit of forces (directions, ...)."""
-        return np.asarray(np.abs(forces).max(axis=0) if self.boxed else np.sqrt((forces**2).sum(axis=0)))
+        given, normal = self.given, self.given.normal_port
+        lost = given.kt * given.size(away[list(given.ports)])
+        if normal is not None:
+            lost = lost + given.mu * given.normal_stiffness * away[normal]
+        return float(lost)
 
 
 def history_of(solution: Solution) -> History:
     """Return what a converged response does not say without its history."""
     sticking, scene = _sticking(solution), solution.scene
-    given = all(load_is_given(contact) for contact in scene.contacts)
+    given = all(contact.load_is_given for contact in scene.contacts)
     if not sticking:
         only = (solution.mean, solution.mean) if given else (math.nan, math.nan)
         return History(mean_open=False, half_range_open=False, mean_range=only)
@@ -139,17 +126,12 @@ def has_another_solution(workspace: Workspace, u: Real, p: float) -> bool:
     Under loads that are given, without gaps and nonlinear springs, there is one solution but for residual
     forces; else there may be several, of which this looks for one more: finding none proves nothing.
     """
-    if all(load_is_given(contact) for contact in workspace.balance.scene.contacts):
+    if all(contact.load_is_given for contact in workspace.balance.scene.contacts):
         return False
     other = workspace.solve(p, np.zeros_like(u))
     if not other.converged:
         return False
     return float(np.abs(other.u - u).max(initial=0.0)) > _ELSEWHERE * float(np.abs(u).max(initial=0.0))
-
-
-def load_is_given(contact: AnyContact) -> bool:
-    """Return whether a contact is friction whose load does not depend on the motion."""
-    return isinstance(contact, FrictionContact) and not isinstance(contact, ElasticNormalContact)
 
 
 def _sticking(solution: Solution) -> tuple[_Contact, ...]:
@@ -159,23 +141,21 @@ def _sticking(solution: Solution) -> tuple[_Contact, ...]:
     for contact, response, (begin, end) in zip(
         solution.scene.contacts, solution.contacts, pairwise(ends.tolist()), strict=True
     ):
-        if not isinstance(contact, FrictionContact) or not _sticks(contact, response):
-            continue
-        found.append(_Contact(given=contact, found=response, ports=slice(begin, end)))
+        if contact.friction is not None and _sticks(contact.friction, response):
+            found.append(_Contact(given=contact.friction, found=response, ports=slice(begin, end)))
     return tuple(found)
 
 
-def _sticks(contact: FrictionContact, response: ContactResponse) -> bool:
+def _sticks(slider: Slider, response: ContactResponse) -> bool:
     """Return whether a contact sticks all the time; a sampled one may graze its limit without any slip."""
     if response.state is ContactState.STUCK:
         return True
-    circular = isinstance(contact, PlanarContact) and contact.limit != "box"
-    if not circular or response.state is not ContactState.SLIPPING:
+    if not slider.sampled or response.state is not ContactState.SLIPPING:
         return False
-    pairs = zip(response.motions, response.forces, strict=True)
-    slips = [float(np.abs(force[1:] - contact.kt * u[1:]).max(initial=0.0)) for u, force in pairs]
-    largest = max(float(np.abs(force[1:]).max(initial=0.0)) for force in response.forces)
-    return max(slips) <= SLIPS * largest
+    motions, forces, ports = np.array(response.motions), np.array(response.forces), list(slider.ports)
+    slips = np.abs(forces[ports, 1:] - slider.kt * motions[ports, 1:])
+    largest = float(np.abs(forces[ports, 1:]).max(initial=0.0))
+    return float(slips.max(initial=0.0)) <= SLIPS * largest
 
 
 def _instants(solution: Solution) -> Real:
@@ -186,7 +166,7 @@ def _instants(solution: Solution) -> Real:
 def _sticks_from_rest(solution: Solution, sticking: tuple[_Contact, ...]) -> bool:
     """Return whether what sticks has certainly not slipped on the way from rest."""
     tau = _instants(solution)
-    room = [contact.limit(tau) - contact.size(contact.forces(tau)) for contact in sticking]
+    room = [contact.limit(tau) - contact.given.size(contact.forces(tau)) for contact in sticking]
     if any(np.any(each <= 0.0) for each in room):
         return False
     model = linear_model(solution.scene)
@@ -214,11 +194,11 @@ def _sticks_from_rest(solution: Solution, sticking: tuple[_Contact, ...]) -> boo
     return keeps_sticking(start, _Fits(sticking, angles), holds)
 
 
-def _most_lost(given: FrictionContact, distance: float, slip: float, approach: float) -> float:
+def _most_lost(given: Slider, distance: float, slip: float, approach: float) -> float:
     """Return the most that motion within a distance [J] takes of the room below the limit [N]."""
     lost = given.kt * math.sqrt(2.0 * distance * slip)
-    if isinstance(given, ElasticNormalContact):
-        lost += given.mu * given.kn * math.sqrt(2.0 * distance * approach)
+    if given.normal_port is not None:
+        lost += given.mu * given.normal_stiffness * math.sqrt(2.0 * distance * approach)
     return lost
 
 
@@ -251,12 +231,12 @@ class _Fits:
     @staticmethod
     def _sticks(moved: Real, contact: _Contact, limit: Real, forces: Real) -> bool:
         away = np.moveaxis(moved[:, :, contact.ports], 2, 0)
-        if isinstance(contact.given, ElasticNormalContact):
-            limit = limit + contact.given.mu * contact.given.kn * away[1]
-            away = away[:1]
-        change = contact.given.kt * away
+        given = contact.given
+        if given.normal_port is not None:
+            limit = limit + given.mu * given.normal_stiffness * away[given.normal_port]
+        change = given.kt * away[list(given.ports)]
         between = _BETWEEN * np.abs(change).max(axis=(0, 1), initial=0.0)
-        return not bool(np.any(contact.size(forces + change) + between >= limit))
+        return not bool(np.any(given.size(forces + change) + between >= limit))
 
 
 def _sector_turns(model: LinearModel) -> Complex:
@@ -319,15 +299,19 @@ def _in_sliders(solution: Solution, model: LinearModel, stiffness: Real) -> floa
     angles = np.arange(model.sectors, dtype=np.float64) * model.interblade_phase
     total = 0.0
     for contact, response, port in zip(solution.scene.contacts, solution.contacts, ends, strict=False):
-        if stiffness[port] > 0.0 or not isinstance(contact, FrictionContact):
+        given = contact.friction
+        if stiffness[port] > 0.0 or given is None:
             continue
         load = fourier.basis(angles, (response.load.size - 1) // 2) @ response.load
-        limits = (contact.mu * np.maximum(load, 0.0)) ** 2
-        if isinstance(contact, PlanarContact):
-            limits = limits * (2.0 if contact.limit == "box" else 1.0)
+        limits = (given.mu * np.maximum(load, 0.0)) ** 2
+        if len(given.ports) > 1:
+            limits = limits * (len(given.ports) if given.limits_apart else 1)
         else:
-            limits = np.minimum(limits, force_at(contact, response, angles % (2.0 * math.pi)) ** 2)
-        total += float(np.sum(limits)) / (2.0 * contact.kt)
+            motions = np.array(response.motions)
+            limits = np.minimum(
+                limits, contact.force_at(motions, response.load, angles % (2.0 * math.pi)) ** 2
+            )
+        total += float(np.sum(limits)) / (2.0 * given.kt)
     return total
 
 

@@ -24,43 +24,11 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import expm
 
+from solver.contacts.laws.parts import SHORTEST, Piece
 from solver.jit.fourier import Real
 
 PERIOD = 2.0 * math.pi
-SHORTEST = 1e-12  # rad; a state that lasts no longer does nothing
 INVARIANT = 1e-9  # smallest singular value, relative to the largest, of what resists a rigid displacement
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Piece:
-    """One state of a contact with m relative motions (ports), and how its force follows a perturbation.
-
-    Attributes
-    ----------
-    begin, end : float
-        When it lasts [rad]; `begin` may be any angle, and the end at most a period later.
-    tangent : (m, m) array
-        df/du [N/m].
-    grip : (m,) array or None
-        df/dw [N/m] of a slider that is held; None if there is none in this state.
-    catch : (m,) array or None
-        dw/du where the state begins; given together with `grip`.
-    """
-
-    begin: float
-    end: float
-    tangent: Real
-    grip: Real | None = None
-    catch: Real | None = None
-
-    @property
-    def lasts(self) -> float:
-        """Its duration [rad]."""
-        return self.end - self.begin
-
-    def holds_at(self, tau: float) -> bool:
-        """Whether it lasts at `tau`."""
-        return (tau - self.begin) % PERIOD < self.lasts or self.lasts >= PERIOD
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -25,7 +25,7 @@ from solver.linear.condensation import loose_ports
 from solver.response.contact_response import OPENS, ContactResponse, ContactState, contact_responses
 from solver.response.history_dependence import has_another_solution, history_of
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
-from solver.scene.scene import FrictionContact, Scene
+from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
@@ -140,7 +140,7 @@ def _nothing_holds_a_part(workspace: Workspace) -> bool:
     loose, kt = loose_ports(balance.scene)
     if not len(loose):
         return False
-    friction = np.array([isinstance(contact, FrictionContact) for contact in balance.scene.contacts])
+    friction = np.array([contact.friction is not None for contact in balance.scene.contacts])
     holds = (~friction | (point.states == STUCK))[balance.system.owner]
     held = (loose * (kt * holds)) @ loose.T
     return bool(np.linalg.eigvalsh(held)[0] < FREE)

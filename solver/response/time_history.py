@@ -16,7 +16,6 @@ from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import LinearModel, linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.linear.contact_table import port_stiffnesses
-from solver.response.force_history import force_at
 from solver.response.solution import Solution
 from solver.scene.validation import listing
 
@@ -70,7 +69,7 @@ def hysteresis_loop(solution: Solution, contact: str, *, samples: int = 512) -> 
     at = names.index(contact)
     given, found = solution.scene.contacts[at], solution.contacts[at]
     basis = fourier.basis(tau, solution.highest_harmonic)
-    return basis @ found.slip, force_at(given, found, tau)
+    return basis @ found.slip, given.force_at(np.array(found.motions), found.load, tau)
 
 
 def response(solution: Solution, k: int) -> Complex:

@@ -18,13 +18,11 @@ from solver.balance.kernels.residual import contact_values, evaluate
 from solver.balance.parameter import Kind
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.balance.workspace import Workspace
-from solver.contacts.kernels import columns
-from solver.contacts.kernels.system import KT, MU, System, by_reference, evaluation_by_value
-from solver.contacts.segments import Shares, sampled_shares, segments_of, shares_of
+from solver.contacts.kernels.system import System, by_reference, evaluation_by_value
+from solver.contacts.segments import Shares
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Real
-from solver.linear.contact_table import DEFAULT_SAMPLES
 from solver.linear.kernels.receptance import receptance
 from solver.response.solution import Solution
 from solver.response.wear_measures import Change, Cycle, friction_work, least_load, slip_travel
@@ -67,7 +65,7 @@ class ContactWear(Piece):
         Distance rubbed [m]; None of a law whose slider does not move on a line.
     shares : Shares or None
         Shares of the period in stick, slip and separation; a spring on one side sticks while it is closed.
-        None of a polynomial spring.
+        None of a law that knows no such.
     """
 
     name: str
@@ -210,23 +208,9 @@ def contact_index(balance: Balance, contact: str) -> int:
 
 
 def period_shares(cycle: Cycle, e: int) -> Shares | None:
-    """Return the shares of the period in stick, slip and separation; None of a polynomial spring."""
-    law, row, ports = int(cycle.balance.system.laws[e]), cycle.table[e], cycle.ports(e)
-    slips = cycle.full(cycle.U[ports.start : ports.stop])
-    if law == columns.POLYNOMIAL:
-        return None
-    if law == columns.GAP_SPRING:
-        # Closed where u − gap > 0: that is the load of a contact which does not slide.
-        opening = slips[0].copy()
-        opening[0] -= row[columns.GAP]
-        return shares_of(segments_of(np.zeros(opening.size), opening, 1.0, 1.0))
-    load = cycle.normal_load(e)
-    if law == columns.COULOMB_PLANE:
-        samples = int(row[columns.SAMPLES]) or DEFAULT_SAMPLES
-        return sampled_shares(slips, load, row[KT], row[MU], samples)
-    if law == columns.COULOMB_BOX:
-        return shares_of(*(segments_of(slip, load, row[KT], row[MU]) for slip in slips))
-    return shares_of(cycle.segments(e))
+    """Return the shares of the period in stick, slip and separation; None of a law that knows no such."""
+    contact, ports = cycle.balance.scene.contacts[e].at(cycle.table[e]), cycle.ports(e)
+    return contact.shares(cycle.full(cycle.U[ports.start : ports.stop]), cycle.normal_load(e))
 
 
 def _measured(found: tuple[float, Real]) -> Measured:

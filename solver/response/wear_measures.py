@@ -25,7 +25,7 @@ import numpy as np
 
 from solver.balance.balance import Balance
 from solver.balance.kernels.residual import contact_values
-from solver.contacts.kernels import columns
+from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SLIP,
     BEGAN,
@@ -39,22 +39,13 @@ from solver.contacts.kernels.stick_slip_events import (
     UNLOADED,
     largest,
 )
-from solver.contacts.kernels.system import KT, MU, Evaluation
+from solver.contacts.kernels.system import Evaluation
 from solver.contacts.segments import Segments, segments_of
 from solver.jit import fourier
 from solver.jit.fourier import Integer, Real
 from solver.jit.trig_polynomial import grid_size, grid_tables, on_grid
 
-# Relative motions of each law that rub; the other one of a rubbing contact is normal to its surface.
-_RUBBING: dict[int, tuple[int, ...]] = {
-    columns.COULOMB: (0,),
-    columns.ELASTIC_NORMAL: (0,),
-    columns.COULOMB_BOX: (0, 1),
-    columns.COULOMB_PLANE: (0, 1),
-}
 _ROUNDING = 1e-13  # of the terms of a sum that cancel
-# Laws whose slider moves on a line.
-_ON_A_LINE = (columns.COULOMB, columns.ELASTIC_NORMAL)
 
 
 class Change(NamedTuple):
@@ -116,23 +107,28 @@ class Cycle:
         """Return the coefficients (2 top + 1,) of the normal load of contact `e`, not cut at 0 [N]."""
         N = np.zeros(2 * self.top + 1)
         N[:3] = self.load[e]
-        if self.balance.system.laws[e] == columns.ELASTIC_NORMAL:
-            N += self.table[e, columns.KN] * self.full(self.U[self.ports(e)[1]])
+        normal = self.balance.system.normal_port[e]
+        if normal >= 0:
+            N += self.table[e, self._stiffness(normal)] * self.full(self.U[normal])
         return N
 
     def load_change(self, e: int, change: Change) -> Real:
         """Return the change of `normal_load`."""
         dN = np.zeros(2 * self.top + 1)
         dN[:3] = change.load[e]
-        if self.balance.system.laws[e] == columns.ELASTIC_NORMAL:
-            normal = self.ports(e)[1]
-            dN += change.row[e, columns.KN] * self.full(self.U[normal])
-            dN += self.table[e, columns.KN] * self.full(change.dU[normal])
+        normal = self.balance.system.normal_port[e]
+        if normal >= 0:
+            dN += change.row[e, self._stiffness(normal)] * self.full(self.U[normal])
+            dN += self.table[e, self._stiffness(normal)] * self.full(change.dU[normal])
         return dN
+
+    def _stiffness(self, port: int) -> int:
+        """Return the column of a port's stiffness."""
+        return int(self.balance.system.held[port, 0])
 
     def has_friction(self, e: int) -> bool:
         """Return whether contact `e` has a normal load and rubs."""
-        return int(self.balance.system.laws[e]) in _RUBBING
+        return self.balance.scene.contacts[e].friction is not None
 
     def segments(self, e: int) -> Segments:
         """Return what contact `e`, whose slider moves on a line, does over the period."""
@@ -147,7 +143,7 @@ def friction_work(cycle: Cycle, e: int, changes: Sequence[Change]) -> tuple[floa
     """
     work, slopes = 0.0, np.zeros(len(changes))
     system, ports = cycle.balance.system, cycle.ports(e)
-    for a in _RUBBING.get(int(system.laws[e]), ()):
+    for a in cycle.balance.scene.contacts[e].RUBBING:
         speed, force = _speed(cycle.U[ports[a]], system.ks), cycle.F[ports[a]]
         done = float(force @ speed)
         if abs(done) <= _ROUNDING * float(np.abs(force) @ np.abs(speed)):
@@ -197,8 +193,7 @@ def slip_travel(cycle: Cycle, e: int, changes: Sequence[Change]) -> tuple[float,
 
     None of a law whose slider does not move on a line.
     """
-    system = cycle.balance.system
-    if int(system.laws[e]) not in _ON_A_LINE:
+    if not cycle.balance.scene.contacts[e].slides_on_a_line:
         return None
     kt, mu, port = cycle.table[e, KT], cycle.table[e, MU], cycle.ports(e)[0]
     U, N = cycle.full(cycle.U[port]), cycle.normal_load(e)

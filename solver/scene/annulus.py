@@ -13,23 +13,18 @@ from typing import TypeVar
 from solver.errors import SettingError
 from solver.results.told import Piece
 from solver.scene.scene import (
-    AnyContact,
     ContactOfAnyLaw,
     CyclicStructure,
     Damper,
-    ElasticNormalContact,
     Excitation,
-    FrictionContact,
-    GapSpring,
     LumpedStructure,
     Mass,
     Observe,
-    PolynomialSpring,
     Scene,
     Spring,
     parse_end,
 )
-from solver.scene.validation import BETWEEN_KEYS, listing
+from solver.scene.validation import listing
 
 _JoinT = TypeVar("_JoinT", Spring, Damper)
 _NamedT = TypeVar("_NamedT", Spring, Damper, Mass)
@@ -84,7 +79,7 @@ def sectors_needed(scene: Scene) -> Extent:
         f"the disk is tuned and the excitation a travelling wave of engine order {order}: "
         f"one sector stands for all {n}"
     )
-    loose = [c.name for c in scene.contacts if not keeps_together(c)]
+    loose = [c.name for c in scene.contacts if not c.keeps_together]
     if not loose or n == 1:
         return Extent(sectors=1, reason=reason)
     reason += (
@@ -92,18 +87,6 @@ def sectors_needed(scene: Scene) -> Extent:
         "in that wave, and the wave be unstable; the effect every-sector solves all of them"
     )
     return Extent(sectors=1, reason=reason, assumed=True)
-
-
-def keeps_together(contact: AnyContact) -> bool:
-    """Return whether a contact never lets two motions under the same forces move apart.
-
-    Friction under a load that is given does not, nor does a spring of constant stiffness. One that closes,
-    stiffens or softens does, and so does friction whose load moves with the parts.
-    """
-    if isinstance(contact, PolynomialSpring):
-        first, *others = contact.coefficients
-        return first >= 0.0 and not any(others)
-    return not isinstance(contact, GapSpring | ElasticNormalContact)
 
 
 def written_out(scene: Scene, *, every_sector: bool = False) -> Scene:
@@ -241,8 +224,7 @@ def _placed(contacts: tuple[ContactOfAnyLaw, ...], j: int, n: int) -> tuple[Cont
     for contact in contacts:
         pairs = {
             key: (_end(pair[0], j, n), _end(pair[1], j, n))
-            for key in BETWEEN_KEYS
-            if (pair := getattr(contact, key, None)) is not None
+            for key, pair in zip(contact.END_KEYS, contact.pairs, strict=True)
         }
         joined = [ends for ends in pairs.values() if ends[0] != ends[1]]
         if joined and len(joined) < len(pairs):
@@ -268,11 +250,7 @@ def _contact(contact: ContactOfAnyLaw, j: int, turn: float, *, standing: bool) -
         "name": _in_sector(contact.name, j),
         "group": contact.group or contact.name,
     }
-    if isinstance(contact, FrictionContact) and standing:
-        share = _cosine(turn)
-        update |= {key: share * value for key in ("N1", "N1_ratio") if (value := getattr(contact, key))}
-    elif isinstance(contact, FrictionContact):
-        update["N1_phase"] = contact.N1_phase + turn
+    update |= contact.in_sector(turn, _cosine(turn) if standing else None)
     return contact.model_copy(update=update)
 
 

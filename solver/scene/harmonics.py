@@ -8,7 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from solver.jit.fourier import Flags, Integer, Real
-from solver.scene.scene import FrictionContact, Scene
+from solver.scene.parameter_paths import changed_quantities
+from solver.scene.scene import Scene
 
 MOST_HARMONICS = 1000
 # A force of this harmonic or above is a fast wave of its own: it gets its multiples, as harmonic 1 does.
@@ -51,8 +52,9 @@ def kept_harmonics(
 def forced_harmonics(scene: Scene, paths: Iterable[str] = ()) -> tuple[int, ...]:
     """Return the harmonics of the forces and of the normal loads that vary, ascending."""
     found = {force.harmonic for force in scene.excitation}
-    varies = any(isinstance(c, FrictionContact) and c.N1_value != 0.0 for c in scene.contacts)
-    if varies or any(path.endswith((".N1", ".N1_ratio")) for path in paths):
+    loads = [contact.load for contact in scene.contacts]
+    varies = any(load is not None and load.amplitude != 0.0 for load in loads)
+    if varies or any(changed.varies_load for path in paths for changed in changed_quantities(scene, path)):
         found |= {0, 1}
     return tuple(sorted(found))
 

@@ -14,8 +14,9 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
+from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.registry import laws
 from solver.matrices.load_set import UNITS
-from solver.scene import contacts as scene_contacts
 from solver.scene import matrices_structure as matrices_part
 from solver.scene import parts as scene_parts
 from solver.scene.descriptions import EXAMPLES, WORDS
@@ -23,7 +24,7 @@ from solver.scene.scene import Scene
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*\n((?:    .*\n?)+)", re.MULTILINE)
-_HOMES = (scene_parts, scene_contacts, matrices_part)
+_HOMES = (scene_parts, matrices_part)
 
 
 class _Generator(GenerateJsonSchema):
@@ -81,14 +82,16 @@ def plain(schema: Any) -> Any:
 
 
 def _model(name: str) -> type[BaseModel]:
-    found: type[BaseModel] = next(getattr(home, name) for home in _HOMES if hasattr(home, name))
-    return found
+    by_name: dict[str, type[BaseModel]] = {law.__name__: law for law in laws().values()}
+    return by_name.get(name) or next(getattr(home, name) for home in _HOMES if hasattr(home, name))
 
 
 def _describe(definition: dict[str, Any], model: type[BaseModel], name: str) -> None:
     """Put the words of a model's docstring, and of those it is made from, into its schema."""
     words = {key: text for base in reversed(model.__mro__) for key, text in _words(base).items()}
     words |= WORDS.get("*", {}) | WORDS.get(name, {})
+    if issubclass(model, AnyContact):
+        words |= {"law": _law_words(), **model.WORDS}
     text = _docstring(model)
     definition["description"] = " ".join(re.split(r"\n\s*(?:Attributes|Parameters)\n", text)[0].split())
     for key, given in definition["properties"].items():
@@ -96,6 +99,12 @@ def _describe(definition: dict[str, Any], model: type[BaseModel], name: str) -> 
             given["description"] = words[key]
         if key in EXAMPLES:
             given["examples"] = EXAMPLES[key]
+
+
+def _law_words() -> str:
+    """What is said of the key `law`: every law there is."""
+    first, *others, last = laws()
+    return f"{', '.join([f'{first} (also if left out)', *others])} or {last}."
 
 
 def _words(model: type) -> dict[str, str]:

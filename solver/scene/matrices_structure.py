@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from solver.contacts.fields import NonNegative, Part
 from solver.matrices.validation import DofTable, check_matrices, symmetric
 from solver.matrices.values import Matrix, Modes
-from solver.scene.fields import NonNegative, Part
 
 Ratio = Annotated[float, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=False)]
 

@@ -8,15 +8,15 @@ from typing import Any, Protocol, Self, TypeVar, cast
 
 from pydantic import ValidationError
 
+from solver.contacts.fields import LARGEST, Part
+from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.parts import Quantity
 from solver.errors import SettingError
-from solver.scene.contacts import AnyContact, FrictionContact
 from solver.scene.parts import (
-    LARGEST,
     Damper,
     Excitation,
     Mass,
     MatricesStructure,
-    Part,
     Spring,
     Structure,
 )
@@ -27,14 +27,6 @@ AMPLITUDE = "excitation.amplitude"
 PHASE = "excitation.phase"
 PROPORTIONAL = ("stiffness_proportional_damping", "mass_proportional_damping")
 _RANGES = {
-    "N0": "must be a number >= 0 (from -1e15 with the law elastic-normal) and <= 1e15 [N]",
-    "kn": "must be a number > 0 and <= 1e15 [N/m]",
-    "gap": "must be a number from -1e15 to 1e15 [m]",
-    "N1": "must be a number from -1e15 to 1e15 [N]",
-    "N1_ratio": "must be a number from -1e15 to 1e15",
-    "N1_phase": "must be a number from -1e4 to 1e4 [rad]",
-    "kt": "must be a number > 0 and <= 1e15 [N/m]",
-    "mu": "must be a number >= 0 and <= 100",
     "m": "must be a number > 0 and <= 1e15 [kg]",
     "k": "must be a number >= 0 and <= 1e15 [N/m]",
     "c": "must be a number >= 0 and <= 1e15 [N s/m]",
@@ -102,6 +94,12 @@ def has_parameter(contact: AnyContact, owner: str, key: str) -> bool:
     return owner in (contact.name, contact.group) and key in contact.PARAMETERS
 
 
+def changed_quantities(scene: HasParts, path: str) -> tuple[Quantity, ...]:
+    """What a path changes in each contact it acts on; nothing of a path that is no contact's."""
+    owner, _, key = path.rpartition(".")
+    return tuple(c.PARAMETERS[key] for c in scene.contacts if has_parameter(c, owner, key))
+
+
 def check_path(scene: HasParts, path: str) -> None:
     """Raise SettingError unless `path` is ``frequency`` or a path of the scene."""
     if path != FREQUENCY and path not in parameter_paths(scene):
@@ -125,7 +123,7 @@ def value(scene: HasParts, path: str) -> float:
     contact = next((c for c in scene.contacts if has_parameter(c, owner, key)), None)
     if contact is None:
         raise _unknown(scene, path)
-    return _contact_value(contact, key)
+    return contact.value_of(key)
 
 
 def with_values(scene: _SceneT, values: Mapping[str, float]) -> _SceneT:
@@ -146,11 +144,10 @@ def _with_value(scene: _SceneT, path: str, new: float) -> _SceneT:
         return scene.model_copy(update={"structure": _with_structure(scene, path, key, new)})
     if not any(has_parameter(contact, owner, key) for contact in scene.contacts):
         raise _unknown(scene, path)
-    update: dict[str, object] = {key: new}
-    if key in ("N1", "N1_ratio"):
-        update = {"N1": None, "N1_ratio": None, key: new}
     contacts = tuple(
-        _changed(contact, update, path, new) if has_parameter(contact, owner, key) else contact
+        _changed(contact, contact.changed_by(key, new), path, new, contact.PARAMETERS[key].wanted)
+        if has_parameter(contact, owner, key)
+        else contact
         for contact in scene.contacts
     )
     return scene.model_copy(update={"contacts": contacts})
@@ -166,7 +163,9 @@ def _with_structure(scene: HasParts, path: str, name: str, new: float) -> Struct
     if not members:
         raise _unknown(scene, path)
     changed = {
-        id(part): _changed(part, {_quantity(part): new * share(part, name)}, path, new) for part in members
+        id(part): _changed(part, {key: new * share(part, name)}, path, new, _RANGES[key])
+        for part in members
+        for key in (_quantity(part),)
     }
     tables = {table: getattr(scene.structure, table) for table in ("masses", "springs", "dampers")}
     return scene.structure.model_copy(
@@ -179,7 +178,11 @@ def _with_amplitude(forces: tuple[Excitation, ...], new: float) -> tuple[Excitat
     if first == 0.0 and len(forces) > 1:
         raise SettingError(AMPLITUDE, new, "scales all forces by one factor, but the first one is 0")
     scaled = [new, *(force.amplitude * (new / first) for force in forces[1:])]
-    return tuple(_changed(f, {"amplitude": a}, AMPLITUDE, new) for f, a in zip(forces, scaled, strict=True))
+    wanted = _RANGES["amplitude"]
+    return tuple(
+        _changed(force, {"amplitude": a}, AMPLITUDE, new, wanted)
+        for force, a in zip(forces, scaled, strict=True)
+    )
 
 
 def _with_phase(forces: tuple[Excitation, ...], new: float) -> tuple[Excitation, ...]:
@@ -190,34 +193,19 @@ def _with_phase(forces: tuple[Excitation, ...], new: float) -> tuple[Excitation,
     shift = new - moving[0].phase
     phases = {id(force): force.phase + shift for force in moving} | {id(moving[0]): new}
     return tuple(
-        _changed(force, {"phase": phases[id(force)]}, PHASE, new) if force.harmonic else force
+        _changed(force, {"phase": phases[id(force)]}, PHASE, new, _RANGES["phase"])
+        if force.harmonic
+        else force
         for force in forces
     )
 
 
-def _changed(part: _PartT, update: Mapping[str, object], path: str, new: float) -> _PartT:
+def _changed(part: _PartT, update: Mapping[str, object], path: str, new: float, wanted: str) -> _PartT:
+    """The part with other fields; SettingError says what is `wanted` if it may not have them."""
     try:
         return type(part).model_validate({**part.__dict__, **update})
     except ValidationError as error:
-        key = next((k for k in update if update[k] is not None), "")
-        wanted = _RANGES.get(key, "must be a number from -1e15 to 1e15")
         raise SettingError(path, new, wanted) from error
-
-
-def _contact_value(contact: AnyContact, key: str) -> float:
-    if not isinstance(contact, FrictionContact):
-        return getattr(contact, key) or 0.0
-    if key == "N1":
-        return contact.N1_value
-    if key != "N1_ratio":
-        return cast(float, getattr(contact, key))
-    if contact.N1_ratio is not None:
-        return contact.N1_ratio
-    if contact.N0 == 0.0 and contact.N1_value != 0.0:
-        raise SettingError(
-            f"{contact.name}.N1_ratio", None, f"is undefined with N0 = 0 and N1 = {contact.N1_value:g}"
-        )
-    return contact.N1_value / contact.N0 if contact.N0 else 0.0
 
 
 def _structure_parts(structure: Structure, name: str) -> tuple[_Named, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, NamedTuple, Self, cast
+from typing import Annotated, Literal, Self, cast
 
 import numpy as np
 from pydantic import (
@@ -14,53 +14,14 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, core_schema
 
-from solver.scene.fields import LARGEST as LARGEST
-from solver.scene.fields import NonNegative as NonNegative
-from solver.scene.fields import Part as Part
+from solver.contacts.fields import Angle, Element, MemberName, Name, NonNegative, Part, Positive, Signed
 from solver.scene.matrices_structure import MatricesStructure as MatricesStructure
 from solver.scene.matrices_structure import Reduction as Reduction
 
-GROUND = "ground"
-NEXT = "next"
-
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+\z", max_length=100)]
-MemberName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(@[0-9]+)?\z", max_length=100)]
-EndName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(@([0-9]+|next))?\z", max_length=105)]
-Between = tuple[EndName, EndName]
-Positive = Annotated[float, Field(strict=True, gt=0.0, le=LARGEST, allow_inf_nan=False)]
-Signed = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
-Friction = Annotated[float, Field(strict=True, ge=0.0, le=100.0, allow_inf_nan=False)]
-Angle = Annotated[float, Field(strict=True, ge=-1e4, le=1e4, allow_inf_nan=False)]
 Sectors = Annotated[int, Field(strict=True, ge=1, le=10_000)]
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**63 - 1)]
 Order = Annotated[int, Field(strict=True, ge=0, le=10_000)]
 HarmonicIndex = Annotated[int, Field(strict=True, ge=0, le=1_000)]
-
-
-class End(NamedTuple):
-    """One end of a spring, dashpot or contact: a DOF (None = ground), here or in the next sector."""
-
-    dof: str | None
-    next: bool
-
-
-def parse_end(text: str) -> End:
-    """Read ``"tip"``, ``"tip@next"``, ``"tip@3"`` (a DOF of an annulus) or ``"ground"``."""
-    if text == GROUND:
-        return End(None, False)
-    base, at, suffix = text.partition("@")
-    return End(base, True) if at and suffix == NEXT else End(text, False)
-
-
-class Element(Part):
-    """Something that joins two ends."""
-
-    between: Between
-
-    @property
-    def ends(self) -> tuple[End, End]:
-        """The two ends, read."""
-        return parse_end(self.between[0]), parse_end(self.between[1])
 
 
 class _Grouped(Part):

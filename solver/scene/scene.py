@@ -5,38 +5,41 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import Field, ModelWrapValidatorHandler, ValidationError, field_validator, model_validator
+from pydantic import (
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
+from solver.contacts.fields import End, Name, Part, parse_end
+from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.coulomb import Contact
+from solver.contacts.laws.coulomb_2d import PlanarContact
+from solver.contacts.laws.elastic_normal import ElasticNormalContact
+from solver.contacts.laws.friction import FrictionContact
+from solver.contacts.laws.gap import GapSpring
+from solver.contacts.laws.polynomial import PolynomialSpring
+from solver.contacts.laws.registry import on_change
 from solver.errors import Issue, SceneError
 from solver.scene import parameter_paths as scene_paths
-from solver.scene.contacts import (
-    AnyContact,
-    Contact,
-    ContactOfAnyLaw,
-    ElasticNormalContact,
-    FrictionContact,
-    GapSpring,
-    PlanarContact,
-    PolynomialSpring,
-)
+from solver.scene.contacts import ContactOfAnyLaw
 from solver.scene.cyclic_validation import cyclic_issues
 from solver.scene.io import load_raw, scene_folder, shipped_scenes
 from solver.scene.parts import (
     KINDS,
     CyclicStructure,
     Damper,
-    End,
     Excitation,
     LumpedStructure,
     Mass,
     MatricesStructure,
     Mistuning,
-    Name,
     Observe,
-    Part,
     Spring,
     Structure,
-    parse_end,
 )
 from solver.scene.validation import cross_issues, field_issues, plain
 
@@ -92,6 +95,9 @@ class Scene(Part):
     SceneError
         Lists everything that is wrong, each with a JSON pointer.
     """
+
+    # The union of the laws is made on first use, when every module that brings one can be imported.
+    model_config = ConfigDict(defer_build=True)
 
     name: Name
     structure: Annotated[Structure, Field(discriminator="kind")]
@@ -216,3 +222,6 @@ def load_scene(name_or_path: object) -> Scene:
 
         raw = with_files(raw, scene_folder(name_or_path))
     return Scene.from_dict(raw)
+
+
+on_change(lambda: Scene.model_rebuild(force=True))

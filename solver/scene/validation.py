@@ -14,10 +14,11 @@ from typing import Any, cast
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from solver.contacts.fields import GROUND, parse_end
+from solver.contacts.laws.registry import DEFAULT, laws
 from solver.errors import Issue
-from solver.scene.contacts import LAW_TAG, LAWS
+from solver.scene.contacts import LAW_TAG
 from solver.scene.parts import (
-    GROUND,
     KINDS,
     CyclicStructure,
     Damper,
@@ -28,12 +29,10 @@ from solver.scene.parts import (
     Observe,
     Reduction,
     Spring,
-    parse_end,
 )
 
 MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
 RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe")
-BETWEEN_KEYS = ("between", "normal_between", "between_second")
 _SCENE_KEYS = ("name", "structure", "contacts", "excitation", "observe")
 _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     (): ("a scene", _SCENE_KEYS),
@@ -45,17 +44,27 @@ _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     ("structure", "springs"): ("a spring", tuple(Spring.model_fields)),
     ("structure", "dampers"): ("a damper", tuple(Damper.model_fields)),
     ("structure", "mistuning"): ("mistuning", tuple(Mistuning.model_fields)),
-    ("contacts",): ("a contact", tuple(LAWS["coulomb"].model_fields)),
-    **{
-        ("contacts", LAW_TAG + law): (
-            "a contact" if law == "coulomb" else f"a contact with the law `{law}`",
-            tuple(each.model_fields),
-        )
-        for law, each in LAWS.items()
-    },
     ("excitation",): ("an excitation", tuple(Excitation.model_fields)),
     ("observe",): ("observe", tuple(Observe.model_fields)),
 }
+
+
+def between_keys() -> tuple[str, ...]:
+    """The keys of ends of a contact, of whatever law."""
+    return tuple(dict.fromkeys(key for law in laws().values() for key in law.END_KEYS))
+
+
+def _contact_keys() -> dict[tuple[str, ...], tuple[str, tuple[str, ...]]]:
+    """Name and known keys of the contacts of each law."""
+    found: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {}
+    for law, each in laws().items():
+        answer = f"a contact with the law `{law}`", tuple(each.model_fields)
+        if law == DEFAULT:
+            answer = found["contacts",] = "a contact", answer[1]
+        found["contacts", LAW_TAG + law] = answer
+    return found
+
+
 _BOUNDS = {"greater_than": (">", "gt"), "greater_than_equal": (">=", "ge"), "less_than_equal": ("<=", "le")}
 _WANTED = {
     "float_type": "must be a number",
@@ -127,7 +136,7 @@ def _field_issue(found: ErrorDetails, raw: dict[str, Any]) -> Issue:
         known = f"known keys: {listing(keys)}{nearest(key, keys)}"
         message = f"`{key}` = {quoted(last)} is not a key of {table}; {known}"
     elif kind in ("union_tag_invalid", "union_tag_not_found"):
-        tag, tags = ("law", tuple(LAWS)) if steps[:1] == ["contacts"] else ("kind", KINDS)
+        tag, tags = ("law", tuple(laws())) if steps[:1] == ["contacts"] else ("kind", KINDS)
         got = last.get(tag) if isinstance(last, dict) else None
         steps = [*steps, tag]
         hint = nearest(got, tags) if isinstance(got, str) else ""
@@ -165,7 +174,7 @@ def _walk(loc: Iterable[int | str], raw: object) -> tuple[list[int | str], objec
 def _table(loc: tuple[int | str, ...]) -> tuple[str, tuple[str, ...]]:
     """Name and known keys of the innermost table on the way to a location."""
     names = tuple(step for step in loc[:-1] if isinstance(step, str))
-    for known, answer in reversed(_KEYS.items()):
+    for known, answer in reversed([*_KEYS.items(), *_contact_keys().items()]):
         without_tag = tuple(name for name in names if name not in KINDS)
         if names[: len(known)] == known or (known and without_tag[: len(known)] == known):
             return answer
@@ -233,7 +242,7 @@ def _end_issues(
         (["structure", *steps], row) for key in ("springs", "dampers") for steps, row in _rows(structure, key)
     ]
     for steps, row in [*elements, *_rows(raw, "contacts")]:
-        for key in BETWEEN_KEYS:
+        for key in between_keys():
             yield from _pair_issues([*steps, key], row.get(key), dofs, cyclic)
 
 

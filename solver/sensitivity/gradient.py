@@ -19,12 +19,13 @@ from solver.balance.balance import Balance
 from solver.balance.contact_hessian import ContactForces, check_laws, check_loads, contact_forces
 from solver.balance.dynamic_stiffness import WholeMotion, times, whole_motion
 from solver.balance.kernels.jacobian import factorise, step_back
+from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Kind
 from solver.balance.parameter_derivatives import contact_slopes, matrices_of_paths, modal_dampings, resolved
 from solver.balance.workspace import Workspace
-from solver.contacts.kernels.columns import COULOMB
+from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.laws import law_force
-from solver.contacts.kernels.system import KT, MU, N0, N1, PHASE, evaluation_by_value
+from solver.contacts.kernels.system import evaluation_by_value
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real, cosine_position
 from solver.results.told import Piece
@@ -137,8 +138,8 @@ class Sensitivities:
         self._point = evaluation_by_value(self._workspace.point)
         ne, nc, n = balance.system.laws.size, balance.n_ports, balance.n_coefficients
         acts = np.any(self._slopes != 0.0, axis=(0, 2))
-        self._wanted = (acts & (balance.system.laws == COULOMB)).astype(np.int64)
-        self._others = np.flatnonzero(acts & (balance.system.laws != COULOMB))
+        self._wanted = (acts & (balance.system.jenkins == 1)).astype(np.int64)
+        self._others = np.flatnonzero(acts & (balance.system.jenkins == 0))
         self._x, self._tops = np.zeros(n), np.zeros((2, EXTREME_COLUMNS))
         self._weights, self._pulls = np.zeros((2, nc, n)), np.zeros((2, nc * n))
         self._by = np.zeros((2, ne * PER_ELEMENT + BESIDES))
@@ -282,7 +283,7 @@ class Sensitivities:
         system, ne = self.balance.system, self.balance.system.laws.size
         rows = np.zeros((len(self._parameters), ne * PER_ELEMENT + BESIDES))
         parts = rows[:, : ne * PER_ELEMENT].reshape(len(rows), ne, PER_ELEMENT)
-        plain = system.laws == COULOMB
+        plain = system.jenkins == 1
         parts[:, plain, BY_KT] = self._slopes[:, plain, KT]
         parts[:, plain, BY_MU] = self._slopes[:, plain, MU]
         parts[:, plain, BY_LOAD:] = self._loads[:, plain]
@@ -298,13 +299,11 @@ class Sensitivities:
         system, n, point = self.balance.system, self.balance.n_coefficients, self._point
         begin, end = int(system.first_port[e]), int(system.first_port[e + 1])
         blocks = slice(int(system.first_block[e]), int(system.first_block[e + 1]))
-        row = np.ascontiguousarray(system.contacts[e])
-        cosine, sine = math.cos(row[PHASE]), math.sin(row[PHASE])
-        load = np.array([row[N0], row[N1] * cosine, -row[N1] * sine])
+        table, load, _, _ = contact_values(system, 0.0, 0.0)
         for i in np.flatnonzero(np.any(self._slopes[:, e] != 0.0, axis=1)):
             law_force(
-                system.laws[e], u[begin * n : end * n].reshape(-1, n), system.ks, load, system.load_ks, row,
-                self._slopes[i, e], self._loads[i, e], system.cos_table, system.sin_table,
+                system.laws[e], u[begin * n : end * n].reshape(-1, n), system.ks, load[e], system.load_ks,
+                table[e], self._slopes[i, e], self._loads[i, e], system.cos_table, system.sin_table,
                 point.segments, point.F[begin:end], point.dF_dU[blocks], point.dF_dp[begin:end],
             )  # fmt: skip
             slopes[i] += float(np.sum(weights[begin:end] * point.dF_dp[begin:end]))

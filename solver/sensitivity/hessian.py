@@ -21,7 +21,7 @@ import numpy as np
 
 from solver.balance.contact_hessian import ContactForces, second_forces, second_loads
 from solver.balance.dynamic_stiffness import WholeMotion, times, times_transposed
-from solver.contacts.kernels.system import KT, MU
+from solver.contacts.kernels.columns import KT, MU
 from solver.jit.fourier import Complex, Integer, Real
 from solver.results.told import Piece
 

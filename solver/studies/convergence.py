@@ -16,6 +16,8 @@ from solver.balance.kernels.output import MAX_ABS
 from solver.balance.more_harmonics import more_harmonics, pad
 from solver.balance.workspace import Workspace
 from solver.branches.sweep import sweep
+from solver.contacts.kernels.columns import SAMPLES as SAMPLES_COLUMN
+from solver.contacts.kernels.laws import law_number
 from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.extrema.error_estimate import truncation_error
@@ -237,7 +239,12 @@ def sampled(balance: Balance, samples: int) -> Balance:
     """
     if check_samples(samples) <= 2 * balance.highest_harmonic:
         raise SettingError("samples", samples, f"must be > {2 * balance.n_harmonics} for these harmonics")
-    return replace(balance, system=balance.system._replace(samples=samples))
+    system, contacts = balance.system, balance.scene.contacts
+    laws, table = system.laws.copy(), system.contacts.copy()
+    for e, contact in enumerate(contacts):
+        if contact.sampled_kernel is not None:
+            laws[e], table[e, SAMPLES_COLUMN] = law_number(contact.sampled_kernel), samples
+    return replace(balance, system=system._replace(samples=samples, laws=laws, contacts=table))
 
 
 def _reference(scene: Scene, p: float, top: int) -> tuple[Workspace, Real, float] | None:

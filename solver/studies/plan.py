@@ -18,7 +18,6 @@ from solver.contacts.kernels.system import (
     receptance_by_value,
 )
 from solver.jit.fourier import Real
-from solver.linear.contact_table import DEFAULT_SAMPLES
 from solver.linear.kernels.receptance import receptance
 from solver.results.base import Shown
 from solver.results.views import Views
@@ -26,11 +25,6 @@ from solver.scene.annulus import sectors_needed
 from solver.scene.parts import CyclicStructure, MatricesStructure
 from solver.scene.scene import (
     AnyContact,
-    Contact,
-    ElasticNormalContact,
-    FrictionContact,
-    PlanarContact,
-    PolynomialSpring,
     Scene,
 )
 from solver.studies.memory import dense_bytes
@@ -211,16 +205,17 @@ def _slip(balance: Balance, i: int, stuck: Real) -> Effect:
     name = f"slip of {contact.name}"
     if balance.effects.every_contact:
         return Effect(name=name, used=True, reason=f"{contact.name} was asked to stay in every Newton step")
-    if not isinstance(contact, Contact):
-        return Effect(name=f"law of {contact.name}", used=True, reason=_law(contact))
-    limit = contact.mu * max(contact.N0 - abs(contact.N1_value), 0.0)
+    friction, load = contact.friction, contact.load
+    if friction is None or load is None or not contact.JENKINS:
+        return Effect(name=f"law of {contact.name}", used=True, reason=contact.evaluation)
+    limit = friction.mu * max(load.least, 0.0)
     carried = stuck[balance.system.first_port[i]]
     words = f"stuck, {contact.name} would carry up to {carried:.4g} N in the band; its limit is {limit:.4g} N"
     if carried <= limit:
         return Effect(
             name=name,
             used=False,
-            reason=f"{words}: while it sticks it is its spring of {contact.kt:g} N/m, checked at every step",
+            reason=f"{words}: while it sticks it is its spring of {friction.kt:g} N/m, checked at every step",
         )
     return Effect(name=name, used=True, reason=words)
 
@@ -272,31 +267,9 @@ def _linear_part(balance: Balance) -> str:
     return _FORMS[balance.system.form]
 
 
-def _law(contact: AnyContact) -> str:
-    """Say how the force of a contact that is not plain Coulomb is found."""
-    if isinstance(contact, PlanarContact) and contact.limit != "box":
-        samples = contact.samples or DEFAULT_SAMPLES
-        return f"circular limit, marched over {samples} samples a period, of second order"
-    if isinstance(contact, PlanarContact):
-        return "a limit for each direction by itself: two contacts in closed form"
-    if isinstance(contact, ElasticNormalContact):
-        return f"the normal load moves with the parts by {contact.kn:g} N/m: friction and load in closed form"
-    if isinstance(contact, PolynomialSpring):
-        return "a polynomial: exact with enough samples"
-    return "a spring on one side: closed form"
-
-
 def _separation(contact: AnyContact) -> Effect:
-    if not isinstance(contact, FrictionContact) or isinstance(contact, ElasticNormalContact):
-        may = not isinstance(contact, PolynomialSpring)
-        reason = f"{contact.name} opens and closes as it moves" if may else f"{contact.name} has no gap"
-        return Effect(name=f"separation of {contact.name}", used=may, reason=reason)
-    least = contact.N0 - abs(contact.N1_value)
-    loses = least < 0.0
-    reason = f"the normal load of {contact.name} falls to {least:g} N" if loses else (
-        f"the normal load of {contact.name} stays at {least:g} N or more"
-    )  # fmt: skip
-    return Effect(name=f"separation of {contact.name}", used=loses, reason=reason)
+    may, reason = contact.separation
+    return Effect(name=f"separation of {contact.name}", used=may, reason=reason)
 
 
 def _stiffness_shift(shift: np.ndarray) -> Effect:

@@ -8,10 +8,11 @@ import numpy as np
 from contact_cases import central_difference, tables
 
 from solver.contacts.kernels import columns
-from solver.contacts.kernels.laws import law_force
+from solver.contacts.kernels.laws import law_force, law_number
 from solver.contacts.kernels.stick_slip_events import SEGMENT_COLUMNS
 from solver.jit import fourier
 
+COULOMB_BOX, ELASTIC_NORMAL, GAP_SPRING, POLYNOMIAL, COULOMB_PLANE, _ = columns.KERNELS
 LOAD_KS = fourier.all_harmonics(1)
 
 
@@ -19,7 +20,7 @@ LOAD_KS = fourier.all_harmonics(1)
 class Element:
     """One element: motions (m, n) of the harmonics `ks`, given load, and a row of the contact table."""
 
-    law: int
+    law: str | int
     U: np.ndarray
     row: np.ndarray
     load: np.ndarray = field(default_factory=lambda: np.zeros(3))
@@ -55,8 +56,9 @@ def evaluate(element: Element, slope: np.ndarray | None = None, dload: np.ndarra
     top = max(int(element.harmonics[-1]), 1)
     segments = np.zeros((16 * top + 64, SEGMENT_COLUMNS))
     F, dF_dU, dF_dp = np.full((m, n), np.nan), np.full((m * m, n, n), np.nan), np.full((m, n), np.nan)
+    number = element.law if isinstance(element.law, int) else law_number(element.law)
     state, piece = law_force(
-        element.law, element.U, element.harmonics, element.load, LOAD_KS, element.row,
+        number, element.U, element.harmonics, element.load, LOAD_KS, element.row,
         np.zeros(columns.COLUMNS) if slope is None else slope, np.zeros(3) if dload is None else dload,
         *tables(top), segments, F, dF_dU, dF_dp,
     )  # fmt: skip

@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import solver
-from optim.criteria.criterion import Criterion, Form, Key
+from optim.criteria.criterion import Criterion, Form, Judged, Key, Row
 from optim.criteria.json_types import PositiveNumber
 from solver.balance.workspace import Workspace
 
 if TYPE_CHECKING:
-    from optim.criteria.judged import Judged
-    from optim.criteria.rows import Row
     from solver.scene.scene import Scene
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import Field
 
+from optim.problem.keys import of_front
 from service.cli.commands import submit
 from service.errors import InputError
 from service.jobs.common.problem import Pair, ProblemRequest, Ranges
@@ -45,10 +46,13 @@ class Decided(JobRequest):
     really: bool
 
 
-class Further(ProblemRequest):
+class _Further(ProblemRequest):
     """A design problem with a key of its own."""
 
     tries: int = 3
+
+
+Further = of_front(_Further)
 
 
 def kind(request: type[JobRequest], **view: Any) -> JobKind:
@@ -137,7 +141,7 @@ def test_a_problem_of_another_kind_has_the_options_of_problems(told: list[Mappin
     assert told == [{"kind": "shapes", "scene": "two-dof", **body}]
     flags = submit.options_of(submit.submission(kind(Further), None))
     assert "--max-peak" in flags
-    assert "--basins" not in flags, "a key of `design` alone"
+    assert {"--basins", "--max-band"}.isdisjoint(flags), "keys of `design` alone"
 
 
 def test_options_of_the_local_command_keep_their_words() -> None:

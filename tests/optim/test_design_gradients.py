@@ -11,11 +11,12 @@ import pytest
 
 import solver
 from optim.criteria.band import BAND
+from optim.criteria.criterion import Row
 from optim.criteria.evaluation import evaluate
 from optim.criteria.forbidden import FORBIDDEN
 from optim.criteria.friction_work import FRICTION_WORK
 from optim.criteria.peak import PEAK
-from optim.criteria.rows import Evaluation, Row, nearest
+from optim.criteria.rows import Evaluation, nearest
 from optim.criteria.separation import SEPARATION
 from optim.problem.problem import Problem, pose
 

@@ -13,8 +13,9 @@ import pytest
 
 import optim
 import solver
+from optim.criteria.band import BAND
+from optim.criteria.criterion import Row
 from optim.criteria.peak import PEAK
-from optim.criteria.rows import Row
 from optim.problem.problem import pose
 from optim.problem.uncertainty_input import read_uncertain
 from optim.problem.uncertainty_set import Scenario, Shape
@@ -221,7 +222,7 @@ def test_a_limit_is_kept_in_every_scenario() -> None:
         solver.sweep(TWO.with_values({**result.optimum, "damper.mu": mu}), limit=1.5).band.width  # type: ignore[union-attr]
         for mu in np.linspace(0.25, 0.35, 11)
     ]
-    assert problem.limits.band_hz == 0.30
+    assert problem.limits.of(BAND) == 0.30
     assert (max(bands) <= 0.30 * (1.0 + 1e-5)) == (result.status is RobustStatus.OPTIMAL)
 
 

@@ -20,7 +20,7 @@ import optim
 import solver
 from service.cli import main
 from service.cli.app import command
-from service.cli.options.problem_inputs import OPTIONS
+from service.cli.options.problem import OPTIONS
 from service.jobs.common.problem import arguments
 from service.jobs.kinds.design import DesignRequest, design_issues
 from service.jobs.validation import validated

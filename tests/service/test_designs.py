@@ -310,7 +310,7 @@ def test_the_designs_of_an_old_database_are_filled_in_and_can_be_taken_back(url:
     database = Database(url)
     repository = DesignRepository(database)
     rows = {row.job_id: row for row in repository.page(DesignQuery().to_filter(), 1000)}
-    variables = repository.variables(list(rows))
+    variables = repository.parts(list(rows))
     database.close()
     assert len(rows) == 4 + 450
     first = rows["a"]

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from matplotlib.figure import Figure
 
+from optim.criteria.forbidden import FORBIDDEN
+from optim.criteria.peak import PEAK
 from solver.jit.fourier import Real
 from solver.results import units
 from solver.views.plots import style
@@ -37,8 +39,8 @@ def design_figure(result: DesignResult, *, ax: Into = None) -> Figure:
     limits = result.problem.limits
     asked = Demands(
         limit=result.problem.limit,
-        max_peak=limits.peak,
-        forbidden=() if case is None else limits.forbidden_hz.get(case, ()),
+        max_peak=limits.of(PEAK),
+        forbidden=() if case is None else (limits.of(FORBIDDEN) or {}).get(case, ()),
     )
     several = len(result.problem.cases) > 1 and case is not None
     title = f"{result.scene}, {case}" if several and case != result.scene else None

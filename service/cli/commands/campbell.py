@@ -6,14 +6,14 @@ from typing import Annotated
 
 import typer
 
-from service.cli.failures import FELL_SHORT
+from service.cli.failures import end
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.options.inputs import whole_number
 from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.rendering.tables import campbell as campbell_reports
-from service.rendering.tables.text import print_json
+from service.rendering.tables.text import show
 
 Speeds = Annotated[
     tuple[float, float], typer.Option("--speeds", metavar="LO HI", help="Running speeds [1/min].")
@@ -70,10 +70,5 @@ def campbell(
         )  # fmt: skip
     drawn = any(one.branch.values.size for one in diagram.orders)
     outputs.write(diagram, diagram.plot if drawn else None)
-    if as_json:
-        print_json(diagram.to_json())
-    else:
-        campbell_reports.diagram(diagram.to_json())
-    if not diagram.completed:
-        typer.echo(f"stickslip: {diagram.status.value}", err=True)
-        raise typer.Exit(FELL_SHORT)
+    show(diagram.to_json(), campbell_reports.diagram, as_json=as_json)
+    end(diagram.completed, diagram.status.value)

@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import partial
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import typer
 
+from optim.problem.keys import DesignKeys, FrontKeys
+from optim.problem.keys import options as key_options
 from service.cli.commands.report import SUFFIXES, write
-from service.cli.failures import FELL_SHORT
+from service.cli.failures import end
 from service.cli.options import inputs, problem_inputs
 from service.cli.options import shared as options
-from service.cli.options.problem import NOT_OF_A_FRONT, ProblemFlags, takes_problem
+from service.cli.options.problem import ProblemFlags, takes_problem
+from service.cli.options.problem_inputs import Description, IssuesOf
 from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.rendering.tables import design as design_reports
 from service.rendering.tables import robust as robust_reports
-from service.rendering.tables.text import print_json
+from service.rendering.tables.text import show
 
 if TYPE_CHECKING:
+    from optim.results.design import DesignResult
+    from optim.robust.result import RobustResult
+    from optim.studies.pareto_result import ParetoResult
+    from service.jobs.common.problem import ProblemRequest
     from solver.scene.scene import Scene
+
+    Result = DesignResult | RobustResult | ParetoResult
 
 
 Report = Annotated[
@@ -29,7 +38,40 @@ Report = Annotated[
 ]
 
 
-@takes_problem
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Asked:
+    """What was asked on the command line, checked, and where its result goes."""
+
+    scene: Scene
+    given: Mapping[str, Any]
+    outputs: Outputs
+    page: Path | None
+    as_json: bool
+
+    @classmethod
+    def of(
+        cls, told: Description, model: type[ProblemRequest], issues_of: IssuesOf, *, plot: str | None,
+        out: str | None, report: str | None, as_json: bool,
+    ) -> Self:  # fmt: skip
+        """Check it, the files that are to be written first."""
+        outputs = Outputs.asked(plot, out)
+        page = inputs.output_path("--report", report, SUFFIXES)
+        scene, given = problem_inputs.posed(told, model, issues_of)
+        return cls(scene=scene, given=given, outputs=outputs, page=page, as_json=as_json)
+
+    def end(self, found: Result, told: Callable[[Mapping[str, Any]], None], *, drawn: bool) -> None:
+        """Write and print what was found; status 1 if the goal was not reached."""
+        answer = found.to_json()
+        self.outputs.write(found, found.plot if drawn else None)
+        if self.page is not None:
+            from service.rendering.report.sections import Designed
+
+            write(Designed(scene=self.scene, problem=self.given, result=answer), self.page)
+        show(answer, told, as_json=self.as_json)
+        end(found.reached, found.status.value)
+
+
+@takes_problem(key_options(DesignKeys))
 def design(
     flags: ProblemFlags,
     name: options.AnyScene = None,
@@ -45,31 +87,26 @@ def design(
     """
     from service.jobs.kinds.design import UNCERTAIN, DesignRequest, design_issues
 
-    outputs = Outputs.asked(plot, out)
-    page = inputs.output_path("--report", report, SUFFIXES)
     told = problem_inputs.description(name, flags, "design")
-    scene, given = problem_inputs.posed(told, DesignRequest, design_issues)
-    if UNCERTAIN in given:
-        _robust(scene, given, outputs, page, as_json=as_json)
+    asked = _Asked.of(told, DesignRequest, design_issues, plot=plot, out=out, report=report, as_json=as_json)
+    if UNCERTAIN in asked.given:
+        with bar("robust design", "responses") as on_progress:
+            import optim
+
+            robust = optim.robust_design(asked.scene, **asked.given, on_progress=on_progress)
+        asked.end(robust, robust_reports.robust, drawn=robust.nominal is not None)
         return
     with bar("design", "designs") as on_progress:
         import optim
 
-        result = optim.design(scene, **given, on_progress=on_progress)
-    outputs.write(result, result.plot if result.sweeps else None)
-    _report(scene, given, result.to_json(), page)
-    if as_json:
-        print_json(result.to_json())
-    else:
-        design_reports.design(result.to_json())
-    end(result.reached, result.status.value)
+        found = optim.design(asked.scene, **asked.given, on_progress=on_progress)
+    asked.end(found, design_reports.design, drawn=bool(found.sweeps))
 
 
-@partial(takes_problem, without=NOT_OF_A_FRONT)
+@takes_problem(key_options(FrontKeys))
 def pareto(
     flags: ProblemFlags,
     name: options.AnyScene = None,
-    points: options.Points = None,
     plot: options.Plot = None,
     out: options.Out = None,
     report: Report = None,
@@ -82,50 +119,10 @@ def pareto(
     """
     from service.jobs.kinds.pareto import ParetoRequest, pareto_issues
 
-    outputs = Outputs.asked(plot, out)
-    page = inputs.output_path("--report", report, SUFFIXES)
-    told = problem_inputs.description(name, flags, "pareto", points=("--points", points))
-    scene, given = problem_inputs.posed(told, ParetoRequest, pareto_issues)
+    told = problem_inputs.description(name, flags, "pareto")
+    asked = _Asked.of(told, ParetoRequest, pareto_issues, plot=plot, out=out, report=report, as_json=as_json)
     with bar("pareto", "designs") as on_progress:
         import optim
 
-        found = optim.pareto_front(scene, **given, on_progress=on_progress)
-    outputs.write(found, found.plot if found.points else None)
-    _report(scene, given, found.to_json(), page)
-    if as_json:
-        print_json(found.to_json())
-    else:
-        design_reports.front(found.to_json())
-    end(found.reached, found.status.value)
-
-
-def _robust(
-    scene: Scene, given: Mapping[str, Any], outputs: Outputs, page: Path | None, *, as_json: bool
-) -> None:
-    """A design with uncertain parameters: the nominal and the robust optimum side by side."""
-    with bar("robust design", "responses") as on_progress:
-        import optim
-
-        result = optim.robust_design(scene, **given, on_progress=on_progress)
-    outputs.write(result, result.plot if result.nominal is not None else None)
-    _report(scene, given, result.to_json(), page)
-    if as_json:
-        print_json(result.to_json())
-    else:
-        robust_reports.robust(result.to_json())
-    end(result.reached, result.status.value)
-
-
-def _report(scene: Scene, given: Mapping[str, Any], found: Mapping[str, Any], page: Path | None) -> None:
-    """Write the report, if one was asked for."""
-    if page is not None:
-        from service.rendering.report.sections import Designed
-
-        write(Designed(scene=scene, problem=given, result=found), page)
-
-
-def end(reached: bool, status: str) -> None:
-    """Leave with status 1 and the reason, if the goal was not reached."""
-    if not reached:
-        typer.echo(f"stickslip: {status}", err=True)
-        raise typer.Exit(FELL_SHORT)
+        front = optim.pareto_front(asked.scene, **asked.given, on_progress=on_progress)
+    asked.end(front, design_reports.front, drawn=bool(front.points))

@@ -6,14 +6,14 @@ from typing import Annotated
 
 import typer
 
-from service.cli.failures import FELL_SHORT
+from service.cli.failures import end
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.options.inputs import number, whole_number
 from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.rendering.tables import mistuning as tables
-from service.rendering.tables.text import print_json
+from service.rendering.tables.text import show
 
 Parts = Annotated[
     list[str],
@@ -67,10 +67,5 @@ def mistuning(
             harmonics=harmonics, on_progress=on_progress,
         )  # fmt: skip
     outputs.write(study, study.plot if study.worst is not None else None, scene=scene)
-    if as_json:
-        print_json(study.to_json())
-    else:
-        tables.report(study.to_json())
-    if not study.completed:
-        typer.echo(f"stickslip: {study.status.value}", err=True)
-        raise typer.Exit(FELL_SHORT)
+    show(study.to_json(), tables.report, as_json=as_json)
+    end(study.completed, study.status.value)

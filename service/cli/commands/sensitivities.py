@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from service.cli.commands.design import end
+from service.cli.failures import end
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.output_files import Outputs
 from service.cli.progress import patience
-from service.rendering.tables.text import print_json, print_table, say
+from service.rendering.tables.text import print_table, say, show
 from solver.results import units
 
 
@@ -36,10 +36,7 @@ def sensitivities(
     answer: Mapping[str, Any] = found.to_json()
     drawn = any(row["peak_percent"] is not None for row in answer["rows"])
     outputs.write(found, found.plot if drawn else None)
-    if as_json:
-        print_json(answer)
-    else:
-        _show(answer)
+    show(answer, _show, as_json=as_json)
     end(found.reached, found.status.value)
 
 

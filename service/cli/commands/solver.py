@@ -8,16 +8,14 @@ from __future__ import annotations
 
 from functools import partial
 
-import typer
-
-from service.cli.failures import FELL_SHORT
+from service.cli.failures import end
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.output_files import Outputs
 from service.cli.progress import bar, patience
 from service.errors import InputError
 from service.rendering.tables import results as reports
-from service.rendering.tables.text import print_json
+from service.rendering.tables.text import print_json, show
 
 
 def scenes(as_json: options.Json = False) -> None:
@@ -43,10 +41,7 @@ def plan(
 
     asked = solver.Effects.read(effects)
     found = solver.plan(inputs.scene(name, values), harmonics=harmonics, effects=asked)
-    if as_json:
-        print_json(found.to_json())
-    else:
-        reports.plan(found.to_json())
+    show(found.to_json(), reports.plan, as_json=as_json)
 
 
 def solve(
@@ -71,11 +66,8 @@ def solve(
         )
     if solution.converged:
         outputs.write(solution, solution.plot)
-    if as_json:
-        print_json(solution.to_json())
-    else:
-        reports.solution(solution.to_json())
-    _end(solution.reached, solution.status.value)
+    show(solution.to_json(), reports.solution, as_json=as_json)
+    end(solution.reached, solution.status.value)
 
 
 def sweep(
@@ -111,11 +103,8 @@ def sweep(
             limit=limit, effects=asked, on_progress=on_progress,
         )  # fmt: skip
     outputs.write(branch, partial(branch.plot, limit=limit) if len(branch.values) else None)
-    if as_json:
-        print_json(branch.to_json())
-    else:
-        reports.branch(branch.to_json())
-    _end(branch.completed, branch.status.value)
+    show(branch.to_json(), reports.branch, as_json=as_json)
+    end(branch.completed, branch.status.value)
 
 
 def accuracy(
@@ -137,10 +126,7 @@ def accuracy(
     with bar("accuracy", "rows") as on_progress:
         study = solver.accuracy_study(scene, frequency, on_progress=on_progress)
     outputs.write(study, study.plot, scene=scene)
-    if as_json:
-        print_json(study.to_json())
-    else:
-        reports.accuracy(study.to_json())
+    show(study.to_json(), reports.accuracy, as_json=as_json)
 
 
 def march(
@@ -168,15 +154,5 @@ def march(
         )  # fmt: skip
     if marched.converged:
         outputs.write(marched, partial(marched.plot, scene=scene), scene=scene)
-    if as_json:
-        print_json(marched.to_json())
-    else:
-        reports.march(marched.to_json())
-    _end(marched.converged, marched.status.value)
-
-
-def _end(reached: bool, status: str) -> None:
-    """Leave with status 1 and the reason, if the goal was not reached."""
-    if not reached:
-        typer.echo(f"stickslip: {status}", err=True)
-        raise typer.Exit(FELL_SHORT)
+    show(marched.to_json(), reports.march, as_json=as_json)
+    end(marched.converged, marched.status.value)

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Container, Sequence
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+from optim.problem.keys import options as key_options_of
 from service.cli.commands.jobs import hand_in, scene_of
-from service.cli.commands.key_options import (
+from service.cli.options import problem_inputs
+from service.cli.options import shared as options
+from service.cli.options.key_options import (
     SCENE,
     Command,
     KeyOption,
-    flags_of,
     key_options,
     options_of,
 )
-from service.cli.options import problem_inputs
-from service.cli.options import shared as options
 from service.cli.options.keyed import keyed
 from service.cli.options.problem import FLAGS, ProblemFlags, takes_problem
-from service.cli.options.problem_inputs import OPTIONS
 from service.cli.table import COMMANDS
 from service.jobs.registry import JobKind
 
@@ -81,10 +80,9 @@ def _beside_a_problem(option: KeyOption, of_problems: Container[str], known: Con
 
 def _of_a_problem(kind: JobKind, model: type[ProblemRequest], own: Sequence[KeyOption]) -> Command:
     """As `submission`, of a design problem: described by options, by a file, or by both."""
-    keys = {OPTIONS[key] for key in kind.request.model_fields if key in OPTIONS}
-    hints = get_type_hints(ProblemFlags, include_extras=True)
-    foreign = [name for name in hints if name != "problem" and not keys.intersection(flags_of(hints[name]))]
-    beside = [one for one in own if one.flag not in keys]
+    keys = key_options_of(kind.request)
+    taken = {"--set", *(one.flag for one in keys.values())}
+    beside = [one for one in own if one.flag not in taken]
 
     def submit(
         flags: ProblemFlags,
@@ -105,7 +103,7 @@ def _of_a_problem(kind: JobKind, model: type[ProblemRequest], own: Sequence[KeyO
         _keyword("name", options.AnyScene, None),
         *(one.parameter for one in beside),
     ]
-    return takes_problem(_with_options(submit, parameters), without=foreign)
+    return takes_problem(keys)(_with_options(submit, parameters))
 
 
 def _with_options(command: Command, parameters: Sequence[inspect.Parameter]) -> Command:

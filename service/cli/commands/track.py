@@ -7,14 +7,14 @@ from typing import Annotated
 import typer
 
 from service.cli import completion
-from service.cli.failures import FELL_SHORT
+from service.cli.failures import end
 from service.cli.options import inputs
 from service.cli.options import shared as options
 from service.cli.options.inputs import number, whole_number
 from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.rendering.tables import track as track_reports
-from service.rendering.tables.text import print_json
+from service.rendering.tables.text import show
 
 Followed = Annotated[
     str,
@@ -69,11 +69,8 @@ def peaks(
             scene, parameter, start, stop, harmonics=harmonics, checks=checks, on_progress=on_progress
         )
     outputs.write(track, track.plot if track.parameter.size else None)
-    if as_json:
-        print_json(track.to_json())
-    else:
-        track_reports.track(track.to_json())
-    _end(track.completed, track.status.value)
+    show(track.to_json(), track_reports.track, as_json=as_json)
+    end(track.completed, track.status.value)
 
 
 def response_map(
@@ -103,15 +100,5 @@ def response_map(
             ridge=not no_ridge, on_progress=on_progress,
         )  # fmt: skip
     outputs.write(found, found.plot if np.isfinite(found.amplitude).any() else None)
-    if as_json:
-        print_json(found.to_json())
-    else:
-        track_reports.response_map(found.to_json())
-    _end(found.completed, found.status.value)
-
-
-def _end(reached: bool, status: str) -> None:
-    """Leave with status 1 and the reason, if the goal was not reached."""
-    if not reached:
-        typer.echo(f"stickslip: {status}", err=True)
-        raise typer.Exit(FELL_SHORT)
+    show(found.to_json(), track_reports.response_map, as_json=as_json)
+    end(found.completed, found.status.value)

@@ -13,12 +13,9 @@ from service.errors import InputError
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
-    from solver.scene.scene import Scene
+    from pydantic import BaseModel
 
-_VARIABLE = "--variable"
-# Repeatable options of several words each, which Typer does not have, and the commands that have them.
-_WORDS = {_VARIABLE: 3, "--forbidden": 2, "--speeds": 2}
-_WITH_WORDS = ("design", "pareto")
+    from solver.scene.scene import Scene
 
 
 def number(text: str) -> float:
@@ -51,12 +48,12 @@ def age(text: str) -> float:
 
 
 def join_words(arguments: Sequence[str]) -> list[str]:
-    """Make one argument of the words that follow ``--variable``, ``--forbidden`` and ``--speeds``."""
-    submitted = arguments[:1] == ["submit"]
-    command = arguments[1:2] if submitted else arguments[:1]
-    if not command or not _WORDS.keys() & set(arguments):
-        return list(arguments)
-    if command[0] not in _WITH_WORDS and not (submitted and _is_problem(command[0])):
+    """Make one argument of the words that follow ``--variable PATH LO HI`` and the like.
+
+    Repeatable options of several words each are what Typer does not have.
+    """
+    several = _several(arguments)
+    if not several.keys() & set(arguments):
         return list(arguments)
     joined: list[str] = []
     waiting, first = 0, False
@@ -65,7 +62,7 @@ def join_words(arguments: Sequence[str]) -> list[str]:
             waiting = 0
         if not waiting:
             joined.append(argument)
-            waiting = _WORDS.get(argument, 0)
+            waiting = several.get(argument, 0)
             first = True
             continue
         if first:
@@ -77,28 +74,34 @@ def join_words(arguments: Sequence[str]) -> list[str]:
     return joined
 
 
-def _is_problem(kind: str) -> bool:
-    """Whether jobs of this kind are design problems."""
-    from service.jobs.common.problem import ProblemRequest
-    from service.settings.kinds import registry_here
+def _several(arguments: Sequence[str]) -> dict[str, int]:
+    """How many words follow an option of a command each time, where that is more than one."""
+    if not arguments or arguments[0] not in ("design", "pareto", "submit"):
+        return {}
+    from optim.problem.keys import DesignKeys, FrontKeys, options
 
-    registry = registry_here()
-    return kind in registry and issubclass(registry[kind].request, ProblemRequest)
+    model: type[BaseModel] = DesignKeys if arguments[0] == "design" else FrontKeys
+    if arguments[0] == "submit":
+        from service.settings.kinds import registry_here
+
+        registry = registry_here()
+        if arguments[1:2] == [] or arguments[1] not in registry:
+            return {}
+        model = registry[arguments[1]].request
+    return {one.flag: one.several for one in options(model).values() if one.several > 1}
 
 
-def bounds(texts: Sequence[str] | None) -> dict[str, tuple[float, float]] | None:
-    """The variables of a design with their bounds; None if there are none."""
-    if not texts:
-        return None
-    variables: dict[str, tuple[float, float]] = {}
+def bounds(option: str, texts: Sequence[str]) -> dict[str, list[float]]:
+    """The variables of a design with their bounds."""
+    variables: dict[str, list[float]] = {}
     for text in texts:
         words = text.split()
         if len(words) != 3:
-            raise InputError(f"`{_VARIABLE}` takes PATH LO HI, for example shroud.N0 20 3000, got {text!r}")
+            raise InputError(f"`{option}` takes PATH LO HI, for example shroud.N0 20 3000, got {text!r}")
         path, low, high = words
         if path in variables:
-            raise InputError(f"`{_VARIABLE}` names {path!r} twice; keep one")
-        variables[path] = (part(_VARIABLE, text, low), part(_VARIABLE, text, high))
+            raise InputError(f"`{option}` names {path!r} twice; keep one")
+        variables[path] = [part(option, text, low), part(option, text, high)]
     return variables
 
 

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from optim.criteria.criterion import Form, Key
-from optim.criteria.registry import limit_keys
+from optim.criteria.key import Form, Option
 from service.cli.options import inputs
-from service.cli.options.problem import ProblemFlags
+from service.cli.options.problem import OPTIONS, ProblemFlags
 from service.cli.options.scene_files import scene_to_submit
 from service.errors import InputError
 from solver.errors import Issue, SceneError, SettingError
@@ -60,13 +59,6 @@ class Description:
         return f"`{option}`: {issue.message}"
 
 
-OPTIONS = {
-    "variables": "--variable", "scaling": "--scaling", "limit": "--limit", "weights": "--weight",
-    **{key.name: key.flag for key in limit_keys()}, "start": "--start", "method": "--method",
-    "basins": "--basins", "set": "--set", "harmonics": "--harmonics", "scene": "SCENE",
-}  # fmt: skip
-
-
 def description(scene: str | None, flags: ProblemFlags, kind: str, **further: tuple[str, Any]) -> Description:
     """Put the file and the options together.
 
@@ -82,7 +74,7 @@ def description(scene: str | None, flags: ProblemFlags, kind: str, **further: tu
     InputError
         An option or the file cannot be read, or there is no scene.
     """
-    file = None if flags.problem is None else Path(flags.problem)
+    file = None if flags.file is None else Path(flags.file)
     body = {} if file is None else _read(file, kind)
     given = _of_flags(flags) | ({} if scene is None else {"scene": scene})
     given |= {key: value for key, (_, value) in further.items() if value is not None}
@@ -182,26 +174,13 @@ def _with_values(told: Description, scene: Scene, request: ProblemRequest) -> Sc
 
 def _of_flags(flags: ProblemFlags) -> dict[str, Any]:
     """The keys the options stand for."""
-    bounds = inputs.bounds(flags.variables)
-    given: dict[str, Any] = {
-        "variables": None if bounds is None else {path: list(pair) for path, pair in bounds.items()},
-        "scaling": _table("--scaling", flags.scaling, "shroud.N0=logarithmic"),
-        "limit": flags.limit,
-        "weights": _numbers("--weight", flags.weights, "peak=1"),
-        **{key.name: _of_key(key, flags.limits.get(key.name)) for key in limit_keys()},
-        "start": _numbers("--start", flags.start, "shroud.N0=150"),
-        "method": flags.method,
-        "basins": flags.basins,
-        "set": inputs.settings(flags.values) or None,
-        "harmonics": flags.harmonics,
-    }  # fmt: skip
+    given = {name: _value(option, text) for name, (option, text) in flags.keys.items()}
+    given["set"] = inputs.settings(flags.values) or None
     return {key: value for key, value in given.items() if value is not None}
 
 
-def _table(option: str, texts: Sequence[str] | None, example: str) -> dict[str, str] | None:
+def _table(option: str, texts: Sequence[str], example: str) -> dict[str, str]:
     """The names and words of a repeatable option NAME=WORD."""
-    if not texts:
-        return None
     found: dict[str, str] = {}
     for text in texts:
         name, equals, word = text.partition("=")
@@ -213,15 +192,8 @@ def _table(option: str, texts: Sequence[str] | None, example: str) -> dict[str, 
     return found
 
 
-def _numbers(option: str, texts: Sequence[str] | None, example: str) -> dict[str, float] | None:
-    table = _table(option, texts, example)
-    return None if table is None else {n: inputs.part(option, f"{n}={w}", w) for n, w in table.items()}
-
-
-def _ranges(option: str, texts: Sequence[str] | None, example: str) -> list[list[float]] | None:
+def _ranges(option: str, texts: Sequence[str], example: str) -> list[list[float]]:
     """The ranges of a repeatable option LO HI."""
-    if not texts:
-        return None
     found = []
     for text in texts:
         words = text.split()
@@ -231,17 +203,24 @@ def _ranges(option: str, texts: Sequence[str] | None, example: str) -> list[list
     return found
 
 
-def _of_key(key: Key, given: Any) -> Any:
-    """The value of a key of a criterion, from the option as it was written."""
-    if key.form is Form.NUMBER or not given:
-        return given
-    if key.form is Form.RANGES:
-        return _ranges(key.flag, given, key.example)
-    if key.form is Form.NAMES:
-        return dict.fromkeys(given, key.word)
-    if len(given) == 1 and "=" not in given[0]:
-        return inputs.part(key.flag, given[0], given[0])
-    return _numbers(key.flag, given, key.example)
+def _value(option: Option, given: Any) -> Any:
+    """The value of a key, from its option as it was written; None if it was not given."""
+    flag, example = option.flag, option.example
+    if given is None or given == []:
+        return None
+    if option.form is Form.BOUNDS:
+        return inputs.bounds(flag, given)
+    if option.form is Form.RANGES:
+        return _ranges(flag, given, example)
+    if option.form is Form.NAMES:
+        return dict.fromkeys(given, option.word)
+    if option.form is Form.WORDS_BY_PATH:
+        return _table(flag, given, example)
+    if option.form is Form.NUMBER_OR_TABLE and len(given) == 1 and "=" not in given[0]:
+        return inputs.part(flag, given[0], given[0])
+    if option.form in (Form.NUMBERS_BY_PATH, Form.NUMBERS_BY_WORD, Form.NUMBER_OR_TABLE):
+        return {n: inputs.part(flag, f"{n}={w}", w) for n, w in _table(flag, given, example).items()}
+    return given
 
 
 def _read(file: Path, kind: str) -> dict[str, Any]:

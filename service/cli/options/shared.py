@@ -90,10 +90,6 @@ Limit = Annotated[
         help="Amplitude [m] above which the resonance band is measured; peak/√2 if left out.",
     ),
 ]  # fmt: skip
-Points = Annotated[
-    int | None,
-    typer.Option("--points", metavar="N", parser=whole_number, help="Points of the front, 9 if left out."),
-]
 Steps = Annotated[
     int | None,
     typer.Option("--steps", metavar="N", parser=whole_number, help="Steps per period; chosen if left out."),

@@ -13,6 +13,7 @@ from sqlalchemy import ColumnElement, Connection, Executable, and_, func, select
 from service.db.clock import Clock, SharedClock, utc_now
 from service.db.engine import Database
 from service.db.models import NOBODY, Job, JobState
+from service.db.pagination import met, owner_condition, plain_conditions
 from service.db.repositories import job_statements as statements
 from service.db.repositories.checkpoints import (
     as_far_as_kept,
@@ -24,7 +25,6 @@ from service.db.repositories.claims import Turns
 from service.db.repositories.designs import insert_design
 from service.db.repositories.guards import OWNED, change_owned, of_attempt
 from service.db.repositories.leases import renew
-from service.db.repositories.pagination import met, owner_condition, plain_conditions
 from service.db.repositories.queue_limits import Room, require_share
 from service.db.repositories.recovery import FREE, change, recover
 from service.db.repositories.rows import Attempt, JobRow, NewJob, Recovered

@@ -7,7 +7,7 @@ from datetime import datetime
 from typing import Any
 
 from service.db.models import NOBODY, JobState
-from service.jobs.outputs import DesignValues, Piece, SweepValues
+from service.jobs.outputs import Piece
 from service.jobs.strict_json import JsonText
 
 
@@ -114,23 +114,3 @@ class WholeSceneRow(SceneRow):
     """A stored scene with its tables, which may be large."""
 
     body: dict[str, Any]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SweepRow(SweepValues):
-    """A stored sweep without its arrays and contacts."""
-
-    id: str
-    job_id: str
-    position: int
-    owner: str
-    created: datetime
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignRow(DesignValues):
-    """A stored design without its variables."""
-
-    job_id: str
-    owner: str
-    created: datetime

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 
-from service.db.repositories import SweepRow
+from service.db.models import Sweep
 from service.http.dependencies import CallerDependency, ServiceDependency, listing, tagged
 from service.http.in_lane import drawing, reading, writing_files
 from service.http.routes.described import BINARY, LISTED, TEXT, UNCHANGED, media
@@ -97,5 +97,5 @@ def plot_png(
     return _picture(service.sweep(sweep_id, caller), "png", request, service)
 
 
-def _picture(sweep: SweepRow, suffix: str, request: Request, service: ServiceDependency) -> Response:
+def _picture(sweep: Sweep, suffix: str, request: Request, service: ServiceDependency) -> Response:
     return tagged(request, sweep_picture(sweep, suffix, service.sweeps), _PICTURE_TYPES[suffix])

@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.scene.scene import AnyContact, FrictionContact, GapSpring
+from solver.contacts.laws.parts import Motion
+from solver.scene.scene import AnyContact
 
 if TYPE_CHECKING:
     from solver.marching.result import MarchResult
     from solver.response.contact_response import ContactResponse
     from solver.response.solution import Solution
 
-STICK, SLIP, SEPARATION = 0, 1, 2
 FloatArray = NDArray[np.float64]
-CodeArray = NDArray[np.int64]
 
 
 def period_of(solution: Solution, samples: int) -> dict[str, Any]:
@@ -66,46 +65,24 @@ def history_of(march: MarchResult, samples: int) -> dict[str, Any]:
 
 def _contact(given: AnyContact, found: ContactResponse, tau: FloatArray) -> dict[str, Any]:
     from solver.jit import fourier
-    from solver.response.force_history import force_at
 
     slip = fourier.basis(tau, (found.slip.size - 1) // 2) @ found.slip
     load = fourier.basis(tau, (found.load.size - 1) // 2) @ found.load
-    force = force_at(given, found, tau[:-1])
-    motion = _motion(given, found, tau[:-1], force)
+    motions = np.array(found.motions)
+    force = given.force_at(motions, found.load, tau[:-1])
+    motion = given.motion_at(motions, found.load, force, tau[:-1])
     shares = None
     if motion is not None:
-        shares = {
-            name: float(np.mean(motion == code))
-            for name, code in (("stick", STICK), ("slip", SLIP), ("separation", SEPARATION))
-        }
+        shares = {each.name.lower(): motion.count(each) / len(motion) for each in Motion}
     return {
         "name": found.name,
         "state": found.state.value,
         "slip": slip.tolist(),
         "force": _closed(force),
         "load": np.maximum(load, 0.0).tolist(),
-        "motion": None if motion is None else motion.tolist(),
+        "motion": None if motion is None else [each.value for each in motion],
         "shares": shares,
     }
-
-
-def _motion(
-    given: AnyContact, found: ContactResponse, tau: FloatArray, force: FloatArray
-) -> CodeArray | None:
-    """What a contact does at every angle; None where its law knows no stick and slip."""
-    from solver.contacts.kernels.stick_slip_events import BEGIN, END, MOTION
-    from solver.contacts.kernels.stick_slip_events import SLIP as SLIDES
-    from solver.contacts.segments import segments_of
-
-    if isinstance(given, GapSpring):
-        return np.where(force == 0.0, SEPARATION, STICK)
-    if not isinstance(given, FrictionContact) or found.second_motion is not None:
-        return None
-    motion = np.full(tau.size, SEPARATION)
-    for row in segments_of(found.slip, found.load, given.kt, given.mu).rows:
-        inside = (tau - row[BEGIN]) % (2.0 * math.pi) <= row[END] - row[BEGIN]
-        motion[inside] = SLIP if row[MOTION] == SLIDES else STICK
-    return motion
 
 
 def _closed(samples: FloatArray) -> list[float]:

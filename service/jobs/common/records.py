@@ -12,13 +12,14 @@ import numpy as np
 from service.jobs.arrays import encode
 from service.jobs.outputs import ContactValues, DesignRecord, StoredArray, SweepRecord, VariableValues
 from service.jobs.strict_json import digest
-from solver.scene.scene import AnyContact, FrictionContact, Scene
+from solver.scene.scene import AnyContact, Scene
 
 if TYPE_CHECKING:
     from optim.results.design import DesignResult
     from optim.robust.result import RobustResult
     from solver import Branch
 
+_STORED = tuple(field.name for field in fields(ContactValues) if field.name != "name")
 _ARRAYS = ("amplitude", "half_peak_to_peak", "mean", "coefficients", "observed")
 
 
@@ -171,7 +172,7 @@ def _finite(value: float) -> float | None:
 
 
 def contact_values(scene: Scene, parameter: str) -> tuple[ContactValues, ...]:
-    """The values of every contact; None for what changes while `parameter` does."""
+    """The values of every contact; None for what changes while `parameter` does, and for what it has not."""
     owner, _, key = parameter.rpartition(".")
     return tuple(
         _values(contact, key if owner in (contact.name, contact.group) else "") for contact in scene.contacts
@@ -179,14 +180,6 @@ def contact_values(scene: Scene, parameter: str) -> tuple[ContactValues, ...]:
 
 
 def _values(contact: AnyContact, swept: str) -> ContactValues:
-    if not isinstance(contact, FrictionContact):
-        return ContactValues(name=contact.name, kt=None, mu=None, N0=None, N1=None, N1_phase=None)
-    load_follows = swept in ("N1", "N1_ratio") or (swept == "N0" and contact.N1_ratio is not None)
-    return ContactValues(
-        name=contact.name,
-        kt=None if swept == "kt" else contact.kt,
-        mu=None if swept == "mu" else contact.mu,
-        N0=None if swept == "N0" else contact.N0,
-        N1=None if load_follows else contact.N1_value,
-        N1_phase=None if swept == "N1_phase" else contact.N1_phase,
-    )
+    kept = contact.PARAMETERS.keys() - contact.followers(swept)
+    values = {key: contact.value_of(key) if key in kept else None for key in _STORED}
+    return ContactValues(name=contact.name, **values)

@@ -10,22 +10,23 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from optim.criteria.json_types import LARGEST as LARGEST
+from optim.criteria.json_types import MAX_HARMONICS as MAX_HARMONICS
 from optim.criteria.json_types import FrequencyHz as FrequencyHz
+from optim.criteria.json_types import Harmonics as Harmonics
 from optim.criteria.json_types import Number as Number
+from optim.criteria.json_types import ParameterPath as ParameterPath
 from optim.criteria.json_types import PositiveNumber as PositiveNumber
 from service.errors import InvalidRequestError
 from service.jobs.registry import JobRequest, Resolved, SceneSource
-from service.jobs.strict_json import digest, pointer
-from solver.errors import Issue, SceneError, SettingError
+from service.jobs.strict_json import digest
+from solver.errors import Issue, SceneError, SettingError, pointer
 from solver.scene.scene import Scene, load_scene, shipped_scenes
 
-MAX_HARMONICS = 200
 MOST_SET = 1000
 UPLOAD = "upload:"
 """What stands before the id of an upload where a scene file names a file."""
 
 _SCENE_NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
-_PATH_PATTERN = r"^[A-Za-z0-9_@-]+(\.[A-Za-z0-9_@-]+)?$"
 
 
 def _scene_reference(value: object) -> object:
@@ -47,8 +48,6 @@ SceneReference = Annotated[
     BeforeValidator(_scene_reference),
     WithJsonSchema({"anyOf": [{"type": "string", "pattern": _SCENE_NAME.pattern}, {"type": "object"}]}),
 ]
-Harmonics = Annotated[int, Field(strict=True, ge=1, le=MAX_HARMONICS)]
-ParameterPath = Annotated[str, Field(max_length=210, pattern=_PATH_PATTERN)]
 
 
 class SceneRequest(JobRequest):

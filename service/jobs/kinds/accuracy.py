@@ -24,7 +24,7 @@ from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep
 from service.jobs.kinds.registry.results import Amplitude, EndedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
-from service.jobs.strict_json import pointer
+from solver.errors import pointer
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -115,10 +115,10 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
         on_progress=progress,
         should_stop=should_stop,
     )
-    return JobOutput(
-        result=study.to_json(),
+    return JobOutput.of(
+        study,
+        reached=study.completed,
         sweeps=() if study.branch is None else sweep_records([study.branch]),
-        shortfall=None if study.completed else study.status.value,
     )
 
 

@@ -25,8 +25,7 @@ from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep
 from service.jobs.kinds.registry.results import Amplitude, EndedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
-from service.jobs.strict_json import pointer
-from solver.errors import Issue
+from solver.errors import Issue, pointer
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -134,10 +133,10 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
         on_progress=progress,
         should_stop=should_stop,
     )
-    return JobOutput(
-        result=diagram.to_json(),
+    return JobOutput.of(
+        diagram,
+        reached=diagram.completed,
         sweeps=sweep_records(one.branch for one in diagram.orders),
-        shortfall=None if diagram.completed else diagram.status.value,
     )
 
 

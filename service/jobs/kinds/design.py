@@ -3,31 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from pydantic import ConfigDict, Field, RootModel
+from pydantic import ConfigDict, RootModel
 
 import optim
-from optim.criteria.registry import criteria, limit_keys, weight_words
-from service.jobs.common.problem import (
-    ProblemRequest,
-    Weight,
-    arguments,
-    default_variables,
-    problem_of,
-    with_keys,
-)
-from service.jobs.common.problem_check import problem_issues, uncertainty_issues
+from optim.problem.keys import ROBUST, NominalAndRobustKeys, of_design
+from service.jobs.common.problem import ProblemRequest, arguments, default_variables, problem_of
 from service.jobs.common.records import design_record, robust_record, sweep_record
 from service.jobs.common.scenes import refusal, require, resolve_scene, resolved
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
-from service.jobs.common.uncertain import Uncertain
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
 from service.jobs.kinds.registry.results import Amplitude, PeakAt, ReachedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
-from service.jobs.strict_json import pointer
-from solver.errors import Issue
+from solver.errors import Issue, pointer
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -36,8 +26,6 @@ if TYPE_CHECKING:
 
 UNCERTAIN = "uncertain"
 _NOT_ROBUST = ("basins",)
-MINIMISED = [f"{one.weight} [1/{one.unit}]" for one in criteria() if one.weight]
-ROBUST = (UNCERTAIN, "aim", "quantile", "samples", "seed")
 
 
 _EXAMPLE: dict[str, Any] = {
@@ -52,62 +40,13 @@ _EXAMPLE: dict[str, Any] = {
 }
 
 
-class _DesignRequest(ProblemRequest):
-    """A design problem, in the words of `optim.design`, or with `uncertain` of `optim.robust_design`.
-
-    Attributes
-    ----------
-    weights : dict or None
-        Of criteria in what is minimised, by their words.
-    basins : int or None
-        How many local optima are looked for.
-    uncertain : dict, list or None
-        What is not known.
-    aim : str or None
-        What is minimised over it: ``worst-case``, ``mean`` or ``quantile``.
-    quantile : float or None
-        The share of the samples, for the aim of that name.
-    samples, seed : int or None
-        How many scenarios are drawn, and the seed of the random numbers.
-    """
+class _DesignRequest(NominalAndRobustKeys, ProblemRequest):
+    """A design problem, in the words of `optim.design`, or with `uncertain` of `optim.robust_design`."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
 
-    basins: Annotated[int, Field(strict=True, ge=1, le=20)] | None = Field(
-        default=None, description="How many local optima are looked for; 2."
-    )
-    uncertain: Uncertain | None = Field(
-        default=None,
-        description="What is not known: a table of intervals, a table of an ellipsoid, or a list of samples.",
-        examples=[{"damper.mu": [0.2, 0.4], "damper.kt": {"deviation": 0.1}}],
-    )
-    aim: Literal["worst-case", "mean", "quantile"] | None = Field(
-        default=None, description="What is minimised over the uncertainty; worst-case."
-    )
-    quantile: Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] | None = Field(
-        default=None, description="Share of the samples that the aim `quantile` minimises; 0.95."
-    )
-    samples: Annotated[int, Field(strict=True, ge=2, le=10_000)] | None = Field(
-        default=None, description="Scenarios drawn; 32 of a worst case, else 64."
-    )
-    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] | None = Field(
-        default=None, description="Of the random numbers; 0."
-    )
 
-
-Words = Literal[weight_words()]  # type: ignore[valid-type]
-DesignRequest = with_keys(
-    _DesignRequest,
-    limit_keys(),
-    weights=(
-        dict[Words, Weight] | None,  # type: ignore[valid-type]
-        Field(
-            default=None,
-            description=f"What is minimised: {', '.join(MINIMISED)}, each times its weight; the peak alone.",
-            examples=[{"peak": 1, "band": 1e-6}],
-        ),
-    ),
-)
+DesignRequest = of_design(_DesignRequest)
 
 
 class OptimumResult(ReachedResult):
@@ -192,6 +131,9 @@ def resolve(request: _DesignRequest, source: SceneSource) -> Resolved:
 
 def design_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
     """Everything wrong with the arguments of a design, robust or not."""
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from optim.problem.issues import problem_issues, uncertainty_issues
+
     known = {key: value for key, value in given.items() if key not in ROBUST}
     issues = problem_issues(scene, known)
     if UNCERTAIN in given:
@@ -216,11 +158,11 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     if UNCERTAIN in given:
         return _run_robust(scene, given, progress, should_stop)
     found = optim.design(scene, **given, on_progress=progress, should_stop=should_stop)
-    return JobOutput(
-        result=found.to_json(),
+    return JobOutput.of(
+        found,
+        reached=found.reached,
         sweeps=tuple(sweep_record(branch) for branch in found.sweeps if len(branch.values)),
         design=design_record(found),
-        shortfall=None if found.reached else found.status.value,
     )
 
 
@@ -229,11 +171,11 @@ def _run_robust(
 ) -> JobOutput:
     """Search over the uncertainty; the stored sweeps are those of the search without it."""
     found = optim.robust_design(scene, **given, on_progress=progress, should_stop=should_stop)
-    return JobOutput(
-        result=found.to_json(),
+    return JobOutput.of(
+        found,
+        reached=found.reached,
         sweeps=tuple(sweep_record(branch) for branch in found.design.sweeps if len(branch.values)),
         design=robust_record(found),
-        shortfall=None if found.reached else found.status.value,
     )
 
 

@@ -22,8 +22,7 @@ from service.jobs.kinds.registry.results import EndedResult, Table
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
 from service.jobs.registry import JobKind, Resolved, SceneSource
-from service.jobs.strict_json import pointer
-from solver.errors import Issue, SceneError, SettingError
+from solver.errors import Issue, SceneError, SettingError, pointer
 from solver.scene.scene import CyclicStructure, Scene
 
 if TYPE_CHECKING:
@@ -257,10 +256,10 @@ def join(spec: Mapping[str, Any], outputs: Mapping[int, PartOutput]) -> JobOutpu
     # The first of those that are equally high.
     highest = max(others, key=lambda part: part.result["largest"], default=None)
     sweeps = [part for part in (parts[0], highest) if part is not None]
-    return JobOutput(
-        result=study.to_json(),
+    return JobOutput.of(
+        study,
+        reached=study.completed,
         sweeps=tuple(record for part in sweeps for record in unpacked(part.result["sweeps"], part.arrays)),
-        shortfall=None if study.completed else study.status.value,
     )
 
 

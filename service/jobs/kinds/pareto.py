@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ConfigDict, Field
 
 import optim
-from optim.criteria.registry import limit_keys
-from service.jobs.common.problem import ProblemRequest, arguments, default_variables, problem_of, with_keys
-from service.jobs.common.problem_check import problem_issues
+from optim.problem.keys import PointsOfFront, of_front
+from service.jobs.common.problem import ProblemRequest, arguments, default_variables, problem_of
 from service.jobs.common.records import sweep_record
 from service.jobs.common.scenes import require, resolve_scene, resolved
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
@@ -28,27 +27,20 @@ if TYPE_CHECKING:
 _EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "variables": {"shroud.N0": [20, 3000]}, "limit": 8e-5}
 
 
-class _ParetoRequest(ProblemRequest):
-    """A design problem without a limit on the band and weights: those are the front's own.
-
-    Attributes
-    ----------
-    points : int or None
-        How many points of the front are looked for, both ends included.
-    """
+class _ParetoRequest(PointsOfFront, ProblemRequest):
+    """A design problem without a limit on the band and weights: those are the front's own."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
 
-    points: Annotated[int, Field(strict=True, ge=3, le=200)] | None = Field(
-        default=None, description="Points of the front looked for, both ends included; 9."
-    )
 
-
-ParetoRequest = with_keys(_ParetoRequest, limit_keys(of_fronts=True))
+ParetoRequest = of_front(_ParetoRequest)
 
 
 def pareto_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
     """Everything wrong with the arguments of a front."""
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from optim.problem.issues import problem_issues
+
     return problem_issues(scene, {key: value for key, value in given.items() if key != "points"})
 
 
@@ -86,10 +78,10 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     branches = [
         r.branch for evaluation in evaluations if evaluation is not None for r in evaluation.responses
     ]
-    return JobOutput(
-        result=found.to_json(),
+    return JobOutput.of(
+        found,
+        reached=found.reached,
         sweeps=tuple(sweep_record(branch) for branch in branches if len(branch.values)),
-        shortfall=None if found.reached else found.status.value,
     )
 
 

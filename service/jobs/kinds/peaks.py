@@ -91,10 +91,10 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
         on_progress=progress,
         should_stop=should_stop,
     )
-    return JobOutput(
-        result=track.to_json(),
+    return JobOutput.of(
+        track,
+        reached=track.completed,
         sweeps=sweep_records(track.branches),
-        shortfall=None if track.completed else track.status.value,
     )
 
 

@@ -66,8 +66,9 @@ def run(spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) 
     solution = solver.solve(
         Scene.from_dict(spec["scene"]), frequency_hz=spec["frequency_hz"], harmonics=spec["harmonics"]
     )
-    return JobOutput(
-        result=solution.to_json(), shortfall=None if solution.converged else solution.status.value
+    return JobOutput.of(
+        solution,
+        reached=solution.converged,
     )
 
 

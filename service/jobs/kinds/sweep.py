@@ -171,10 +171,10 @@ def run_on(
             raise
         checkpoints.begin_anew(str(error))
         branch = _follow(spec, progress, should_stop, checkpoints)
-    return JobOutput(
-        result=branch.to_json(),
+    return JobOutput.of(
+        branch,
+        reached=branch.completed,
         sweeps=(sweep_record(branch, spec["frequency_hz"]),) if len(branch.values) else (),
-        shortfall=None if branch.completed else branch.status.value,
     )
 
 

@@ -16,7 +16,7 @@ from service.jobs.linear_limits import linear_limit
 from solver.branches.observation import observing
 from solver.continuation.branch import Branch
 from solver.results import units
-from solver.scene.scene import Contact, CyclicStructure, Scene
+from solver.scene.scene import CyclicStructure, Scene
 from solver.views.plots import style
 from solver.views.plots.curves import Response
 
@@ -95,7 +95,7 @@ def linear_lines(scene: Scene, paths: Sequence[str]) -> list[Line]:
     designed = {path.partition(".")[0] for path in paths}
     names = [contact.name for contact in scene.contacts]
     removed = [name for name in names if name in designed] or names
-    if not names or not all(isinstance(contact, Contact) for contact in scene.contacts):
+    if not names or not all(contact.JENKINS for contact in scene.contacts):
         return []
     sweeps = Sweeps(harmonics=1, limit=None)
     limits = (

@@ -7,8 +7,8 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,6 +20,11 @@ _BOLD, _DIM = "1", "2"
 def print_json(obj: Mapping[str, object]) -> None:
     """Print one JSON object on one line."""
     sys.stdout.write(json.dumps(obj, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+def show(answer: Mapping[str, Any], told: Callable[[Mapping[str, Any]], None], *, as_json: bool) -> None:
+    """Print what was computed: one JSON object, or what `told` makes of it."""
+    (print_json if as_json else told)(answer)
 
 
 def say(text: str) -> None:

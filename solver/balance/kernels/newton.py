@@ -15,11 +15,10 @@ import numpy as np
 from solver.balance.kernels.gauge import rebase
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.residual import contact_values, evaluate
-from solver.contacts.kernels.columns import ELASTIC_NORMAL, KN
-from solver.contacts.kernels.laws import held_stiffness, is_friction
-from solver.contacts.kernels.system import KT, MU, N0, N1, Evaluation, Receptance, System
+from solver.contacts.kernels.columns import KT, MU, N0, N1
+from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Real, coefficient_count, cosine_position
+from solver.jit.fourier import Integer, Real, coefficient_count, cosine_position
 from solver.jit.lapack import copy_to, invert, set_to
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance import receptance
@@ -156,7 +155,7 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
         for c in range(nc):
             for d in range(nc):
                 e = system.owner[d]
-                held = held_stiffness(system.laws[e], table[e], d - system.first_port[e])
+                held = _held_stiffness(table[e], system.held[d])
                 matrix[c, d] = linear.A[0, i, c, d] * (held - system.shift[d])
             matrix[c, c] += 1.0
         good = invert(matrix, inverse)
@@ -171,14 +170,22 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
     added = 0.0
     for c in range(nc):
         e = system.owner[c]
-        row, rubs = table[e], system.laws[e] == ELASTIC_NORMAL
-        if row[MU] <= 0.0 or not is_friction(system.laws[e]) or (rubs and c > system.first_port[e]):
+        row, normal = table[e], system.normal_port[e]
+        if row[MU] <= 0.0 or system.rubs[c] == 0:
             continue
         needed = 1.05 * row[KT] * _reach(system, u, c) / row[MU] - (row[N0] - abs(row[N1]))
-        if rubs:
-            needed += 1.05 * row[KN] * _reach(system, u, c + 1)
+        if normal >= 0:
+            needed += 1.05 * row[system.held[normal, 0]] * _reach(system, u, normal)
         added = max(added, needed)
     return added
+
+
+@compiled
+def _held_stiffness(row: Real, held: Integer) -> float:
+    """Return the stiffness [N/m] a port begins with: closed and stuck if it presses at rest, else open."""
+    if held[2] != 0 and held[2] * row[held[1]] <= 0.0:
+        return 0.0
+    return float(row[held[0]])
 
 
 @compiled

@@ -7,30 +7,10 @@ import math
 import numpy as np
 
 from solver.balance.kernels.gauge import find_gauge, let_hold
-from solver.contacts.kernels.aft import sampled_force
-from solver.contacts.kernels.columns import COLUMNS, COULOMB, OWN, OWN_KIND
-from solver.contacts.kernels.coulomb import contact_force
-from solver.contacts.kernels.laws import law_force
-from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED, piece_of
-from solver.contacts.kernels.system import (
-    FRICTION,
-    KT,
-    LEVEL,
-    LOAD_AMPLITUDE,
-    LOAD_COEFFICIENTS,
-    LOAD_PHASE,
-    LOAD_RATIO,
-    MU,
-    N0,
-    N1,
-    NORMAL_LOAD,
-    PHASE,
-    RATIO,
-    STIFFNESS,
-    Evaluation,
-    Receptance,
-    System,
-)
+from solver.contacts.kernels.columns import COLUMN_KIND, COLUMNS, KT, N0, N1, PHASE, RATIO
+from solver.contacts.kernels.laws import call_law
+from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED
+from solver.contacts.kernels.system import LEVEL, LOAD_COEFFICIENTS, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real, coefficient_count, cosine_position
 from solver.jit.lapack import copy_block
@@ -51,22 +31,10 @@ def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, 
     for c in range(nc):
         row, d = table[c], slope[c]
         tied = not math.isnan(row[RATIO])
-        if system.active[c] > 0.0:
-            if system.kind == NORMAL_LOAD:
-                row[N0], d[N0] = p, 1.0
-            elif system.kind == LOAD_AMPLITUDE:
-                row[N1], d[N1], tied = p, 1.0, False
-            elif system.kind == LOAD_RATIO:
-                row[RATIO], d[RATIO], tied = p, 1.0, True
-            elif system.kind == LOAD_PHASE:
-                row[PHASE], d[PHASE] = p, 1.0
-            elif system.kind == STIFFNESS:
-                row[KT], d[KT] = p, 1.0
-            elif system.kind == FRICTION:
-                row[MU], d[MU] = p, 1.0
-            elif system.kind >= OWN_KIND:
-                column = OWN + system.kind - OWN_KIND
-                row[column], d[column] = p, 1.0
+        if system.active[c] > 0.0 and system.kind >= COLUMN_KIND:
+            column = system.kind - COLUMN_KIND
+            row[column], d[column] = p, 1.0
+            tied = column == RATIO or (tied and column != N1)
         if tied:
             row[N1] = row[RATIO] * row[N0]
             d[N1] = row[RATIO] * d[N0] + d[RATIO] * row[N0]
@@ -94,61 +62,30 @@ def evaluate(system: System, linear: Receptance, u: Real, p: float, added: float
             return np.nan
     table, load, slope, dload = contact_values(system, p, added)
     for e in range(system.laws.size):
-        if system.laws[e] == COULOMB:
-            good = _coulomb(system, e, u, table[e], load[e], slope[e], dload[e], out)
-        else:
-            good = _any_law(system, e, u, table[e], load[e], slope[e], dload[e], out)
+        good = _element(system, e, u, table[e], load[e], slope[e], dload[e], out)
         if not good:
             return np.nan
     return _residual(system, linear, u, least_size(system, p), out)
 
 
-@apart
-def _coulomb(
-    system: System, e: int, u: Real, table: Real, load: Real, slope: Real, dload: Real, out: Evaluation
-) -> bool:
-    """Evaluate an elastic Coulomb contact with a given load; False if its march failed."""
-    n = coefficient_count(system.ks)
-    c, block = system.first_port[e], system.first_block[e]
-    if system.samples > 0:
-        state, count = sampled_force(
-            u[c * n : (c + 1) * n], system.ks, load, system.load_ks, table[KT], table[MU], system.samples,
-            out.segments, out.dF_dU[block], out.dF_dkt, out.dF_dmu, out.dF_dN, out.F[c],
-        )  # fmt: skip
-    else:
-        state, count = contact_force(
-            u[c * n : (c + 1) * n], system.ks, load, system.load_ks, table[KT], table[MU], system.cos_table,
-            system.sin_table, out.segments, out.dF_dU[block], out.dF_dkt, out.dF_dmu, out.dF_dN, out.F[c],
-        )  # fmt: skip
-    out.states[e], out.pieces[e] = state, piece_of(out.segments, count)
-    out.slopes[e] = np.nan
-    if state == FAILED:
-        return False
-    if state == SEPARATED:
-        out.slopes[e] = 0.0
-    elif state == STUCK and out.segments[0, BEGAN] == UNLOADED:
-        out.slopes[e] = table[KT]
-    for i in range(n):
-        total = slope[KT] * out.dF_dkt[i] + slope[MU] * out.dF_dmu[i]
-        for j in range(LOAD_COEFFICIENTS):
-            total += out.dF_dN[i, j] * dload[j]
-        out.dF_dp[c, i] = total
-    return True
-
-
-@apart
-def _any_law(
+@compiled
+def _element(
     system: System, e: int, u: Real, table: Real, load: Real, slope: Real, dload: Real, out: Evaluation
 ) -> bool:
     """Evaluate an element of any law; False if it failed."""
     n, c, block = coefficient_count(system.ks), system.first_port[e], system.first_block[e]
     end, last = system.first_port[e + 1], system.first_block[e + 1]
     U = u[c * n : end * n].reshape((end - c, n))
-    state, piece = law_force(
+    state, piece = call_law(
         system.laws[e], U, system.ks, load, system.load_ks, table, slope, dload, system.cos_table,
         system.sin_table, out.segments, out.F[c:end], out.dF_dU[block:last], out.dF_dp[c:end],
     )  # fmt: skip
     out.states[e], out.pieces[e], out.slopes[e] = state, piece, np.nan
+    if system.jenkins[e] == 1:
+        if state == SEPARATED:
+            out.slopes[e] = 0.0
+        elif state == STUCK and out.segments[0, BEGAN] == UNLOADED:
+            out.slopes[e] = table[KT]
     return bool(state != FAILED)
 
 

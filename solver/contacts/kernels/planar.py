@@ -191,8 +191,8 @@ def periods_to_repeat(u: Real, limit: Real, kt: float) -> int:
 
 @apart
 def coulomb_plane(
-    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real, F: Real,
-    dF_dU: Real, dF_dp: Real,
+    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
+    cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Fill both components of the force, their Jacobian and their derivative by λ (as in the contract)."""
     samples = int(row[SAMPLES])

@@ -45,8 +45,8 @@ def positive_intervals(c: Real, s: Real, degree: int, cos_table: Real, sin_table
 
 @apart
 def gap_spring(
-    U: Real, ks: Integer, row: Real, slope: Real, cos_table: Real, sin_table: Real, F: Real, dF_dU: Real,
-    dF_dp: Real,
+    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
+    cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
     """Fill the force of a gap spring, its Jacobian and its derivative by λ (arguments as in the contract)."""
     n, top = coefficient_count(ks), max(ks[-1], 1)
@@ -78,8 +78,9 @@ def gap_spring(
 
 @apart
 def polynomial_spring(
-    U: Real, ks: Integer, row: Real, slope: Real, F: Real, dF_dU: Real, dF_dp: Real
-) -> tuple[int, int]:
+    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
+    cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
+) -> tuple[int, int]:  # fmt: skip
     """Fill the force of a polynomial spring, its Jacobian and its derivative by λ (as in the contract)."""
     top, degree = max(ks[-1], 1), 1
     for j in range(MOST_DEGREE):

@@ -27,13 +27,10 @@ from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Index, Integer, Real, coefficient_count
 from solver.jit.reference import Reference
 
-# What λ is.
+# What λ is, where it is no column of the contact table.
 FREQUENCY, LEVEL, FORCE_PHASE, STRUCTURE = 0, 1, 2, 3
-NORMAL_LOAD, LOAD_AMPLITUDE, LOAD_RATIO, LOAD_PHASE, STIFFNESS, FRICTION = 4, 5, 6, 7, 8, 9
 # How Z⁻¹ is kept.
 MODES, POLES, DENSE = 0, 1, 2
-# Columns of the contact table.
-KT, MU, N0, N1, RATIO, PHASE = 0, 1, 2, 3, 4, 5
 LOAD_COEFFICIENTS = 3
 # Numbers in `Evaluation.counts`.
 FREE, HELD, SIZE, AT_BRANCH_POINT, UNHELD = 0, 1, 2, 3, 4
@@ -51,10 +48,14 @@ class System(NamedTuple):
     which: Integer  # (nk,) structure of each harmonic
     cos_table: Real
     sin_table: Real
-    laws: Integer  # (ne,) COULOMB, … of `solver.contacts.kernels.columns`
+    laws: Integer  # (ne,) numbers of the kernels, see `solver.contacts.kernels.laws`
+    jenkins: Integer  # (ne,) 1: the force is that of one spring and slider under the given load, else 0
+    normal_port: Integer  # (ne,) the port whose motion changes the normal load, −1: the load is given
     first_port: Integer  # (ne + 1,) where the ports of each element begin
     first_block: Integer  # (ne + 1,) where its blocks of dF_dU begin: ports² of them, row after row
     owner: Integer  # (nc,) element of each port
+    rubs: Integer  # (nc,) 1: friction, which a larger normal load would hold, else 0
+    held: Integer  # (nc, 3) of the stiffness at rest: its column, and the column and sign of what must be > 0
     contacts: Real  # (ne, COLUMNS) kt, mu, N0, N1, N1_ratio (NaN: not tied), N1_phase, and a law's own
     active: Real  # (ne,) 1.0 where λ acts
     shift: Real  # (nc,) stiffness moved into the structure [N/m]

@@ -21,10 +21,11 @@ import numpy as np
 from solver.balance.kernels.jacobian import factorise, step_back, step_back_transposed
 from solver.balance.kernels.output import extremes
 from solver.balance.kernels.residual import contact_values, least_size
+from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.coulomb import contact_force
 from solver.contacts.kernels.coulomb_hessian import inner, second_along
 from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED, piece_of
-from solver.contacts.kernels.system import KT, LOAD_COEFFICIENTS, MU, System
+from solver.contacts.kernels.system import LOAD_COEFFICIENTS, System
 from solver.extrema.kernels.peak_state import (
     AMPLITUDE,
     CURVE,

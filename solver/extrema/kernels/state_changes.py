@@ -16,10 +16,10 @@ from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.newton import newton
 from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, PIECE, RESIDUAL, measure, piece
 from solver.balance.kernels.residual import contact_values, evaluate
-from solver.contacts.kernels.columns import COULOMB
+from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.state_durations import find_segments
 from solver.contacts.kernels.stick_slip_events import piece_of
-from solver.contacts.kernels.system import KT, MU, Evaluation, Receptance, System
+from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
 from solver.jit.lapack import copy_to
@@ -47,7 +47,7 @@ def _piece_at(system: System, linear: Receptance, point: Evaluation, u: Real, p:
     """Return `piece` for the motions u at λ = p, by the events of the contacts alone where that goes."""
     simple = system.samples == 0
     for e in range(system.laws.size):
-        simple = simple and system.laws[e] == COULOMB
+        simple = simple and system.jenkins[e] == 1
     if not simple:
         # The receptance may be that of anywhere: the residual is not looked at.
         evaluate(system, linear, u, p, 0.0, point)

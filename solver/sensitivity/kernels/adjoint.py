@@ -19,10 +19,10 @@ import numpy as np
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.output import SAME_HEIGHT, extremes, observed_motion
 from solver.balance.kernels.residual import contact_values, evaluate
-from solver.contacts.kernels.columns import COULOMB
+from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.coulomb import contact_force
 from solver.contacts.kernels.stick_slip_events import FAILED
-from solver.contacts.kernels.system import KT, LOAD_COEFFICIENTS, MU, Evaluation, Receptance, System
+from solver.contacts.kernels.system import LOAD_COEFFICIENTS, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count, cosine_position
 from solver.jit.separate import apart
@@ -170,11 +170,11 @@ def _by_contacts(
     system: System, u: Real, omega: float, point: Evaluation, wanted: Integer, count: int, weights: Real,
     by: Real,
 ) -> None:  # fmt: skip
-    """Fill w·∂F/∂kt, w·∂F/∂mu and w·∂F/∂N of the elastic Coulomb contacts asked for."""
+    """Fill w·∂F/∂kt, w·∂F/∂mu and w·∂F/∂N of the Jenkins elements asked for."""
     n = coefficient_count(system.ks)
     table, load, _, _ = contact_values(system, omega, 0.0)
     for e in range(system.laws.size):
-        if wanted[e] == 0 or system.laws[e] != COULOMB:
+        if wanted[e] == 0 or system.jenkins[e] == 0:
             continue
         c, block = system.first_port[e], system.first_block[e]
         state, _ = contact_force(

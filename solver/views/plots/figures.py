@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from matplotlib.figure import Figure
 
 from solver.continuation.branch import Branch
@@ -13,7 +15,6 @@ from solver.scene.scene import Scene
 from solver.studies.blades import BladeAmplitudes, BladePeaks
 from solver.studies.convergence import AccuracyStudy
 from solver.studies.mistuning import MistuningStudy
-from solver.studies.response_map import ResponseMap
 from solver.views.plots.accuracy import accuracy_figure
 from solver.views.plots.curves import Response
 from solver.views.plots.disks import blades_figure, mistuning_figure
@@ -22,6 +23,9 @@ from solver.views.plots.multipliers import multipliers_figure
 from solver.views.plots.responses import Demands, response_figure
 from solver.views.plots.style import Into
 from solver.views.plots.tracks import map_figure, track_figure
+
+if TYPE_CHECKING:
+    from solver.studies.response_map import ResponseMap
 
 
 def of_branch(branch: Branch, ax: Into = None, *, limit: float | None = None) -> Figure:

@@ -15,7 +15,7 @@ from sqlalchemy.sql.operators import custom_op
 Range = tuple[float | None, float | None]
 Position = tuple[float | None, str]
 
-_FEW = 2000
+FEW = 2000
 _FEW_OF_AN_OWNER = 5000
 _PLANNING = (
     "SELECT set_config('plan_cache_mode', 'force_custom_plan', true), "
@@ -37,7 +37,7 @@ class Condition:
 
     ids: Select[str]
     holds: ColumnElement[bool]
-    few: int = _FEW
+    few: int = FEW
     apart: bool = False
 
 

@@ -1,4 +1,4 @@
-"""The key `uncertain` of a design problem: its types, which the design layer takes for granted."""
+"""The type of the key `uncertain`; `optim.problem.uncertainty_input` reads what it means."""
 
 from __future__ import annotations
 

@@ -1,0 +1,109 @@
+"""Keys by which criteria are limited, and how the command writes any key of a design problem."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+WORD = re.compile(r"[a-z][a-z0-9_]*")
+_FLAG = re.compile(r"--[a-z][a-z0-9-]*")
+
+
+class Form(Enum):
+    """How the option of a key is written."""
+
+    NUMBER = "one number"
+    WHOLE_NUMBER = "one whole number"
+    WORD = "one word"
+    RANGES = "LO HI, repeatable"
+    BOUNDS = "PATH LO HI, repeatable"
+    NUMBER_OR_TABLE = "one number, or NAME=NUMBER, repeatable"
+    NUMBERS_BY_PATH = "PATH=NUMBER, repeatable"
+    NUMBERS_BY_WORD = "WORD=NUMBER, repeatable"
+    WORDS_BY_PATH = "PATH=WORD, repeatable"
+    NAMES = "NAME, repeatable"
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """The option of the command that stands for a key.
+
+    Attributes
+    ----------
+    form : Form
+        How it is written.
+    flag : str
+        Its name.
+    metavar : str
+        What stands behind it in the help.
+    help : str
+        What it means.
+    word : str
+        What each name of an option of `Form.NAMES` stands for in the table of the key.
+    example : str
+        Of its text.
+    words : tuple of str
+        Those it takes, of `Form.WORD`.
+    """
+
+    form: Form
+    flag: str
+    metavar: str
+    help: str
+    word: str = ""
+    example: str = ""
+    words: tuple[str, ...] = ()
+
+    @property
+    def several(self) -> int:
+        """How many words follow it each time it is given."""
+        return {Form.BOUNDS: 3, Form.RANGES: 2}.get(self.form, 1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Key:
+    """A key that limits a criterion: of problem files, REST bodies and `optim.design`, with its option.
+
+    Attributes
+    ----------
+    name : str
+        The key.
+    help : str
+        What it means, with its unit; a sentence.
+    annotation : type
+        Its values in a body: a type that pydantic understands, without None.
+    form, flag, metavar, word, example
+        Those of its option, see `Option`.
+    option_help : str
+        Help of the option; `help` if empty.
+    examples : tuple
+        Values of the key.
+    needs_limit : bool
+        Whether it is refused without the key ``limit``.
+    """
+
+    name: str
+    help: str
+    annotation: Any
+    form: Form
+    flag: str
+    metavar: str
+    option_help: str = ""
+    word: str = ""
+    example: str = ""
+    examples: tuple[Any, ...] = ()
+    needs_limit: bool = False
+
+    def __post_init__(self) -> None:
+        if not WORD.fullmatch(self.name):
+            raise ValueError(f"`name` of a key must be such as max_peak, got {self.name!r}")
+        if not _FLAG.fullmatch(self.flag):
+            raise ValueError(f"`flag` of {self.name} must be such as --max-peak, got {self.flag!r}")
+
+    @property
+    def option(self) -> Option:
+        """Its option."""
+        words = self.option_help or self.help
+        return Option(self.form, self.flag, self.metavar, words, word=self.word, example=self.example)

@@ -1,0 +1,240 @@
+"""The keys of a design problem, each said once: type, range, words, and its option of the command.
+
+The arguments of `optim.design`, `robust_design` and `pareto_front` (`optim.problem.keywords`), problem files,
+bodies of requests, options of the command and the table in docs/design.md follow from these models. They know
+types and ranges; whether a description fits its scene, `optim.problem.reading` finds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated, Any, Literal, Optional, TypeVar, get_args
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, create_model
+
+from optim.criteria.json_types import LARGEST, Harmonics, Name, Number, Pair, ParameterPath, PositiveNumber
+from optim.criteria.key import Form, Key, Option
+from optim.criteria.registry import criteria, limit_keys, weight_words
+from optim.problem.uncertainty_type import Uncertain
+from optim.problem.words import AimWord, MethodWord, ScalingWord
+
+MAX_VARIABLES = 50
+MAX_CASES = 50
+VARIABLE_LENGTH = 500
+HARMONICS = 11
+BASINS, MOST_BASINS = 2, 20
+POINTS, FEWEST_POINTS = 9, 3
+QUANTILE = 0.95
+FEWEST_SAMPLES = 2
+SEED = 0
+
+
+def _observed(value: object) -> object:
+    """A DOF, or a list of them."""
+    texts = [value] if isinstance(value, str) else value
+    if (
+        isinstance(texts, list)
+        and 1 <= len(texts) <= MAX_CASES
+        and all(isinstance(text, str) and 0 < len(text) <= 200 for text in texts)
+    ):
+        return value
+    raise ValueError("must be the name of a DOF, or a list of them")
+
+
+_PATH = r"[A-Za-z0-9_@-]+(\.[A-Za-z0-9_@-]+)?"
+VariableName = Annotated[str, Field(max_length=VARIABLE_LENGTH, pattern=rf"^{_PATH}(\s*,\s*{_PATH})*$")]
+Weight = Annotated[float, Field(strict=True, ge=0.0, le=LARGEST)]
+Observed = Annotated[
+    Any,
+    BeforeValidator(_observed),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
+]
+
+
+class CaseRequest(BaseModel):
+    """One load case: a response the design is judged by, the scene's own where a key is left out."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+    name: Name | None = Field(default=None, description="How results call it.")
+    set: dict[ParameterPath, Number] = Field(
+        default={}, max_length=1000, description="Values of this case alone, parameter path to value."
+    )
+    band: Pair | None = Field(default=None, description="Frequencies [low, high] [Hz]; the scene's band.")
+    observe: Observed | None = Field(default=None, description="DOF whose amplitude counts, or several.")
+    engine_order: Annotated[int, Field(strict=True, ge=0, le=10_000)] | None = Field(
+        default=None, description="Engine order of every excitation; cyclic scenes only."
+    )
+    order: Annotated[int, Field(strict=True, ge=1, le=10_000)] | None = Field(
+        default=None, description="Excitations a revolution; the engine order, else 1."
+    )
+    weight: PositiveNumber | None = Field(
+        default=None, description="By which its peaks count in what is minimised; 1."
+    )
+
+
+class ProblemKeys(BaseModel):
+    """What the design problems of all kinds have in common; `with_limits` adds the keys of the criteria."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, defer_build=True)
+
+    harmonics: Annotated[
+        Harmonics,
+        Option(Form.WHOLE_NUMBER, "--harmonics", "H", help=f"Highest harmonic kept; {HARMONICS}."),
+    ] = Field(default=HARMONICS, description="Highest harmonic of the balance.")
+    variables: Annotated[
+        Annotated[dict[VariableName, Pair], Field(min_length=1, max_length=MAX_VARIABLES)] | None,
+        Option(
+            Form.BOUNDS, "--variable", "PATH LO HI",
+            help="A parameter and its bounds, for example shroud.N0 20 3000; paths that share a value are "
+            "separated by commas; repeatable. If left out, the normal load of the contact whose load varies.",
+        ),
+    ] = Field(
+        default=None,
+        description="Variable to [low, high]: a parameter path, or several that share a value, separated "
+        "by commas. The normal load of the contact whose load varies if left out.",
+        examples=[{"damper.N0": [20, 1000]}, {"shroud.N0,root.N0": [20, 3000]}],
+    )  # fmt: skip
+    scaling: Annotated[
+        dict[VariableName, ScalingWord] | None,
+        Option(
+            Form.WORDS_BY_PATH, "--scaling", "PATH=HOW", example="shroud.N0=logarithmic",
+            help="Scale a variable linear or logarithmic; by its bounds.",
+        ),
+    ] = Field(
+        default=None, max_length=MAX_VARIABLES,
+        description="Whether equal steps or equal ratios of a variable count equally; by its bounds.",
+        examples=[{"damper.N0": "logarithmic"}],
+    )  # fmt: skip
+    cases: Annotated[list[CaseRequest], Field(min_length=1, max_length=MAX_CASES)] | None = Field(
+        default=None, description="The responses that count; the scene as it is if left out."
+    )
+    limit: Annotated[
+        PositiveNumber | None,
+        Option(
+            Form.NUMBER, "--limit", "A",
+            help="Amplitude [m] above which the resonance band is measured; peak/√2 if left out.",
+        ),
+    ] = Field(
+        default=None,
+        description="Amplitude [m] above which the resonance band is measured; half power of the peak.",
+    )  # fmt: skip
+    start: Annotated[
+        dict[VariableName, Number] | None,
+        Option(
+            Form.NUMBERS_BY_PATH, "--start", "PATH=VALUE", example="shroud.N0=150",
+            help="A design to start from; repeatable.",
+        ),
+    ] = Field(
+        default=None, max_length=MAX_VARIABLES, description="A design to start from, variable to value."
+    )  # fmt: skip
+    method: Annotated[
+        MethodWord,
+        Option(
+            Form.WORD,
+            "--method",
+            "M",
+            help="auto, tracked, minimax or ipopt; auto.",
+            words=get_args(MethodWord),
+        ),
+    ] = Field(default="auto", description="How the optimum is searched.")
+
+
+class NominalAndRobustKeys(ProblemKeys):
+    """What a design takes besides; `of_design` adds limits and weights."""
+
+    basins: Annotated[
+        Annotated[int, Field(strict=True, ge=1, le=MOST_BASINS)] | None,
+        Option(Form.WHOLE_NUMBER, "--basins", "N", help=f"Local optima looked for; {BASINS}."),
+    ] = Field(default=None, description=f"How many local optima are looked for; {BASINS}.")
+    uncertain: Uncertain | None = Field(
+        default=None,
+        description="What is not known: a table of intervals, a table of an ellipsoid, or a list of samples.",
+        examples=[{"damper.mu": [0.2, 0.4], "damper.kt": {"deviation": 0.1}}],
+    )
+    aim: AimWord | None = Field(
+        default=None, description="What is minimised over the uncertainty; worst-case."
+    )
+    quantile: Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] | None = Field(
+        default=None, description=f"Share of the samples that the aim `quantile` minimises; {QUANTILE}."
+    )
+    samples: Annotated[int, Field(strict=True, ge=FEWEST_SAMPLES, le=10_000)] | None = Field(
+        default=None, description="Scenarios drawn; 32 of a worst case, else 64."
+    )
+    seed: Annotated[int, Field(strict=True, ge=SEED, lt=2**63)] | None = Field(
+        default=None, description=f"Of the random numbers; {SEED}."
+    )
+
+
+class PointsOfFront(ProblemKeys):
+    """What a front takes besides; `of_front` adds its limits."""
+
+    points: Annotated[
+        Annotated[int, Field(strict=True, ge=FEWEST_POINTS, le=200)] | None,
+        Option(Form.WHOLE_NUMBER, "--points", "N", help=f"Points of the front, {POINTS} if left out."),
+    ] = Field(
+        default=None, description=f"Points of the front looked for, both ends included; {POINTS}."
+    )  # fmt: skip
+
+
+Model = TypeVar("Model", bound=ProblemKeys)
+
+
+def with_limits(model: type[Model], keys: Iterable[Key], **further: Any) -> type[Model]:
+    """Return a model with the keys of criteria, and fields of its own.
+
+    Parameters
+    ----------
+    model : without them.
+    keys : of its limits.
+    further : name to (type, `Field`).
+    """
+    limits: dict[str, Any] = {
+        key.name: (
+            Annotated[Optional[key.annotation], key.option],  # noqa: UP045 - a type that is known when this runs
+            Field(default=None, description=key.help, examples=list(key.examples) or None),
+        )
+        for key in keys
+    }
+    return create_model(
+        model.__name__.removeprefix("_"), __base__=model, __module__=model.__module__, __doc__=model.__doc__,
+        __cls_kwargs__={"defer_build": False}, **limits, **further,
+    )  # fmt: skip
+
+
+def of_design(model: type[Model]) -> type[Model]:
+    """Return a model with the limits and the weights of a design."""
+    words = weight_words()
+    minimised = ", ".join(f"{one.weight} [1/{one.unit}]" for one in criteria() if one.weight)
+    option = Option(
+        Form.NUMBERS_BY_WORD, "--weight", "|".join(f"{word}=W" for word in words), example="peak=1",
+        help="What is minimised; the peak alone if left out.",
+    )  # fmt: skip
+    table = dict[Literal[words], Weight] | None  # type: ignore[valid-type]
+    weights = Field(
+        default=None,
+        description=f"What is minimised: {minimised}, each times its weight; the peak alone.",
+        examples=[{"peak": 1, "band": 1e-6}],
+    )
+    return with_limits(model, limit_keys(), weights=(Annotated[table, option], weights))
+
+
+def of_front(model: type[Model]) -> type[Model]:
+    """Return a model with the limits of a front: what it minimises and the limit on the band are its own."""
+    return with_limits(model, limit_keys(of_fronts=True))
+
+
+DesignKeys = of_design(NominalAndRobustKeys)
+FrontKeys = of_front(PointsOfFront)
+ROBUST = ("uncertain", "aim", "quantile", "samples", "seed")
+"""The keys of a design for which not everything is known."""
+
+
+def options(model: type[BaseModel]) -> dict[str, Option]:
+    """Return the keys of a model that have an option of the command, in order."""
+    return {
+        name: one
+        for name, field in model.model_fields.items()
+        for one in field.metadata
+        if isinstance(one, Option)
+    }

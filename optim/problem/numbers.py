@@ -1,0 +1,57 @@
+"""Numbers of a description, checked; what is refused names its field."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TypeGuard
+
+from optim.errors import DesignError
+from solver.errors import Place
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Return whether a value is a finite number."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def number_pair(name: str | Place, pair: object) -> tuple[float, float]:
+    """Return two finite numbers.
+
+    Raises
+    ------
+    DesignError
+        Anything else.
+    """
+    if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
+        raise DesignError(name, pair, "must be two numbers, low and high")
+    for value in pair:
+        if not is_number(value):
+            raise DesignError(name, pair, "must be two finite numbers, low and high")
+    return float(pair[0]), float(pair[1])
+
+
+def whole(name: str | Place, value: object, *, least: int) -> int:
+    """Return a whole number from `least` on.
+
+    Raises
+    ------
+    DesignError
+        Anything else.
+    """
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise DesignError(name, value, f"must be a whole number >= {least}")
+    return value
+
+
+def positive(name: str | Place, value: object) -> float:
+    """Return a finite number above 0.
+
+    Raises
+    ------
+    DesignError
+        Anything else.
+    """
+    if not is_number(value) or value <= 0.0:
+        raise DesignError(name, value, "must be a number > 0")
+    return float(value)

@@ -1,0 +1,186 @@
+"""What stored sweeps and stored designs share: rows with parts (contacts, variables), and their lists."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, Generic, TypeVar
+
+from sqlalchemy import Connection, Select, bindparam, select
+from sqlalchemy.orm import InstrumentedAttribute, Session
+
+from service.db.engine import Database
+from service.db.models import NOBODY
+from service.db.pagination import (
+    FEW,
+    Condition,
+    Position,
+    Range,
+    met,
+    ordered,
+    owner_condition,
+    plain_conditions,
+    within,
+)
+
+Row = TypeVar("Row")
+Part = TypeVar("Part")
+Column = InstrumentedAttribute[Any]
+CREATED = "created"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Filter:
+    """Which rows to list; every condition must hold.
+
+    Attributes
+    ----------
+    owner : str or None
+        Whose; None for everybody's.
+    equal : mapping
+        Column name to value.
+    ranges : mapping
+        Column name to (lowest, highest), each None for open.
+    part : str or None
+        Name of a part it must have; None for any.
+    part_ranges : mapping
+        Column name of the parts to (lowest, highest); one part must meet all of them.
+    sort : str
+        ``created`` (by the time the job was handed in) or a sort of the table; rows that have no such value
+        are left out.
+    descending : bool
+        Largest or newest first.
+    """
+
+    owner: str | None = NOBODY
+    equal: Mapping[str, object] = field(default_factory=dict)
+    ranges: Mapping[str, Range] = field(default_factory=dict)
+    part: str | None = None
+    part_ranges: Mapping[str, Range] = field(default_factory=dict)
+    sort: str = CREATED
+    descending: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts(Generic[Part]):
+    """The table of the parts of rows.
+
+    Attributes
+    ----------
+    table : mapped class
+        With ``name`` and ``position``.
+    of : column
+        The id of the row a part belongs to.
+    values : type
+        Dataclass of what is read of it.
+    few : int
+        Up to so many rows a condition on parts leads a query, see `service.db.pagination.met`.
+    apart : bool
+        Whether PostgreSQL is asked too how many there are.
+    """
+
+    table: Any
+    of: Column
+    values: type[Part]
+    few: int = FEW
+    apart: bool = False
+
+
+class StoredRepository(Generic[Row, Part]):
+    """Rows of one table with their parts, in one database.
+
+    Parameters
+    ----------
+    database : where they are.
+    table : the mapped class.
+    identity : column of the ids, which sort by time.
+    sorts : word to the column it sorts by.
+    parts : their table.
+    """
+
+    def __init__(
+        self, database: Database, table: type[Row], identity: Column, sorts: Mapping[str, Column],
+        parts: Parts[Part],
+    ) -> None:  # fmt: skip
+        self._db = database
+        self._identity, self._sorts, self._parts = identity, sorts, parts
+        self._table: Any = table
+        # Built once: building a statement costs more than running it.
+        self._select = select(table)
+        self._part_names = [one.name for one in fields(parts.values)]  # type: ignore[arg-type]
+        self._select_parts = (
+            select(parts.of, *(getattr(parts.table, name) for name in self._part_names))
+            .where(parts.of.in_(bindparam("owners", expanding=True)))
+            .order_by(parts.of, parts.table.position)
+        )
+
+    def page(self, wanted: Filter, limit: int, after: Position | None = None) -> list[Row]:
+        """A page of rows; `after` is the sort value and id of the last one of the page before."""
+        with self._db.reading() as connection:
+            column = self._sorts.get(wanted.sort)
+            conditions = self._conditions(wanted)
+            leads = column is None and not wanted.equal
+            owner: Column = self._table.owner
+            conditions += owner_condition(connection, self._identity, owner, wanted.owner, leads=leads)
+            query = met(connection, self._select, self._identity, conditions, column)
+            query = ordered(query, self._identity, column, descending=wanted.descending, after=after)
+            return self._read(connection, query.limit(limit))
+
+    def get(self, row_id: str) -> Row | None:
+        """The row, or None."""
+        with self._db.reading() as connection:
+            return next(iter(self._read(connection, self._select.where(self._identity == row_id))), None)
+
+    def position(self, row: Row, sort: str) -> Position:
+        """Where a page that ends with this row goes on, sorted by this word."""
+        column = self._sorts.get(sort)
+        return None if column is None else getattr(row, column.key), getattr(row, self._identity.key)
+
+    def parts(self, row_ids: Sequence[str]) -> dict[str, list[Part]]:
+        """The parts of several rows, by row."""
+        found: dict[str, list[Part]] = {row_id: [] for row_id in row_ids}
+        with self._db.reading() as connection:
+            for row_id, *values in connection.execute(self._select_parts, {"owners": list(row_ids)}):
+                found[row_id].append(
+                    self._parts.values(**dict(zip(self._part_names, values, strict=True)))
+                )  # fmt: skip
+        return found
+
+    @staticmethod
+    def _read(
+        connection: Connection, query: Select[Row], given: Mapping[str, Any] | None = None
+    ) -> list[Row]:  # fmt: skip
+        with Session(connection) as session:
+            return list(session.scalars(query, given))
+
+    def _conditions(self, wanted: Filter) -> list[Condition]:
+        found = [getattr(self._table, name) == value for name, value in wanted.equal.items()]
+        for name, bounds in wanted.ranges.items():
+            found.extend(within(getattr(self._table, name), bounds))
+        conditions = plain_conditions(self._identity, found)
+        if wanted.part is not None or wanted.part_ranges:
+            conditions.append(self._part_condition(wanted))
+        return conditions
+
+    def _part_condition(self, wanted: Filter) -> Condition:
+        """True for a row one of whose parts has the name and all the values."""
+        parts = self._parts
+        found = [] if wanted.part is None else [parts.table.name == wanted.part]
+        for name, bounds in wanted.part_ranges.items():
+            found.extend(within(getattr(parts.table, name), bounds))
+        ids = select(parts.of).where(*found)
+        holds = ids.where(parts.of == self._identity).correlate(self._table).exists()
+        return Condition(ids=ids, holds=holds, few=parts.few, apart=parts.apart)
+
+
+def part_rows(owner: Mapping[str, str], parts: Sequence[Any]) -> list[dict[str, object]]:
+    """Return the rows to insert for the parts of a row, in order.
+
+    Parameters
+    ----------
+    owner : the column of its id, and the id.
+    """
+    return [
+        {**owner, "position": position, **{one.name: getattr(part, one.name) for one in fields(part)}}
+        for position, part in enumerate(parts)
+    ]

@@ -1,0 +1,56 @@
+"""What the parts of a scene are made of: names, ends, numbers with their ranges."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+Real: TypeAlias = NDArray[np.float64]
+LARGEST = 1e15
+GROUND = "ground"
+NEXT = "next"
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+\z", max_length=100)]
+MemberName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(@[0-9]+)?\z", max_length=100)]
+EndName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(@([0-9]+|next))?\z", max_length=105)]
+Between = tuple[EndName, EndName]
+NonNegative = Annotated[float, Field(strict=True, ge=0.0, le=LARGEST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0.0, le=LARGEST, allow_inf_nan=False)]
+Signed = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+Friction = Annotated[float, Field(strict=True, ge=0.0, le=100.0, allow_inf_nan=False)]
+Angle = Annotated[float, Field(strict=True, ge=-1e4, le=1e4, allow_inf_nan=False)]
+
+
+class Part(BaseModel):
+    """Root of everything in a scene: frozen, no unknown keys, no NaN."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class End(NamedTuple):
+    """One end of a spring, dashpot or contact: a DOF (None = ground), here or in the next sector."""
+
+    dof: str | None
+    next: bool
+
+
+def parse_end(text: str) -> End:
+    """Read ``"tip"``, ``"tip@next"``, ``"tip@3"`` (a DOF of an annulus) or ``"ground"``."""
+    if text == GROUND:
+        return End(None, False)
+    base, at, suffix = text.partition("@")
+    return End(base, True) if at and suffix == NEXT else End(text, False)
+
+
+class Element(Part):
+    """Something that joins two ends."""
+
+    between: Between
+
+    @property
+    def ends(self) -> tuple[End, End]:
+        """The two ends, read."""
+        return parse_end(self.between[0]), parse_end(self.between[1])

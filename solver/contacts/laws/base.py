@@ -1,0 +1,258 @@
+"""The contract of a contact law: what a scene says of it, and the answers everything else asks for.
+
+A law is a class made from `AnyContact`. Its fields are those of a contact in a scene, with ranges and words;
+`PARAMETERS` says where each number stands in the contact table; `KERNEL` names the kernel behind the contract
+of `solver.contacts.kernels.laws`. What else a law may answer has a default that is right for a spring of one
+motion, or says that the law has no such thing. Nothing outside this folder asks which law a contact has.
+
+Importing a law must not load Numba: what computes is imported inside the methods.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
+
+from solver.contacts.fields import Between, Element, End, MemberName, Name, Real, parse_end
+from solver.contacts.laws.parts import Held, Motion, NormalLoad, Piece, Quantity, Row, Slider
+from solver.errors import SettingError
+
+if TYPE_CHECKING:
+    from solver.contacts.segments import Shares
+
+
+class AnyContact(Element):
+    """What all contacts have.
+
+    Attributes
+    ----------
+    name : str
+        Name in parameter paths.
+    between : (str, str)
+        Its ends; the relative motion is x(first) - x(second), and the force resists it.
+    group : str or None
+        A name that sets several contacts at once in parameter paths.
+    """
+
+    LAW: ClassVar[str]
+    """The word of `law` in a scene."""
+    FORCE: ClassVar[str]
+    """The force in a line of Markdown, for the table of docs/laws.md."""
+    KERNEL: ClassVar[str]
+    """``module:NAME`` of the kernel."""
+    PARAMETERS: ClassVar[Mapping[str, Quantity]] = {}
+    """Its numbers that are parameter paths."""
+    WORDS: ClassVar[Mapping[str, str]] = {}
+    """What the schema of scenes says of keys, in place of the docstring's words."""
+    END_KEYS: ClassVar[tuple[str, ...]] = ("between",)
+    """The keys of the ends of each relative motion the force depends on, port after port."""
+    HELD: ClassVar[tuple[Held, ...]]
+    """What each port begins with at rest."""
+
+    JENKINS: ClassVar[bool] = False
+    """Whether the force is that of one spring kt and one slider μN under the given load (`friction`).
+
+    What is known in closed form of this element is then used: second derivatives, its events, and that it is
+    a spring between nothing and kt.
+    """
+    OPENS: ClassVar[bool] = False
+    """Whether it opens and closes as the parts move."""
+    RUBBING: ClassVar[tuple[int, ...]] = ()
+    """The ports along which friction works."""
+    NORMAL_PORT: ClassVar[int | None] = None
+    """The port whose motion changes the normal load, by the stiffness it begins with."""
+
+    name: MemberName
+    group: Name | None = None
+
+    # Scene
+
+    @property
+    def pairs(self) -> tuple[Between, ...]:
+        """The ends of each relative motion the force depends on."""
+        return tuple(getattr(self, key) for key in self.END_KEYS)
+
+    @property
+    def pair_ends(self) -> tuple[tuple[End, End], ...]:
+        """The same, read."""
+        return tuple((parse_end(first), parse_end(second)) for first, second in self.pairs)
+
+    def value_of(self, key: str) -> float:
+        """Value of a parameter.
+
+        Raises
+        ------
+        SettingError
+            It has none as the others stand.
+        """
+        return cast(float, getattr(self, key) or 0.0)
+
+    def changed_by(self, key: str, new: float) -> dict[str, object]:
+        """The fields that change where a parameter is set."""
+        return {key: new}
+
+    def followers(self, key: str) -> frozenset[str]:
+        """The parameters that change while one of its own does, itself among them."""
+        return frozenset({key} & self.PARAMETERS.keys())
+
+    def in_sector(self, turn: float, share: float | None) -> dict[str, object]:
+        """The fields that differ in another sector of an annulus.
+
+        Parameters
+        ----------
+        turn : the angle by which the wave comes later there [rad].
+        share : of the amplitude in a standing wave, None in one that travels.
+        """
+        del turn, share
+        return {}
+
+    # Contact table and kernel
+
+    @property
+    def kernel(self) -> str:
+        """``module:NAME`` of the kernel for its settings."""
+        return self.KERNEL
+
+    @property
+    def sampled_kernel(self) -> str | None:
+        """The kernel that takes as many samples of a period as `columns.SAMPLES` says instead, if any."""
+        return None
+
+    @property
+    def stiffnesses(self) -> tuple[float, ...]:
+        """A stiffness of each relative motion [N/m]: what holds it when the contact is closed and stuck."""
+        return (0.0,) * len(self.pairs)
+
+    def fill(self, row: Real, highest: int) -> None:
+        """Put its numbers into its row of the contact table, for harmonics up to `highest`."""
+        del highest
+        for key, quantity in self.PARAMETERS.items():
+            row[quantity.column] = self.value_of(key)
+
+    def at(self, row: Real) -> Self:
+        """The contact with the numbers of a row of the contact table."""
+        numbers = {key: float(row[quantity.column]) for key, quantity in self.PARAMETERS.items()}
+        return self.model_copy(update=numbers)
+
+    # Load and friction
+
+    @property
+    def friction(self) -> Slider | None:
+        """Its slider if it is friction with a limit μN, else None."""
+        return None
+
+    @property
+    def slides_on_a_line(self) -> bool:
+        """Whether its slider has the events of `solver.contacts.segments`, so that its travel is known."""
+        return False
+
+    @property
+    def load(self) -> NormalLoad | None:
+        """The given normal load; None where the law knows none."""
+        return None
+
+    @property
+    def load_is_given(self) -> bool:
+        """Whether it is friction whose load does not depend on the motion."""
+        return self.load is not None and self.NORMAL_PORT is None
+
+    def normal_load(self, motions: Real) -> Real:
+        """Return the coefficients of the normal load not cut at 0 [N]; motions are (ports, 2H + 1) [m]."""
+        del motions
+        return (self.load or NormalLoad(mean=0.0, amplitude=0.0, phase=0.0)).coefficients
+
+    # What may be taken for granted
+
+    @property
+    def answers_unlike(self) -> str | None:
+        """Why it answers a motion and its negative half a period later differently, or None."""
+        return None
+
+    @property
+    def several_responses(self) -> str | None:
+        """Why a half-wave symmetric response need not be the only one, or None.
+
+        Friction and springs of a constant stiffness never let two responses move apart.
+        """
+        return None
+
+    @property
+    def keeps_together(self) -> bool:
+        """Whether it never lets two motions under the same forces move apart."""
+        return False
+
+    # Plan
+
+    @property
+    def evaluation(self) -> str:
+        """How its force is found, in the words of a plan."""
+        return f"the law {self.LAW}"
+
+    @property
+    def separation(self) -> tuple[bool, str]:
+        """Whether it may open, and why."""
+        may = f"{self.name} opens and closes as it moves" if self.OPENS else f"{self.name} has no gap"
+        return self.OPENS, may
+
+    # A periodic motion
+
+    def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
+        """Return the force along the first motion [N] at the angles `tau`, evenly spaced from 0.
+
+        Parameters
+        ----------
+        motions : (ports, 2H + 1) full coefficients [m]; load : those of the normal load [N].
+        """
+        del motions, load, tau
+        raise SettingError(
+            "contact", self.name, f"must have a law whose force is known over time ({self.LAW} is not)"
+        )
+
+    def utilisation(self, forces: Real, load: Real) -> float:
+        """Return the largest share of its limit that it carries while it sticks; forces (ports, 2H + 1)."""
+        del forces, load
+        return 1.0
+
+    def motion_at(self, motions: Real, load: Real, force: Real, tau: Real) -> list[Motion] | None:
+        """Return what it does at every angle, where its force is `force`; None where it knows no such."""
+        del motions, load, force, tau
+        return None
+
+    def shares(self, motions: Real, load: Real) -> Shares | None:
+        """Return the shares of the period in stick, slip and separation; None where it knows no such."""
+        del motions, load
+        return None
+
+    def pieces(self, slip: Real) -> tuple[Piece, ...] | None:
+        """Return its states for the stability of a motion, of whose `slip` these are the full coefficients.
+
+        None where the stability is not computed.
+        """
+        del slip
+        return None
+
+    def rows(self) -> tuple[Row, ...]:
+        """Return the rows of the time march.
+
+        Raises
+        ------
+        SettingError
+            The law cannot be marched.
+        """
+        raise SettingError("scene", self.name, "has a contact of a law that cannot be marched in time")
+
+    # Limits
+
+    def linear_limit(self, load: float, *, gone: bool) -> dict[str, Any] | None:
+        """Return what makes it linear: without force if it is `gone`, else stuck under a large load [N].
+
+        None where it stays as it is. A key whose value is None is left out of the scene.
+        """
+        del load, gone
+        return None
+
+    def least_load_slope(self, key: str) -> float:
+        """Return the derivative of the least normal load of a given load by a parameter of its own."""
+        del key
+        return math.nan

@@ -1,0 +1,102 @@
+"""The law `coulomb`: elastic Coulomb friction under a given normal load, in closed form."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+
+from solver.contacts.fields import NonNegative, Real
+from solver.contacts.laws.friction import FrictionContact
+from solver.contacts.laws.parts import SHORTEST, Motion, Piece, Row
+from solver.errors import SettingError
+
+if TYPE_CHECKING:
+    from solver.contacts.segments import Shares
+
+
+class SlidesOnALine(FrictionContact):
+    """Friction in one direction: the events of a period say all that the contact does."""
+
+    @property
+    def slides_on_a_line(self) -> bool:
+        """Whether it has one slider with the events of `solver.contacts.segments`."""
+        return True
+
+    def shares(self, motions: Real, load: Real) -> Shares:
+        """Return the shares of the period in stick, slip and separation."""
+        from solver.contacts.segments import segments_of, shares_of
+
+        return shares_of(segments_of(motions[0], load, self.kt, self.mu))
+
+
+class Contact(SlidesOnALine):
+    """A friction contact: elastic Coulomb with a given normal load N(t) = N0 + N1 cos(omega t + N1_phase).
+
+    Attributes
+    ----------
+    kt : float
+        Tangential contact stiffness [N/m].
+    mu : float
+        Friction coefficient.
+    N0 : float
+        Mean normal load [N].
+    N1, N1_ratio : float or None
+        Amplitude of the load [N], or that amplitude as a multiple of N0; one of them or neither (no
+        variation). `N1_value` is the amplitude whichever was given. Where N1 > N0 the contact opens.
+    N1_phase : float
+        Phase of the load [rad].
+    """
+
+    LAW: ClassVar[str] = "coulomb"
+    FORCE: ClassVar[str] = (
+        "stick `kt u + c`, slip `± μN`, nothing while `N <= 0`; `N = N0 + N1 cos(ωt + N1_phase)`"
+    )
+    KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb_ports:coulomb_ports"
+    JENKINS: ClassVar[bool] = True
+
+    law: Literal["coulomb"] | None = None
+    N0: NonNegative
+
+    @property
+    def sampled_kernel(self) -> str:
+        """The kernel that samples motion and load instead."""
+        return "solver.contacts.kernels.coulomb_ports:coulomb_sampled"
+
+    @property
+    def evaluation(self) -> str:
+        """How its force is found, in the words of a plan."""
+        return "elastic Coulomb friction under a given load: closed form"
+
+    def motion_at(self, motions: Real, load: Real, force: Real, tau: Real) -> list[Motion]:
+        """Return what it does at every angle, by its segments."""
+        from solver.contacts.segments import motion_at, segments_of
+
+        del force
+        return motion_at(segments_of(motions[0], load, self.kt, self.mu), tau)
+
+    def pieces(self, slip: Real) -> tuple[Piece, ...]:
+        """Return its states: in stick the slider is held, in slip and separation the force is given."""
+        from solver.contacts.kernels.stick_slip_events import BEGIN, END, FAILED, MOTION, STICK
+        from solver.contacts.segments import segments_of
+
+        found = segments_of(slip, self.load.coefficients, self.kt, self.mu)
+        if found.state == FAILED:
+            raise SettingError(
+                "solution", self.name, "must have a motion of every contact that can be followed"
+            )
+        stiff, none = np.array([[self.kt]]), np.zeros((1, 1))
+        return tuple(
+            Piece(begin=row[BEGIN], end=row[END], tangent=stiff, grip=-stiff[0], catch=np.ones(1))
+            if row[MOTION] == STICK
+            else Piece(begin=row[BEGIN], end=row[END], tangent=none)
+            for row in found.rows
+            if row[END] - row[BEGIN] > SHORTEST
+        )
+
+    def rows(self) -> tuple[Row, ...]:
+        """Return its row of the time march."""
+        return (Row(name=self.name, ends=self.pair_ends[0], **self.row_numbers()),)
+
+
+LAW = Contact

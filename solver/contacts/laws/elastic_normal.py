@@ -1,0 +1,99 @@
+"""The law `elastic-normal`: rubbing, where the normal load moves with the parts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
+
+from solver.contacts.fields import Between, Positive, Real
+from solver.contacts.kernels import columns
+from solver.contacts.laws.coulomb import SlidesOnALine
+from solver.contacts.laws.friction import FrictionContact
+from solver.contacts.laws.parts import Follows, Held, Quantity, Row
+
+_CLOSED = (columns.N0, 1)
+
+
+class ElasticNormalContact(SlidesOnALine):
+    """A rubbing contact: the load moves with the parts, N = N0 + N1 cos(omega t + N1_phase) + kn v.
+
+    The friction is that of `Contact`, without force while N <= 0; max(N, 0) acts on the normal pair.
+
+    Attributes
+    ----------
+    normal_between : (str, str)
+        The ends of the normal motion v = x(first) - x(second); v > 0 presses.
+    kn : float
+        Normal contact stiffness [N/m].
+    N0 : float
+        Load [N] at v = 0; -kn * gap for an initial gap.
+    prestressed : bool
+        Whether v counts from the state in which a positive N0 is in equilibrium already: the force on the
+        normal pair is then max(N, 0) - max(N0, 0). Else it is the whole max(N, 0).
+    """
+
+    LAW: ClassVar[str] = "elastic-normal"
+    FORCE: ClassVar[str] = (
+        "the same with `N = N0 + N1 cos(ωt + N1_phase) + kn v`, and `max(N, 0)` on the normal pair"
+    )
+    KERNEL: ClassVar[str] = "solver.contacts.kernels.elastic_normal:elastic_normal"
+    PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
+        **FrictionContact.PARAMETERS,
+        # It may stand apart at rest.
+        "N0": Quantity(
+            column=columns.N0, unit="N",
+            wanted="must be a number >= 0 (from -1e15 with the law elastic-normal) and <= 1e15 [N]",
+        ),
+        "kn": Quantity(
+            column=columns.KN, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]"
+        ),
+    }  # fmt: skip
+    WORDS: ClassVar[Mapping[str, str]] = {
+        **FrictionContact.WORDS,
+        "N0": "Load [N] at v = 0; -kn times the gap for an initial gap.",
+    }
+    END_KEYS: ClassVar[tuple[str, ...]] = ("between", "normal_between")
+    HELD: ClassVar[tuple[Held, ...]] = (Held(columns.KT, *_CLOSED), Held(columns.KN, *_CLOSED))
+    OPENS: ClassVar[bool] = True
+    NORMAL_PORT: ClassVar[int | None] = 1
+
+    law: Literal["elastic-normal"]
+    normal_between: Between
+    kn: Positive
+    prestressed: bool = False
+
+    @property
+    def stiffnesses(self) -> tuple[float, ...]:
+        """A stiffness of each relative motion [N/m]: what holds it when the contact is closed and stuck."""
+        return (self.kt, self.kn)
+
+    def fill(self, row: Real, highest: int) -> None:
+        """Put its numbers into its row of the contact table."""
+        super().fill(row, highest)
+        row[columns.PRESTRESSED] = float(self.prestressed)
+
+    @property
+    def evaluation(self) -> str:
+        """How its force is found, in the words of a plan."""
+        return f"the normal load moves with the parts by {self.kn:g} N/m: friction and load in closed form"
+
+    def rows(self) -> tuple[Row, ...]:
+        """Return its row of the time march."""
+        rest = max(self.N0, 0.0) if self.prestressed else 0.0
+        tangential, normal = self.pair_ends
+        return (
+            Row(
+                name=self.name, ends=tangential, follows=Follows.RUBBING, normal_ends=normal, kn=self.kn,
+                rest=rest, **self.row_numbers(),
+            ),
+        )  # fmt: skip
+
+    def linear_limit(self, load: float, *, gone: bool) -> dict[str, Any]:
+        """Return what makes it linear; its load acts on the parts.
+
+        Removed it never closes, stuck it counts from the pressed state.
+        """
+        return {**super().linear_limit(load, gone=gone), **({"N0": -load} if gone else {"prestressed": True})}
+
+
+LAW = ElasticNormalContact

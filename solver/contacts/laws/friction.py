@@ -1,0 +1,215 @@
+"""What the laws of elastic Coulomb friction share: kt, μ, and a normal load N0 + N1 cos(ωt + N1_phase)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self, cast
+
+import numpy as np
+from pydantic import model_validator
+
+from solver.contacts.fields import Angle, Friction, Positive, Real, Signed
+from solver.contacts.kernels import columns
+from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.parts import Held, NormalLoad, Quantity, Slider
+from solver.errors import SettingError
+
+_LEAST_FRICTION = 0.1  # in a linear limit: what must stick does so with a load of reason
+_VARIATION = "changes the variation of a normal load"
+
+
+class FrictionContact(AnyContact):
+    """Elastic Coulomb friction with a normal load N(t) = N0 + N1 cos(omega t + N1_phase)."""
+
+    PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
+        "N0": Quantity(
+            column=columns.N0, unit="N", least=0.0,
+            wanted="must be a number >= 0 (from -1e15 with the law elastic-normal) and <= 1e15 [N]",
+        ),
+        "N1": Quantity(
+            column=columns.N1, unit="N", wanted="must be a number from -1e15 to 1e15 [N]",
+            unlike_half_waves=_VARIATION, breaks_symmetry=True, varies_load=True,
+        ),
+        "N1_ratio": Quantity(
+            column=columns.RATIO, unit="", unlike_half_waves=_VARIATION, breaks_symmetry=True,
+            varies_load=True,
+        ),
+        "N1_phase": Quantity(
+            column=columns.PHASE, unit="rad", wanted="must be a number from -1e4 to 1e4 [rad]"
+        ),
+        "kt": Quantity(
+            column=columns.KT, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]"
+        ),
+        "mu": Quantity(column=columns.MU, unit="", least=0.0, wanted="must be a number >= 0 and <= 100"),
+    }  # fmt: skip
+    WORDS: ClassVar[Mapping[str, str]] = {
+        "kt": "Tangential contact stiffness [N/m].",
+        "mu": "Friction coefficient.",
+        "N0": "Mean normal load [N].",
+        "N1": "Amplitude of the normal load [N]; in place of N1_ratio.",
+        "N1_ratio": "Amplitude of the normal load as a multiple of N0; in place of N1.",
+        "N1_phase": "Phase of the normal load [rad]: N0 + N1 cos(ωt + N1_phase).",
+    }
+    HELD: ClassVar[tuple[Held, ...]] = (Held(columns.KT),)
+    RUBBING: ClassVar[tuple[int, ...]] = (0,)
+
+    kt: Positive
+    mu: Friction
+    N0: Signed
+    N1: Signed | None = None
+    N1_ratio: Signed | None = None
+    N1_phase: Angle = 0.0
+
+    @model_validator(mode="after")
+    def _one_of_n1(self) -> FrictionContact:
+        if self.N1 is not None and self.N1_ratio is not None:
+            raise ValueError(
+                f"`N1` and `N1_ratio` of contact `{self.name}` exclude each other: give one, "
+                f"got N1 = {self.N1!r} and N1_ratio = {self.N1_ratio!r}"
+            )
+        return self
+
+    @property
+    def N1_value(self) -> float:
+        """Amplitude of the normal load [N], from `N1` or `N1_ratio`."""
+        if self.N1_ratio is not None:
+            return self.N1_ratio * self.N0
+        return 0.0 if self.N1 is None else self.N1
+
+    @property
+    def stiffnesses(self) -> tuple[float, ...]:
+        """A stiffness of each relative motion [N/m]: what holds it when the contact is closed and stuck."""
+        return (self.kt,) * len(self.pairs)
+
+    @property
+    def friction(self) -> Slider:
+        """Its slider."""
+        normal = self.NORMAL_PORT
+        return Slider(
+            kt=self.kt, mu=self.mu, ports=self.RUBBING, normal_port=normal,
+            normal_stiffness=0.0 if normal is None else self.stiffnesses[normal],
+        )  # fmt: skip
+
+    @property
+    def load(self) -> NormalLoad:
+        """The given normal load."""
+        return NormalLoad(mean=self.N0, amplitude=self.N1_value, phase=self.N1_phase, ratio=self.N1_ratio)
+
+    def value_of(self, key: str) -> float:
+        """Value of a parameter; of the load's amplitude whichever way it was given."""
+        if key == "N1":
+            return self.N1_value
+        if key != "N1_ratio":
+            return cast(float, getattr(self, key))
+        if self.N1_ratio is not None:
+            return self.N1_ratio
+        if self.N0 == 0.0 and self.N1_value != 0.0:
+            raise SettingError(
+                f"{self.name}.N1_ratio", None, f"is undefined with N0 = 0 and N1 = {self.N1_value:g}"
+            )
+        return self.N1_value / self.N0 if self.N0 else 0.0
+
+    def changed_by(self, key: str, new: float) -> dict[str, object]:
+        """The fields that change where a parameter is set: N1 unties the amplitude, N1_ratio ties it."""
+        if key in ("N1", "N1_ratio"):
+            return {"N1": None, "N1_ratio": None, key: new}
+        return {key: new}
+
+    def followers(self, key: str) -> frozenset[str]:
+        """The parameters that change while one of its own does: the amplitude with what it is tied to."""
+        ties = {"N1", "N1_ratio"} if self.N1_ratio is None else {"N0", "N1", "N1_ratio"}
+        return super().followers(key) | ({"N1"} if key in ties else frozenset())
+
+    def in_sector(self, turn: float, share: float | None) -> dict[str, object]:
+        """The load in another sector: later in a wave that travels, smaller in a standing one."""
+        if share is None:
+            return {"N1_phase": self.N1_phase + turn}
+        return {key: share * value for key in ("N1", "N1_ratio") if (value := getattr(self, key))}
+
+    def fill(self, row: Real, highest: int) -> None:
+        """Put its numbers into its row of the contact table; a load that is not tied has a ratio NaN."""
+        del highest
+        for key, quantity in self.PARAMETERS.items():
+            if key != "N1_ratio":
+                row[quantity.column] = self.value_of(key)
+        row[columns.RATIO] = math.nan if self.N1_ratio is None else self.N1_ratio
+
+    def at(self, row: Real) -> Self:
+        """The contact with the numbers of a row of the contact table."""
+        moved = super().at(row)
+        tied = not math.isnan(row[columns.RATIO])
+        return moved.model_copy(update={"N1": None} if tied else {"N1_ratio": None})
+
+    def normal_load(self, motions: Real) -> Real:
+        """Return the coefficients of the normal load not cut at 0 [N], with what the normal motion adds."""
+        given = self.load.coefficients
+        if self.NORMAL_PORT is None:
+            return given
+        moving = self.friction.normal_stiffness * motions[self.NORMAL_PORT]
+        given = np.pad(given, (0, max(moving.size - given.size, 0)))
+        given[: moving.size] += moving
+        return given
+
+    @property
+    def answers_unlike(self) -> str | None:
+        """Why it answers a motion and its negative half a period later differently, or None."""
+        if self.NORMAL_PORT is not None:
+            return f"the normal load of {self.name} moves with the parts"
+        if self.N1_value != 0.0:
+            return f"the normal load of {self.name} varies by {abs(self.N1_value):g} N"
+        return None
+
+    @property
+    def keeps_together(self) -> bool:
+        """Whether it never lets two motions under the same forces move apart: under a load that is given."""
+        return self.NORMAL_PORT is None
+
+    @property
+    def separation(self) -> tuple[bool, str]:
+        """Whether it may open, and why."""
+        if self.OPENS:
+            return super().separation
+        least = self.load.least
+        if least < 0.0:
+            return True, f"the normal load of {self.name} falls to {least:g} N"
+        return False, f"the normal load of {self.name} stays at {least:g} N or more"
+
+    def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
+        """Return the force along the first motion [N] at the angles `tau`, by its segments."""
+        from solver.contacts.force_history import force_by_segments
+
+        return force_by_segments(motions[0], load, self.kt, self.mu, tau)
+
+    def utilisation(self, forces: Real, load: Real) -> float:
+        """Return the largest share of its limit that it carries while it sticks."""
+        from solver.jit import fourier
+
+        n = forces.shape[1]
+        tau = np.linspace(0.0, 2.0 * np.pi, max(360, 8 * n), endpoint=False)
+        limit = self.mu * (fourier.basis(tau, (load.size - 1) // 2) @ load)
+        along = forces[list(self.RUBBING)] @ fourier.basis(tau, (n - 1) // 2).T
+        carried = self.friction.size(along)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shares = np.where(carried > 0.0, carried / limit, 0.0)
+        return float(min(shares.max(), 1.0))
+
+    def row_numbers(self) -> dict[str, Any]:
+        """Return the numbers of a row of the time march that friction has."""
+        load = self.load
+        return {
+            "kt": self.kt, "mu": self.mu, "N0": load.mean, "N1": load.amplitude, "N1_phase": load.phase
+        }  # fmt: skip
+
+    def linear_limit(self, load: float, *, gone: bool) -> dict[str, Any]:
+        """Return what makes it linear: no load if it is `gone`, else stuck under a large load [N]."""
+        changed: dict[str, Any] = {"N1_ratio": None, "N1": 0.0, "N0": 0.0 if gone else load}
+        if self.mu < _LEAST_FRICTION:
+            changed["mu"] = _LEAST_FRICTION
+        return changed
+
+    def least_load_slope(self, key: str) -> float:
+        """Return the derivative of N0 − |N1| of a given load by a parameter of its own."""
+        sign = math.copysign(1.0, self.N1_value)
+        by_key = {"N0": 1.0 - sign * (self.N1_ratio or 0.0), "N1": -sign, "N1_ratio": -sign * self.N0}
+        return by_key.get(key, 0.0)

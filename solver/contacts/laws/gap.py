@@ -1,0 +1,90 @@
+"""The law `gap`: a spring on one side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+
+from solver.contacts.fields import NonNegative, Real, Signed
+from solver.contacts.kernels import columns
+from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.parts import Follows, Held, Motion, Quantity, Row
+
+if TYPE_CHECKING:
+    from solver.contacts.segments import Shares
+
+
+class GapSpring(AnyContact):
+    """A spring on one side: F = k max(u - gap, 0).
+
+    Attributes
+    ----------
+    k : float
+        Stiffness once the gap is closed [N/m].
+    gap : float
+        Gap [m]; negative if the spring is pressed at rest.
+    """
+
+    LAW: ClassVar[str] = "gap"
+    FORCE: ClassVar[str] = "`k max(u - gap, 0)`"
+    KERNEL: ClassVar[str] = "solver.contacts.kernels.springs:gap_spring"
+    PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
+        "k": Quantity(
+            column=columns.K_GAP, unit="N/m", least=0.0, wanted="must be a number >= 0 and <= 1e15 [N/m]"
+        ),
+        "gap": Quantity(column=columns.GAP, unit="m", wanted="must be a number from -1e15 to 1e15 [m]"),
+    }
+    HELD: ClassVar[tuple[Held, ...]] = (Held(columns.K_GAP, columns.GAP, -1),)
+    OPENS: ClassVar[bool] = True
+
+    law: Literal["gap"]
+    k: NonNegative
+    gap: Signed
+
+    @property
+    def stiffnesses(self) -> tuple[float, ...]:
+        """A stiffness of each relative motion [N/m]: what holds it when the contact is closed and stuck."""
+        return (self.k,)
+
+    @property
+    def answers_unlike(self) -> str:
+        """Why it answers a motion and its negative half a period later differently."""
+        return f"{self.name} pushes on one side only"
+
+    @property
+    def evaluation(self) -> str:
+        """How its force is found, in the words of a plan."""
+        return "a spring on one side: closed form"
+
+    def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
+        """Return the force along the first motion [N] at the angles `tau`."""
+        from solver.jit import fourier
+
+        del load
+        u = fourier.basis(tau, (motions.shape[1] - 1) // 2) @ motions[0]
+        return np.asarray(self.k * np.maximum(u - self.gap, 0.0))
+
+    def motion_at(self, motions: Real, load: Real, force: Real, tau: Real) -> list[Motion]:
+        """Return what it does at every angle: it is closed where it pushes."""
+        del motions, load, tau
+        return [Motion.SEPARATION if each == 0.0 else Motion.STICK for each in force]
+
+    def shares(self, motions: Real, load: Real) -> Shares:
+        """Return the shares of the period: u − gap > 0 is the load of a contact that does not slide."""
+        from solver.contacts.segments import segments_of, shares_of
+
+        del load
+        opening = motions[0].copy()
+        opening[0] -= self.gap
+        return shares_of(segments_of(np.zeros(opening.size), opening, 1.0, 1.0))
+
+    def rows(self) -> tuple[Row, ...]:
+        """Return its row of the time march."""
+        return (
+            Row(name=self.name, ends=self.pair_ends[0], follows=Follows.GAP, kt=self.k, gap=self.gap),
+        )  # fmt: skip
+
+
+LAW = GapSpring

@@ -1,0 +1,208 @@
+"""What a law tells of itself in numbers and records: its parameters, its load, what it holds, its march."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.contacts.fields import End, Real
+
+SHORTEST = 1e-12  # rad; a state of a contact that lasts no longer does nothing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """A parameter of a law.
+
+    Attributes
+    ----------
+    column : int
+        Of the contact table, see `solver.contacts.kernels.columns`.
+    unit : str
+        Empty of a pure number.
+    wanted : str
+        What a value must be, for the message of a bad one.
+    least : float
+        Smallest value that means something to a continuation.
+    unlike_half_waves : str
+        Why a change of it may call for even harmonics: "changes …"; empty if it does not.
+    breaks_symmetry : bool
+        Whether with it a motion and its negative half a period later are answered differently.
+    varies_load : bool
+        Whether it makes the normal load vary.
+    """
+
+    column: int
+    unit: str
+    wanted: str = "must be a number from -1e15 to 1e15"
+    least: float = -math.inf
+    unlike_half_waves: str = ""
+    breaks_symmetry: bool = False
+    varies_load: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NormalLoad:
+    """A given normal load N(τ) = mean + amplitude cos(τ + phase) [N, rad].
+
+    Attributes
+    ----------
+    ratio : float or None
+        Of the amplitude to the mean where it is tied to it.
+    """
+
+    mean: float
+    amplitude: float
+    phase: float
+    ratio: float | None = None
+
+    @property
+    def coefficients(self) -> Real:
+        """Its Fourier coefficients (3,) [N]."""
+        return np.array(
+            [self.mean, self.amplitude * math.cos(self.phase), -self.amplitude * math.sin(self.phase)]
+        )
+
+    @property
+    def least(self) -> float:
+        """Its least value in a period [N]; below 0 it would pull."""
+        return self.mean - abs(self.amplitude)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slider:
+    """Friction with a limit: a spring and a slider that moves where the spring's force reaches μN.
+
+    Attributes
+    ----------
+    kt : float
+        Stiffness of the spring in every direction it slides in [N/m].
+    mu : float
+        Friction coefficient.
+    ports : tuple of int
+        The relative motions it slides along.
+    normal_port, normal_stiffness
+        The motion that changes the load, and by how much [N/m]; None and 0 where the load is given.
+    limits_apart : bool
+        Each direction has its own limit, in place of one for the whole force.
+    sampled : bool
+        The force comes from samples, so that it may graze its limit without any slip.
+    """
+
+    kt: float
+    mu: float
+    ports: tuple[int, ...] = (0,)
+    normal_port: int | None = None
+    normal_stiffness: float = 0.0
+    limits_apart: bool = False
+    sampled: bool = False
+
+    def size(self, forces: Real) -> Real:
+        """Return what counts against the limit of forces (directions, ...) [N]."""
+        return np.asarray(
+            np.abs(forces).max(axis=0) if self.limits_apart else np.sqrt((forces**2).sum(axis=0))
+        )
+
+
+class Held(NamedTuple):
+    """What a port begins with at rest: a stiffness, where a number is above 0 (or always).
+
+    Attributes
+    ----------
+    column : of the stiffness [N/m] in the contact table.
+    when, sign : column and sign of that number; sign 0: always.
+    """
+
+    column: int
+    when: int = 0
+    sign: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Piece:
+    """One state of a contact with m relative motions (ports), and how its force follows a perturbation.
+
+    Attributes
+    ----------
+    begin, end : float
+        When it lasts [rad]; `begin` may be any angle, and the end at most a period later.
+    tangent : (m, m) array
+        df/du [N/m].
+    grip : (m,) array or None
+        df/dw [N/m] of a slider that is held; None if there is none in this state.
+    catch : (m,) array or None
+        dw/du where the state begins; given together with `grip`.
+    """
+
+    begin: float
+    end: float
+    tangent: Real
+    grip: Real | None = None
+    catch: Real | None = None
+
+    @property
+    def lasts(self) -> float:
+        """Its duration [rad]."""
+        return self.end - self.begin
+
+    def holds_at(self, tau: float) -> bool:
+        """Whether it lasts at `tau`."""
+        turn = 2.0 * math.pi
+        return (tau - self.begin) % turn < self.lasts or self.lasts >= turn
+
+
+class Follows(Enum):
+    """What one row of the time march follows; the value is that of `solver.marching.kernels.state`."""
+
+    FRICTION = 0
+    RUBBING = 1
+    GAP = 2
+    POLYNOMIAL = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """A contact, or a part of one, as the time march follows it.
+
+    Attributes
+    ----------
+    name : str
+        As the march calls it.
+    ends : (End, End)
+        Of its relative motion.
+    kt, mu, N0, N1, N1_phase : float
+        Stiffness [N/m], friction coefficient, normal load [N, rad].
+    normal_ends, kn, rest : of a row that rubs
+        Ends of the normal motion, its stiffness [N/m], and the part of the normal force that is in
+        equilibrium at rest [N].
+    gap : float
+        Where a spring on one side begins [m].
+    powers : tuple of float
+        a1, a2, … of a polynomial spring [N/m^j]; `kt` is then the size of a1.
+    """
+
+    name: str
+    ends: tuple[End, End]
+    follows: Follows = Follows.FRICTION
+    kt: float = 0.0
+    mu: float = 0.0
+    N0: float = 0.0
+    N1: float = 0.0
+    N1_phase: float = 0.0
+    normal_ends: tuple[End, End] | None = None
+    kn: float = 0.0
+    rest: float = 0.0
+    gap: float = 0.0
+    powers: tuple[float, ...] = field(default=())
+
+
+class Motion(Enum):
+    """What a contact does at an instant; the value is what a client reads."""
+
+    STICK = 0
+    SLIP = 1
+    SEPARATION = 2

@@ -1,0 +1,112 @@
+"""The law `polynomial`: a nonlinear spring."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import model_validator
+
+from solver.contacts.fields import Real, Signed
+from solver.contacts.kernels import columns
+from solver.contacts.laws.base import AnyContact
+from solver.contacts.laws.parts import Follows, Held, Quantity, Row
+
+
+def _coefficient(power: int) -> Quantity:
+    return Quantity(
+        column=columns.A_1 + power - 1, unit="N/m" if power == 1 else f"N/m^{power}",
+        unlike_half_waves="changes a power of the motion", breaks_symmetry=power % 2 == 0,
+    )  # fmt: skip
+
+
+class PolynomialSpring(AnyContact):
+    """A spring with the force a1 u + a2 u^2 + ... + a9 u^9, a_j in N/m^j; what is left out is 0."""
+
+    LAW: ClassVar[str] = "polynomial"
+    FORCE: ClassVar[str] = "`a1 u + a2 u² + … + a9 u⁹`"
+    KERNEL: ClassVar[str] = "solver.contacts.kernels.springs:polynomial_spring"
+    PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
+        f"a{j}": _coefficient(j) for j in range(1, columns.MOST_DEGREE + 1)
+    }
+    WORDS: ClassVar[Mapping[str, str]] = {
+        f"a{j}": f"Coefficient of u^{j} [N/m^{j}]." for j in range(1, columns.MOST_DEGREE + 1)
+    }
+    HELD: ClassVar[tuple[Held, ...]] = (Held(columns.A_1),)
+
+    law: Literal["polynomial"]
+    a1: Signed | None = None
+    a2: Signed | None = None
+    a3: Signed | None = None
+    a4: Signed | None = None
+    a5: Signed | None = None
+    a6: Signed | None = None
+    a7: Signed | None = None
+    a8: Signed | None = None
+    a9: Signed | None = None
+
+    @model_validator(mode="after")
+    def _at_least_one(self) -> PolynomialSpring:
+        if all(getattr(self, key) is None for key in self.PARAMETERS):
+            raise ValueError(f"`a1` … `a9` of contact `{self.name}`: give at least one coefficient, got none")
+        return self
+
+    @property
+    def coefficients(self) -> tuple[float, ...]:
+        """a1 ... a9."""
+        return tuple(getattr(self, key) or 0.0 for key in self.PARAMETERS)
+
+    @property
+    def stiffnesses(self) -> tuple[float, ...]:
+        """A stiffness of each relative motion [N/m]: what holds it when the contact is closed and stuck."""
+        return (max(self.a1 or 0.0, 0.0),)
+
+    @property
+    def answers_unlike(self) -> str | None:
+        """Why it answers a motion and its negative half a period later differently, or None."""
+        return f"{self.name} has an even power of the motion" if any(self.coefficients[1::2]) else None
+
+    @property
+    def several_responses(self) -> str | None:
+        """Why a half-wave symmetric response need not be the only one, or None.
+
+        A spring that stiffens or softens lets two responses move apart, with the inertia, though its force is
+        odd: m = k = a3 = 1, c = 0.2, F = 15 has at ω = 1.6 rad/s a symmetric response that is not stable, and
+        two with a mean that are.
+        """
+        first, *others = self.coefficients
+        if any(others):
+            return f"the stiffness of {self.name} changes with its motion, so other responses are possible"
+        return f"the stiffness of {self.name} is negative" if first < 0.0 else None
+
+    @property
+    def keeps_together(self) -> bool:
+        """Whether it never lets two motions under the same forces move apart: one of constant stiffness."""
+        return self.several_responses is None
+
+    @property
+    def evaluation(self) -> str:
+        """How its force is found, in the words of a plan."""
+        return "a polynomial: exact with enough samples"
+
+    def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
+        """Return the force along the first motion [N] at the angles `tau`."""
+        from solver.jit import fourier
+
+        del load
+        u = fourier.basis(tau, (motions.shape[1] - 1) // 2) @ motions[0]
+        return np.asarray(np.polyval([*self.coefficients[::-1], 0.0], u))
+
+    def rows(self) -> tuple[Row, ...]:
+        """Return its row of the time march."""
+        powers = self.coefficients
+        return (
+            Row(
+                name=self.name, ends=self.pair_ends[0], follows=Follows.POLYNOMIAL, kt=abs(powers[0]),
+                powers=powers,
+            ),
+        )  # fmt: skip
+
+
+LAW = PolynomialSpring

@@ -1,0 +1,254 @@
+"""A contact law of this folder (`iwan`): named once, it is solved, swept, marched, designed and described.
+
+Time marching of its sliders, each by itself, is the referee: it shares nothing with the kernel.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from contact_cases import central_difference
+from iwan import LIMIT, SLIDERS, IwanContact, K
+from launch import COMMAND, served
+from law_cases import Element, evaluate, jacobian
+
+import optim
+import solver
+from service.client.client import Client
+from service.errors import ServiceProblem
+from service.rendering.docs_tables import TABLES
+from solver import extensions
+from solver.contacts.kernels import columns
+from solver.contacts.laws.registry import laws, register, unregister
+from solver.scene.json_schema import scene_schema
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+NAMED = {extensions.VARIABLE: json.dumps(["iwan:IwanContact"])}
+SCENE: dict[str, Any] = {
+    "name": "joined",
+    "structure": {
+        "kind": "lumped",
+        "masses": {"a": 1.0, "b": 0.6},
+        "springs": [
+            {"between": ["a", "ground"], "k": 1.0, "c": 0.02},
+            {"between": ["a", "b"], "k": 0.8, "c": 0.02},
+        ],
+    },
+    "contacts": [{"name": "joint", "law": "iwan", "between": ["b", "ground"], "k": 0.7, "limit": 0.8}],
+    "excitation": {"dof": "a", "amplitude": 1.0},
+    "observe": {"dof": "b", "band": [0.1, 0.3]},
+}
+HZ, HARMONICS = 0.19, 21
+
+
+@pytest.fixture
+def registered() -> Iterator[None]:
+    """In this process."""
+    register(IwanContact)
+    yield
+    unregister(IwanContact)
+
+
+def scene(**values: float) -> solver.Scene:
+    found = solver.Scene.from_dict(SCENE)
+    return found.with_values({f"joint.{key}": value for key, value in values.items()})
+
+
+def environment() -> dict[str, str]:
+    paths = os.pathsep.join((str(ROOT), str(Path(__file__).parent)))
+    return {**os.environ, **NAMED, "PYTHONPATH": paths}
+
+
+def command(*arguments: str, cwd: Path) -> str:
+    ended = subprocess.run(
+        [*COMMAND, *arguments], env=environment(), cwd=cwd, capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 0, ended.stderr
+    return ended.stdout
+
+
+def test_the_kernel_has_the_derivatives_of_its_force() -> None:
+    row = np.zeros(columns.COLUMNS)
+    row[K], row[LIMIT] = 2.0, 0.9
+    element = Element(law=IwanContact.KERNEL, U=np.random.default_rng(4).normal(size=(1, 7)), row=row)
+    here = evaluate(element)
+
+    def moved(U: np.ndarray, row: np.ndarray) -> np.ndarray:
+        found = evaluate(Element(law=IwanContact.KERNEL, U=U, row=row))
+        assert found.piece == here.piece
+        return found.F[0]
+
+    for i, unit in enumerate(np.eye(7)):
+        slope = central_difference(lambda x, d=unit: moved(element.U + x * d, row), 1e-6)
+        assert jacobian(here)[:, i] == pytest.approx(slope, abs=1e-8)
+    for column in (K, LIMIT):
+        unit = np.eye(columns.COLUMNS)[column]
+        slope = central_difference(lambda x, d=unit: moved(element.U, row + x * d), 1e-6)
+        assert evaluate(element, slope=unit).dF_dp[0] == pytest.approx(slope, abs=1e-8)
+
+
+@pytest.mark.usefixtures("registered")
+@pytest.mark.parametrize("limit", [0.1, 0.8, 3.0])
+def test_the_balance_is_what_marching_its_sliders_gives(limit: float) -> None:
+    found = solver.solve(scene(limit=limit), frequency_hz=HZ, harmonics=HARMONICS)
+    referee = solver.march(scene(limit=limit), frequency_hz=HZ)
+    assert found.converged
+    assert referee.converged
+    assert len(referee.contacts) == SLIDERS
+    assert found.half_peak_to_peak == pytest.approx(referee.half_peak_to_peak, rel=2e-4)
+
+
+@pytest.mark.usefixtures("registered")
+def test_its_friction_work_is_the_area_of_its_loop() -> None:
+    branch = solver.sweep(scene(), harmonics=HARMONICS)
+    worst = solver.worst_friction_work(branch, "joint")
+    found = solver.solve(scene(), frequency_hz=worst.at, harmonics=HARMONICS)
+    u, force = solver.hysteresis_loop(found, "joint", samples=20_000)
+    area = float(0.5 * (force + np.roll(force, -1)) @ (np.roll(u, -1) - u))
+    assert worst.value == pytest.approx(area, rel=1e-3)
+    assert worst.value > 0.0
+
+
+@pytest.mark.usefixtures("registered")
+@pytest.mark.parametrize(("path", "step"), [("joint.limit", 1e-5), ("joint.k", 1e-5)])
+def test_its_parameters_are_paths_with_gradients(path: str, step: float) -> None:
+    def amplitude(value: float) -> float:
+        changed = scene().with_values({path: value})
+        return solver.solve(changed, frequency_hz=HZ, harmonics=HARMONICS).max_abs
+
+    branch = solver.sweep(scene(), start=HZ, stop=0.2, harmonics=HARMONICS)
+    found = solver.solve(scene(), frequency_hz=HZ, harmonics=HARMONICS)
+    slopes = solver.Sensitivities(branch.balance, [path])
+    gradient = slopes.gradient(branch.solutions[0], HZ).by_parameters[0]
+    value = scene().value(path)
+    assert gradient == pytest.approx(
+        (amplitude(value + step) - amplitude(value - step)) / (2.0 * step), rel=1e-4
+    )
+    assert found.max_abs == pytest.approx(branch.amplitude[0], rel=1e-8)
+    along = solver.sweep(scene(), path, frequency_hz=HZ, start=value, stop=1.5 * value, harmonics=HARMONICS)
+    assert along.amplitude[-1] == pytest.approx(amplitude(1.5 * value), rel=1e-6)
+
+
+@pytest.mark.usefixtures("registered")
+def test_its_limit_is_designed() -> None:
+    found = optim.design(scene(), variables={"joint.limit": (0.05, 4.0)}, harmonics=5)
+    assert found.reached, found.status
+    best = found.optimum["joint.limit"]
+
+    def peak(limit: float) -> float:
+        return solver.sweep(scene(limit=limit), harmonics=5).peak.value
+
+    assert found.peak.value == pytest.approx(peak(best), rel=1e-6)
+    assert found.peak.value <= min(
+        peak(limit) for limit in (0.8 * best, 0.98 * best, 1.02 * best, 1.3 * best)
+    )
+
+
+@pytest.mark.usefixtures("registered")
+def test_the_plan_speaks_of_it() -> None:
+    effects = {effect.name: effect for effect in solver.plan(scene()).effects}
+    assert effects["law of joint"].reason == f"{SLIDERS} sliders side by side: closed form"
+    assert not effects["separation of joint"].used
+    assert not effects["even harmonics and mean"].used
+
+
+@pytest.mark.usefixtures("registered")
+def test_what_is_wrong_is_told() -> None:
+    wrong = {**SCENE, "contacts": [{**SCENE["contacts"][0], "limit": -1.0, "mu": 0.3}]}
+    with pytest.raises(solver.SceneError) as refused:
+        solver.Scene.from_dict(wrong)
+    said = {issue.pointer: issue.message for issue in refused.value.issues}
+    assert said["/contacts/0/limit"] == "`limit` must be > 0, got -1.0"
+    assert "is not a key of a contact with the law `iwan`; known keys:" in said["/contacts/0/mu"]
+    with pytest.raises(solver.SettingError, match=r"joint.limit.*must be a number > 0 and <= 1e15 \[N\]"):
+        scene(limit=0.0)
+    stable = solver.solve(scene(), frequency_hz=HZ, harmonics=3)
+    with pytest.raises(solver.SettingError, match="joint"):
+        solver.stability(stable)
+
+
+def test_a_scene_knows_it_while_it_is_registered() -> None:
+    with pytest.raises(solver.SceneError, match=r"`law` must be one of coulomb, .*polynomial, got 'iwan'"):
+        scene()
+    register(IwanContact)
+    try:
+        assert scene().contacts[0].kernel == "iwan:iwan"
+        with pytest.raises(ValueError, match="iwan"):
+            register(IwanContact)
+    finally:
+        unregister(IwanContact)
+    assert "iwan" not in laws()
+    with pytest.raises(solver.SceneError):
+        scene()
+
+
+@pytest.mark.usefixtures("registered")
+def test_the_schema_of_scenes_describes_it() -> None:
+    found = scene_schema()["$defs"]["IwanContact"]["properties"]
+    assert found["limit"]["description"] == "Force at which all of it slips [N]."
+    assert found["law"]["description"].endswith("gap, polynomial or iwan.")
+
+
+@pytest.mark.usefixtures("registered")
+def test_the_table_of_laws_has_it() -> None:
+    (line,) = (line for line in TABLES["laws.md"]["laws"]().splitlines() if "iwan" in line)
+    assert line == f"| `iwan` | {IwanContact.FORCE} | `k`, `limit` |"
+
+
+def test_the_command_solves_and_describes_it(tmp_path: Path) -> None:
+    (tmp_path / "joined.json").write_text(json.dumps(SCENE))
+    solved = command(
+        "solve", "joined.json", "--frequency", str(HZ), "--harmonics", "5", "--json", cwd=tmp_path
+    )
+    register(IwanContact)
+    try:
+        expected = solver.solve(scene(), frequency_hz=HZ, harmonics=5).max_abs
+    finally:
+        unregister(IwanContact)
+    assert json.loads(solved)["max_abs"] == pytest.approx(expected, rel=1e-9)
+    described = json.loads(command("schema", "scene", cwd=tmp_path))
+    assert "IwanContact" in described["$defs"]
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
+    """A service in a process of its own, with a worker."""
+    with served(tmp_path_factory.mktemp("service"), environment()) as url, Client(url) as client:
+        yield client
+
+
+def test_the_service_computes_and_plans_it(client: Client) -> None:
+    body = {"kind": "solve", "scene": SCENE, "frequency_hz": HZ, "harmonics": 5}
+    job = client.wait(client.submit(body).id)
+    assert job.status == "successful", job
+    found = client.results(job.id).result
+    assert found["contacts"] == {"joint": "stick and slip"}
+    planned = client.plan({"scene": SCENE, "harmonics": 5})
+    assert "law of joint" in [effect["name"] for effect in planned["effects"]]
+
+
+def test_the_page_reads_and_previews_it(client: Client) -> None:
+    assert client.read_scene(json.dumps(SCENE), "json") == {"scene": SCENE, "issues": []}
+    shown = client.preview(
+        {"kind": "point", "scene": SCENE, "frequency_hz": HZ, "harmonics": 5, "set": {"joint.limit": 0.4}}
+    )
+    register(IwanContact)
+    try:
+        expected = solver.solve(scene(limit=0.4), frequency_hz=HZ, harmonics=5).max_abs
+    finally:
+        unregister(IwanContact)
+    assert shown["max_abs"] == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_service_refuses_a_bad_value(client: Client) -> None:
+    wrong = {**SCENE, "contacts": [{**SCENE["contacts"][0], "k": 0.0}]}
+    with pytest.raises(ServiceProblem) as refused:
+        client.submit({"kind": "solve", "scene": wrong, "frequency_hz": HZ})
+    assert [one["pointer"] for one in refused.value.problem["errors"]] == ["/scene/contacts/0/k"]

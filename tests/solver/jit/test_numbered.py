@@ -1,0 +1,48 @@
+"""Kernels called by number: a call announces those its contract knows, others load when asked for."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import numba
+import pytest
+from numba import types
+
+from solver.contacts.kernels.columns import KERNELS
+from solver.contacts.kernels.laws import call_law, law_number
+from solver.jit.separate import watched
+
+
+class Noted:
+    def __init__(self) -> None:
+        self.names: list[str] = []
+
+    def called(self, name: bytes) -> None:
+        module, kernel, *_ = pickle.loads(name)
+        self.names.append(f"{module}:{kernel}")
+
+    def needed(self, name: bytes) -> None:
+        pass
+
+
+def test_compiling_a_call_announces_every_law_of_the_package() -> None:
+    one, two, three = (types.Array(types.float64, dimensions, "C") for dimensions in (1, 2, 3))
+    ks = types.Array(types.int64, 1, "C")
+
+    @numba.njit
+    def caller(e: int, *rest: Any) -> tuple[int, int]:
+        return call_law(e, *rest)
+
+    noted = Noted()
+    with watched(noted):
+        rest = types.Tuple([two, ks, one, ks, one, one, one, two, two, two, two, three, two])
+        caller.compile((types.int64, rest))
+    assert set(KERNELS) <= set(noted.names)
+
+
+def test_what_is_no_kernel_of_the_contract_gets_no_number() -> None:
+    with pytest.raises(TypeError, match="returns"):
+        law_number("not_a_law:returns_a_float")
+    with pytest.raises(ModuleNotFoundError):
+        law_number("no_such_module:law")
