@@ -31,6 +31,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         service_pruning,
         service_requests,
         service_scale,
+        space_kernel,
         start,
         sweep_costs,
     )  # fmt: skip
@@ -52,6 +53,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "map": disk.disk_map,
         "beam": beam.beams,
         "savings": savings.savings,
+        "space-kernel": space_kernel.space_kernel,
         "stages": sweep_costs.stages,
         "two-hundred": large.two_hundred_contacts,
         "reduction": reduction.reduction,

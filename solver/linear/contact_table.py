@@ -33,14 +33,14 @@ def contact_set(scene: Scene) -> ContactSet:
     contacts, ports = scene.contacts, port_counts(scene)
     first = np.append(0, np.cumsum(ports))
     normal = [
-        -1 if contact.NORMAL_PORT is None else begin + contact.NORMAL_PORT
+        -1 if contact.normal_port is None else begin + contact.normal_port
         for contact, begin in zip(contacts, first.tolist(), strict=False)
     ]
     rubs = np.zeros(first[-1], dtype=np.int64)
     for contact, (begin, _) in zip(contacts, pairwise(first.tolist()), strict=True):
         if contact.friction is not None:
             rubs[[begin + port for port in contact.RUBBING]] = 1
-    held = [tuple(port) for contact in contacts for port in contact.HELD]
+    held = [tuple(port) for contact in contacts for port in contact.held]
     return ContactSet(
         laws=np.array([law_number(contact.kernel) for contact in contacts], dtype=np.int64),
         jenkins=np.array([contact.JENKINS for contact in contacts], dtype=np.int64),

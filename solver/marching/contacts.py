@@ -34,7 +34,7 @@ def columns(found: tuple[Row, ...], index: dict[str, int]) -> dict[str, NDArray[
     powers = np.zeros((len(found), max(degree, 1)))
     for i, row in enumerate(found):
         powers[i, : len(row.powers)] = row.powers
-    scalars = ("kt", "mu", "N0", "N1", "N1_phase", "kn", "rest", "gap")
+    scalars = ("kt", "mu", "N0", "N1", "N1_phase", "kn", "rest", "presses", "gap")
     numbers = {name: np.array([getattr(row, name) for row in found], dtype=np.float64) for name in scalars}
     return {
         **numbers, "law": np.array([row.follows.value for row in found], dtype=np.int64), "first": first,

@@ -281,7 +281,8 @@ def _at_rest(system: kernel.System) -> kernel.State:
     """No motion, no friction force; open where nothing presses at tau = 0 or friction never acts."""
     n, n_contacts = system.A_start.size - 1, system.kt.size
     load = system.N0 + system.N1 * np.cos(system.N1_phase)
-    closed = np.where(system.law == kernel.ELASTIC_NORMAL, load, system.mu * load) > 0.0
+    moving = np.isin(system.law, (kernel.ELASTIC_NORMAL, kernel.CIRCLE))
+    closed = np.where(moving, load, system.mu * load) > 0.0
     closed = np.where(system.law == kernel.GAP, system.gap < 0.0, closed) | (system.law == kernel.POLYNOMIAL)
     mode = np.where(closed, kernel.STICK, kernel.SEPARATED).astype(np.int64)
     return kernel.State(np.zeros(n), np.zeros(n), np.zeros(n_contacts), mode)

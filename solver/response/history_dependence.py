@@ -98,7 +98,7 @@ class _Contact:
         """Return the most that motions of all ports up to `moved` [m] take of the room to the limit [N]."""
         away = moved[self.ports]
         given, normal = self.given, self.given.normal_port
-        lost = given.kt * given.size(away[list(given.ports)])
+        lost = given.size(given.pull(away[list(given.ports)]))
         if normal is not None:
             lost = lost + given.mu * given.normal_stiffness * away[normal]
         return float(lost)
@@ -153,7 +153,7 @@ def _sticks(slider: Slider, response: ContactResponse) -> bool:
     if not slider.sampled or response.state is not ContactState.SLIPPING:
         return False
     motions, forces, ports = np.array(response.motions), np.array(response.forces), list(slider.ports)
-    slips = np.abs(forces[ports, 1:] - slider.kt * motions[ports, 1:])
+    slips = np.abs(forces[ports, 1:] - slider.pull(motions[ports, 1:]))
     largest = float(np.abs(forces[ports, 1:]).max(initial=0.0))
     return float(slips.max(initial=0.0)) <= SLIPS * largest
 
@@ -196,7 +196,7 @@ def _sticks_from_rest(solution: Solution, sticking: tuple[_Contact, ...]) -> boo
 
 def _most_lost(given: Slider, distance: float, slip: float, approach: float) -> float:
     """Return the most that motion within a distance [J] takes of the room below the limit [N]."""
-    lost = given.kt * math.sqrt(2.0 * distance * slip)
+    lost = max(given.stiffnesses) * math.sqrt(2.0 * distance * slip)
     if given.normal_port is not None:
         lost += given.mu * given.normal_stiffness * math.sqrt(2.0 * distance * approach)
     return lost
@@ -234,7 +234,7 @@ class _Fits:
         given = contact.given
         if given.normal_port is not None:
             limit = limit + given.mu * given.normal_stiffness * away[given.normal_port]
-        change = given.kt * away[list(given.ports)]
+        change = given.pull(away[list(given.ports)])
         between = _BETWEEN * np.abs(change).max(axis=(0, 1), initial=0.0)
         return not bool(np.any(given.size(forces + change) + between >= limit))
 
@@ -311,7 +311,7 @@ def _in_sliders(solution: Solution, model: LinearModel, stiffness: Real) -> floa
             limits = np.minimum(
                 limits, contact.force_at(motions, response.load, angles % (2.0 * math.pi)) ** 2
             )
-        total += float(np.sum(limits)) / (2.0 * given.kt)
+        total += float(np.sum(limits)) / (2.0 * min(given.stiffnesses))
     return total
 
 

@@ -224,7 +224,7 @@ def _placed(contacts: tuple[ContactOfAnyLaw, ...], j: int, n: int) -> tuple[Cont
     for contact in contacts:
         pairs = {
             key: (_end(pair[0], j, n), _end(pair[1], j, n))
-            for key, pair in zip(contact.END_KEYS, contact.pairs, strict=True)
+            for key, pair in zip(contact.end_keys, contact.pairs, strict=True)
         }
         joined = [ends for ends in pairs.values() if ends[0] != ends[1]]
         if joined and len(joined) < len(pairs):

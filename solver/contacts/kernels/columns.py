@@ -12,6 +12,8 @@ COLUMNS = OWN + MOST_OWN
 COLUMN_KIND = 4
 # Elastic normal: stiffness [N/m], and 1.0 where the normal motion counts from the prestressed state.
 KN, PRESTRESSED = OWN, OWN + 1
+# In space, beside these: stiffness of the second direction [N/m], NaN where it is that of the first.
+KT_SECOND = OWN + 2
 # Gap spring: stiffness [N/m] and gap [m].
 K_GAP, GAP = OWN, OWN + 1
 # Polynomial spring: a_1, a_2, … [N/m^j]
@@ -31,4 +33,6 @@ KERNELS = (
     "solver.contacts.kernels.springs:polynomial_spring",
     "solver.contacts.kernels.planar:coulomb_plane",
     "solver.contacts.kernels.coulomb_ports:coulomb_sampled",
+    "solver.contacts.kernels.coulomb_space:coulomb_circle",
+    "solver.contacts.kernels.coulomb_space_box:coulomb_box",
 )

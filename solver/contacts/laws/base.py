@@ -66,12 +66,29 @@ class AnyContact(Element):
     name: MemberName
     group: Name | None = None
 
+    # Ports
+
+    @property
+    def end_keys(self) -> tuple[str, ...]:
+        """The keys of the ends of its relative motions, port after port: those of `END_KEYS` it was given."""
+        return self.END_KEYS
+
+    @property
+    def held(self) -> tuple[Held, ...]:
+        """What each of its ports begins with at rest."""
+        return self.HELD
+
+    @property
+    def normal_port(self) -> int | None:
+        """The port whose motion changes its normal load, or None."""
+        return self.NORMAL_PORT
+
     # Scene
 
     @property
     def pairs(self) -> tuple[Between, ...]:
         """The ends of each relative motion the force depends on."""
-        return tuple(getattr(self, key) for key in self.END_KEYS)
+        return tuple(getattr(self, key) for key in self.end_keys)
 
     @property
     def pair_ends(self) -> tuple[tuple[End, End], ...]:
@@ -155,7 +172,7 @@ class AnyContact(Element):
     @property
     def load_is_given(self) -> bool:
         """Whether it is friction whose load does not depend on the motion."""
-        return self.load is not None and self.NORMAL_PORT is None
+        return self.load is not None and self.normal_port is None
 
     def normal_load(self, motions: Real) -> Real:
         """Return the coefficients of the normal load not cut at 0 [N]; motions are (ports, 2H + 1) [m]."""

@@ -85,7 +85,7 @@ class FrictionContact(AnyContact):
     @property
     def friction(self) -> Slider:
         """Its slider."""
-        normal = self.NORMAL_PORT
+        normal = self.normal_port
         return Slider(
             kt=self.kt, mu=self.mu, ports=self.RUBBING, normal_port=normal,
             normal_stiffness=0.0 if normal is None else self.stiffnesses[normal],
@@ -144,9 +144,9 @@ class FrictionContact(AnyContact):
     def normal_load(self, motions: Real) -> Real:
         """Return the coefficients of the normal load not cut at 0 [N], with what the normal motion adds."""
         given = self.load.coefficients
-        if self.NORMAL_PORT is None:
+        if self.normal_port is None:
             return given
-        moving = self.friction.normal_stiffness * motions[self.NORMAL_PORT]
+        moving = self.friction.normal_stiffness * motions[self.normal_port]
         given = np.pad(given, (0, max(moving.size - given.size, 0)))
         given[: moving.size] += moving
         return given
@@ -154,7 +154,7 @@ class FrictionContact(AnyContact):
     @property
     def answers_unlike(self) -> str | None:
         """Why it answers a motion and its negative half a period later differently, or None."""
-        if self.NORMAL_PORT is not None:
+        if self.normal_port is not None:
             return f"the normal load of {self.name} moves with the parts"
         if self.N1_value != 0.0:
             return f"the normal load of {self.name} varies by {abs(self.N1_value):g} N"
@@ -163,7 +163,7 @@ class FrictionContact(AnyContact):
     @property
     def keeps_together(self) -> bool:
         """Whether it never lets two motions under the same forces move apart: under a load that is given."""
-        return self.NORMAL_PORT is None
+        return self.normal_port is None
 
     @property
     def separation(self) -> tuple[bool, str]:

@@ -80,7 +80,9 @@ class Slider:
     Attributes
     ----------
     kt : float
-        Stiffness of the spring in every direction it slides in [N/m].
+        Stiffness of the spring in the first direction it slides in [N/m].
+    kt_second : float or None
+        That of the second direction [N/m]; None: the same.
     mu : float
         Friction coefficient.
     ports : tuple of int
@@ -95,11 +97,22 @@ class Slider:
 
     kt: float
     mu: float
+    kt_second: float | None = None
     ports: tuple[int, ...] = (0,)
     normal_port: int | None = None
     normal_stiffness: float = 0.0
     limits_apart: bool = False
     sampled: bool = False
+
+    @property
+    def stiffnesses(self) -> tuple[float, ...]:
+        """The stiffness of every direction [N/m]."""
+        second = self.kt if self.kt_second is None else self.kt_second
+        return (self.kt, second)[: len(self.ports)]
+
+    def pull(self, away: Real) -> Real:
+        """Return the forces (directions, ...) [N] of its spring for motions `away` of its directions [m]."""
+        return np.asarray([kt * each for kt, each in zip(self.stiffnesses, away, strict=True)])
 
     def size(self, forces: Real) -> Real:
         """Return what counts against the limit of forces (directions, ...) [N]."""
@@ -162,6 +175,8 @@ class Follows(Enum):
     RUBBING = 1
     GAP = 2
     POLYNOMIAL = 3
+    CIRCLE = 4
+    CIRCLE_SECOND = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,6 +194,8 @@ class Row:
     normal_ends, kn, rest : of a row that rubs
         Ends of the normal motion, its stiffness [N/m], and the part of the normal force that is in
         equilibrium at rest [N].
+    presses : float
+        0.0 where another row has the normal force already, else 1.0.
     gap : float
         Where a spring on one side begins [m].
     powers : tuple of float
@@ -196,6 +213,7 @@ class Row:
     normal_ends: tuple[End, End] | None = None
     kn: float = 0.0
     rest: float = 0.0
+    presses: float = 1.0
     gap: float = 0.0
     powers: tuple[float, ...] = field(default=())
 

@@ -18,6 +18,7 @@ SHIPPED = (
     "solver.contacts.laws.coulomb",
     "solver.contacts.laws.elastic_normal",
     "solver.contacts.laws.coulomb_2d",
+    "solver.contacts.laws.coulomb_3d",
     "solver.contacts.laws.gap",
     "solver.contacts.laws.polynomial",
 )

@@ -19,6 +19,7 @@ Whole = NDArray[np.int64]
 ORDER = 8  # of the Taylor series; stable on the imaginary axis for h |lambda| < 3.4
 # Laws of the contacts.
 COULOMB, ELASTIC_NORMAL, GAP, POLYNOMIAL = 0, 1, 2, 3
+CIRCLE, CIRCLE_SECOND = 4, 5  # two rows, one after the other, of a contact with a circular limit
 # What a contact does; a slipping one has its direction, +1 or -1. A gap is closed (STICK) or open.
 STICK, SEPARATED = 0, 2
 # How a run of periods ended.
@@ -28,9 +29,10 @@ RAN, SETTLED, CHATTER, NOT_FINITE = 0, 1, 2, 3
 class System(NamedTuple):
     """The equations in tau: x'' = W (force - L^T F) - A x - B x', with A, B and W as compressed sparse rows.
 
-    W is the inverse of the mass matrix times omega^-2. `kt` is also the stiffness of a gap spring. Of the law
-    elastic-normal: the ends of the normal motion, its stiffness, and the part of the normal force that is in
-    equilibrium at rest. `powers` (n_contacts, degree) are the coefficients of polynomial springs.
+    W is the inverse of the mass matrix times omega^-2. `kt` is also the stiffness of a gap spring. Of the
+    laws elastic-normal and circle: the ends of the normal motion, its stiffness, and the part of the normal
+    force that is in equilibrium at rest; `presses` is 0 where another row has that force already. `powers`
+    (n_contacts, degree) are the coefficients of polynomial springs.
     """
 
     A_start: Whole
@@ -58,6 +60,7 @@ class System(NamedTuple):
     normal_second: Whole
     kn: Real
     rest: Real
+    presses: Real
     gap: Real
     powers: Real
 
@@ -74,7 +77,7 @@ class State(NamedTuple):
 class Series(NamedTuple):
     """Taylor coefficients over a step, row k belongs to s^k, s = 0..1; of u^j at [contact, j - 1, k].
 
-    `pull` is scratch, a force a DOF.
+    `pull` is scratch, a force a DOF; `turn` that of slips in space, see `solver.marching.kernels.circle`.
     """
 
     x: Real
@@ -84,6 +87,7 @@ class Series(NamedTuple):
     pull: Real
     normal: Real
     power: Real
+    turn: Real
 
 
 class Record(NamedTuple):

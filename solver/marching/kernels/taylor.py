@@ -21,9 +21,12 @@ import numpy as np
 
 from solver.jit.decorators import compiled
 from solver.jit.separate import apart
+from solver.marching.kernels.circle import TURN_ROWS, circle_change, circle_series, close_circle, reach
 from solver.marching.kernels.event_roots import NONE, first_fall, value_at
 from solver.marching.kernels.state import (
     CHATTER,
+    CIRCLE,
+    CIRCLE_SECOND,
     COULOMB,
     ELASTIC_NORMAL,
     GAP,
@@ -67,12 +70,17 @@ def _contact_series(system: System, state: State, series: Series, k: int) -> Non
     """Coefficient k of the contact forces from the motion's and the given load's."""
     for c in range(system.kt.size):
         mode, law = state.mode[c], system.law[c]
-        if law == ELASTIC_NORMAL:
+        if law == CIRCLE_SECOND:
+            continue
+        if law in (ELASTIC_NORMAL, CIRCLE):
             series.load[k, c] += system.kn[c] * normal_slip(system, series.x[k], c)
             series.normal[k, c] = 0.0 if mode == SEPARATED else series.load[k, c]
             if k == 0:
                 series.normal[k, c] -= system.rest[c]
-        if mode == SEPARATED or (law == ELASTIC_NORMAL and system.mu[c] == 0.0):
+        if law == CIRCLE:
+            series.load[k, c + 1] = series.load[k, c]
+            circle_series(system, state, series, c, k)
+        elif mode == SEPARATED or (law == ELASTIC_NORMAL and system.mu[c] == 0.0):
             series.force[k, c] = 0.0
         elif law == POLYNOMIAL:
             series.force[k, c] = power_series(system, series, c, k)
@@ -102,7 +110,7 @@ def _pull(system: System, tau: float, k: int, scale: float, series: Series) -> N
             pull[first] -= f[c]
         if second >= 0:
             pull[second] += f[c]
-        if system.law[c] == ELASTIC_NORMAL:
+        if system.law[c] in (ELASTIC_NORMAL, CIRCLE) and system.presses[c] > 0.0:
             first, second = system.normal_first[c], system.normal_second[c]
             if first >= 0:
                 pull[first] -= series.normal[k, c]
@@ -169,8 +177,10 @@ def _next_change(
     """
     mode, mu, law = state.mode[c], system.mu[c], system.law[c]
     when, target = NONE, mode
-    if law == POLYNOMIAL:
+    if law in (POLYNOMIAL, CIRCLE_SECOND):
         return when, target
+    if law == CIRCLE:
+        return circle_change(system, state, series, c, q)
     if law == GAP:
         return _gap_change(system, series, c, mode, q)
     margin = abs(system.N0[c]) + abs(system.N1[c])
@@ -228,7 +238,12 @@ def _change(system: System, state: State, tau: float, c: int, target: int) -> No
     """Put contact c into its next state at `tau`; one that closes sticks or slips by its rates."""
     before = state.mode[c]
     state.mode[c] = target
-    if target == SEPARATED:
+    if system.law[c] == CIRCLE:
+        if target == SEPARATED:
+            state.force[c], state.force[c + 1] = 0.0, 0.0
+        elif before == SEPARATED:
+            close_circle(system, state, tau, c)
+    elif target == SEPARATED:
         state.force[c] = 0.0
     elif before == SEPARATED:
         state.force[c] = 0.0
@@ -267,21 +282,25 @@ def _step(
         rest = h - gone
         _expand(system, state, start + gone, rest, series)
         when, target, which = NONE, STICK, -1
+        far = 1.0
         for c in range(system.kt.size):
             if system.law[c] != COULOMB or system.mu[c] * (system.N0[c] + abs(system.N1[c])) > 0.0:
                 s, mode = _next_change(system, state, series, rest, c, q)
                 if s < when:
                     when, target, which = s, mode, c
-        end = min(when, 1.0)
+                if system.law[c] == CIRCLE:
+                    far = min(far, reach(system, state, series, c))
+        end = min(when, far)
         while sample < per_step and sample / per_step * h <= gone + end * rest:
             place = max((sample / per_step * h - gone) / rest, 0.0)
             _sample(system, series, place, step * per_step + sample, dof, record)
             sample += 1
         _advance(system, state, series, end)
-        if which < 0:
+        if which < 0 and end == 1.0:
             return True
         gone += end * rest
-        _change(system, state, start + gone, which, target)
+        if end == when:
+            _change(system, state, start + gone, which, target)
         small = small + 1 if end * rest < 1e-12 else 0
         if small > 20 + 8 * system.kt.size:
             return False
@@ -345,6 +364,7 @@ def _run_periods(
     series = new_series(
         np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, n_contacts)), np.empty((rows, n_contacts)),
         np.empty(n), np.empty((rows, n_contacts)), np.empty((n_contacts, system.powers.shape[1], rows)),
+        np.zeros((n_contacts, TURN_ROWS, rows)),
     )  # fmt: skip
     q = np.empty(rows)
     for period in range(change.size):

@@ -1,0 +1,237 @@
+"""The law `coulomb-3d`: contact in space, friction in two directions under a load that may move."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import model_validator
+
+from solver.contacts.fields import Between, Positive, Real
+from solver.contacts.kernels import columns
+from solver.contacts.laws.friction import FrictionContact
+from solver.contacts.laws.parts import Follows, Held, Quantity, Row, Slider
+
+if TYPE_CHECKING:
+    from solver.contacts.segments import Shares
+
+_CLOSED = (columns.N0, 1)
+
+
+class SpaceContact(FrictionContact):
+    """A contact in space: two directions it slides in and, if given, a normal motion v that changes the load.
+
+    N = N0 + N1 cos(omega t + N1_phase) + kn v; the friction force is 0 and the normal force too while N <= 0.
+
+    Attributes
+    ----------
+    between_second : (str, str)
+        The ends of the motion in the second direction.
+    normal_between : (str, str) or None
+        The ends of the normal motion v = x(first) - x(second), v > 0 presses; None: the load is given.
+    kt, kt_second : float
+        Tangential stiffness of the first and of the second direction [N/m]; the second is the first's if
+        left out.
+    kn : float or None
+        Normal contact stiffness [N/m]; given together with `normal_between`.
+    N0 : float
+        Mean load, or load at v = 0 [N]; -kn * gap for an initial gap.
+    prestressed : bool
+        Whether v counts from the state in which a positive N0 is in equilibrium already: the force on the
+        normal pair is then max(N, 0) - max(N0, 0). Else it is the whole max(N, 0).
+    limit : "circle", "box" or None
+        |T| <= mu N for the whole force (also if left out), or each direction by itself.
+    """
+
+    LAW: ClassVar[str] = "coulomb-3d"
+    FORCE: ClassVar[str] = (
+        "friction in two directions with one limit, under `N = N0 + N1 cos(ωt + N1_phase) + kn v`; "
+        "`max(N, 0)` on the normal pair, if there is one"
+    )
+    PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
+        **FrictionContact.PARAMETERS,
+        "kt_second": Quantity(
+            column=columns.KT_SECOND, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]"
+        ),
+        "kn": Quantity(
+            column=columns.KN, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]"
+        ),
+    }  # fmt: skip
+    WORDS: ClassVar[Mapping[str, str]] = {
+        **FrictionContact.WORDS,
+        "N0": "Mean load, or load at v = 0 [N]; -kn times the gap for an initial gap.",
+    }
+    END_KEYS: ClassVar[tuple[str, ...]] = ("between", "between_second", "normal_between")
+    RUBBING: ClassVar[tuple[int, ...]] = (0, 1)
+
+    law: Literal["coulomb-3d"]
+    between_second: Between
+    normal_between: Between | None = None
+    kt_second: Positive | None = None
+    kn: Positive | None = None
+    prestressed: bool = False
+    limit: Literal["circle", "box"] | None = None
+
+    @model_validator(mode="after")
+    def _load_moves_or_is_given(self) -> SpaceContact:
+        if (self.normal_between is None) != (self.kn is None):
+            missing, given = ("kn", "normal_between") if self.kn is None else ("normal_between", "kn")
+            raise ValueError(
+                f"`{missing}` of contact `{self.name}` is missing beside `{given}`: give both for a load "
+                "that moves with the parts, or neither for one that is given"
+            )
+        if self.normal_between is None and self.N0 < 0.0:
+            raise ValueError(
+                f"`N0` of contact `{self.name}` must be >= 0 where the load is given, got {self.N0!r}"
+            )
+        if self.normal_between is None and self.prestressed:
+            raise ValueError(f"`prestressed` of contact `{self.name}` needs `normal_between` and `kn`")
+        return self
+
+    # Ports
+
+    @property
+    def end_keys(self) -> tuple[str, ...]:
+        """The keys of the ends of its relative motions."""
+        return self.END_KEYS if self.normal_between is not None else self.END_KEYS[:2]
+
+    @property
+    def normal_port(self) -> int | None:
+        """The port whose motion changes its normal load, or None."""
+        return None if self.normal_between is None else 2
+
+    @property
+    def held(self) -> tuple[Held, ...]:
+        """What each of its ports begins with at rest."""
+        second = columns.KT if self.kt_second is None else columns.KT_SECOND
+        if self.normal_between is None:
+            return Held(columns.KT), Held(second)
+        return tuple(Held(column, *_CLOSED) for column in (columns.KT, second, columns.KN))
+
+    @property
+    def stiffnesses(self) -> tuple[float, ...]:
+        """A stiffness of each relative motion [N/m]: what holds it when the contact is closed and stuck."""
+        return (*self._tangential, *(() if self.kn is None else (self.kn,)))
+
+    @property
+    def _tangential(self) -> tuple[float, float]:
+        return self.kt, self.kt if self.kt_second is None else self.kt_second
+
+    @property
+    def limits_apart(self) -> bool:
+        """Whether each direction has its own limit."""
+        return self.limit == "box"
+
+    @property
+    def friction(self) -> Slider:
+        """Its slider."""
+        found = super().friction
+        return replace(found, kt_second=self.kt_second, limits_apart=self.limits_apart)
+
+    # Contact table and kernel
+
+    @property
+    def kernel(self) -> str:
+        """The kernel of its limit."""
+        if self.limits_apart:
+            return "solver.contacts.kernels.coulomb_space_box:coulomb_box"
+        return "solver.contacts.kernels.coulomb_space:coulomb_circle"
+
+    def value_of(self, key: str) -> float:
+        """Value of a parameter; a second stiffness that is left out is the first."""
+        if key == "kt_second":
+            return self._tangential[1]
+        if key == "kn":
+            return self.kn or 0.0
+        return super().value_of(key)
+
+    def followers(self, key: str) -> frozenset[str]:
+        """The parameters that change while one of its own does."""
+        tied = {"kt_second"} if key == "kt" and self.kt_second is None else set()
+        return super().followers(key) | tied
+
+    def fill(self, row: Real, highest: int) -> None:
+        """Put its numbers into its row of the contact table; a tied second stiffness is NaN."""
+        super().fill(row, highest)
+        row[columns.PRESTRESSED] = float(self.prestressed)
+        if self.kt_second is None:
+            row[columns.KT_SECOND] = math.nan
+
+    def at(self, row: Real) -> SpaceContact:
+        """The contact with the numbers of a row of the contact table."""
+        moved = super().at(row)
+        left_out = {key: None for key in ("kt_second", "kn") if getattr(self, key) is None}
+        return moved.model_copy(update=left_out)
+
+    @property
+    def separation(self) -> tuple[bool, str]:
+        """Whether it may open, and why."""
+        if self.normal_between is not None:
+            return True, f"{self.name} opens and closes as it moves"
+        return super().separation
+
+    @property
+    def evaluation(self) -> str:
+        """How its force is found, in the words of a plan."""
+        load = "under a given load" if self.kn is None else f"the load moves with {self.kn:g} N/m"
+        if self.limits_apart:
+            return f"contact in space, {load}: a limit for each direction, in closed form"
+        return f"contact in space, {load}: circular limit, closed form in stick, collocation in slip"
+
+    # A periodic motion
+
+    def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
+        """Return the force along the first motion [N] at the angles `tau`."""
+        if self.limits_apart:
+            return super().force_at(motions, load, tau)
+        from solver.contacts.space_path import force_in_space, path_in_space
+
+        both = force_in_space(path_in_space(motions, load, *self._tangential, self.mu), tau)
+        return np.asarray(both[0])
+
+    def shares(self, motions: Real, load: Real) -> Shares:
+        """Return the shares of the period in stick, slip and separation."""
+        if self.limits_apart:
+            from solver.contacts.segments import segments_of, shares_of
+
+            pairs = zip(motions[:2], self._tangential, strict=True)
+            return shares_of(*(segments_of(slip, load, kt, self.mu) for slip, kt in pairs))
+        from solver.contacts.space_path import path_in_space, shares_in_space
+
+        return shares_in_space(path_in_space(motions, load, *self._tangential, self.mu))
+
+    def rows(self) -> tuple[Row, ...]:
+        """Return its rows of the time march, one for each direction; the first has the normal force."""
+        moves = self.normal_between is not None
+        given: dict[str, Any] = self.row_numbers()
+        if moves:
+            rest = max(self.N0, 0.0) if self.prestressed else 0.0
+            given |= {"normal_ends": self.pair_ends[2], "kn": self.kn, "rest": rest}
+        first = second = Follows.RUBBING if moves else Follows.FRICTION
+        if not self.limits_apart:
+            first, second = Follows.CIRCLE, Follows.CIRCLE_SECOND
+        pressing = 1.0 if moves else 0.0
+        along, across = self.pair_ends[:2]
+        return (
+            Row(name=self.name, ends=along, follows=first, presses=pressing, **given),
+            Row(
+                name=f"{self.name} (second)", ends=across, follows=second, presses=0.0,
+                **{**given, "kt": self._tangential[1]},
+            ),
+        )  # fmt: skip
+
+    def linear_limit(self, load: float, *, gone: bool) -> dict[str, Any]:
+        """Return what makes it linear; a load that moves acts on the parts.
+
+        Removed it never closes, stuck it counts from the pressed state.
+        """
+        found = super().linear_limit(load, gone=gone)
+        if self.normal_between is None:
+            return found
+        return {**found, **({"N0": -load} if gone else {"prestressed": True})}
+
+
+LAW = SpaceContact
