@@ -87,7 +87,7 @@ class Besieged:
         self.opened.append(made)
         if receive_buffer is not None:
             made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
-        made.settimeout(30.0)
+        made.settimeout(120.0)
         made.connect(("127.0.0.1", self.port))
         lines = [f"GET {path} HTTP/1.1", "Host: 127.0.0.1"]
         lines += [f"{name}: {value}" for name, value in self.headers(owner).items()]
