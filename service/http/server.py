@@ -21,6 +21,7 @@ from service.errors import ConfigurationError
 from service.http.app import create_app
 from service.http.connections import Connections
 from service.http.gc_freeze import spare_modules
+from service.http.malloc import give_back_large_blocks
 from service.jobs.registry import Registry
 from service.queue.core import Service
 from service.settings import logs
@@ -68,6 +69,7 @@ def serve(settings: Settings, registry: Registry | None = None) -> None:
         log.info("listening on http://%s:%d", settings.host, listener.getsockname()[1])
         server = _Server(_config(app, settings), service)
         spare_modules()
+        give_back_large_blocks()
 
         def stop() -> None:
             server.should_exit = True

@@ -100,7 +100,7 @@ class Besieged:
         self.process.send_signal(signal.SIGTERM)
         self.process.wait(120.0)
         took = time.monotonic() - begun
-        print(f"ended {took:.1f} s after SIGTERM")
+        print(f"ended {took:.1f} s after SIGTERM")  # noqa: T201
         return took
 
 
@@ -187,7 +187,7 @@ def others_are_served(service: Besieged, path: str, owner: str = "") -> None:
             took = sorted(_timed(client, path) for _ in range(_WINDOW))
             slowest.append(took[int(0.99 * _WINDOW) - 1])
             if slowest[-1] <= LATENCY:
-                print(f"another client: 99 % within {1e3 * slowest[-1]:.0f} ms")
+                print(f"another client: 99 % within {1e3 * slowest[-1]:.0f} ms")  # noqa: T201
                 return
     pytest.fail(f"of {_WINDOWS} times {_WINDOW} requests the 99th of 100 took {slowest} s")
 
@@ -203,5 +203,5 @@ def _timed(client: httpx.Client, path: str) -> float:
 def no_more_memory(service: Besieged) -> None:
     """The attack added less than `MEMORY_MB`."""
     added = service.added()
-    print(f"memory: {added:.0f} MB more than {service.idle:.0f}")
+    print(f"memory: {added:.0f} MB more than {service.idle:.0f}")  # noqa: T201
     assert added <= MEMORY_MB

@@ -89,6 +89,8 @@ def uploading(service: Besieged, owner: str) -> object:
                 body = file.replace(b"\n", f"\n% {number} {threading.get_ident()}\n".encode(), 1)
                 answer = client.post("/v1/uploads", content=body, params={"name": "K.mtx"})
                 assert answer.status_code in (201, 429, 503), answer.text
+                # The attack is on the service, not on the process of the test, which also measures.
+                over.wait(0.0 if answer.is_success else 0.2)
 
     return attack
 
