@@ -26,6 +26,7 @@ log = logging.getLogger("stickslip.http")
 
 MEDIA_TYPE = "application/problem+json"
 _RETRY_SECONDS = 5
+_METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
 # Not the service's fault, and no news for its log.
 _EXPECTED = frozenset({"queue-full", "overloaded", "storage-full"})
 _CHALLENGE = 'Bearer realm="stickslip"'
@@ -203,19 +204,17 @@ async def _http_error(request: Request, error: Exception) -> JSONResponse:
 
 def _allowed(request: Request) -> list[str]:
     """The methods of every route at the path of a request; Starlette names those of the first one only."""
-    methods = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
-    path = request.url.path.rstrip("/")
-    routes = request.app.routes
     # A path that is a route's own, such as /v1/scenes/read, is not one that a parameter of another would fit.
-    own = [route for route in routes if getattr(route, "path", None) == path]
-    return [
-        method
-        for method in methods
-        if any(
-            route.matches({**request.scope, "method": "GET" if method == "HEAD" else method})[0] is Match.FULL
-            for route in own or routes
-        )
-    ]
+    own = {method.upper() for method in request.app.openapi()["paths"].get(request.url.path, ())}
+
+    def possible(method: str) -> bool:
+        asked = "GET" if method == "HEAD" else method
+        if own:
+            return asked in own
+        scope = {**request.scope, "method": asked}
+        return any(route.matches(scope)[0] is Match.FULL for route in request.app.routes)
+
+    return [method for method in _METHODS if possible(method)]
 
 
 class _Boundary:
