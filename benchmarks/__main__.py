@@ -8,7 +8,10 @@ from collections.abc import Callable
 
 from benchmarks.harness import WrongResultError
 
-GROUPS = {"chains": ("chain-8", "chain-32", "one-slider"), "service": ("load", "latency", "lists", "scale")}
+GROUPS = {
+    "chains": ("chain-8", "chain-32", "one-slider"),
+    "service": ("load", "latency", "requests", "lists", "scale"),
+}
 
 
 def _cases() -> dict[str, Callable[[], None]]:
@@ -26,6 +29,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         savings,
         service_load,
         service_pruning,
+        service_requests,
         service_scale,
         space_kernel,
         start,
@@ -57,6 +61,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "load": service_load.load,
         "latency": service_load.latency,
         "lists": service_load.lists,
+        "requests": service_requests.requests,
         "pruning": service_pruning.pruning,
         "scale": service_scale.scale,
         "page": page.page,

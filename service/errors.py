@@ -26,6 +26,10 @@ class DatabaseError(ServiceError):
     """A database the service must not or cannot use: wrong revision, in use, damaged."""
 
 
+class DamagedDatabaseError(DatabaseError):
+    """A database that cannot be read."""
+
+
 class DatabaseInUseError(DatabaseError):
     """Another service holds this SQLite file."""
 
@@ -149,6 +153,18 @@ class RetryLaterError(ServiceError):
 
 class QueueFullError(RetryLaterError):
     """The queue takes no more jobs at present."""
+
+
+class OverloadedError(RetryLaterError):
+    """The service has as much to do as it takes on at a time."""
+
+
+class StorageFullError(ServiceError):
+    """An owner stores as much as they may."""
+
+
+class DatabaseAwayError(RetryLaterError):
+    """The database did not take a write in time; nothing was written."""
 
 
 class TooManyRequestsError(RetryLaterError):

@@ -31,14 +31,22 @@ _INCLUDED = {
 
 
 class KeyLimits(BaseModel):
-    """Limits of one key; what is not given here, the settings of the service say.
+    """Limits of one key; what is not given here, the settings of the service say (`owner_…`).
+
+    Those that count things at a time count all of the key's owner; 0 is no limit.
 
     Attributes
     ----------
     requests_per_minute : int or None
         Requests in a minute.
     waiting : int or None
-        Jobs of the key's owner that may wait at a time.
+        Jobs that may wait at a time.
+    storage_bytes : int or None
+        What uploads and results may take [bytes].
+    requests, streams, previews, uploads : int or None
+        Requests answered, event streams, waiting previews and uploads at a time.
+    priority : int or None
+        The highest priority of a job.
     seconds : float or None
         Longest time one attempt at a job may take [s].
     work : int or None
@@ -48,7 +56,13 @@ class KeyLimits(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
 
     requests_per_minute: int | None = Field(default=None, ge=1, le=1_000_000)
-    waiting: int | None = Field(default=None, ge=1, le=1_000_000)
+    waiting: int | None = Field(default=None, ge=0, le=1_000_000)
+    storage_bytes: int | None = Field(default=None, ge=0, le=10**15)
+    requests: int | None = Field(default=None, ge=0, le=100_000)
+    streams: int | None = Field(default=None, ge=0, le=100_000)
+    previews: int | None = Field(default=None, ge=0, le=1000)
+    uploads: int | None = Field(default=None, ge=0, le=1000)
+    priority: int | None = Field(default=None, ge=-100, le=100)
     seconds: float | None = Field(default=None, ge=0.1, le=1e7)
     work: int | None = Field(default=None, ge=1, le=10**15)
 

@@ -37,6 +37,7 @@ _OPTIONS = {
 }
 # What is not the user's input: the state of a file or of a service.
 _STATE = (
+    errors.DamagedDatabaseError,
     errors.DatabaseInUseError,
     errors.WrongRevisionError,
     errors.ConflictError,

@@ -222,7 +222,7 @@ class Client:
 
     def scenes(self) -> list[SceneAnswer]:
         """Shipped and stored scenes."""
-        return self._get(SceneList, "/v1/scenes").items
+        return list(self._pages(SceneList, "/v1/scenes", {}))
 
     def scene(self, name: str) -> SceneDetail:
         """A scene with its tables."""

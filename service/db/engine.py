@@ -9,10 +9,15 @@ and ``BEGIN`` on the read engine.
 
 from __future__ import annotations
 
+import math
+import shutil
 import sqlite3
+import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -25,7 +30,7 @@ from sqlalchemy.pool import ConnectionPoolEntry, NullPool
 from service.db import postgresql
 from service.db.clock import utc_now
 from service.db.group_commit import GroupedWrites
-from service.db.lock import FileLock
+from service.db.lock import FileLock, make_private
 from service.errors import DatabaseError
 from service.jobs import strict_json
 
@@ -35,6 +40,10 @@ CONNECTIONS = 16
 # Of the transactions that threads share: PostgreSQL runs several at a time, and each of these collects what
 # comes while its server answers.
 _LEADERS = 4
+
+_PROBE_SECONDS = 1.0
+_STEPS_BETWEEN_LOOKS = 100_000  # of SQLite's virtual machine: some thousandths of a second
+_DEADLINE = "stickslip deadline"
 
 _Written = TypeVar("_Written")
 
@@ -71,14 +80,19 @@ def sqlite_note() -> str | None:
 
 
 def _on_connect(
-    *, read_only: bool, foreign_keys: bool
+    *, read_only: bool, foreign_keys: bool, seconds: float | None = None
 ) -> Callable[[DBAPIConnection, ConnectionPoolEntry], None]:
-    """What every new SQLite connection is told, before SQLAlchemy uses it."""
+    """What every new SQLite connection is told, before SQLAlchemy uses it.
 
-    def configure(connection: DBAPIConnection, _record: ConnectionPoolEntry) -> None:
+    With `seconds`, a transaction ends with an error when it takes longer [s].
+    """
+
+    def configure(connection: DBAPIConnection, record: ConnectionPoolEntry) -> None:
         connection.isolation_level = None
+        if seconds is not None:
+            connection.set_progress_handler(partial(_overdue, record.info), _STEPS_BETWEEN_LOOKS)
         cursor = connection.cursor()
-        cursor.execute(f"PRAGMA busy_timeout = {int(BUSY_TIMEOUT_SECONDS * 1000)}")
+        cursor.execute(f"PRAGMA busy_timeout = {int((seconds or BUSY_TIMEOUT_SECONDS) * 1000)}")
         cursor.execute("PRAGMA journal_mode = WAL")
         cursor.execute("PRAGMA synchronous = FULL")
         cursor.execute(f"PRAGMA foreign_keys = {'ON' if foreign_keys else 'OFF'}")
@@ -89,48 +103,57 @@ def _on_connect(
     return configure
 
 
-def _begin_with(statement: str) -> Callable[[Connection], None]:
+def _overdue(info: dict[str, Any]) -> bool:
+    """Whether the transaction of an SQLite connection takes too long."""
+    deadline: float = info.get(_DEADLINE, math.inf)
+    return time.monotonic() > deadline
+
+
+def _begin_with(statement: str, seconds: float | None = None) -> Callable[[Connection], None]:
     def begin(connection: Connection) -> None:
+        if seconds is not None:
+            # The time for the lock, which the statement waits for, and the time to work.
+            connection.info[_DEADLINE] = time.monotonic() + 2.0 * seconds
         connection.exec_driver_sql(statement)
 
     return begin
 
 
-def write_engine(url: str, connections: int = CONNECTIONS) -> Engine:
+def write_engine(url: str, connections: int = CONNECTIONS, seconds: float = BUSY_TIMEOUT_SECONDS) -> Engine:
     """An engine whose transactions may write.
 
     Those of SQLite take the write lock when they begin, and the pool holds one connection: the threads of a
     process queue for it in memory, fairly and without the sleeps of SQLite's busy handler. `connections` is
-    for PostgreSQL.
+    for PostgreSQL; `seconds` limits every wait.
     """
     if not is_sqlite(url):
-        return postgresql.service_engine(url, connections)
+        return postgresql.service_engine(url, connections, seconds)
     engine = create_engine(
         url,
         pool_size=1,
         max_overflow=0,
-        pool_timeout=BUSY_TIMEOUT_SECONDS,
+        pool_timeout=seconds,
         json_serializer=strict_json.stored,
-        connect_args={"timeout": BUSY_TIMEOUT_SECONDS},
+        connect_args={"timeout": seconds},
     )
-    event.listen(engine, "connect", _on_connect(read_only=False, foreign_keys=True))
-    event.listen(engine, "begin", _begin_with("BEGIN IMMEDIATE"))
+    event.listen(engine, "connect", _on_connect(read_only=False, foreign_keys=True, seconds=seconds))
+    event.listen(engine, "begin", _begin_with("BEGIN IMMEDIATE", seconds))
     return engine
 
 
-def read_engine(url: str) -> Engine:
-    """An engine whose transactions read one snapshot and cannot write; not part of a service."""
+def read_engine(url: str, seconds: float | None = None) -> Engine:
+    """An engine whose transactions read one snapshot and cannot write; on PostgreSQL not part of a service.
+
+    `seconds` limits every wait and every transaction; without it they take what they take.
+    """
     if not is_sqlite(url):
         return postgresql.reading(postgresql.migration_engine(url))
+    patience = seconds or BUSY_TIMEOUT_SECONDS
     engine = create_engine(
-        url,
-        pool_size=8,
-        max_overflow=32,
-        pool_timeout=BUSY_TIMEOUT_SECONDS,
-        connect_args={"timeout": BUSY_TIMEOUT_SECONDS},
+        url, pool_size=8, max_overflow=32, pool_timeout=patience, connect_args={"timeout": patience}
     )
-    event.listen(engine, "connect", _on_connect(read_only=True, foreign_keys=True))
-    event.listen(engine, "begin", _begin_with("BEGIN"))
+    event.listen(engine, "connect", _on_connect(read_only=True, foreign_keys=True, seconds=seconds))
+    event.listen(engine, "begin", _begin_with("BEGIN", seconds))
     return engine
 
 
@@ -157,6 +180,8 @@ def migrating(url: str) -> Iterator[Connection]:
     DatabaseError
         If the database cannot be used.
     """
+    if is_sqlite(url):
+        make_private(database_path(url))
     engine = migration_engine(url)
     try:
         with engine.begin() as connection:
@@ -178,16 +203,22 @@ class Database:
         An SQLite or PostgreSQL URL.
     connections : int
         Most connections to PostgreSQL at a time.
+    seconds : float
+        Longest time for a statement, for a lock, for a connection [s].
     """
 
-    def __init__(self, url: str, connections: int = CONNECTIONS) -> None:
+    def __init__(
+        self, url: str, connections: int = CONNECTIONS, seconds: float = BUSY_TIMEOUT_SECONDS
+    ) -> None:
         self.url = url
+        self._seconds = seconds
+        self._here = threading.local()
         self.name = database_name(url)
         self._lock = FileLock(database_path(url)) if is_sqlite(url) else None
-        self._write = write_engine(url, connections)
-        self._read = read_engine(url) if is_sqlite(url) else postgresql.reading(self._write)
+        self._write = write_engine(url, connections, seconds)
+        self._read = read_engine(url, seconds) if is_sqlite(url) else postgresql.reading(self._write)
         leaders = 1 if is_sqlite(url) else max(1, min(_LEADERS, connections // 2))
-        self._grouped = GroupedWrites(self.writing, leaders)
+        self._grouped = GroupedWrites(self.writing, leaders, seconds)
 
     @property
     def backend(self) -> str:
@@ -226,9 +257,17 @@ class Database:
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
-        """A transaction that sees one snapshot of the database."""
+        """A transaction that sees one snapshot; inside another one of the same thread, that one."""
+        known: Connection | None = getattr(self._here, "connection", None)
+        if known is not None:
+            yield known
+            return
         with self._read.begin() as connection:
-            yield connection
+            self._here.connection = connection
+            try:
+                yield connection
+            finally:
+                self._here.connection = None
 
     def settle(self) -> None:
         """Move what was committed from the log of SQLite into its file; nobody waits for it."""
@@ -238,7 +277,7 @@ class Database:
 
     def own_connection(self) -> Any:
         """A connection to PostgreSQL outside of the pool (`Notices`)."""
-        return postgresql.own_connection(self._write)
+        return postgresql.own_connection(self._write, self._seconds)
 
     def time(self) -> datetime:
         """The time of the PostgreSQL server, for SQLite of this machine."""
@@ -247,6 +286,29 @@ class Database:
         with self.reading() as connection:
             found: datetime = connection.execute(select(func.clock_timestamp())).scalar_one()
         return found.astimezone(UTC)
+
+    def trouble(self, least_free_bytes: int) -> str | None:
+        """Why nothing can be written now, or None; raises what the database raises.
+
+        Of SQLite's file whether another program has locked it, and the room on its disk; of PostgreSQL
+        whether it answers.
+        """
+        if not self.exclusive:
+            self.version()
+            return None
+        path = database_path(self.url)
+        disk = shutil.disk_usage(path.parent)
+        if disk.free < least_free_bytes:
+            return f"{disk.free} bytes are free on the disk of the database, {least_free_bytes} are needed"
+        probe = sqlite3.connect(path, timeout=_PROBE_SECONDS, isolation_level=None)
+        try:
+            probe.execute("BEGIN IMMEDIATE")
+            probe.rollback()
+        except sqlite3.OperationalError as error:
+            return f"the database cannot be written: {error}"
+        finally:
+            probe.close()
+        return None
 
     def version(self) -> str:
         """The version of the SQLite library or the PostgreSQL server; raises what the database raises."""
@@ -270,6 +332,7 @@ def backup(url: str, target: Path) -> None:
         raise DatabaseError(f"there is no database {source} to back up")
     if target.exists():
         raise DatabaseError(f"{target} exists already: a backup does not overwrite")
+    make_private(target)
     reader = sqlite3.connect(source, timeout=BUSY_TIMEOUT_SECONDS)
     try:
         writer = sqlite3.connect(target)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -11,9 +12,10 @@ from typing import Any, TypeVar, cast
 from sqlalchemy import Connection
 from sqlalchemy.exc import IntegrityError
 
-from service.errors import ServiceError
+from service.errors import DatabaseAwayError, ServiceError
 
 _MOST = 64
+_RETRY_SECONDS = 5
 
 _Written = TypeVar("_Written")
 Work = Callable[[Connection], _Written]
@@ -54,10 +56,15 @@ class GroupedWrites:
         Begins a transaction that commits at its end.
     leaders : int
         Most transactions at a time.
+    seconds : float
+        Longest time a write waits for its turn, and after which what failed together is not tried again [s].
     """
 
-    def __init__(self, writing: Callable[[], AbstractContextManager[Connection]], leaders: int) -> None:
+    def __init__(
+        self, writing: Callable[[], AbstractContextManager[Connection]], leaders: int, seconds: float
+    ) -> None:
         self._writing = writing
+        self._seconds = seconds
         self._leading = threading.BoundedSemaphore(leaders)
         self._lock = threading.Lock()
         self._pending: deque[_Entry] = deque()
@@ -67,17 +74,38 @@ class GroupedWrites:
 
         It may be done more than once, in transactions of which one is committed; a `ServiceError` it raises
         must come before it writes anything.
+
+        Raises
+        ------
+        DatabaseAwayError
+            If it was not its turn in time; nothing was written.
         """
         entry = _Entry(work)
         with self._lock:
             self._pending.append(entry)
+        end = time.monotonic() + self._seconds
         while not entry.taken:
-            with self._leading:
-                self._write(self._take())
+            if self._leading.acquire(timeout=max(0.0, end - time.monotonic())):
+                try:
+                    self._write(self._take())
+                finally:
+                    self._leading.release()
+            elif self._withdrawn(entry):
+                raise DatabaseAwayError(
+                    f"the database took no write for {self._seconds:g} s; nothing was written", _RETRY_SECONDS
+                )
         entry.ended.wait()
         if entry.error is not None:
             raise entry.error
         return cast(_Written, entry.result)
+
+    def _withdrawn(self, entry: _Entry) -> bool:
+        """Take an entry back that waits; False if it is being written."""
+        with self._lock:
+            if entry.taken:
+                return False
+            self._pending.remove(entry)
+            return True
 
     def _take(self) -> list[_Entry]:
         with self._lock:
@@ -89,24 +117,30 @@ class GroupedWrites:
     def _write(self, batch: list[_Entry]) -> None:
         if not batch:
             return
+        end = time.monotonic() + self._seconds
         try:
-            if len(batch) == 1 or not self._together(batch):
+            failed = None if len(batch) == 1 else self._together(batch)
+            if len(batch) == 1 or failed is not None:
                 for entry in batch:
-                    self._alone(entry)
+                    if failed is not None and time.monotonic() >= end:
+                        # The database is away: each by itself would only wait as long as all together.
+                        entry.error = failed
+                    else:
+                        self._alone(entry)
         finally:
             # Whatever happened, nobody is left waiting: what was not written has its error by now.
             for entry in batch:
                 entry.ended.set()
 
-    def _together(self, batch: list[_Entry]) -> bool:
-        """Write all in one transaction; False if that failed and nothing was written."""
+    def _together(self, batch: list[_Entry]) -> Exception | None:
+        """Write all in one transaction; the error if that failed and nothing was written."""
         try:
             with self._writing() as connection:
                 for entry in batch:
                     entry.attempt(connection)
-        except Exception:  # noqa: BLE001 - each is tried again by itself and then tells its own caller
-            return False
-        return True
+        except Exception as error:  # noqa: BLE001 - each is tried again by itself and tells its own caller
+            return error
+        return None
 
     def _alone(self, entry: _Entry) -> None:
         """Write one in its own transaction; again if another service wrote the same row meanwhile."""

@@ -7,12 +7,19 @@ from dataclasses import dataclass
 from sqlalchemy.exc import DBAPIError
 
 from service.db.engine import database_name, database_path, is_sqlite, read_engine, shown
-from service.db.repositories.integrity import Contents, arrays, contents, contradictions, damage
+from service.db.repositories.integrity import (
+    Contents,
+    arrays,
+    contents,
+    contradictions,
+    damage,
+    damaged_results,
+)
 from service.db.revisions import current_revision, head_revision
-from service.errors import DatabaseError
+from service.errors import DamagedDatabaseError, DatabaseError, WrongRevisionError
 from service.jobs.arrays import decode
 
-MOST_NAMED = 20  # damaged arrays that are named one by one
+MOST_NAMED = 20  # damaged arrays and results that are named one by one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,14 +61,16 @@ def check(url: str) -> Findings:
     Raises
     ------
     DatabaseError
-        There is no such database, it cannot be read, or it is at another revision.
+        There is no such database.
+    DamagedDatabaseError, WrongRevisionError
+        It cannot be read, or it is at another revision.
     """
     name = database_name(url)
     if is_sqlite(url) and not database_path(url).exists():
         raise DatabaseError(f"there is no database {name} to check")
     revision, wanted = current_revision(url), head_revision()
     if revision != wanted:
-        raise DatabaseError(
+        raise WrongRevisionError(
             f"{name} is at revision {revision}, this version checks {wanted}: "
             f"run `stickslip db upgrade --database {shown(url)}`"
         )
@@ -76,11 +85,12 @@ def check(url: str) -> Findings:
                 decode(stored)
             except (DatabaseError, ValueError) as error:
                 damaged.append(f"array `{name}` of sweep {sweep_id}: {error}")
+        damaged += damaged_results(engine)
     except DBAPIError as error:
-        raise DatabaseError(f"{name} cannot be read: {error.orig}") from error
+        raise DamagedDatabaseError(f"{name} cannot be read: {error.orig}") from error
     finally:
         engine.dispose()
-    more = [f"{len(damaged) - MOST_NAMED} more arrays"] if len(damaged) > MOST_NAMED else []
+    more = [f"{len(damaged) - MOST_NAMED} more arrays and results"] if len(damaged) > MOST_NAMED else []
     return Findings(
         revision=revision, wanted=wanted, trouble=(*trouble, *damaged[:MOST_NAMED], *more), contents=held
     )

@@ -8,6 +8,7 @@ from typing import Any
 
 from sqlalchemy import (
     JSON,
+    BigInteger,
     CheckConstraint,
     DateTime,
     Dialect,
@@ -127,14 +128,16 @@ class Job(Base):
     error: Mapped[dict[str, Any] | None]
     request: Mapped[dict[str, Any]]
     spec: Mapped[dict[str, Any]]
+    stored_bytes: Mapped[int] = mapped_column(BigInteger(), default=0, server_default="0")
 
     __table_args__ = (
-        Index(None, "state", "priority", "id"),
-        Index(None, "spec_hash", "state"),
+        Index(None, "state", "owner", "priority", "id"),
+        Index(None, "spec_hash", "state", "owner"),
         Index(None, "kind", "id"),
         Index(None, "scene_name", "id"),
         Index(None, "result_of"),
         Index(None, "owner", "id"),
+        Index(None, "owner", "stored_bytes"),
         UniqueConstraint("owner", "idempotency_key"),
         CheckConstraint("attempt >= 0 AND max_attempts >= 1", name="attempts"),
         CheckConstraint("(state = 'running') = (lease_owner IS NOT NULL)", name="lease"),
@@ -150,6 +153,7 @@ class JobResult(Base):
         String(ID_LENGTH), ForeignKey("job.id", ondelete="CASCADE"), primary_key=True
     )
     body: Mapped[dict[str, Any]]
+    sha256: Mapped[str | None] = mapped_column(String(64))
 
 
 class Checkpoint(Base):
@@ -213,6 +217,7 @@ class Scene(Base):
     name: Mapped[str] = mapped_column(String(200), primary_key=True)
     scene_hash: Mapped[str] = mapped_column(String(64))
     created: Mapped[datetime]
+    size: Mapped[int] = mapped_column(BigInteger(), default=0, server_default="0")
     body: Mapped[dict[str, Any]]
 
 

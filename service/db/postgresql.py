@@ -9,6 +9,8 @@ connection pooler between service and server has to pool sessions, not transacti
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, text
@@ -24,24 +26,24 @@ OLDEST = 15
 
 _WAIT_SECONDS = 30.0
 _CONNECT_SECONDS = 10
+_LEAST_CONNECT_SECONDS = 2  # libpq takes no less
 # Two numbers of our own; advisory locks know their holders' agreement by number alone.
 _SERVICES = 0x5354_4943_4B01
 _TABLES = 0x5354_4943_4B02
 _ROOM = 0x5354_4943_4B03
 
 
-def _arguments(url: URL) -> dict[str, Any]:
+def _arguments(url: URL, connect_seconds: int = _CONNECT_SECONDS) -> dict[str, Any]:
     """What libpq is told besides the URL, which has the last word."""
-    defaults = {"application_name": "stickslip", "connect_timeout": _CONNECT_SECONDS, "keepalives_idle": 30}
+    defaults = {"application_name": "stickslip", "connect_timeout": connect_seconds, "keepalives_idle": 30}
     return {name: value for name, value in defaults.items() if name not in url.query}
 
 
-def _create(url: str, **pool: Any) -> Engine:
+def _create(url: str, connect_seconds: int = _CONNECT_SECONDS, **pool: Any) -> Engine:
     parsed = make_url(url)
+    arguments = _arguments(parsed, connect_seconds)
     try:
-        return create_engine(
-            parsed, connect_args=_arguments(parsed), json_serializer=strict_json.stored, **pool
-        )
+        return create_engine(parsed, connect_args=arguments, json_serializer=strict_json.stored, **pool)
     except ModuleNotFoundError as error:
         raise DatabaseError(
             f"PostgreSQL needs the package psycopg ({error}): install stickslip[postgresql]"
@@ -64,7 +66,37 @@ def _join_services(connection: DBAPIConnection, _record: ConnectionPoolEntry) ->
     connection.commit()
 
 
-def service_engine(url: str, connections: int) -> Engine:
+def _limit(seconds: float) -> Callable[[DBAPIConnection, ConnectionPoolEntry], None]:
+    """No statement takes longer than so long [s], waiting for locks included."""
+
+    def limit(connection: DBAPIConnection, _record: ConnectionPoolEntry) -> None:
+        cursor = connection.cursor()
+        cursor.execute(f"SET lock_timeout = {int(seconds * 1000)}")
+        cursor.execute(f"SET statement_timeout = {int(seconds * 1000)}")
+        cursor.close()
+        connection.commit()
+
+    return limit
+
+
+def _connect_bounded(seconds: float) -> Callable[[Any, Any, list[Any], dict[str, Any]], Any]:
+    """For SQLAlchemy's event `do_connect`."""
+
+    def connect(_dialect: Any, _record: Any, words: list[Any], options: dict[str, Any]) -> Any:
+        return bounded_connect(seconds)(*words, **options)
+
+    return connect
+
+
+def bounded_connect(seconds: float) -> Callable[..., Any]:
+    """What opens connections of psycopg whose server has so long for each answer [s]."""
+    # Loaded here: only services on PostgreSQL need the driver.
+    from service.db.bounded import connector
+
+    return connector(seconds)
+
+
+def service_engine(url: str, connections: int, seconds: float) -> Engine:
     """The pool of a service; a connection that broke while it lay idle is replaced before its use.
 
     Parameters
@@ -73,23 +105,25 @@ def service_engine(url: str, connections: int) -> Engine:
         A PostgreSQL URL.
     connections : int
         Most connections at a time; further threads wait for one.
+    seconds : float
+        Longest time for a statement, and to wait for a connection [s].
     """
+    patience = max(_LEAST_CONNECT_SECONDS, math.ceil(seconds))
     engine = _create(
-        url, pool_size=connections, max_overflow=0, pool_timeout=_WAIT_SECONDS, pool_pre_ping=True
-    )
-    event.listen(engine, "connect", _limit_waits)
+        url, connect_seconds=patience, pool_size=connections, max_overflow=0, pool_timeout=seconds,
+        pool_pre_ping=True,
+    )  # fmt: skip
+    event.listen(engine, "do_connect", _connect_bounded(seconds))
+    event.listen(engine, "connect", _limit(seconds))
     event.listen(engine, "connect", _join_services)
     return engine
 
 
-def own_connection(engine: Engine) -> Any:
-    """A connection of psycopg outside of the pool, which commits by itself."""
-    # Loaded here: only services on PostgreSQL need the driver.
-    import psycopg
-
+def own_connection(engine: Engine, seconds: float) -> Any:
+    """A connection of psycopg outside of the pool, which commits by itself; `seconds` as of the pool."""
     words, options = engine.dialect.create_connect_args(engine.url)
     arguments: dict[str, Any] = {**options, **_arguments(engine.url), "autocommit": True}
-    return psycopg.connect(*words, **arguments)
+    return bounded_connect(seconds)(*words, **arguments)
 
 
 def reading(engine: Engine) -> Engine:

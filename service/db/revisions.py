@@ -17,7 +17,7 @@ from sqlalchemy.exc import DBAPIError
 from service.db import postgresql
 from service.db.engine import database_name, database_path, is_sqlite, migrating, read_engine, shown
 from service.db.lock import FileLock
-from service.errors import DatabaseError, WrongRevisionError
+from service.errors import DamagedDatabaseError, DatabaseError, WrongRevisionError
 
 # Beside this package, in the source tree and once installed; found by place, since another
 # package of this common name may come first on the path.
@@ -51,7 +51,7 @@ def current_revision(url: str) -> str:
 
     Raises
     ------
-    DatabaseError
+    DamagedDatabaseError
         If it cannot be used.
     """
     engine = read_engine(url)
@@ -59,7 +59,7 @@ def current_revision(url: str) -> str:
         with engine.begin() as connection:
             return _current(connection)[0] or "none"
     except DBAPIError as error:
-        raise DatabaseError(f"{database_name(url)} cannot be used: {error.orig}") from error
+        raise DamagedDatabaseError(f"{database_name(url)} cannot be used: {error.orig}") from error
     finally:
         engine.dispose()
 

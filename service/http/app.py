@@ -11,7 +11,10 @@ from starlette.concurrency import run_in_threadpool
 
 from service.auth.authenticator import Doorkeeper
 from service.http import openapi
+from service.http.bodies import Turns
+from service.http.connections import Connections
 from service.http.dependencies import HostCheck
+from service.http.events import Looks
 from service.http.head import Head
 from service.http.metrics import Measured, Metrics
 from service.http.middleware import Gate
@@ -34,8 +37,10 @@ from service.http.routes import (
     uploads,
 )
 from service.http.security_headers import Seal
+from service.http.turnstile import Turnstile
 from service.jobs.registry import Registry
 from service.queue.core import SOLVER_VERSION, Service
+from service.queue.health import Probe
 from service.schemas import problems
 from service.settings.settings import Settings, load_settings
 
@@ -77,9 +82,15 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     )
     app.state.service = service
     app.state.metrics = Metrics(service)
+    app.state.turns = Turns()
+    app.state.probe = Probe(service)
+    app.state.looks = Looks(service)
+    app.state.connections = connections = _connections(service.settings)
+    service.lanes.guard(connections.require_taken)
     # The last one added is the outermost.
     app.add_middleware(Head)
-    app.add_middleware(Gate, doorkeeper=Doorkeeper(service.keys, service.settings, service.jobs.now))
+    doorkeeper = Doorkeeper(service.keys, service.settings, service.jobs.now)
+    app.add_middleware(Gate, doorkeeper=doorkeeper, turnstile=Turnstile(service.settings))
     app.add_middleware(HostCheck, hosts=service.settings.hosts)
     app.add_middleware(Measured, metrics=app.state.metrics)
     app.add_middleware(RequestLog)
@@ -94,6 +105,12 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
         app.include_router(module.router)
     openapi.install(app, service.registry)
     return app
+
+
+def _connections(settings: Settings) -> Connections:
+    return Connections(
+        settings.connections, settings.header_seconds, settings.write_seconds, settings.unsent_bytes
+    )
 
 
 def _say_if_nobody_can_come_in(service: Service) -> None:

@@ -9,13 +9,14 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import re
-from collections.abc import Callable, Coroutine, Mapping
-from typing import Annotated, Any
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping, Sequence
+from contextlib import asynccontextmanager
+from typing import Annotated, Any, TypeVar
 
 from fastapi import Body, Depends, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
-from starlette.concurrency import run_in_threadpool
+from pydantic import BaseModel
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -27,8 +28,8 @@ from service.errors import (
     MalformedBodyError,
     UnsupportedMediaError,
 )
-from service.http.bodies import whole
-from service.jobs import strict_json
+from service.http.bodies import Turns, whole
+from service.jobs.strict_json import MOST_TOLD
 from service.jobs.validation import issues_of
 from service.queue.core import Service
 from service.queue.subscriptions import Event
@@ -42,17 +43,25 @@ _PREFER_WAIT = re.compile(r"(?:^|[,;\s])wait\s*=\s*\"?(\d{1,6})\"?(?:$|[,;\s])",
 _KEY = re.compile(r"[\x21-\x7e]{1,200}")
 _LOOK_AGAIN_SECONDS = 2.0
 
+AnswerT = TypeVar("AnswerT")
 
-def service_of(request: Request) -> Service:
+
+def service_behind(request: Request) -> Service:
     """The service behind the app."""
     service: Service = request.app.state.service
     return service
 
 
+# Dependencies are asynchronous: others would be run in a thread each, which costs more than they do.
+async def service_of(request: Request) -> Service:
+    """The service behind the app."""
+    return service_behind(request)
+
+
 ServiceDependency = Annotated[Service, Depends(service_of)]
 
 
-def caller_of(request: Request) -> Caller:
+async def caller_of(request: Request) -> Caller:
     """Who asks: the gate has put them there."""
     caller: Caller = getattr(request.state, "caller", KEYLESS)
     return caller
@@ -61,8 +70,8 @@ def caller_of(request: Request) -> Caller:
 CallerDependency = Annotated[Caller, Depends(caller_of)]
 
 
-async def json_body(request: Request) -> dict[str, Any]:
-    """The body of a request as a JSON object, no larger than the settings allow.
+async def json_body(request: Request) -> AsyncIterator[dict[str, Any]]:
+    """The body of a request as a JSON object, no larger than the settings allow, until it is answered.
 
     Raises
     ------
@@ -72,13 +81,18 @@ async def json_body(request: Request) -> dict[str, Any]:
     kind = request.headers.get("content-type", "").split(";")[0].strip().lower()
     if kind != "application/json" and not kind.endswith("+json"):
         raise UnsupportedMediaError(f"`Content-Type` must be application/json, got {kind or 'none'}")
-    settings = service_of(request).settings
-    value = strict_json.loads(await whole(request, settings.max_body_bytes, settings.body_seconds))
-    if not isinstance(value, dict):
-        raise MalformedBodyError(f"the body must be a JSON object, got {type(value).__name__}")
-    return value
+    settings = service_behind(request).settings
+    data = await whole(request, settings.max_body_bytes, settings.body_seconds)
+    turns: Turns = request.app.state.turns
+    async with turns.of((await caller_of(request)).owner, len(data)):
+        value = await turns.parsed(data)
+        del data
+        if not isinstance(value, dict):
+            raise MalformedBodyError(f"the body must be a JSON object, got {type(value).__name__}")
+        yield value
 
 
+reading = asynccontextmanager(json_body)
 JsonBody = Annotated[dict[str, Any], Depends(json_body)]
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -119,14 +133,16 @@ class TypedRoute(APIRoute):
         of_kinds = getattr(field.field_info, "discriminator", None) is not None
 
         async def read_and_handle(request: Request) -> Response:
-            value = await json_body(request)
-            try:
-                return await handle(_ReadRequest(request, value))
-            except RequestValidationError as error:
-                # The place of an error begins with "body" and, of several kinds, with the name of the kind.
-                found = [{**one, "loc": one["loc"][1:]} for one in error.errors()]
-                known = [{**one, "loc": one["loc"][1:]} if of_kinds else one for one in found]
-                raise InvalidRequestError(issues_of(known)) from error
+            async with reading(request) as value:
+                try:
+                    return await handle(_ReadRequest(request, value))
+                except RequestValidationError as error:
+                    # The place of an error begins with "body" and, of several kinds, with the name of the
+                    # kind.
+                    errors = error.errors()[:MOST_TOLD]
+                    found = [{**one, "loc": one["loc"][1:]} for one in errors]
+                    known = [{**one, "loc": one["loc"][1:]} if of_kinds else one for one in found]
+                    raise InvalidRequestError(issues_of(known)) from error
 
         return read_and_handle
 
@@ -185,6 +201,22 @@ def tagged(
     return Response(body, media_type=media_type, headers=kept)
 
 
+def as_json(answer: BaseModel, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
+    """An answer as JSON, written here, in the thread that made it: FastAPI would do it on the event loop."""
+    return Response(answer.__pydantic_serializer__.to_json(answer), status, headers, "application/json")
+
+
+def with_raw(answer: BaseModel, **raw: bytes) -> bytes:
+    """An answer as JSON with further keys whose JSON there is already."""
+    more = b"".join(b',"%s":%s' % (name.encode(), value) for name, value in raw.items())
+    return bytes(answer.__pydantic_serializer__.to_json(answer))[:-1] + more + b"}"
+
+
+def raw_list(answers: Sequence[BaseModel]) -> bytes:
+    """Answers as a JSON list."""
+    return b"[" + b",".join(one.__pydantic_serializer__.to_json(one) for one in answers) + b"]"
+
+
 def listing(request: Request, page: SweepPage | DesignPage | JobPage | UploadPage) -> Response:
     """A page of a list as JSON or CSV, with a link to the next one in its header too (RFC 8288)."""
     kind = chosen(request.headers.get("accept"), LIST_MEDIA)
@@ -196,8 +228,22 @@ def listing(request: Request, page: SweepPage | DesignPage | JobPage | UploadPag
     return Response(csv_of_items(page.model_dump(mode="json")["items"]), media_type=kind, headers=headers)
 
 
-async def wait_for_end(service: Service, job_id: str, seconds: float, caller: Caller = KEYLESS) -> JobRow:
-    """The job when it has ended, the time is over or the service stops; holds no thread meanwhile."""
+async def wait_for_end(
+    service: Service,
+    job_id: str,
+    seconds: float,
+    caller: Caller,
+    answer: Callable[[JobRow], AnswerT],
+    known: JobRow | None = None,
+) -> AnswerT:
+    """Wait until a job has ended, the time is over or the service stops; holds no thread meanwhile.
+
+    Parameters
+    ----------
+    service, job_id, seconds, caller : where to look, for which job, how long [s], as whom.
+    answer : makes of the row what is wanted, in the same transaction.
+    known : the row as it was a moment ago: it is not looked at before something happens.
+    """
     loop = asyncio.get_running_loop()
     changed = asyncio.Event()
 
@@ -205,13 +251,22 @@ async def wait_for_end(service: Service, job_id: str, seconds: float, caller: Ca
         if event.ended:
             loop.call_soon_threadsafe(changed.set)
 
+    def look() -> tuple[bool, AnswerT]:
+        with service.database.reading():
+            row = service.job(job_id, caller)
+            return row.state.finished, answer(row)
+
     end = loop.time() + seconds
     with service.waiters.listening(job_id, listen):
+        waits = known is not None and not known.state.finished and not service.waiters.ended_lately(job_id)
         while True:
-            row = await run_in_threadpool(service.job, job_id, caller)
             left = end - loop.time()
-            if row.state.finished or service.stopping.is_set() or left <= 0.0:
-                return row
+            over = service.stopping.is_set() or left <= 0.0
+            if over or not waits:
+                finished, found = await service.lanes.reads.run(caller.owner, look)
+                if finished or over or service.stopping.is_set():
+                    return found
+            waits = False
             try:
                 await asyncio.wait_for(changed.wait(), min(left, _LOOK_AGAIN_SECONDS))
             except TimeoutError:

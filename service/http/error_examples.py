@@ -53,11 +53,12 @@ _LIST = ("NotAcceptable", "InvalidQuery")
 _OF: dict[tuple[str, str], tuple[str, ...]] = {
     ("post", "/v1/jobs"): (*_BODY, "QueueFull"),
     ("post", "/v1/designs"): (*_BODY, "QueueFull"),
-    ("post", "/v1/scenes"): (*_BODY, "Conflict"),
-    ("post", "/v1/plan"): _BODY,
-    ("post", "/v1/previews"): (*_BODY, "Overtaken", "Preview"),
-    ("post", "/v1/scenes/read"): _BODY,
-    ("post", "/v1/scenes/text"): _BODY,
+    ("post", "/v1/scenes"): (*_BODY, "Conflict", "QueueFull"),
+    ("get", "/v1/scenes"): ("InvalidQuery",),
+    ("post", "/v1/plan"): (*_BODY, "QueueFull"),
+    ("post", "/v1/previews"): (*_BODY, "Overtaken", "Preview", "QueueFull"),
+    ("post", "/v1/scenes/read"): (*_BODY, "QueueFull"),
+    ("post", "/v1/scenes/text"): (*_BODY, "QueueFull"),
     ("post", "/v1/uploads"): (
         "BodyTooSlow", "BodyTooLarge", "UnsupportedMedia", "UnreadableUpload", "QueueFull",
     ),

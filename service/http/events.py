@@ -1,7 +1,8 @@
 """A job as a stream of events: news of its progress, points of its branch as they come, its end.
 
 A stream holds no thread and no database connection while it waits; it ends with the job, with its client
-and with the service.
+and with the service. Many are as cheap as few: the rows of all their jobs are looked up together (`Looks`),
+and the more streams there are, the less often each of them tells of progress.
 """
 
 from __future__ import annotations
@@ -11,10 +12,9 @@ import re
 from collections.abc import AsyncIterator, Iterator
 
 from fastapi.sse import ServerSentEvent
-from starlette.concurrency import run_in_threadpool
 
-from service.auth.callers import Caller
-from service.db.models import JobState
+from service.auth.callers import Caller, visible
+from service.db.models import NOBODY, JobState
 from service.db.repositories import JobRow
 from service.queue.core import Service
 from service.queue.queue import Live
@@ -23,7 +23,9 @@ from service.schemas.answers import JobAnswer
 from service.schemas.event_answers import END, PARTIAL, PROGRESS, JobPoints, JobProgress
 
 _LEAST_SECONDS = 0.1
-_LOOK_AGAIN_SECONDS = 2.0
+_EVENTS_A_SECOND = 200.0
+_LOOK_AGAIN_SECONDS = 5.0
+_GATHER_SECONDS = 0.02
 # A job that another service runs tells nothing but what it writes.
 _LOOK_ELSEWHERE_SECONDS = 0.5
 _RETRY_MILLISECONDS = 1000
@@ -78,9 +80,9 @@ class _Bell:
         """A listener of `Waiters`."""
         self._loop.call_soon_threadsafe(self._ring, event.ended)
 
-    async def rung(self, patience: float) -> bool:
-        """Wait for news, at least `_LEAST_SECONDS` unless the job ended; whether its row has changed."""
-        await _within(self._ended, _LEAST_SECONDS)
+    async def rung(self, least: float, patience: float) -> bool:
+        """Wait for news, at least so long [s] unless the job ended; whether its row has changed."""
+        await _within(self._ended, least)
         await _within(self._changed, patience)
         ended = self._ended.is_set()
         self._changed.clear()
@@ -100,8 +102,49 @@ async def _within(event: asyncio.Event, seconds: float) -> None:
         return
 
 
+class Looks:
+    """The rows of jobs for all streams: those that are asked for at about the same time in one look-up."""
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        self._asked: dict[str, asyncio.Future[JobRow | None]] = {}
+        self._task: asyncio.Task[None] | None = None
+        self.streams = 0
+
+    @property
+    def least_seconds(self) -> float:
+        """Least time between two events of a stream [s]."""
+        return max(_LEAST_SECONDS, self.streams / _EVENTS_A_SECOND)
+
+    async def row(self, job_id: str, caller: Caller) -> JobRow:
+        """The row of a job; `Service.job` lists the errors."""
+        found = self._asked.get(job_id)
+        if found is None:
+            found = self._asked[job_id] = asyncio.get_running_loop().create_future()
+            if self._task is None:
+                self._task = asyncio.create_task(self._look())
+        # Several streams wait for the same: one that ends must not end that of the others.
+        return visible(await asyncio.shield(found), caller, f"there is no job {job_id!r}")
+
+    async def _look(self) -> None:
+        await asyncio.sleep(_GATHER_SECONDS)
+        asked, self._asked, self._task = self._asked, {}, None
+        try:
+            rows = await self._service.lanes.reads.run(NOBODY, self._service.jobs.several, list(asked))
+        except Exception as error:  # noqa: BLE001 - told to each stream
+            for waiting in asked.values():
+                waiting.set_exception(error)
+            return
+        for job_id, waiting in asked.items():
+            waiting.set_result(rows.get(job_id))
+
+
 async def job_events(
-    service: Service, job_id: str, caller: Caller, last_event_id: str | None = None
+    service: Service,
+    job_id: str,
+    caller: Caller,
+    last_event_id: str | None = None,
+    looks: Looks | None = None,
 ) -> AsyncIterator[ServerSentEvent]:
     """Yield the events of a job until it has ended or the service stops.
 
@@ -115,13 +158,16 @@ async def job_events(
         Who may see it.
     last_event_id : str or None
         What the client was told last: points it has are not sent again.
+    looks : Looks, optional
+        Of all streams of the service; its own if it is the only one.
     """
+    looks = looks or Looks(service)
     bell, story = _Bell(), _Story(last_event_id)
     loop = asyncio.get_running_loop()
     heartbeat = service.settings.heartbeat_seconds
     with service.waiters.listening(job_id, bell.listen):
         yield ServerSentEvent(comment=f"job {job_id}", retry=_RETRY_MILLISECONDS)
-        row = await run_in_threadpool(service.job, job_id, caller)
+        row = await looks.row(job_id, caller)
         looked = said = loop.time()
         while not service.stopping.is_set():
             live = service.queue.live(job_id)
@@ -134,10 +180,12 @@ async def job_events(
             elsewhere = live is None and not service.database.exclusive
             look_after = _LOOK_ELSEWHERE_SECONDS if elsewhere else _LOOK_AGAIN_SECONDS
             now = loop.time()
-            changed = await bell.rung(max(min(looked + look_after, said + heartbeat) - now, 0.0))
+            changed = await bell.rung(
+                looks.least_seconds, max(min(looked + look_after, said + heartbeat) - now, 0.0)
+            )
             now = loop.time()
             if changed or now - looked >= look_after:
-                row = await run_in_threadpool(service.job, job_id, caller)
+                row = await looks.row(job_id, caller)
                 looked = now
             if now - said >= heartbeat:
                 yield ServerSentEvent(comment="still here")

@@ -6,10 +6,10 @@ It lets through what is listed here and refuses the rest: a new route needs a ke
 from __future__ import annotations
 
 import time
+from contextlib import ExitStack
 from urllib.parse import urlsplit
 
 from fastapi import Request
-from sqlalchemy.exc import OperationalError
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -18,7 +18,8 @@ from service.auth.authenticator import REMEMBERED_SECONDS, Doorkeeper
 from service.auth.callers import Caller
 from service.auth.keys import id_of
 from service.errors import OriginRefusedError, ServiceError, UnauthorizedError
-from service.schemas.problems import answered
+from service.http.turnstile import Turnstile
+from service.schemas.problems import AWAY, answered
 
 OPEN = frozenset({"/health/live", "/health/ready", "/openapi.json", "/docs", "/docs/style.css", "/"})
 """Paths that need no key: whether the service lives, what its API is, and the page, which asks for a key."""
@@ -41,9 +42,10 @@ def scope_of(method: str, path: str) -> callers.Scope | None:
 class Gate:
     """Finds out who asks and refuses who may not."""
 
-    def __init__(self, app: ASGIApp, doorkeeper: Doorkeeper) -> None:
+    def __init__(self, app: ASGIApp, doorkeeper: Doorkeeper, turnstile: Turnstile) -> None:
         self._app = app
         self._doorkeeper = doorkeeper
+        self._turnstile = turnstile
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on with its caller, or answer it with a problem."""
@@ -51,22 +53,24 @@ class Gate:
             await self._app(scope, receive, send)
             return
         request = Request(scope, receive)
-        try:
-            _refuse_other_pages(request)
-            token = _token(request)
-            caller = await self._admit(request, token)
-            needed = scope_of(request.method, request.url.path)
-            if needed is not None:
-                self._doorkeeper.require(caller, needed)
-            self._doorkeeper.count(caller)
-        except (ServiceError, OperationalError) as error:
-            await answered(request, error)(scope, receive, send)
-            return
-        request.state.caller = caller
-        if token is None:
-            await self._app(scope, receive, send)
-        else:
-            await self._serve(request, token, receive, send)
+        with ExitStack() as held:
+            try:
+                _refuse_other_pages(request)
+                token = _token(request)
+                caller = await self._admit(request, token)
+                needed = scope_of(scope["method"], scope["path"])
+                if needed is not None:
+                    self._doorkeeper.require(caller, needed)
+                    held.enter_context(self._turnstile.passed(caller, scope))
+                self._doorkeeper.count(caller)
+            except (ServiceError, *AWAY) as error:
+                await answered(request, error)(scope, receive, send)
+                return
+            request.state.caller = caller
+            if token is None:
+                await self._app(scope, receive, send)
+            else:
+                await self._serve(request, token, receive, send)
 
     async def _admit(self, request: Request, token: str | None) -> Caller:
         request.state.key_id = None if token is None else id_of(token)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
+import os
 import signal
 import socket
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import cast
 
 import uvicorn
 from fastapi import FastAPI
@@ -15,16 +19,21 @@ from fastapi import FastAPI
 from service.db.models import JobState
 from service.errors import ConfigurationError
 from service.http.app import create_app
+from service.http.connections import Connections
 from service.http.gc_freeze import spare_modules
-from service.http.header_timeout import patient
+from service.http.malloc import give_back_large_blocks
 from service.jobs.registry import Registry
 from service.queue.core import Service
 from service.settings import logs
 from service.settings.settings import Settings
+from service.uploads.scratch import scratch_folder
 
 log = logging.getLogger("stickslip.service")
 
 _TICK_SECONDS = 0.2
+# Files of a service besides its connections: database, workers, pipes, uploads.
+_OTHER_FILES = 256
+_FORCED = 1
 
 
 class _Server(uvicorn.Server):
@@ -56,10 +65,17 @@ def serve(settings: Settings, registry: Registry | None = None) -> None:
     listener = _bind(settings)
     try:
         service.open()
+        service.answers.begin()
         log.info("listening on http://%s:%d", settings.host, listener.getsockname()[1])
         server = _Server(_config(app, settings), service)
         spare_modules()
-        with _signals(lambda: setattr(server, "should_exit", True)):
+        give_back_large_blocks()
+
+        def stop() -> None:
+            server.should_exit = True
+            _end_by_force_after(settings.exit_seconds)
+
+        with _signals(stop), scratch_folder():
             server.run(sockets=[listener])
     finally:
         service.database.close()
@@ -85,7 +101,12 @@ def work(settings: Settings, registry: Registry | None = None, *, until_empty: b
     logs.configure(settings.log_level, settings.log_format)
     stop = threading.Event()
     service = Service(settings, registry)
-    with _signals(stop.set):
+
+    def told_to_stop() -> None:
+        stop.set()
+        _end_by_force_after(settings.exit_seconds)
+
+    with _signals(told_to_stop):
         service.start()
         try:
             while not stop.wait(_TICK_SECONDS):
@@ -96,9 +117,11 @@ def work(settings: Settings, registry: Registry | None = None, *, until_empty: b
 
 
 def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
+    connections: Connections = app.state.connections
+    connections.most = min(connections.most, _files_allowed() - _OTHER_FILES)
     return uvicorn.Config(
         app,
-        http=patient(settings.header_seconds),
+        http=cast(type[asyncio.Protocol], connections.protocol),
         log_config=None,
         access_log=False,
         lifespan="on",
@@ -107,6 +130,34 @@ def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
         proxy_headers=bool(settings.trusted_proxies),
         forwarded_allow_ips=list(settings.trusted_proxies),
     )
+
+
+def _end_by_force_after(seconds: float) -> None:
+    """End this process in some time [s] if it has not ended by itself; its workers notice and end too.
+
+    Jobs that ran are then computed again, as after a crash.
+    """
+
+    def end() -> None:
+        log.error("the service did not end within %g s and is ended by force", seconds)
+        logging.shutdown()
+        os._exit(_FORCED)
+
+    timer = threading.Timer(seconds, end)
+    timer.daemon = True
+    timer.start()
+
+
+def _files_allowed() -> int:
+    """How many files, connections among them, this process may open; as many as it can be given."""
+    if sys.platform == "win32":
+        return 1 << 20
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != hard:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    return 1 << 20 if hard == resource.RLIM_INFINITY else hard
 
 
 @contextmanager

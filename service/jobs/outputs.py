@@ -200,6 +200,7 @@ class FailureKind(enum.StrEnum):
     GOAL = "goal-not-reached"
     WORKER_LOST = "worker-lost"
     TIME_LIMIT = "time-limit"
+    MEMORY_LIMIT = "memory-limit"
     INTERNAL = "internal"
 
 

@@ -32,7 +32,7 @@ class JobRequest(BaseModel):
     fresh : bool
         Compute again even if the same thing was computed before.
     priority : int
-        Jobs of a higher priority run first; equal ones in the order they came.
+        Of one owner's jobs those of a higher priority run first; equal ones in the order they came.
     max_seconds : float or None
         Longest time an attempt at it may take [s]; that of the service if left out.
     """
@@ -42,7 +42,9 @@ class JobRequest(BaseModel):
     fresh: bool = Field(
         default=False, strict=True, description="Compute again even if a stored result exists."
     )
-    priority: int = Field(default=0, strict=True, ge=-100, le=100, description="Higher ones run first.")
+    priority: int = Field(
+        default=0, strict=True, ge=-100, le=100, description="Of one's own jobs, higher ones run first."
+    )
     max_seconds: float | None = Field(
         default=None,
         strict=True,
@@ -88,7 +90,9 @@ _NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobKind:
-    """A kind of job. `run` is sent to workers by name: a function at the top level of a module.
+    """A kind of job.
+
+    `request`, `resolve` and `run` are sent to processes by name: they stand at the top level of a module.
 
     Attributes
     ----------
@@ -99,8 +103,9 @@ class JobKind:
     request : type of JobRequest
         Validates what was asked; its docstring and the `examples` of its schema are those of the API.
     resolve : callable
-        From request to spec; raises InvalidRequestError for what does not fit or is too large. Runs in the
-        service.
+        From request to spec; raises InvalidRequestError for what does not fit or is too large. What comes by
+        HTTP is resolved in a process with limits (`service.jobs.answering`), to which the service sends the
+        scenes and uploads that are asked for.
     run : callable
         From spec to output; raises SolverError for what is wrong for good. Runs in a worker.
     parts : Parts or None
@@ -179,7 +184,7 @@ class Registry:
         """
         if isinstance(name, str) and name in self._kinds:
             return self._kinds[name]
-        message = f"`kind` must be one of {', '.join(self._kinds)}, got {name!r}"
+        message = f"`kind` must be one of {', '.join(self._kinds)}, got {name!r:.80}"
         raise InvalidRequestError([Issue(pointer=pointer("kind"), message=message)])
 
     def extended(self, *kinds: JobKind) -> Registry:

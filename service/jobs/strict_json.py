@@ -6,10 +6,14 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import islice
+from typing import Any
 
-from service.errors import InvalidRequestError, MalformedBodyError
+from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError
 from solver.errors import Issue, pointer
+
+_Way = Any  # None at the top, or a pair: the way to a container, and a key or an index in it
 
 
 class JsonText(str):
@@ -30,21 +34,55 @@ def encoded(value: object) -> JsonText:
 
 
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
+MOST_DEPTH = 64
+"""Lists and objects inside each other."""
+MOST_VALUES = 500_000
+MOST_KEYS = 20_000
+MOST_TOLD = 100
+"""Of what is wrong, so much is said."""
+_MOST_DIGITS = 308
+"""Of an integer: one of more is beyond the largest double."""
+_ENDLESS_DIGITS = 4300
+"""More are no number of JSON that anybody reads, Python neither."""
 
 
 def loads(data: bytes) -> object:
-    """Parse a request body.
+    """Parse a request body, in a time that grows with its length alone.
 
     Raises
     ------
     MalformedBodyError
-        Not UTF-8, not JSON, nested too deeply, a key given twice, or half a character (``"\\ud800"``).
+        Not UTF-8, not JSON, nested too deeply, a key given twice, half a character (``"\\ud800"``), an
+        integer of thousands of digits.
+    BodyTooLargeError
+        More values or keys than are read.
     InvalidRequestError
-        A number that is not finite (``NaN``, ``Infinity``, ``1e999``), with its pointer.
+        A number that is not finite (``NaN``, ``Infinity``, ``1e999``, an integer of 400 digits), with its
+        pointer.
     """
+    numbers = _Numbers()
+    value = _parsed(data, numbers)
+    if numbers.wrong:
+        issues = issues_of_numbers(value)
+        if numbers.unending:
+            raise MalformedBodyError("; ".join(issue.message for issue in issues))
+        raise InvalidRequestError(issues)
+    return value
+
+
+def marked(data: bytes) -> object:
+    """The same, with numbers that are not finite as `Unreadable`, which `issues_of_numbers` finds."""
+    return _parsed(data, _Numbers())
+
+
+def _parsed(data: bytes, numbers: _Numbers) -> object:
+    _measure(data)
     try:
         text = data.decode("utf-8")
-        value: object = json.loads(text, object_pairs_hook=_without_duplicates)
+        value: object = json.loads(
+            text, object_pairs_hook=_without_duplicates, parse_float=numbers.fraction,
+            parse_int=numbers.integer, parse_constant=numbers.constant,
+        )  # fmt: skip
     except UnicodeDecodeError as error:
         raise MalformedBodyError(f"the body must be UTF-8, byte {error.start} is not") from error
     except json.JSONDecodeError as error:
@@ -53,25 +91,107 @@ def loads(data: bytes) -> object:
         ) from error
     except RecursionError as error:
         raise MalformedBodyError("the body is nested too deeply") from error
-    except ValueError as error:
-        raise MalformedBodyError(f"the body is not JSON: {error}") from error
     if _SURROGATE.search(text) and not _whole_characters(value):
         raise MalformedBodyError("the body holds half of a character: \\ud800 to \\udfff alone")
-    issues = [
-        Issue(pointer=where, message=f"`{where}` must be a finite number, got {found!r}")
-        for where, found in _not_finite(value)
-    ]
-    if issues:
-        raise InvalidRequestError(issues)
     return value
 
 
+def _measure(data: bytes) -> None:
+    """Refuse what would take much memory or a deep stack, before it is read.
+
+    Raises
+    ------
+    MalformedBodyError, BodyTooLargeError
+        As `loads`.
+    """
+    if len(data) <= MOST_DEPTH:
+        return
+    # Loaded here: the command reads small files of JSON without it.
+    import numpy as np
+
+    # Without escapes every second quotation mark ends a text: what stands outside of texts are signs of JSON.
+    plain = data.replace(b"\\\\", b"").replace(b'\\"', b"")
+    signs = np.frombuffer(plain, np.uint8)
+    signs = signs[(np.cumsum(signs == ord('"'), dtype=np.uint8) & 1) == 0]
+    opened = (signs == ord("[")) | (signs == ord("{"))
+    closed = (signs == ord("]")) | (signs == ord("}"))
+    brackets = opened.astype(np.int8) - closed.astype(np.int8)
+    deepest = int(np.cumsum(brackets, dtype=np.int32).max(initial=0))
+    if deepest > MOST_DEPTH:
+        raise MalformedBodyError(
+            f"the body is nested too deeply: {MOST_DEPTH} lists and objects may stand inside each other, "
+            f"here {deepest} do"
+        )
+    for most, found, what in (
+        (MOST_VALUES, int(np.count_nonzero(signs == ord(",")) + np.count_nonzero(opened)) + 1, "values"),
+        (MOST_KEYS, int(np.count_nonzero(signs == ord(":"))), "keys"),
+    ):
+        if found > most:
+            raise BodyTooLargeError(f"the body may have {most} {what}, this one has {found}")
+
+
+class Unreadable(str):
+    """A number of a text, as it stands there, that is none to compute with."""
+
+    __slots__ = ()
+
+
+class _Numbers:
+    """Reads the numbers of a text, and keeps those apart that are not finite."""
+
+    def __init__(self) -> None:
+        self.wrong: dict[str, Unreadable] = {}
+        self.unending = False
+
+    def fraction(self, text: str) -> object:
+        """A number with a point or an exponent."""
+        value = float(text)
+        return value if math.isfinite(value) else self.constant(text)
+
+    def integer(self, text: str) -> object:
+        """A number without."""
+        self.unending |= len(text) > _ENDLESS_DIGITS
+        return int(text) if len(text) <= _MOST_DIGITS else self.constant(text)
+
+    def constant(self, text: str) -> Unreadable:
+        """NaN, Infinity, or a number beyond the largest."""
+        return self.wrong.setdefault(text, Unreadable(text))
+
+
+def issues_of_numbers(value: object) -> list[Issue]:
+    """The numbers of a value that are not finite, in the order of their pointers; of many the first ones."""
+    found = islice(_not_finite([value], None), MOST_TOLD)
+    return sorted((_issue_of_number(item, way) for item, way in found), key=lambda issue: issue.pointer)
+
+
+def _not_finite(items: Mapping[str, object] | list[object], way: _Way) -> Iterator[tuple[str | float, _Way]]:
+    """What is wrong below, each with the way to it; a chain, for a text is made for what is wrong alone."""
+    for key, item in items.items() if isinstance(items, Mapping) else enumerate(items):
+        if isinstance(item, dict | list):
+            yield from _not_finite(item, (way, key))
+        elif isinstance(item, Unreadable) or (isinstance(item, float) and not math.isfinite(item)):
+            yield item, (way, key)
+
+
+def _issue_of_number(item: str | float, way: _Way) -> Issue:
+    parts: list[object] = []
+    while way is not None:
+        way, part = way
+        parts.append(part)
+    where = pointer(*parts[-2::-1])  # the first is the place in the list around the whole
+    text = str(item)
+    shown = text if len(text) <= 40 else f"one of {len(text)} digits"
+    return Issue(pointer=where, message=f"`{where[-200:]}` must be a finite number, got {shown}")
+
+
 def _without_duplicates(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    table: dict[str, object] = {}
-    for key, value in pairs:
-        if key in table:
-            raise MalformedBodyError(f"the key {key!r} is given twice in one object")
-        table[key] = value
+    table = dict(pairs)
+    if len(table) < len(pairs):
+        known: set[str] = set()
+        for key, _ in pairs:
+            if key in known:
+                raise MalformedBodyError(f"the key {key[:200]!r} is given twice in one object")
+            known.add(key)
     return table
 
 
@@ -82,21 +202,6 @@ def _whole_characters(value: object) -> bool:
     except UnicodeEncodeError:
         return False
     return True
-
-
-def _not_finite(value: object) -> list[tuple[str, float]]:
-    """Pointers of the numbers that are not finite; without recursion, the parser has its own limit."""
-    found: list[tuple[str, float]] = []
-    pending: list[tuple[str, object]] = [("", value)]
-    while pending:
-        where, item = pending.pop()
-        if isinstance(item, dict):
-            pending.extend((where + pointer(key), inner) for key, inner in item.items())
-        elif isinstance(item, list):
-            pending.extend((where + pointer(index), inner) for index, inner in enumerate(item))
-        elif isinstance(item, float) and not math.isfinite(item):
-            found.append((where, item))
-    return sorted(found, key=lambda pair: pair[0])
 
 
 def dumps(value: object) -> str:

@@ -8,10 +8,12 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from service.errors import InvalidRequestError
+from service.jobs.strict_json import MOST_TOLD
 from solver.errors import Issue, pointer
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
+_SHOWN = 80  # characters of what was given
 _MESSAGES = {
     "extra_forbidden": "is not a known key",
     "missing": "is missing",
@@ -37,7 +39,7 @@ def validated(model: type[ModelT], body: object) -> ModelT:
     try:
         return model.model_validate(dict(body))
     except ValidationError as error:
-        raise InvalidRequestError(issues_of(error.errors(include_url=False))) from error
+        raise InvalidRequestError(issues_of(error.errors(include_url=False)[:MOST_TOLD])) from error
 
 
 def issues_of(errors: Sequence[Any]) -> list[Issue]:
@@ -50,7 +52,7 @@ def _issue(error: Mapping[str, Any]) -> Issue:
     kind = error["type"]
     if kind in ("union_tag_not_found", "union_tag_invalid"):
         return _unknown_tag(error, location)
-    key = str(location[-1]) if location else "body"
+    key = _cut(str(location[-1])) if location else "body"
     message = _MESSAGES.get(kind) or str(error["msg"]).removeprefix("Value error, ")
     if message.startswith("Input should be "):
         message = "must be " + message.removeprefix("Input should be ")
@@ -73,5 +75,11 @@ def _unknown_tag(error: Mapping[str, Any], location: Sequence[object]) -> Issue:
 
 
 def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else text[:77] + "..."
+    # What is large is not written out to be cut.
+    if isinstance(value, str | list | tuple | dict) and len(value) > _SHOWN:
+        value = value[:_SHOWN] if isinstance(value, str | list | tuple) else f"an object of {len(value)} keys"
+    return _cut(repr(value))
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import math
 import threading
@@ -13,6 +14,8 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from service.auth.callers import KEYLESS, Caller, visible
+from service.auth.shares import highest_priority, share
+from service.auth.storage import Storage
 from service.db import revisions
 from service.db.clock import Clock
 from service.db.engine import Database
@@ -28,14 +31,16 @@ from service.db.repositories import (
     UploadRepository,
 )
 from service.db.repositories.keys import KeyRepository
+from service.db.repositories.storage import StorageRepository
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
-from service.jobs.common.sizes import work_limited
+from service.jobs import answering
+from service.jobs.answering import Prepared, prepared
 from service.jobs.kinds.registry.bodies import KIND
 from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.outputs import OnProgress
 from service.jobs.registry import JobKind, JobRequest, Registry
-from service.jobs.strict_json import digest
 from service.jobs.validation import validated
+from service.queue.lanes import Lanes
 from service.queue.queue import JobQueue
 from service.queue.retention import Retention
 from service.queue.scene_store import SceneStore
@@ -43,6 +48,7 @@ from service.queue.subscriptions import Event, Waiters
 from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
 from service.workers import executor_of
+from service.workers.answers import AnswerLimits, Answers
 from service.workers.preview_workers import Previews
 from solver.errors import Issue
 
@@ -55,11 +61,17 @@ _LOOK_AGAIN_SECONDS = 2.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Results:
-    """What a finished job left."""
+    """What a finished job left; `text` is the JSON of its result."""
 
     job: JobRow
-    result: dict[str, Any]
+    text: str
     sweeps: list[Sweep]
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """The result."""
+        found: dict[str, Any] = json.loads(self.text)
+        return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +81,15 @@ class WholeDesign:
     row: Design
     job: JobRow
     result: dict[str, Any]
+
+
+def _answer_limits(settings: Settings) -> AnswerLimits:
+    return AnswerLimits(
+        workers=settings.answer_workers,
+        seconds=settings.answer_seconds,
+        memory_bytes=settings.answer_memory_bytes,
+        budget_seconds=settings.answer_budget_seconds,
+    )
 
 
 class Service:
@@ -89,15 +110,20 @@ class Service:
     ) -> None:
         self.settings = settings
         self.registry = registry_of(settings.kinds) if registry is None else registry
-        self.database = Database(settings.database, settings.database_connections)
+        self.database = Database(settings.database, settings.database_connections, settings.database_seconds)
         self.jobs = JobRepository(self.database, now)
         self.sweeps = SweepRepository(self.database)
         self.designs = DesignRepository(self.database)
         self.keys = KeyRepository(self.database)
-        self.uploads = Uploads(UploadRepository(self.database), settings)
+        self.storage = Storage(StorageRepository(self.database), settings)
+        self.uploads = Uploads(UploadRepository(self.database), settings, self.storage)
         self.scenes = SceneStore(SceneRepository(self.database), self.uploads)
         self.waiters = Waiters()
-        self.previews = Previews(settings.preview_seconds)
+        self.lanes = Lanes(settings.database_seconds)
+        self.previews = Previews(settings.preview_seconds, memory_bytes=settings.answer_memory_bytes)
+        self.answers = Answers(
+            answering.runs(self.registry, self.previews.registry), answering.warm_up, _answer_limits(settings)
+        )
         self.queue = JobQueue(self.jobs, executor_of(settings, self.registry), settings, self.waiters)
         self.retention = Retention(self.database, settings, self.jobs.now)
         self._notices = None if self.database.exclusive else self._make_notices()
@@ -153,6 +179,7 @@ class Service:
         """End the workers, give running jobs back to the queue, close the database."""
         self.stop_waiting()
         self.previews.close()
+        self.answers.close()
         self.retention.stop()
         self.queue.stop()
         if self._notices is not None:
@@ -190,32 +217,51 @@ class Service:
         body: Mapping[str, Any],
         idempotency_key: str | None = None,
         caller: Caller = KEYLESS,
+        found: Prepared | None = None,
     ) -> tuple[JobRow, bool]:
-        """As `submit`, of a body that was checked: `request` is what it says, without its kind."""
+        """As `submit`, of a body that was checked: `request` is what it says, without its kind.
+
+        Parameters
+        ----------
+        found : what the request was resolved to, beside this process if it is a stranger's.
+        """
         seconds = self._seconds_limit(request, caller)
-        with work_limited(caller.limits.work):
-            resolved = kind.resolve(request, self.scenes.of(caller))
+        self._require_priority(request, caller)
+        self.storage.require(caller)
+        if found is None:
+            found = prepared(
+                kind.name, kind.resolve, request, body, self.scenes.of(caller),
+                work=caller.limits.work, memory=self.settings.worker_memory_bytes or None,
+                version=SOLVER_VERSION,
+            )  # fmt: skip
         new = NewJob(
             kind=kind.name,
             request=dict(body),
-            spec=resolved.spec,
-            spec_hash=digest({"kind": kind.name, "spec": resolved.spec, "version": SOLVER_VERSION}),
-            request_hash=digest(body),
+            spec=found.spec,
+            spec_hash=found.spec_hash,
+            request_hash=found.request_hash,
             max_attempts=self.settings.max_attempts,
-            scene_name=resolved.scene_name,
-            scene_hash=resolved.scene_hash,
+            scene_name=found.scene_name,
+            scene_hash=found.scene_hash,
             priority=request.priority,
             fresh=request.fresh,
             idempotency_key=idempotency_key,
             owner=caller.owner,
             seconds_limit=seconds,
         )
-        row, inserted = self.jobs.submit(new, self.settings.queue_limit, caller.limits.waiting)
+        waiting = None if caller.key_id is None else share(caller, self.settings, "waiting")
+        row, inserted = self.jobs.submit(new, self.settings.queue_limit, waiting)
         if row.state is JobState.ACCEPTED:
             self.queue.wake()
             if self._notices is not None:
                 self._notices.tell_accepted()
         return row, inserted
+
+    def _require_priority(self, request: JobRequest, caller: Caller) -> None:
+        most = highest_priority(caller, self.settings)
+        if request.priority > most:
+            message = f"`priority` must be at most {most} with this key, got {request.priority}"
+            raise InvalidRequestError([Issue(pointer="/priority", message=message)])
 
     def _seconds_limit(self, request: JobRequest, caller: Caller) -> float | None:
         """The longest time an attempt may take, if the request or the key says so [s]."""
@@ -296,9 +342,9 @@ class Service:
         """
         row = self.job(job_id, caller)
         source = row.result_of or row.id
-        result = self.jobs.result(source)
-        if result is not None:
-            return Results(job=row, result=result, sweeps=self.sweeps.of_job(source))
+        text = self.jobs.result_text(source)
+        if text is not None:
+            return Results(job=row, text=text, sweeps=self.sweeps.of_job(source))
         if row.state is JobState.FAILED:
             error = row.error or {}
             raise JobFailedError(f"job {job_id} failed: {error.get('detail', 'for no known reason')}", error)

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
+import threading
+from collections.abc import Callable
+
 from pydantic import BaseModel, ConfigDict
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.db import revisions
 from service.db.engine import sqlite_note
 from service.queue.core import SOLVER_VERSION, Service
+
+_PROBE_SECONDS = 2.0
 
 
 class Readiness(BaseModel):
@@ -41,6 +47,64 @@ class Health(Readiness):
     jobs: dict[str, int]
 
 
+Look = Callable[[Service], Readiness]
+
+
+class Probe:
+    """Looks how the service is, in a thread of its own: whatever else hangs, the answer comes in time.
+
+    Parameters
+    ----------
+    service : Service
+        Looked at.
+    seconds : float
+        Time after which a database that has not answered is called away [s].
+    """
+
+    def __init__(self, service: Service, seconds: float = _PROBE_SECONDS) -> None:
+        self._service = service
+        self._seconds = seconds
+        self._looks: dict[Look, asyncio.Future[Readiness]] = {}
+
+    async def detailed(self) -> Readiness:
+        """How the service is; without details if the database does not answer."""
+        return await self._looked(check)
+
+    async def brief(self) -> Readiness:
+        """Whether the service takes and runs jobs."""
+        return await self._looked(readiness)
+
+    async def _looked(self, look: Look) -> Readiness:
+        loop = asyncio.get_running_loop()
+        found = self._looks.get(look)
+        if found is None:
+            found = self._looks[look] = loop.create_future()
+            found.add_done_callback(lambda _: self._looks.pop(look, None))
+            # No pool: a look that hangs must neither keep others out nor hold up the end of the process.
+            told = (look, loop, found)
+            threading.Thread(target=self._look, args=told, name="stickslip probe", daemon=True).start()
+        try:
+            return await asyncio.wait_for(asyncio.shield(found), self._seconds)
+        except TimeoutError:
+            return unanswered(self._service, self._seconds) if look is check else Readiness(ready=False)
+
+    def _look(self, look: Look, loop: asyncio.AbstractEventLoop, found: asyncio.Future[Readiness]) -> None:
+        result = look(self._service)
+
+        def tell() -> None:
+            if not found.done():
+                found.set_result(result)
+
+        if not loop.is_closed():
+            loop.call_soon_threadsafe(tell)
+
+
+def unanswered(service: Service, seconds: float) -> Health:
+    """What is known of a service whose database does not answer."""
+    words = f"the database does not answer within {seconds:g} s"
+    return _health(service, [words], {}, "unknown")
+
+
 def check(service: Service) -> Health:
     """Look at database, queue and workers."""
     trouble: list[str] = []
@@ -49,8 +113,14 @@ def check(service: Service) -> Health:
     try:
         version = service.database.version()
         counts = {state.value: number for state, number in service.jobs.count().items()}
-    except SQLAlchemyError as error:
+        trouble += filter(None, [service.database.trouble(service.settings.least_free_bytes)])
+    except (SQLAlchemyError, OSError) as error:
         trouble.append(f"the database does not answer: {type(error).__name__}")
+    return _health(service, trouble, counts, version)
+
+
+def _health(service: Service, trouble: list[str], counts: dict[str, int], version: str) -> Health:
+    trouble = list(trouble)
     if not service.queue.alive:
         trouble.append("the queue takes no jobs")
     workers = service.queue.status()
@@ -78,7 +148,8 @@ def check(service: Service) -> Health:
 def readiness(service: Service) -> Readiness:
     """Look at database, queue and workers, without counting anything: anybody may ask for this."""
     try:
-        service.database.version()
-    except SQLAlchemyError:
+        if service.database.trouble(service.settings.least_free_bytes) is not None:
+            return Readiness(ready=False)
+    except (SQLAlchemyError, OSError):
         return Readiness(ready=False)
     return Readiness(ready=service.queue.alive and service.queue.status().ready > 0)

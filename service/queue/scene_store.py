@@ -9,12 +9,15 @@ from functools import cache
 
 from service.auth.callers import KEYLESS, Caller
 from service.db.models import NOBODY
-from service.db.repositories import SceneRepository, SceneRow
+from service.db.repositories import SceneRepository
+from service.db.repositories.rows import WholeSceneRow
 from service.errors import ConflictError, NotFoundError
 from service.jobs.common.scenes import read_scene
-from service.jobs.strict_json import digest
+from service.jobs.strict_json import digest, encoded
 from service.uploads.uploads import Uploads
 from solver.scene.scene import load_scene, shipped_scenes
+
+_BETWEEN = "\n"  # of name and owner where a page ends; neither has one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,9 +37,15 @@ class KnownScene:
     name: str
     shipped: bool
     scene_hash: str
-    body: Mapping[str, object]
     created: datetime | None = None
     owner: str = NOBODY
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WholeScene(KnownScene):
+    """A scene with its tables, which may be large."""
+
+    body: Mapping[str, object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +71,7 @@ class SceneStore:
         except NotFoundError:
             return None
 
-    def get(self, name: str) -> KnownScene:
+    def get(self, name: str) -> WholeScene:
         """The shipped scene of this name, or the caller's own; only names are looked up, never paths.
 
         Raises
@@ -78,12 +87,32 @@ class SceneStore:
             raise NotFoundError(f"there is no scene {name!r}: shipped are {known}, GET /v1/scenes lists all")
         return _stored(row)
 
-    def all(self) -> list[KnownScene]:
-        """Shipped scenes, then the stored ones that the caller may see, each by name."""
-        stored = self.repository.all(self.caller.sees)
-        return [*map(_shipped, shipped_scenes()), *map(_stored, stored)]
+    def page(self, size: int, after: str | None = None) -> tuple[list[KnownScene], str | None]:
+        """Shipped scenes, then `size` of the stored ones that the caller may see, by name, without tables.
 
-    def add(self, body: Mapping[str, object]) -> tuple[KnownScene, bool]:
+        Parameters
+        ----------
+        after : where the page before ended; shipped scenes are on the first one.
+
+        Returns
+        -------
+        The scenes, and where the page ended if more follow.
+        """
+        position = None
+        if after is not None:
+            name, _, owner = after.partition(_BETWEEN)
+            position = (name, owner)
+        rows = self.repository.page(self.caller.sees, position, size + 1)
+        stored = [
+            KnownScene(
+                name=row.name, shipped=False, scene_hash=row.scene_hash, created=row.created, owner=row.owner
+            )
+            for row in rows[:size]
+        ]
+        end = None if len(rows) <= size else f"{stored[-1].name}{_BETWEEN}{stored[-1].owner}"
+        return [*map(_shipped, shipped_scenes() if after is None else ()), *stored], end
+
+    def add(self, body: Mapping[str, object]) -> tuple[WholeScene, bool]:
         """Store a scene under its own name; whether it is new.
 
         Raises
@@ -95,29 +124,33 @@ class SceneStore:
         """
         scene = read_scene(self.with_uploads(body))
         tables = scene.to_dict()
-        scene_hash = digest(tables)
-        if scene.name in shipped_scenes():
-            known, added = _shipped(scene.name), False
+        return self.keep(scene.name, digest(tables), tables)
+
+    def keep(self, name: str, scene_hash: str, tables: dict[str, object]) -> tuple[WholeScene, bool]:
+        """Store a scene that was read and checked; `add` lists the errors."""
+        if name in shipped_scenes():
+            known, added = _shipped(name), False
         else:
-            row, added = self.repository.add(self.caller.owner, scene.name, scene_hash, tables)
+            self.uploads.storage.require(self.caller, len(encoded(tables)))
+            row, added = self.repository.add(self.caller.owner, name, scene_hash, tables)
             known = _stored(row)
         if known.scene_hash != scene_hash:
             kind = "shipped" if known.shipped else "stored"
             raise ConflictError(
-                f"another scene is {kind} under the name {scene.name!r} and a name keeps its meaning: "
+                f"another scene is {kind} under the name {name!r} and a name keeps its meaning: "
                 "give this one another `name`"
             )
         return known, added
 
 
 @cache
-def _shipped(name: str) -> KnownScene:
+def _shipped(name: str) -> WholeScene:
     body = load_scene(name).to_dict()
-    return KnownScene(name=name, shipped=True, scene_hash=digest(body), body=body)
+    return WholeScene(name=name, shipped=True, scene_hash=digest(body), body=body)
 
 
-def _stored(row: SceneRow) -> KnownScene:
-    return KnownScene(
+def _stored(row: WholeSceneRow) -> WholeScene:
+    return WholeScene(
         name=row.name,
         shipped=False,
         scene_hash=row.scene_hash,

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import logging
 import threading
+from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 log = logging.getLogger("stickslip.queue")
+
+# More than can end while the answer of one that was just accepted is on its way.
+_LATELY = 4096
 
 Listener = Callable[["Event"], None]
 
@@ -29,6 +33,7 @@ class Waiters:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._listeners: dict[str, list[Listener]] = {}
+        self._lately: OrderedDict[str, None] = OrderedDict()
         self.relay: Callable[[str], None] | None = None
         """Told of every job that ended here, for those who wait at other services."""
 
@@ -59,14 +64,23 @@ class Waiters:
 
     def ended_elsewhere(self, job_id: str) -> None:
         """The job's state changed, perhaps at another service."""
+        with self._lock:
+            self._lately[job_id] = None
+            if len(self._lately) > _LATELY:
+                self._lately.popitem(last=False)
         self._tell(job_id, Event(job_id=job_id, ended=True))
+
+    def ended_lately(self, job_id: str) -> bool:
+        """Whether the job's state changed before somebody could listen; it may be forgotten, see its row."""
+        with self._lock:
+            return job_id in self._lately
 
     def wake_all(self) -> None:
         """The service stops: nobody should wait any longer."""
         with self._lock:
             ids = list(self._listeners)
         for job_id in ids:
-            self.ended_elsewhere(job_id)
+            self._tell(job_id, Event(job_id=job_id, ended=True))
 
     def _tell(self, job_id: str, event: Event) -> None:
         with self._lock:

@@ -17,7 +17,7 @@ from service.db.repositories import JobRow, SweepRepository
 from service.db.repositories.stored import StoredRepository
 from service.jobs.arrays import decode
 from service.jobs.outputs import ContactValues, VariableValues
-from service.queue.scene_store import KnownScene
+from service.queue.scene_store import KnownScene, WholeScene
 
 if TYPE_CHECKING:
     from service.queue.core import Results
@@ -235,11 +235,16 @@ class JobScene(Answer):
     scene: dict[str, Any]
 
 
-class ResultsAnswer(Answer):
-    """What a job computed."""
+class ResultsHead(Answer):
+    """What a job computed, without it."""
 
     job: str
     status: JobState
+
+
+class ResultsAnswer(ResultsHead):
+    """What a job computed."""
+
     result: dict[str, Any]
     sweeps: list[SweepAnswer]
 
@@ -356,15 +361,16 @@ class SceneDetail(SceneAnswer):
     scene: dict[str, Any]
 
     @classmethod
-    def of(cls, scene: KnownScene) -> Self:
+    def of_whole(cls, scene: WholeScene) -> Self:
         """The answer for a scene."""
         return cls(**cls.values(scene), scene=dict(scene.body))
 
 
 class SceneList(Answer):
-    """All scenes."""
+    """A page of the scenes."""
 
     items: list[SceneAnswer]
+    next: str | None = Field(description="Link to the next page; null on the last one.")
 
 
 def _listed(array: NDArray[Any]) -> list[Any]:

@@ -12,6 +12,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from sqlalchemy.exc import DataError, OperationalError
+from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.routing import Match
@@ -25,6 +26,9 @@ log = logging.getLogger("stickslip.http")
 
 MEDIA_TYPE = "application/problem+json"
 _RETRY_SECONDS = 5
+_METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
+# Not the service's fault, and no news for its log.
+_EXPECTED = frozenset({"queue-full", "overloaded", "storage-full"})
 _CHALLENGE = 'Bearer realm="stickslip"'
 
 _STATUS: dict[type[errors.ServiceError], tuple[int, str, str]] = {
@@ -48,6 +52,9 @@ _STATUS: dict[type[errors.ServiceError], tuple[int, str, str]] = {
         "The idempotency key belongs to another request",
     ),
     errors.QueueFullError: (503, "queue-full", "The queue is full"),
+    errors.OverloadedError: (503, "overloaded", "The service has too much to do"),
+    errors.StorageFullError: (507, "storage-full", "No more may be stored"),
+    errors.DatabaseAwayError: (503, "database-away", "The database does not answer"),
     errors.PreviewError: (503, "preview", "The preview was not finished"),
     errors.JobFailedError: (409, "job-failed", "The job failed"),
     errors.DatabaseError: (500, "database", "The database cannot be used"),
@@ -85,6 +92,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(ClientDisconnect, _gone)
     app.add_exception_handler(DataError, _unstorable)
     app.add_exception_handler(OperationalError, _database_away)
+    app.add_exception_handler(PoolTimeoutError, _database_away)
     app.add_middleware(_Boundary)
 
 
@@ -94,7 +102,7 @@ def service_problem(request: Request, error: errors.ServiceError) -> JSONRespons
     if known is None:
         return _unexpected(request, error)
     status, slug, title = known
-    if status >= HTTPStatus.INTERNAL_SERVER_ERROR and slug != "queue-full":
+    if status >= HTTPStatus.INTERNAL_SERVER_ERROR and slug not in _EXPECTED:
         log.error("%s %s: %s", request.method, request.url.path, error.detail)
     issues: list[dict[str, str]] = []
     headers: dict[str, str] = {}
@@ -122,7 +130,11 @@ def _entry(issue: Issue, source: str) -> dict[str, str]:
     return entry if source == "body" else {**entry, "in": source}
 
 
-def answered(request: Request, error: errors.ServiceError | OperationalError) -> JSONResponse:
+AWAY = (OperationalError, PoolTimeoutError)
+"""What is raised if the database does not answer, or no connection to it is free in time."""
+
+
+def answered(request: Request, error: Exception) -> JSONResponse:
     """The problem document of an error that no route raised."""
     if isinstance(error, errors.ServiceError):
         return service_problem(request, error)
@@ -192,15 +204,17 @@ async def _http_error(request: Request, error: Exception) -> JSONResponse:
 
 def _allowed(request: Request) -> list[str]:
     """The methods of every route at the path of a request; Starlette names those of the first one only."""
-    methods = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
-    return [
-        method
-        for method in methods
-        if any(
-            route.matches({**request.scope, "method": "GET" if method == "HEAD" else method})[0] is Match.FULL
-            for route in request.app.routes
-        )
-    ]
+    # A path that is a route's own, such as /v1/scenes/read, is not one that a parameter of another would fit.
+    own = {method.upper() for method in request.app.openapi()["paths"].get(request.url.path, ())}
+
+    def possible(method: str) -> bool:
+        asked = "GET" if method == "HEAD" else method
+        if own:
+            return asked in own
+        scope = {**request.scope, "method": asked}
+        return any(route.matches(scope)[0] is Match.FULL for route in request.app.routes)
+
+    return [method for method in _METHODS if possible(method)]
 
 
 class _Boundary:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import logging
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -29,6 +30,14 @@ def about(**fields: object) -> Iterator[None]:
         _FIELDS.reset(token)
 
 
+# All but the end of a line and the tabulator, which a traceback has: a terminal would obey the others.
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+
+
+def _escaped(found: re.Match[str]) -> str:
+    return f"\\x{ord(found[0]):02x}"
+
+
 class TextFormatter(logging.Formatter):
     """Lines for people."""
 
@@ -39,7 +48,7 @@ class TextFormatter(logging.Formatter):
         """The line of a record."""
         fields = _FIELDS.get()
         shown = "".join(f" [{name} {fields[name]}]" for name in _SHOWN if name in fields)
-        return super().format(record) + shown
+        return _CONTROL.sub(_escaped, super().format(record) + shown)
 
 
 class JsonFormatter(logging.Formatter):

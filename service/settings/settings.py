@@ -7,7 +7,7 @@ import os
 from typing import Literal, Self
 
 from pydantic import Field, FilePath, ValidationError, field_validator, model_validator
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic_settings import SettingsConfigDict
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError
 
@@ -15,6 +15,7 @@ from service.db.engine import CONNECTIONS
 from service.db.postgresql import DRIVER
 from service.errors import ConfigurationError
 from service.jobs.outputs import Pace
+from service.settings.limits import Limits
 
 _LOOPBACK_NAMES = ("localhost",)
 
@@ -58,7 +59,7 @@ def _postgresql_url(parsed: URL) -> str:
     return parsed.set(drivername=DRIVER).render_as_string(hide_password=False)
 
 
-class Settings(BaseSettings):
+class Settings(Limits):
     """The settings of one service; frozen. `STICKSLIP_PORT` in the environment sets `port`, and so on."""
 
     model_config = SettingsConfigDict(
@@ -72,6 +73,19 @@ class Settings(BaseSettings):
     )
     database_connections: int = Field(
         default=CONNECTIONS, ge=2, le=1000, description="Connections to PostgreSQL at most."
+    )
+    database_seconds: float = Field(
+        default=10.0,
+        ge=0.1,
+        le=3600.0,
+        description="Longest time for a statement of the database, for its lock, for a connection to it [s]: "
+        "what takes longer is answered 503.",
+    )
+    least_free_bytes: int = Field(
+        default=64_000_000,
+        ge=0,
+        le=10**15,
+        description="Room on the disk of an SQLite database below which the service is not ready [bytes].",
     )
     host: str = Field(default="127.0.0.1", description="Address to listen on.")
     port: int = Field(default=8000, ge=0, le=65535, description="Port to listen on; 0 takes any free one.")
@@ -197,6 +211,39 @@ class Settings(BaseSettings):
         default=3.0, ge=0.05, le=60.0, description="Longest time a preview may be computed [s]."
     )
 
+    answer_workers: int = Field(
+        default=2,
+        ge=1,
+        le=64,
+        description="Processes that compute what is answered at once: plans, scenes from text, checks of "
+        "what is handed in. One of them is left for others whatever one owner asks for.",
+    )
+    answer_seconds: float = Field(
+        default=1.5,
+        ge=0.1,
+        le=600.0,
+        description="Processor time that one such computation may take [s]; more is answered 422.",
+    )
+    answer_memory_bytes: int = Field(
+        default=192 * 1024**2,
+        ge=16 * 1024**2,
+        le=1024**4,
+        description="Memory that one such computation, or a preview, may take [bytes]; more is answered 422.",
+    )
+    answer_budget_seconds: int = Field(
+        default=60,
+        ge=1,
+        le=1_000_000,
+        description="Processor time of such computations for one owner a minute [s]; more is answered 429.",
+    )
+    worker_memory_bytes: int = Field(
+        default=4 * 1024**3,
+        ge=0,
+        le=1024**5,
+        description="Memory that a job may take [bytes]; 0 for no limit. A job whose dense matrices need "
+        "more is refused with 422, one that meets the limit fails with `memory-limit`.",
+    )
+
     log_format: Literal["text", "json"] = Field(
         default="text", description="The log on standard error: lines for people, or JSON objects."
     )
@@ -238,6 +285,13 @@ class Settings(BaseSettings):
     page_limit: int = Field(default=1000, ge=1, le=10_000, description="Most rows one page of a list has.")
     shutdown_seconds: float = Field(
         default=2.0, ge=0.1, le=60.0, description="Time open requests have to end when the service stops [s]."
+    )
+    exit_seconds: float = Field(
+        default=8.0,
+        ge=1.0,
+        le=600.0,
+        description="Time from SIGINT or SIGTERM after which the process ends by force [s], if a database or "
+        "a disk that does not answer holds it up.",
     )
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic.fields import FieldInfo
 
+from service.settings.limits import Limits
 from service.settings.settings import Settings
 
 _HEAD = "| variable | default | |\n| --- | --- | --- |\n"
@@ -13,7 +14,10 @@ _SAID = {"workers": "processors"}
 
 def settings_table() -> str:
     """The settings with their defaults and what they mean, as a table of Markdown."""
-    return _HEAD + "".join(_row(name, field) for name, field in Settings.model_fields.items())
+    fields = Settings.model_fields
+    # What is inherited comes first there, and last here.
+    ordered = sorted(fields, key=lambda name: name in Limits.model_fields)
+    return _HEAD + "".join(_row(name, fields[name]) for name in ordered)
 
 
 def _row(name: str, field: FieldInfo) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from service.auth.callers import KEYLESS, Caller, visible
+from service.auth.storage import Storage
 from service.db.repositories.uploads import UploadRepository, UploadRow
 from service.errors import InvalidRequestError, NotFoundError, UnreadableUploadError
 from service.jobs.common.scenes import UPLOAD
@@ -59,8 +60,9 @@ def format_of(asked: str | None, name: str, content_type: str) -> str:
 class Uploads:
     """The uploaded files of one service."""
 
-    def __init__(self, repository: UploadRepository, settings: Settings) -> None:
+    def __init__(self, repository: UploadRepository, settings: Settings, storage: Storage) -> None:
         self.repository = repository
+        self.storage = storage
         self._seconds = settings.inspection_seconds
         self._lock = threading.Lock()
         self._resolved: OrderedDict[str, dict[str, Any]] = OrderedDict()
@@ -72,7 +74,10 @@ class Uploads:
         ------
         UnreadableUploadError
             If it holds no usable matrix or modes.
+        StorageFullError
+            If its owner may not store so much more.
         """
+        self.storage.require(caller, arrived.size)
         found = contents(arrived.path, self._seconds)
         row, added = self.repository.add(
             owner=caller.owner, name=arrived.name, format=arrived.format, size=arrived.size,
@@ -98,8 +103,9 @@ class Uploads:
         NotFoundError
             If there is none of this id.
         """
-        self.get(upload_id, caller)
+        row = self.get(upload_id, caller)
         self.repository.delete(upload_id)
+        self.storage.forget(row.owner)
 
     def resolved(self, body: Mapping[str, object], caller: Caller = KEYLESS) -> Mapping[str, object]:
         """A scene with what its uploads hold in place of their ids; one without uploads as it is.

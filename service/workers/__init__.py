@@ -7,6 +7,7 @@ from service.jobs.registry import Registry
 from service.settings.settings import Settings
 from service.workers.base import Executor
 from service.workers.local import LocalExecutor
+from service.workers.process_limits import ProcessLimits
 
 
 def executor_of(settings: Settings, registry: Registry) -> Executor:
@@ -24,6 +25,7 @@ def executor_of(settings: Settings, registry: Registry) -> Executor:
             workers=settings.workers,
             grace_seconds=settings.grace_seconds,
             pace=settings.pace,
+            limits=ProcessLimits(memory_bytes=settings.worker_memory_bytes or None),
         )
     try:
         from distributed import Security

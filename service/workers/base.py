@@ -31,9 +31,10 @@ class Stopped:
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """What ran the attempt died; `reason` says how."""
+    """What ran the attempt died; `reason` says how, `signal` which one ended it if one did."""
 
     reason: str
+    signal: int | None = None
 
 
 Outcome = Finished | Failed | Stopped | Lost

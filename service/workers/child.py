@@ -15,6 +15,7 @@ from multiprocessing.context import SpawnProcess
 
 from service.jobs.outputs import Pace
 from service.jobs.registry import RunOn, WarmUp
+from service.workers.process_limits import ProcessLimits
 from service.workers.worker import THREAD_LIMITS, Orders, main
 
 _environment_lock = threading.Lock()
@@ -50,10 +51,15 @@ def death(process: SpawnProcess) -> str:
     return f"worker process {process.pid} ended with status {code}"
 
 
+def ending_signal(process: SpawnProcess) -> int | None:
+    """The signal that ended a process, if one did."""
+    return None if process.exitcode is None or process.exitcode >= 0 else -process.exitcode
+
+
 class Child:
     """One worker process and the parent's end of its pipe."""
 
-    def __init__(self, runs: Mapping[str, RunOn], warm_up: WarmUp, pace: Pace) -> None:
+    def __init__(self, runs: Mapping[str, RunOn], warm_up: WarmUp, pace: Pace, limits: ProcessLimits) -> None:
         context = mp.get_context("spawn")
         numbers: Array[ctypes.c_longlong] = context.RawArray(ctypes.c_longlong, Orders.SIZE)
         self.orders = Orders(numbers)
@@ -61,7 +67,7 @@ class Child:
         self.connection, theirs = context.Pipe()
         self.process = context.Process(
             target=main,
-            args=(theirs, numbers, runs, warm_up, pace),
+            args=(theirs, numbers, runs, warm_up, pace, limits),
             name="stickslip worker",
             daemon=True,
         )

@@ -10,7 +10,10 @@ from service.db.repositories import Attempt
 from service.jobs.outputs import Pace
 from service.jobs.registry import RunOn, WarmUp
 from service.workers.base import ExecutorStatus, Sink, Stopped
+from service.workers.process_limits import ProcessLimits
 from service.workers.slot import Slot
+
+UNLIMITED = ProcessLimits()
 
 _TEND_SECONDS = 0.1
 
@@ -30,6 +33,8 @@ class LocalExecutor:
         Time between asking an attempt to stop and killing its process [s].
     pace : Pace
         How often the processes tell what.
+    limits : ProcessLimits
+        What each process may use.
     """
 
     def __init__(
@@ -40,11 +45,13 @@ class LocalExecutor:
         workers: int,
         grace_seconds: float,
         pace: Pace,
+        limits: ProcessLimits = UNLIMITED,
     ) -> None:
         self.runs = runs
         self.warm_up = warm_up
         self.grace_seconds = grace_seconds
         self.pace = pace
+        self.limits = limits
         self.trouble: str | None = None
         # The first process fills the cache of compiled loops that the others then only read.
         self.warmed = threading.Event()

@@ -15,13 +15,21 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from service.db.repositories import Attempt
-from service.errors import ConflictError, InvalidRequestError, JobFailedError, PreviewError, QueueFullError
+from service.errors import (
+    ConflictError,
+    InvalidRequestError,
+    JobFailedError,
+    PreviewError,
+    QueueFullError,
+    TooManyRequestsError,
+)
 from service.jobs.ids import new_id
 from service.jobs.kinds.previews import PREVIEWS
 from service.jobs.outputs import FailureKind, Pace, Piece, Point
 from service.jobs.registry import Registry
 from service.workers.base import Failed, Finished, Lost, Outcome
 from service.workers.local import LocalExecutor
+from service.workers.process_limits import ProcessLimits
 from solver.errors import Issue
 
 log = logging.getLogger("stickslip.previews")
@@ -40,6 +48,7 @@ class _Asked:
 
     attempt: Attempt
     client: str
+    owner: str
     loop: asyncio.AbstractEventLoop
     answer: asyncio.Future[bytes]
     stopped: Exception | None = field(default=None)
@@ -67,24 +76,34 @@ class Previews:
         Longest time one may take [s].
     registry : Registry
         The kinds of preview.
+    memory_bytes : int or None
+        Most memory one may take.
     """
 
-    def __init__(self, seconds: float, registry: Registry = PREVIEWS) -> None:
+    def __init__(
+        self, seconds: float, registry: Registry = PREVIEWS, memory_bytes: int | None = None
+    ) -> None:
         self.registry = registry
         self._seconds = seconds
+        self._limits = ProcessLimits(memory_bytes=memory_bytes, processor_seconds=seconds + _GRACE_SECONDS)
         self._lock = threading.RLock()
         self._waiting: deque[_Asked] = deque()
         self._running: _Asked | None = None
+        self._served: list[str] = []
         self._executor: LocalExecutor | None = None
         self._closed = False
 
-    async def compute(self, kind: str, spec: dict[str, Any], client: str = "") -> bytes:
-        """The answer to a preview, as JSON.
+    async def compute(
+        self, kind: str, spec: dict[str, Any], client: str = "", owner: str = "", most: int | None = None
+    ) -> bytes:
+        """The answer to a preview, as JSON; `most` of an owner may wait.
 
         Raises
         ------
         QueueFullError
             If too many wait.
+        TooManyRequestsError
+            If too many of the owner wait.
         ConflictError
             If a newer one of the same client took its place.
         PreviewError
@@ -96,8 +115,8 @@ class Previews:
         attempt = Attempt(
             job_id=new_id(), kind=kind, spec=spec, attempt=1, max_attempts=1, lease_owner="preview"
         )
-        asked = _Asked(attempt, client, loop, loop.create_future())
-        self._add(asked)
+        asked = _Asked(attempt, client, owner, loop, loop.create_future())
+        self._add(asked, most)
         try:
             return await asyncio.wait_for(asked.answer, _LONGEST_WAIT_SECONDS)
         except TimeoutError as error:
@@ -116,6 +135,7 @@ class Previews:
                 workers=1,
                 grace_seconds=_GRACE_SECONDS,
                 pace=_SILENT,
+                limits=self._limits,
             )
             self._executor.start(self)
 
@@ -154,21 +174,33 @@ class Previews:
                 return
             if not self._waiting or not self._executor.free():
                 return
-            self._running = asked = self._waiting.popleft()
+            self._running = asked = self._next()
             asked.loop.call_soon_threadsafe(asked.loop.call_later, self._seconds, self._overtime, asked)
             self._executor.submit(asked.attempt)
 
-    def _add(self, asked: _Asked) -> None:
+    def _add(self, asked: _Asked, most: int | None) -> None:
         with self._lock:
             if self._closed:
                 raise PreviewError("the service stops")
             if asked.client:
                 self._supersede(asked.client)
+            own = sum(other.owner == asked.owner for other in self._waiting)
+            if most is not None and own >= most:
+                raise TooManyRequestsError(f"{own} previews of yours wait already", _RETRY_SECONDS)
             if len(self._waiting) >= MOST_WAITING:
                 raise QueueFullError(f"{MOST_WAITING} previews wait already", _RETRY_SECONDS)
             self._waiting.append(asked)
         self.begin()
         self.room()
+
+    def _next(self) -> _Asked:
+        """Owners take turns: the first one of the owner whose turn is longest ago."""
+        turns = {owner: at for at, owner in enumerate(self._served)}
+        found = min(self._waiting, key=lambda asked: turns.get(asked.owner, -1))
+        self._waiting.remove(found)
+        self._served = [*(owner for owner in self._served if owner != found.owner), found.owner]
+        del self._served[:-MOST_WAITING]
+        return found
 
     def _supersede(self, client: str) -> None:
         for other in [each for each in self._waiting if each.client == client]:
@@ -203,6 +235,8 @@ def _answer(outcome: Outcome) -> bytes | Exception:
         return PreviewError(outcome.reason)
     if isinstance(outcome, Failed):
         failure = outcome.failure
+        if failure.kind is FailureKind.MEMORY_LIMIT:
+            return InvalidRequestError([Issue(pointer="/scene", message=f"`scene`: {failure.detail}")])
         if failure.kind in (FailureKind.SCENE, FailureKind.SETTING):
             issues = failure.issues or (Issue(pointer="", message=failure.detail),)
             return InvalidRequestError(issues)

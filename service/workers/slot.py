@@ -20,7 +20,8 @@ from service.jobs.checkpoints import Kept
 from service.jobs.outputs import Pace
 from service.jobs.registry import RunOn, WarmUp
 from service.workers.base import Failed, Finished, Lost, Outcome, Sink, Stopped
-from service.workers.child import Child, death
+from service.workers.child import Child, death, ending_signal
+from service.workers.process_limits import ProcessLimits
 from service.workers.worker import Done, Ready, Reply, Task
 
 log = logging.getLogger("stickslip.executor")
@@ -57,6 +58,7 @@ class Host(Protocol):
     warm_up: WarmUp
     grace_seconds: float
     pace: Pace
+    limits: ProcessLimits
     trouble: str | None
     warmed: threading.Event
     sink: Sink
@@ -164,7 +166,9 @@ class Slot(threading.Thread):
             self._executor.warmed.wait()
         while not self._closing:
             try:
-                child = Child(self._executor.runs, self._executor.warm_up, self._executor.pace)
+                child = Child(
+                    self._executor.runs, self._executor.warm_up, self._executor.pace, self._executor.limits
+                )
             except OSError as error:
                 trouble = f"a worker process could not be started: {error}"
             else:
@@ -262,7 +266,8 @@ class Slot(threading.Thread):
             try:
                 message = child.connection.recv()
             except (EOFError, OSError):
-                self._lose_all(death(child.process))
+                reason = death(child.process)
+                self._lose_all(reason, ending_signal(child.process))
                 return
             except Exception as error:
                 log.exception("the answer of worker process %s cannot be read", child.process.pid)
@@ -320,7 +325,7 @@ class Slot(threading.Thread):
         """A task taken back too late is computed all the same: it has the grace to notice."""
         self._kill_after_grace(child, min(self._withdrawn))
 
-    def _lose_all(self, reason: str) -> None:
+    def _lose_all(self, reason: str, ended_by: int | None = None) -> None:
         """The process is gone: what it computed is lost, what waited behind goes back to the queue."""
         with self._lock:
             self._child = None
@@ -332,7 +337,7 @@ class Slot(threading.Thread):
             log.warning("%s while it had nothing to do", reason)
         lost = held[:1] if held and held[0].sent else []
         for one in lost:
-            self._executor.sink.ended(one.attempt, Lost(reason))
+            self._executor.sink.ended(one.attempt, Lost(reason, ended_by))
         self._give_back(held[len(lost) :])
 
     def _give_back(self, several: Iterable[_Held]) -> None:

@@ -29,6 +29,7 @@ from service.jobs.checkpoints import Checkpoints, Kept
 from service.jobs.outputs import FailureKind, JobFailure, JobOutput, Pace, Piece, Point
 from service.jobs.registry import RunOn, WarmUp
 from service.settings import logs
+from service.workers.process_limits import ProcessLimits
 from solver.errors import SceneError, SettingError, SolverError
 
 THREAD_LIMITS = dict.fromkeys(
@@ -164,6 +165,7 @@ def main(
     runs: Mapping[str, RunOn],
     warm_up: WarmUp,
     pace: Pace,
+    limits: ProcessLimits,
 ) -> None:
     """The life of a worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -171,6 +173,7 @@ def main(
     threading.Thread(target=_die_with_parent, name="parent watch", daemon=True).start()
     logs.configure(pace.log_level, pace.log_format)
     warm_up()
+    limits.confine()
     orders = Orders(numbers)
     connection.send(Ready())
     while True:
@@ -186,7 +189,10 @@ def main(
         stop, reply = _Stop(orders, task.token), _replying(connection, task)
         kept = Checkpoints(task.job_id, task.saved, reply, pace)
         with logs.about(job=task.job_id, kind=task.kind):
-            done = _compute(runs, task, Throttle(reply, pace.progress_seconds), stop, kept)
+            limits.begin()
+            done = _compute(runs, task, Throttle(reply, pace.progress_seconds), stop, kept, limits)
+            limits.end()
+            limits.forget()
         try:
             connection.send(Reply(task.token, done))
         except (pickle.PicklingError, TypeError, AttributeError) as error:
@@ -212,7 +218,12 @@ def _die_with_parent() -> None:
 
 
 def _compute(
-    runs: Mapping[str, RunOn], task: Task, progress: Throttle, stop: _Stop, kept: Checkpoints
+    runs: Mapping[str, RunOn],
+    task: Task,
+    progress: Throttle,
+    stop: _Stop,
+    kept: Checkpoints,
+    limits: ProcessLimits,
 ) -> Done:
     """Run one task; every error becomes an answer, the process lives on."""
     try:
@@ -220,10 +231,18 @@ def _compute(
             raise UnknownKindError(task.kind)
         output = checked(runs[task.kind](task.spec, progress, stop, kept))
     except MemoryError as error:
-        return Done(retry=f"the worker ran out of memory ({error})")
+        return _out_of_memory(error, limits)
     except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
         return _stopped(kept) if stop.obeyed else Done(failure=failure_of(task, error))
     return _stopped(kept) if stop.obeyed else Done(output=output)
+
+
+def _out_of_memory(error: MemoryError, limits: ProcessLimits) -> Done:
+    """A limit is met again by every attempt; without one, another may find more memory free."""
+    if limits.memory_bytes is None:
+        return Done(retry=f"the worker ran out of memory ({error})")
+    detail = f"it takes more memory than {limits.memory_told()}, the limit of a worker ({error})"
+    return Done(failure=JobFailure(kind=FailureKind.MEMORY_LIMIT, detail=detail))
 
 
 def _stopped(kept: Checkpoints) -> Done:

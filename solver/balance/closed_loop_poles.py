@@ -89,7 +89,8 @@ class ClosedLoop:
         system = self.system
         if system.form == MODES and not np.any(system.shift):
             squares = system.eigenvalues.real
-            order = np.arange(len(squares))[:, None], np.argsort(squares, axis=1)
+            # As many as are kept with springs.
+            order = np.arange(len(squares))[:, None], np.argsort(squares, axis=1)[:, :MOST_MODES]
             at = np.sqrt(np.maximum(squares[order], 0.0))
             return Poles(at=at, half_width=0.5 * system.dampings[order])
         return self._ascending(np.zeros_like(self.held))

@@ -7,11 +7,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.balance.balance import Balance, build
+from solver.balance.balance import Balance, build, fewer_harmonics
 from solver.balance.simplifications import Effects, even_harmonics_reason
-from solver.balance.workspace import Workspace
-from solver.contacts.kernels.system import DENSE, MODES, POLES
+from solver.contacts.kernels.system import (
+    DENSE,
+    MODES,
+    POLES,
+    by_reference,
+    new_receptance,
+    receptance_by_value,
+)
 from solver.jit.fourier import Real
+from solver.linear.kernels.receptance import receptance
 from solver.results.base import Shown
 from solver.results.views import Views
 from solver.scene.annulus import sectors_needed
@@ -20,6 +27,7 @@ from solver.scene.scene import (
     AnyContact,
     Scene,
 )
+from solver.studies.memory import dense_bytes
 
 # Fitted to responses of the shipped scenes at 11 harmonics on one core of a server: seconds of a Newton
 # iteration, of one contact with n coefficients (times n²), and of a solve with n unknowns (times n³).
@@ -69,6 +77,8 @@ class Plan(Shown):
         Sizes behind it.
     seconds_a_point : float
         Estimated cost of a point of a branch [s].
+    dense_bytes : int
+        Estimated memory of the dense matrices of a response [bytes].
     """
 
     scene: str
@@ -78,6 +88,7 @@ class Plan(Shown):
     contacts: int
     harmonics: int
     seconds_a_point: float
+    dense_bytes: int
 
     VIEWS: ClassVar = Views("solver.views", "of_plan", "plan_dataset")
 
@@ -93,6 +104,7 @@ class Plan(Shown):
             "contacts": self.contacts,
             "n_harmonics": self.harmonics,
             "estimated_seconds_a_point": self.seconds_a_point,
+            "estimated_dense_bytes": self.dense_bytes,
         }
 
 
@@ -138,6 +150,7 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
         contacts=len(balance.scene.contacts),
         harmonics=harmonics,
         seconds_a_point=_ITERATIONS_A_POINT * iteration,
+        dense_bytes=dense_bytes(scene, harmonics, every_sector=asked.every_sector).total,
     )
 
 
@@ -209,14 +222,18 @@ def _slip(balance: Balance, i: int, stuck: Real) -> Effect:
 
 def _stuck_force(balance: Balance) -> Real:
     """Return the largest force each port carries over the band if all stick [N], without the mean."""
-    workspace, low_high = Workspace.of(balance), balance.scene.observe.band
+    # Stuck contacts are springs: nothing moves but at the harmonics of the forces.
+    forced = fewer_harmonics(balance, 0)
+    system, low_high = by_reference(forced.system), balance.scene.observe.band
+    out = new_receptance(system)
     kt = np.array([k for contact in balance.scene.contacts for k in contact.stiffnesses])
     largest = np.zeros(kt.size)
     stiffness = kt - balance.system.shift
     for frequency in np.linspace(*low_high, _FREQUENCIES):
-        linear = workspace.receptance(2.0 * np.pi * float(frequency))
+        receptance(system, 2.0 * np.pi * float(frequency), out)
+        linear = receptance_by_value(out)
         total = np.zeros(kt.size)
-        for k, A, free in zip(balance.system.ks, linear.A[0], linear.u_linear[0], strict=True):
+        for k, A, free in zip(forced.system.ks, linear.A[0], linear.u_linear[0], strict=True):
             if k > 0 and np.any(free):
                 total += np.abs(np.linalg.solve(np.eye(kt.size) + A * stiffness, free))
         largest = np.maximum(largest, kt * total)

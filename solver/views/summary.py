@@ -149,6 +149,7 @@ def of_plan(found: Plan) -> Summary:
     pairs = [(("" if e.used else "left out: ") + e.name, e.reason) for e in found.effects]
     pairs.append(("unknowns", str(found.unknowns)))
     pairs.append(("a point takes about", units.duration(found.seconds_a_point)))
+    pairs.append(("dense matrices take about", f"{found.dense_bytes / 1e6:.3g} MB"))
     return Summary(title=f"{found.scene}, {found.harmonics} harmonics", pairs=tuple(pairs))
 
 

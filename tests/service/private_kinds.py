@@ -126,6 +126,12 @@ def out_of_memory(_spec: Mapping[str, Any], _progress: Progress, _should_stop: S
     raise MemoryError("this much is not there")
 
 
+def allocate(spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    """As many megabytes as the seed says."""
+    held = np.ones((spec["seed"], 1_000_000), np.uint8)
+    return JobOutput(result={"bytes": int(held.size), "pid": os.getpid()})
+
+
 def threads(_spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
     """What the environment of a worker says about threads."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -170,6 +176,7 @@ _RUNS = {
     "not-finite": not_finite,
     "unsendable": unsendable,
     "out-of-memory": out_of_memory,
+    "allocate": allocate,
     "threads": threads,
 }
 

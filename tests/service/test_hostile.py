@@ -19,7 +19,7 @@ from private_kinds import PRIVATE
 from service_helpers import ServedClient, promptly, serving, until
 
 import solver
-from service.http.header_timeout import patient
+from service.http.connections import Connections
 
 BODY_SECONDS = 1.0
 HEADER_SECONDS = 2.0
@@ -333,8 +333,15 @@ async def answer(_scope: Any, _receive: Any, send: Any) -> None:
 def test_the_limit_holds_for_every_loop(loop: Any) -> None:
     """Also behind an answer; and it is a limit of the headers, not of the answer."""
     pytest.importorskip(loop)
+    connections = Connections(most=100, header_seconds=0.8, write_seconds=60.0, unsent_bytes=1_000_000)
     config = uvicorn.Config(
-        answer, http=patient(0.8), loop=loop, port=0, log_config=None, lifespan="off", timeout_keep_alive=60
+        answer,
+        http=connections.protocol,
+        loop=loop,
+        port=0,
+        log_config=None,
+        lifespan="off",
+        timeout_keep_alive=60,
     )
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run)

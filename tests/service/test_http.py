@@ -194,6 +194,9 @@ def test_other_refusals(http: httpx.Client) -> None:
     put = http.put("/v1/jobs", json={})
     assert is_problem(put, 405)["detail"] == "PUT is not possible at /v1/jobs, use GET, HEAD, POST"
     assert put.headers["allow"] == "GET, HEAD, POST"
+    assert http.delete("/v1/scenes/read").headers["allow"] == "POST"
+    kind = is_problem(http.post("/v1/jobs", json={"kind": "k" * 10_000}), 422)
+    assert len(kind["detail"]) < 1000
     form = http.post("/v1/jobs", data={"kind": "iteration"})
     assert "application/json" in is_problem(form, 415)["detail"]
     is_problem(http.post("/v1/designs", json={"kind": "iteration"}), 422)

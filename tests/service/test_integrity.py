@@ -63,6 +63,7 @@ def test_a_used_database_and_its_backup_are_sound(used: Path, copy: Path) -> Non
     ("statement", "words"),
     [
         ("UPDATE sweep_array SET data = CAST(data || x'00' AS BLOB)", "checksum"),
+        ("UPDATE job_result SET body = replace(body, '1', '2')", "does not match its checksum"),
         ("DELETE FROM job_result", "1 successful jobs without a result"),
         ("UPDATE job SET state = 'dismissed'", "1 results of jobs that computed none"),
         ("UPDATE job SET state = 'dismissed'", "1 sweeps of jobs that computed none"),

@@ -123,3 +123,8 @@ def test_every_answer_has_the_number_of_its_request(
     assert float(line["seconds"]) > 0.0
     missing = [line for line in lines if line.get("request") in numbers and "status" in line]
     assert {line["path"] for line in missing} == {"/v1/jobs/nothing%0Aelse"}, "nothing decoded, no query"
+
+
+def test_lines_for_people_hold_no_control_characters() -> None:
+    record = logging.LogRecord("a", logging.INFO, __file__, 1, "a\x1b[2J\x00b\x9b\tc", None, None)
+    assert TextFormatter().format(record).endswith("a\\x1b[2J\\x00b\\x9b\tc")

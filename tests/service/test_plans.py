@@ -10,6 +10,7 @@ from sqlalchemy.dialects import sqlite
 
 from service.db import revisions
 from service.db.engine import Database
+from service.db.repositories import claims, storage
 from service.db.repositories import job_statements as statements
 
 BY_KEY = "sqlite_autoindex_job_1"
@@ -19,8 +20,10 @@ BY_KEY = "sqlite_autoindex_job_1"
     ("statement", "index"),
     [
         (statements.COMPUTED_BEFORE, "ix_job_spec_hash_state"),
-        (statements.NEXT_PRIORITY, "ix_job_state_priority_id"),
-        (statements.NEXT_JOBS, "ix_job_state_priority_id"),
+        (claims.WAITING_OWNERS, "ix_job_state_owner_priority_id"),
+        (claims.NEXT_PRIORITY, "ix_job_state_owner_priority_id"),
+        (claims.NEXT_JOBS, "ix_job_state_owner_priority_id"),
+        (storage.OF_JOBS, "ix_job_owner_stored_bytes"),
         (statements.TAKE, BY_KEY),
         (statements.REPORT, BY_KEY),
         (statements.SUCCEED, BY_KEY),

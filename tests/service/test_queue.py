@@ -165,10 +165,24 @@ def test_numbers_that_are_not_finite_are_null(lasting: EmbeddedService) -> None:
     assert lasting.results(job).result == {"mean": None, "list": [None, 1.0]}
 
 
-def test_memory_that_runs_out_is_tried_again(lasting: EmbeddedService) -> None:
-    done = lasting.wait(lasting.submit("out-of-memory", {}), timeout=PATIENCE)
+def test_memory_that_runs_out_is_tried_again(make_settings: MakeSettings) -> None:
+    """Without a limit: another attempt may find more of it free."""
+    with EmbeddedService(make_settings(worker_memory_bytes=0), PRIVATE) as service:
+        done = service.wait(service.submit("out-of-memory", {}), timeout=PATIENCE)
     assert (done.status, done.attempt) == (JobState.FAILED, 3)
     assert "ran out of memory" in done.error["detail"]
+
+
+def test_a_worker_that_meets_its_memory_limit_fails_the_job_and_goes_on(make_settings: MakeSettings) -> None:
+    with EmbeddedService(make_settings(worker_memory_bytes=100_000_000), PRIVATE) as service:
+        small = service.wait(service.submit("allocate", {"size": 500}), timeout=PATIENCE)
+        large = service.wait(service.submit("allocate", {"size": 500, "seed": 200}), timeout=PATIENCE)
+        after = service.wait(service.submit("allocate", {"size": 400}), timeout=PATIENCE)
+        pids = [service.results(done.id).result["pid"] for done in (small, after)]
+    assert (large.status, large.attempt) == (JobState.FAILED, 1)
+    assert large.error["type"] == "memory-limit"
+    assert "100 MB" in large.error["detail"]
+    assert pids[0] == pids[1], "the same process computes what comes after"
 
 
 def test_a_job_that_takes_too_long_fails(make_settings: MakeSettings) -> None:

@@ -60,6 +60,14 @@ def test_a_text_that_cannot_be_read_says_where(
     assert words in is_problem(answer, 400)["detail"]
 
 
+def test_a_number_that_is_none_is_named_and_stands_there_as_it_was_written(shipped: httpx.Client) -> None:
+    read = shipped.post("/v1/scenes/read", json={"text": "x = nan\n[a]\ny = [1.0, -inf]\n"}).json()
+    assert read["scene"] == {"x": "NaN", "a": {"y": [1.0, "-Infinity"]}}
+    issues = {issue["pointer"]: issue["detail"] for issue in read["issues"]}
+    assert issues["/x"] == "`/x` must be a finite number, got NaN"
+    assert issues["/a/y/1"] == "`/a/y/1` must be a finite number, got -Infinity"
+
+
 def test_dates_and_numbers_that_are_none(shipped: httpx.Client) -> None:
     read = shipped.post("/v1/scenes/read", json={"text": "name = 2020-01-01\nx = nan\n"}).json()
     assert {"/x", "/structure"} <= {issue["pointer"] for issue in read["issues"]}

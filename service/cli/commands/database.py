@@ -67,7 +67,9 @@ def prune(
 def check(database: options.Database = None, as_json: options.Json = False) -> None:
     """Read a database from end to end and say what is wrong with it.
 
-    The file and its references, the states of jobs against their results, the checksum of every array.
+    The file and its references, the states of jobs against their results, the checksums of arrays and
+    results.
+    Exit status 1 if anything is wrong, 2 if there is no such database.
     """
     from service.db.engine import shown
     from service.db.integrity import check as look

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, Engine, Select, and_, exists, func, select, text
+from sqlalchemy import ColumnElement, Connection, Engine, Select, Text, and_, cast, exists, func, select, text
 
 from service.db.models import Job, JobResult, JobState, Sweep, SweepArray
 from service.jobs.outputs import StoredArray
@@ -68,6 +69,17 @@ def arrays(engine: Engine) -> Iterator[tuple[str, str, StoredArray]]:
     with engine.connect().execution_options(stream_results=True, max_row_buffer=16) as connection:
         for sweep_id, name, sha256, data in connection.execute(query):
             yield sweep_id, name, StoredArray(sha256=sha256, data=data)
+
+
+def damaged_results(engine: Engine) -> Iterator[str]:
+    """Yield what is wrong with results, one at a time; those of earlier versions have no checksum."""
+    query = select(JobResult.job_id, JobResult.sha256, cast(JobResult.body, Text)).where(
+        JobResult.sha256.is_not(None)
+    )
+    with engine.connect().execution_options(stream_results=True, max_row_buffer=16) as connection:
+        for job_id, sha256, body in connection.execute(query):
+            if hashlib.sha256(body.encode()).hexdigest() != sha256:
+                yield f"result of job {job_id}: it does not match its checksum"
 
 
 def contents(connection: Connection) -> Contents:

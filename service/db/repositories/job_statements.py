@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
-from sqlalchemy import Table, Update, bindparam, func, insert, select, update
+from sqlalchemy import Table, Text, Update, bindparam, cast, insert, select, update
 from sqlalchemy.sql.elements import ColumnElement
 
 from service.db.models import Job, JobResult, JobState
@@ -16,8 +16,6 @@ _JOB: Table = Job.metadata.tables["job"]
 _RESULT: Table = JobResult.metadata.tables["job_result"]
 _C = _JOB.c
 
-ABOVE_ALL = 1_000_000
-"""A priority above every one a job can have."""
 ROW = [item.name for item in fields(JobRow)]
 NEW_COLUMNS = [item.name for item in fields(NewJob) if item.name != "fresh"]
 INITIAL: dict[str, Any] = {
@@ -30,7 +28,12 @@ INSERT_JOB = insert(_JOB)
 INSERT_RESULT = insert(_RESULT)
 
 BY_ID = select(*(_C[name] for name in ROW)).where(_C.id == bindparam("job"))
+SEVERAL = select(*(_C[name] for name in ROW)).where(_C.id.in_(bindparam("jobs", expanding=True)))
 RESULT = select(_RESULT.c.body).where(_RESULT.c.job_id == bindparam("job"))
+RESULT_TEXT = select(cast(_RESULT.c.body, Text)).where(_RESULT.c.job_id == bindparam("job"))
+ADD_STORED = (
+    update(_JOB).where(_C.id == bindparam("job")).values(stored_bytes=_C.stored_bytes + bindparam("more"))
+)
 
 # Not ordered by the bare `id`: SQLite would walk all jobs of an owner by the index (owner, id).
 COMPUTED_BEFORE = (
@@ -41,18 +44,9 @@ COMPUTED_BEFORE = (
     .limit(1)
 )
 
-NEXT_PRIORITY = select(func.max(_C.priority)).where(
-    _C.state == JobState.ACCEPTED, _C.priority < bindparam("below")
-)
 _NOT_OF_THE_ROW = ("job_id", "lease_owner", "saved")
-_TAKEN = ["id", *(item.name for item in fields(Attempt) if item.name not in _NOT_OF_THE_ROW)]
-NEXT_JOBS = (
-    select(*(_C[name] for name in _TAKEN))
-    .where(_C.state == JobState.ACCEPTED, _C.priority == bindparam("priority"))
-    .order_by(_C.id)
-    .limit(bindparam("most"))
-    .with_for_update(skip_locked=True)
-)
+TAKEN = ["id", *(item.name for item in fields(Attempt) if item.name not in _NOT_OF_THE_ROW)]
+"""What of a waiting job makes an attempt."""
 TAKE = (
     update(_JOB)
     .where(_C.id == bindparam("job"), _C.state == JobState.ACCEPTED)

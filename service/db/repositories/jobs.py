@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from datetime import datetime
@@ -20,6 +21,7 @@ from service.db.repositories.checkpoints import (
     store_pieces,
     with_what_was_kept,
 )
+from service.db.repositories.claims import Turns
 from service.db.repositories.designs import insert_design
 from service.db.repositories.guards import OWNED, change_owned, of_attempt
 from service.db.repositories.leases import renew
@@ -30,6 +32,7 @@ from service.db.repositories.sweeps import insert_sweeps
 from service.errors import IdempotencyError
 from service.jobs.ids import new_id
 from service.jobs.outputs import JobFailure, JobOutput, Piece
+from service.jobs.strict_json import JsonText, encoded
 
 __all__ = ["Attempt", "JobRepository", "JobRow", "NewJob", "Recovered"]
 
@@ -71,6 +74,7 @@ class JobRepository:
         self._db = database
         self.now: Clock = now or (utc_now if database.exclusive else SharedClock(database.time))
         self._room = Room()
+        self._turns = Turns()
 
     def submit(self, new: NewJob, queue_limit: int, waiting_limit: int | None = None) -> tuple[JobRow, bool]:
         """Insert a job, or find the one this request made before; whether it was inserted.
@@ -113,6 +117,12 @@ class JobRepository:
             row = connection.execute(statements.BY_ID, {"job": job_id}).mappings().one_or_none()
         return None if row is None else JobRow(**row)
 
+    def several(self, job_ids: Sequence[str]) -> dict[str, JobRow]:
+        """Those of the jobs that there are, by id."""
+        with self._db.reading() as connection:
+            rows = connection.execute(statements.SEVERAL, {"jobs": job_ids}).mappings()
+            return {row["id"]: JobRow(**row) for row in rows}
+
     def page(
         self,
         *,
@@ -142,6 +152,11 @@ class JobRepository:
         with self._db.reading() as connection:
             return connection.execute(statements.RESULT, {"job": job_id}).scalar_one_or_none()
 
+    def result_text(self, job_id: str) -> str | None:
+        """The result of a job as its JSON, None if it has none."""
+        with self._db.reading() as connection:
+            return connection.execute(statements.RESULT_TEXT, {"job": job_id}).scalar_one_or_none()
+
     def spec(self, job_id: str) -> dict[str, Any]:
         """What a job computes; empty if there is none of this id."""
         with self._db.reading() as connection:
@@ -167,19 +182,7 @@ class JobRepository:
         return [with_what_was_kept(self._db, attempt) if attempt.points else attempt for attempt in taken]
 
     def _claim(self, connection: Connection, owner: str, lease_until: datetime, most: int) -> list[Attempt]:
-        """Take jobs of the highest priority first.
-
-        The index holds priorities and ids both ascending: one priority after the other is read from it in
-        order, where "highest priority, then lowest id" would sort all that waits for every job taken.
-        """
-        found: list[Any] = []
-        below = statements.ABOVE_ALL
-        while len(found) < most:
-            below = connection.execute(statements.NEXT_PRIORITY, {"below": below}).scalar_one()
-            if below is None:
-                break
-            asked = {"priority": below, "most": most - len(found)}
-            found += connection.execute(statements.NEXT_JOBS, asked).all()
+        found = self._turns.next_jobs(connection, most)
         if not found:
             return []
         taken = {"holder": owner, "until": lease_until, "begun": self.now()}
@@ -355,14 +358,20 @@ class JobRepository:
         if source is not None:
             values |= {"state": JobState.SUCCESSFUL, "started": now, "finished": now, "progress": 1.0}
         written: dict[str, Any] = statements.INITIAL | values
-        connection.execute(statements.INSERT_JOB, written)
+        request, spec = encoded(new.request), encoded(new.spec)
+        stored = {"request": request, "spec": spec, "stored_bytes": len(request) + len(spec)}
+        connection.execute(statements.INSERT_JOB, written | stored)
         return JobRow(**{name: written[name] for name in statements.ROW})
 
     @staticmethod
     def _store(connection: Connection, attempt: Attempt, output: JobOutput, created: datetime) -> None:
         job_id, owner = attempt.job_id, attempt.owner
-        body = output.result if output.encoded is None else output.encoded
-        connection.execute(statements.INSERT_RESULT, {"job_id": job_id, "body": body})
+        body = encoded(output.result) if output.encoded is None else JsonText(output.encoded)
+        text = body.encode()
+        written = {"job_id": job_id, "body": body, "sha256": hashlib.sha256(text).hexdigest()}
+        connection.execute(statements.INSERT_RESULT, written)
+        more = len(text) + sum(len(array.data) for one in output.sweeps for array in one.arrays.values())
+        connection.execute(statements.ADD_STORED, {"job": job_id, "more": more})
         insert_sweeps(connection, job_id, output.sweeps, created, owner)
         if output.design is not None:
             insert_design(connection, job_id, output.design, created, owner)

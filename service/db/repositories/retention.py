@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import ColumnElement, Text, and_, cast, delete, func, or_, select, update
+from sqlalchemy import ColumnElement, Connection, Text, and_, cast, delete, func, or_, select, update
 from sqlalchemy.orm import aliased
 
 from service.db.engine import Database
-from service.db.models import Design, Job, JobState, Sweep, Upload
+from service.db.models import Design, Job, JobState, Sweep, SweepArray, Upload
+from service.db.repositories.job_statements import ADD_STORED
 from service.jobs.common.scenes import UPLOAD
 
 _ENDED = [state for state in JobState if state.finished]
@@ -79,6 +80,7 @@ class RetentionRepository:
         with self._db.writing() as connection:
             ids = list(connection.execute(query).scalars())
             if ids:
+                _uncount(connection, ids)
                 connection.execute(delete(Sweep).where(Sweep.id.in_(ids)))
         return len(ids)
 
@@ -114,6 +116,18 @@ class RetentionRepository:
         statement = delete(Upload).where(Upload.id == upload, Upload.created < before)
         with self._db.writing() as connection:
             return connection.execute(statement).rowcount
+
+
+def _uncount(connection: Connection, sweeps: Sequence[str]) -> None:
+    """Take what sweeps store from what their jobs are said to."""
+    freed = (
+        select(Sweep.job_id, func.sum(func.length(SweepArray.data)).label("bytes"))
+        .join(SweepArray, SweepArray.sweep_id == Sweep.id)
+        .where(Sweep.id.in_(sweeps))
+        .group_by(Sweep.job_id)
+    )
+    for row in connection.execute(freed).all():
+        connection.execute(ADD_STORED, {"job": row.job_id, "more": -row.bytes})
 
 
 def _old(before: datetime, *, keep_designs: bool) -> ColumnElement[bool]:

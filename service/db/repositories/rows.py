@@ -8,6 +8,7 @@ from typing import Any
 
 from service.db.models import NOBODY, JobState
 from service.jobs.outputs import Piece
+from service.jobs.strict_json import JsonText
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +45,7 @@ class NewJob:
 
     kind: str
     request: dict[str, Any]
-    spec: dict[str, Any]
+    spec: dict[str, Any] | JsonText
     spec_hash: str
     request_hash: str
     max_attempts: int
@@ -106,4 +107,10 @@ class SceneRow:
     name: str
     scene_hash: str
     created: datetime
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WholeSceneRow(SceneRow):
+    """A stored scene with its tables, which may be large."""
+
     body: dict[str, Any]

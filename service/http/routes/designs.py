@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 
 from service.http.dependencies import CallerDependency, ServiceDependency, listing, tagged
+from service.http.in_lane import reading
 from service.http.routes.described import LISTED, UNCHANGED
 from service.schemas.answers import DesignDetail, DesignPage
 from service.schemas.design_queries import DesignQuery, design_detail, design_page
@@ -15,6 +16,7 @@ router = APIRouter(prefix="/v1/designs", tags=["designs"])
 
 
 @router.get("", response_model=DesignPage, responses=LISTED)
+@reading
 def list_designs(
     request: Request,
     service: ServiceDependency,
@@ -26,6 +28,7 @@ def list_designs(
 
 
 @router.get("/{design_id}", response_model=DesignDetail, responses=UNCHANGED)
+@reading
 def get_design(
     design_id: str, request: Request, service: ServiceDependency, caller: CallerDependency
 ) -> Response:

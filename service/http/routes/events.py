@@ -8,11 +8,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, FastAPI, Header, Request, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
-from starlette.concurrency import run_in_threadpool
 
 from service.auth.callers import Caller
 from service.http.dependencies import CallerDependency, ServiceDependency
-from service.http.events import job_events
+from service.http.events import Looks, job_events
 from service.http.head import HEADERS_ONLY
 from service.queue.core import Service
 from service.schemas.event_answers import END
@@ -32,6 +31,7 @@ class _ToldEverything(Exception):  # noqa: N818 - no error: there is nothing mor
 @dataclass(frozen=True, slots=True)
 class _Watched:
     service: Service
+    looks: Looks
     caller: Caller
     job_id: str
     last_event_id: str | None
@@ -46,10 +46,12 @@ async def _watched(
     last_event_id: LastEventId = None,
 ) -> _Watched:
     """The job to follow; refused here, before the answer begins, if there is none."""
-    row = await run_in_threadpool(service.job, job_id, caller)
+    row = await service.lanes.reads.run(caller.owner, service.job, job_id, caller)
     if last_event_id == END and row.state.finished:
         raise _ToldEverything
-    return _Watched(service, caller, job_id, last_event_id, HEADERS_ONLY in request.scope)
+    return _Watched(
+        service, request.app.state.looks, caller, job_id, last_event_id, HEADERS_ONLY in request.scope
+    )
 
 
 @router.get(
@@ -66,8 +68,15 @@ async def events(watched: Annotated[_Watched, Depends(_watched)]) -> AsyncIterat
     """
     if watched.headers_only:
         return
-    async for event in job_events(watched.service, watched.job_id, watched.caller, watched.last_event_id):
-        yield event
+    looks = watched.looks
+    looks.streams += 1
+    try:
+        async for event in job_events(
+            watched.service, watched.job_id, watched.caller, watched.last_event_id, looks
+        ):
+            yield event
+    finally:
+        looks.streams -= 1
 
 
 def install(app: FastAPI) -> None:

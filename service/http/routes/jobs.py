@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Depends, Query, Request, Response
-from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
-from starlette.concurrency import run_in_threadpool
 
 from service.auth.callers import Caller
 from service.db.models import JobState
 from service.db.repositories import JobRow
+from service.http.computed import prepared
 from service.http.dependencies import (
     CallerDependency,
     ServiceDependency,
     TypedRoute,
+    as_json,
     idempotency_key,
     listing,
     preferred_wait,
+    raw_list,
     takes_body,
     wait_for_end,
+    with_raw,
 )
+from service.http.in_lane import reading
 from service.http.routes.described import LISTED
 from service.jobs.kinds.registry.bodies import (
     DESIGN,
@@ -37,7 +42,15 @@ from service.jobs.kinds.registry.bodies import (
 from service.jobs.registry import JobRequest, Registry
 from service.queue import cursors
 from service.queue.core import Service
-from service.schemas.answers import FinishedJob, JobAnswer, JobPage, JobScene, ResultsAnswer, SweepAnswer
+from service.schemas.answers import (
+    FinishedJob,
+    JobAnswer,
+    JobPage,
+    JobScene,
+    ResultsAnswer,
+    ResultsHead,
+    SweepAnswer,
+)
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 
@@ -69,6 +82,7 @@ class JobQuery(BaseModel):
 
 
 @router.get("/jobs", response_model=JobPage, responses=LISTED)
+@reading
 def list_jobs(
     request: Request,
     service: ServiceDependency,
@@ -94,36 +108,43 @@ def list_jobs(
     return listing(request, JobPage(items=items, next=following))
 
 
-@router.get("/jobs/{job_id}")
-def get_job(job_id: str, service: ServiceDependency, caller: CallerDependency) -> JobAnswer:
+@router.get("/jobs/{job_id}", response_model=JobAnswer)
+@reading
+def get_job(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
     """A job."""
-    return _answer(service, service.job(job_id, caller))
+    return as_json(_answer(service, service.job(job_id, caller)))
 
 
 @router.delete("/jobs/{job_id}")
 async def dismiss(job_id: str, service: ServiceDependency, caller: CallerDependency) -> JobAnswer:
     """Dismiss a job. A running one is stopped within the grace; the answer waits for that."""
-    row = await run_in_threadpool(service.dismiss, job_id, caller)
+    row = await service.lanes.writes.run(caller.owner, service.dismiss, job_id, caller)
     if not row.state.finished:
-        row = await wait_for_end(
-            service, job_id, service.settings.grace_seconds + _STOP_MARGIN_SECONDS, caller
-        )
+        patience = service.settings.grace_seconds + _STOP_MARGIN_SECONDS
+        row = await wait_for_end(service, job_id, patience, caller, lambda found: found)
     return _answer(service, row)
 
 
-@router.get("/jobs/{job_id}/scene")
-def scene_of(job_id: str, service: ServiceDependency, caller: CallerDependency) -> JobScene:
+@router.get("/jobs/{job_id}/scene", response_model=JobScene)
+@reading
+def scene_of(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
     """The scene of a job as it is computed: with its values set, and what its uploads held.
 
     It stays what it was when the stored scene or the upload it was made of is replaced or deleted.
     """
-    return JobScene(job=job_id, scene=service.scene_of(job_id, caller))
+    return as_json(JobScene(job=job_id, scene=service.scene_of(job_id, caller)))
 
 
-@router.get("/jobs/{job_id}/results")
-def results(job_id: str, service: ServiceDependency, caller: CallerDependency) -> ResultsAnswer:
+@router.get("/jobs/{job_id}/results", response_model=ResultsAnswer)
+@reading
+def results(job_id: str, service: ServiceDependency, caller: CallerDependency) -> Response:
     """What a job computed."""
-    return ResultsAnswer.of(service.results(job_id, caller), service.sweeps)
+    with service.database.reading():
+        found = service.results(job_id, caller)
+        sweeps = SweepAnswer.of_rows(found.sweeps, service.sweeps)
+    about = ResultsHead(job=found.job.id, status=found.job.state)
+    body = with_raw(about, result=found.text.encode(), sweeps=raw_list(sweeps))
+    return Response(body, media_type="application/json")
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +155,7 @@ class Asked:
     seconds: float | None
 
 
-def asked(request: Request, service: ServiceDependency) -> Asked:
+async def asked(request: Request, service: ServiceDependency) -> Asked:
     """Read the headers of a submission; `idempotency_key` lists the errors."""
     return Asked(
         key=idempotency_key(request.headers),
@@ -182,25 +203,32 @@ async def _submit(
     service: Service, caller: Caller, asked: Asked, raw: dict[str, Any], body: JobRequest
 ) -> Response:
     kind = service.registry.get(raw[KIND])
-    row, _ = await run_in_threadpool(service.accept, kind, request_of(kind, body), raw, asked.key, caller)
+    found = await prepared(service, caller, kind, raw)
+    row, _ = await service.lanes.writes.run(
+        caller.owner, service.accept, kind, request_of(kind, body), raw, asked.key, caller, found
+    )
     headers = {"Location": f"/v1/jobs/{row.id}"}
+    answer = partial(_job_or_result, service, headers)
     if asked.seconds is not None:
-        row = await wait_for_end(service, row.id, asked.seconds, caller)
         headers["Preference-Applied"] = f"wait={asked.seconds:g}"
+        return await wait_for_end(service, row.id, asked.seconds, caller, answer, row)
+    if row.state.finished:
+        return await service.lanes.reads.run(caller.owner, answer, row)
+    return answer(row)
+
+
+def _job_or_result(service: Service, headers: Mapping[str, str], row: JobRow) -> Response:
+    """A submitted job; with what it computed if it has ended."""
     if not row.state.finished:
-        return JSONResponse(_answer(service, row).model_dump(mode="json"), 202, headers)
-    finished = await run_in_threadpool(_finished, service, row)
-    return JSONResponse(finished.model_dump(mode="json"), 200, headers)
+        return as_json(_answer(service, row), 202, headers)
+    with service.database.reading():
+        source = row.result_of or row.id
+        text = service.jobs.result_text(source)
+        sweeps = SweepAnswer.of_rows(service.sweeps.of_job(source), service.sweeps)
+    result = b"null" if text is None else text.encode()
+    body = with_raw(JobAnswer.of(row), result=result, sweeps=raw_list(sweeps))
+    return Response(body, 200, headers, "application/json")
 
 
 def _answer(service: Service, row: JobRow) -> JobAnswer:
     return JobAnswer.of(row, None if row.state.finished else service.queue.live_progress(row.id))
-
-
-def _finished(service: Service, row: JobRow) -> FinishedJob:
-    source = row.result_of or row.id
-    return FinishedJob(
-        **JobAnswer.of(row).model_dump(),
-        result=service.jobs.result(source),
-        sweeps=SweepAnswer.of_rows(service.sweeps.of_job(source), service.sweeps),
-    )

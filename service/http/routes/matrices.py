@@ -6,7 +6,6 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
-from starlette.concurrency import run_in_threadpool
 
 from service.errors import InvalidRequestError
 from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
@@ -103,4 +102,5 @@ async def look(body: JsonBody, service: ServiceDependency, caller: CallerDepende
                 [Issue(pointer="/excitation/dof", message="a DOF for the force is needed")]
             )
         asked["observe"] = asked["observe"] or asked["excitation"]
-    return MatricesAnswer.model_validate(await run_in_threadpool(service.uploads.looked_at, asked, caller))
+    found = await service.lanes.uploads.run(caller.owner, service.uploads.looked_at, asked, caller)
+    return MatricesAnswer.model_validate(found)

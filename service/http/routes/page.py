@@ -70,6 +70,7 @@ def index() -> bytes:
 async def page(request: Request, service: ServiceDependency, tasks: BackgroundTasks) -> Response:
     """The page, whose live response is wanted in a moment."""
     tasks.add_task(service.previews.begin)
+    tasks.add_task(service.answers.begin)
     headers = {**_HEADERS, "Cache-Control": "no-cache"}
     return tagged(request, index(), _TYPES[".html"], headers)
 

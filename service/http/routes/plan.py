@@ -7,9 +7,10 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body
 from pydantic import ConfigDict
 
-import solver
+from service.http.computed import computed
 from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute
-from service.jobs.common.scenes import HarmonicRequest, resolve_scene
+from service.jobs.answering import PLAN
+from service.jobs.common.scenes import HarmonicRequest
 from service.schemas.answers import Answer
 
 _EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "set": {"shroud.N0": 150}}
@@ -44,10 +45,10 @@ class PlanAnswer(Answer):
     contacts: int
     n_harmonics: int
     estimated_seconds_a_point: float
+    estimated_dense_bytes: int
 
 
 @router.post("")
-def plan(body: PlanBody, service: ServiceDependency, caller: CallerDependency) -> PlanAnswer:
+async def plan(body: PlanBody, service: ServiceDependency, caller: CallerDependency) -> PlanAnswer:
     """The effects this scene calls for and those left out, each with the reason; sizes and cost."""
-    scene = resolve_scene(body, service.scenes.of(caller))
-    return PlanAnswer.model_validate(solver.plan(scene, harmonics=body.harmonics).to_json())
+    return PlanAnswer.model_validate(await computed(service, caller, PLAN, body.model_dump()))

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
-from starlette.concurrency import run_in_threadpool
+import json
 
-from service.auth.callers import Caller
+from fastapi import APIRouter, Request, Response
+
+from service.auth.shares import share
+from service.http.computed import prepared
 from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute, takes_body
-from service.jobs.common.sizes import work_limited
+from service.jobs.answering import PREVIEW
 from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
-from service.jobs.kinds.registry.bodies import KIND, any_body, examples, request_of
-from service.jobs.registry import JobKind, Resolved
-from service.queue.core import Service
+from service.jobs.kinds.registry.bodies import KIND, any_body, examples
 from service.schemas.preview_answers import LimitsPreview, PointPreview, SweepPreview
 
 router = APIRouter(prefix="/v1/previews", tags=["previews"], route_class=TypedRoute)
@@ -28,9 +28,11 @@ async def preview(
     Of several previews with the same `client` only the newest is computed: the others are answered 409.
     """
     kind = service.previews.registry[(await request.json())[KIND]]
-    resolved = await run_in_threadpool(_resolved, service, caller, kind, body)
+    found = await prepared(service, caller, kind, await request.json(), PREVIEW)
     asking = f"{caller.owner} {body.client}" if body.client else ""
-    answer = await service.previews.compute(kind.name, resolved.spec, asking)
+    most = share(caller, service.settings, "previews")
+    spec = json.loads(found.spec)
+    answer = await service.previews.compute(kind.name, spec, asking, caller.owner, most)
     return Response(answer, media_type="application/json", headers={"Cache-Control": "no-store"})
 
 
@@ -38,8 +40,3 @@ takes_body(preview, any_body(PREVIEWS), examples(PREVIEWS), by=KIND)
 router.add_api_route(
     "", preview, methods=["POST"], response_model=SweepPreview | LimitsPreview | PointPreview
 )
-
-
-def _resolved(service: Service, caller: Caller, kind: JobKind, body: PreviewRequest) -> Resolved:
-    with work_limited(caller.limits.work):
-        return kind.resolve(request_of(kind, body), service.scenes.of(caller))

@@ -6,14 +6,12 @@ from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Body, Response
 from pydantic import BaseModel, ConfigDict, Field
-from starlette.concurrency import run_in_threadpool
 
+from service.http.computed import computed
 from service.http.dependencies import CallerDependency, ServiceDependency, TypedRoute
 from service.http.routes.described import TEXT, media
-from service.jobs.common.scenes import SceneRequest, resolve_scene
-from service.jobs.registry import SceneSource
-from service.schemas.scene_text import issues_of_scene, read_text
-from solver.scene.toml import toml_text
+from service.jobs import answering
+from service.jobs.common.scenes import SceneRequest
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"], route_class=TypedRoute)
 
@@ -57,21 +55,15 @@ class SceneRead(BaseModel):
     issues: list[SceneIssue]
 
 
-@router.post("/read")
-async def read(body: ReadBody, service: ServiceDependency, caller: CallerDependency) -> SceneRead:
+@router.post("/read", response_model=SceneRead)
+async def read(body: ReadBody, service: ServiceDependency, caller: CallerDependency) -> Response:
     """Read the text of a scene file and list everything that is wrong with it; nothing is stored."""
-    return await run_in_threadpool(_read, body, service.scenes.of(caller))
+    found = await computed(service, caller, answering.READ, body.model_dump(), about="/text")
+    return Response(found, media_type="application/json")
 
 
 @router.post("/text", response_class=Response, responses={200: media({"application/toml": TEXT})})
 async def text(body: TextBody, service: ServiceDependency, caller: CallerDependency) -> Response:
     """The TOML of a scene with its values set: the file that reproduces what was computed."""
-    scene = await run_in_threadpool(resolve_scene, body, service.scenes.of(caller))
-    return Response(toml_text(scene.to_dict(), tuple(body.comments)), media_type="application/toml")
-
-
-def _read(request: ReadRequest, source: SceneSource) -> SceneRead:
-    raw = read_text(request.text, request.form)
-    found = issues_of_scene(raw, source)
-    issues = [SceneIssue(pointer=issue.pointer, detail=issue.message) for issue in found]
-    return SceneRead(scene=raw, issues=issues)
+    words = {"scene": body.model_dump(exclude={"comments"}), "comments": body.comments}
+    return Response(await computed(service, caller, answering.TEXT, words), media_type="application/toml")

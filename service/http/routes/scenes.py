@@ -2,24 +2,52 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+import json
+from typing import Annotated, Any
 
+from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.auth.callers import Caller
+from service.http.computed import computed
 from service.http.dependencies import CallerDependency, JsonBody, ServiceDependency
+from service.http.in_lane import reading
+from service.jobs.answering import STORE
+from service.queue import cursors
+from service.queue.core import Service
+from service.queue.scene_store import WholeScene
 from service.schemas.answers import SceneAnswer, SceneDetail, SceneList
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
 
 
+class SceneQuery(BaseModel):
+    """Which scenes to list."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    limit: int = Field(default=1000, ge=1, le=10_000, description="Of the stored scenes.")
+    cursor: str | None = Field(default=None, max_length=500)
+
+
 @router.get("")
-def list_scenes(service: ServiceDependency, caller: CallerDependency) -> SceneList:
-    """Shipped and stored scenes."""
-    return SceneList(items=[SceneAnswer.of(scene) for scene in service.scenes.of(caller).all()])
+@reading
+def list_scenes(
+    service: ServiceDependency, caller: CallerDependency, query: Annotated[SceneQuery, Query()]
+) -> SceneList:
+    """Shipped scenes, on the first page, and stored ones by name."""
+    size = min(query.limit, service.settings.page_limit)
+    after = None if query.cursor is None else cursors.decode(query.cursor)[1]
+    scenes, end = service.scenes.of(caller).page(size, after)
+    following = None if end is None else cursors.next_link("/v1/scenes", query, None, end)
+    return SceneList(items=[SceneAnswer.of(scene) for scene in scenes], next=following)
 
 
 @router.get("/{name}")
+@reading
 def get_scene(name: str, service: ServiceDependency, caller: CallerDependency) -> SceneDetail:
     """A scene with its tables: a shipped one, or one of one's own."""
-    return SceneDetail.of(service.scenes.of(caller).get(name))
+    return SceneDetail.of_whole(service.scenes.of(caller).get(name))
 
 
 @router.post(
@@ -27,11 +55,17 @@ def get_scene(name: str, service: ServiceDependency, caller: CallerDependency) -
     status_code=201,
     responses={200: {"model": SceneDetail, "description": "The same scene was stored before."}},
 )
-def store_scene(
+async def store_scene(
     body: JsonBody, service: ServiceDependency, caller: CallerDependency, response: Response
 ) -> SceneDetail:
     """Store a scene under its `name`; a name keeps its meaning for ever."""
-    scene, added = service.scenes.of(caller).add(body)
+    found = await computed(service, caller, STORE, body, about="")
+    scene, added = await service.lanes.writes.run(caller.owner, _keep, service, caller, found)
     response.status_code = 201 if added else 200
     response.headers["Location"] = f"/v1/scenes/{scene.name}"
-    return SceneDetail.of(scene)
+    return SceneDetail.of_whole(scene)
+
+
+def _keep(service: Service, caller: Caller, found: dict[str, Any]) -> tuple[WholeScene, bool]:
+    tables = json.loads(found["tables"])
+    return service.scenes.of(caller).keep(found["name"], found["scene_hash"], tables)

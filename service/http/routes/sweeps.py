@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from service.db.models import Sweep
 from service.http.dependencies import CallerDependency, ServiceDependency, listing, tagged
+from service.http.in_lane import drawing, reading, writing_files
 from service.http.routes.described import BINARY, LISTED, TEXT, UNCHANGED, media
 from service.rendering.representations import (
     BY_FORMAT,
@@ -31,6 +32,7 @@ _FORMS: dict[int | str, dict[str, Any]] = {
 
 
 @router.get("", response_model=SweepPage, responses=LISTED)
+@reading
 def list_sweeps(
     request: Request,
     service: ServiceDependency,
@@ -42,6 +44,7 @@ def list_sweeps(
 
 
 @router.get("/{sweep_id}", response_model=SweepDetail, responses=_FORMS)
+@writing_files
 def get_sweep(
     sweep_id: str,
     request: Request,
@@ -73,6 +76,7 @@ def get_sweep(
     response_class=Response,
     responses={200: media({"image/svg+xml": TEXT}), **UNCHANGED},
 )
+@drawing
 def plot_svg(
     sweep_id: str, request: Request, service: ServiceDependency, caller: CallerDependency
 ) -> Response:
@@ -85,6 +89,7 @@ def plot_svg(
     response_class=Response,
     responses={200: media({"image/png": BINARY}), **UNCHANGED},
 )
+@drawing
 def plot_png(
     sweep_id: str, request: Request, service: ServiceDependency, caller: CallerDependency
 ) -> Response:

@@ -10,10 +10,10 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
-from starlette.concurrency import run_in_threadpool
 
 from service.http.bodies import saved
 from service.http.dependencies import CallerDependency, ServiceDependency, listing
+from service.http.in_lane import reading, writing
 from service.http.routes.described import LISTED
 from service.queue import cursors
 from service.schemas.upload_answers import NewUpload, UploadAnswer, UploadedArray, UploadPage
@@ -83,13 +83,16 @@ async def upload(
         with path.open("wb") as file:
             size, sha256 = await saved(request, file, settings.max_upload_bytes, settings.upload_seconds)
         arrived = Arrived(path=path, name=name, format=known, size=size, sha256=sha256)
-        row, found, added = await run_in_threadpool(service.uploads.add, arrived, caller)
+        row, found, added = await service.lanes.uploads.run(
+            caller.owner, service.uploads.add, arrived, caller
+        )
     answer = NewUpload(**UploadAnswer.of(row).model_dump(), contents=[UploadedArray(**one) for one in found])
     headers = {"Location": f"/v1/uploads/{row.id}"}
     return JSONResponse(answer.model_dump(mode="json"), 201 if added else 200, headers)
 
 
 @router.get("", response_model=UploadPage, responses=LISTED)
+@reading
 def list_uploads(
     request: Request,
     service: ServiceDependency,
@@ -107,12 +110,14 @@ def list_uploads(
 
 
 @router.get("/{upload_id}")
+@reading
 def get_upload(upload_id: str, service: ServiceDependency, caller: CallerDependency) -> UploadAnswer:
     """An upload, without its bytes."""
     return UploadAnswer.of(service.uploads.get(upload_id, caller))
 
 
 @router.delete("/{upload_id}", status_code=204)
+@writing
 def delete_upload(upload_id: str, service: ServiceDependency, caller: CallerDependency) -> None:
     """Forget an upload. Scenes and jobs that were made with it keep what it held."""
     service.uploads.delete(upload_id, caller)

@@ -22,6 +22,7 @@ from service.jobs.strict_json import digest
 from solver.errors import Issue, SceneError, SettingError, pointer
 from solver.scene.scene import Scene, load_scene, shipped_scenes
 
+MOST_SET = 1000
 UPLOAD = "upload:"
 """What stands before the id of an upload where a scene file names a file."""
 
@@ -33,6 +34,13 @@ def _scene_reference(value: object) -> object:
     if isinstance(value, dict) or (isinstance(value, str) and _SCENE_NAME.fullmatch(value)):
         return value
     raise ValueError("must be the name of a shipped or stored scene, or a scene as an object")
+
+
+def _few(value: object) -> object:
+    """Too many are not looked at one by one, to be told what is wrong with each."""
+    if isinstance(value, dict) and len(value) > MOST_SET:
+        raise ValueError(f"must have at most {MOST_SET} values, got {len(value)}")
+    return value
 
 
 SceneReference = Annotated[
@@ -54,8 +62,8 @@ class SceneRequest(JobRequest):
     """
 
     scene: SceneReference = Field(description="Name of a shipped or stored scene, or the scene as an object.")
-    set: dict[ParameterPath, Number] = Field(
-        default={}, max_length=1000, description='Values of parameters, {"damper.N0": 100}.'
+    set: Annotated[dict[ParameterPath, Number], BeforeValidator(_few)] = Field(
+        default={}, max_length=MOST_SET, description='Values of parameters, {"damper.N0": 100}.'
     )
 
 
@@ -105,7 +113,7 @@ def _read(reference: object, source: SceneSource) -> Scene:
     if not isinstance(body, Mapping):
         message = f"`scene` {reference!r} is neither a shipped scene nor a stored one"
         raise InvalidRequestError([Issue(pointer=pointer("scene"), message=message)])
-    if body is reference and _refers_to_uploads(body):
+    if body is reference and refers_to_uploads(body):
         try:
             body = source.with_uploads(body)
         except InvalidRequestError as error:
@@ -113,7 +121,8 @@ def _read(reference: object, source: SceneSource) -> Scene:
     return read_scene(body, prefix=pointer("scene"))
 
 
-def _refers_to_uploads(body: Mapping[str, object]) -> bool:
+def refers_to_uploads(body: Mapping[str, object]) -> bool:
+    """Whether the structure of a scene names uploads."""
     structure = body.get("structure")
     return isinstance(structure, Mapping) and any(
         isinstance(item, str) and item.startswith(UPLOAD) for item in structure.values()

@@ -24,6 +24,7 @@ POINTS_OF_A_SWEEP = 20
 """Fewer a frequency response seldom has."""
 
 _most_work: ContextVar[int] = ContextVar("most_work", default=MOST_WORK)
+_most_memory: ContextVar[int | None] = ContextVar("most_memory", default=None)
 
 
 @contextmanager
@@ -34,6 +35,41 @@ def work_limited(most: int | None) -> Iterator[None]:
         yield
     finally:
         _most_work.reset(token)
+
+
+@contextmanager
+def memory_limited(most: int | None) -> Iterator[None]:
+    """Inside, jobs may ask for dense matrices of at most so many bytes; None for no such limit."""
+    token = _most_memory.set(most)
+    try:
+        yield
+    finally:
+        _most_memory.reset(token)
+
+
+def memory_issues(scene: Scene, harmonics: int, *, every_sector: bool = False) -> list[Issue]:
+    """Refuse a response whose dense matrices take more memory than a job may, before any is made."""
+    # Loaded here, as below.
+    from solver.studies.memory import dense_bytes
+
+    needed = dense_bytes(scene, harmonics, every_sector=every_sector).total
+    if _fits(needed):
+        return []
+    fewer = harmonics > 1 and _fits(dense_bytes(scene, 1, every_sector=every_sector).total)
+    return [_too_much("harmonics" if fewer else "scene", needed)]
+
+
+def _fits(needed: int) -> bool:
+    most = _most_memory.get()
+    return most is None or needed <= most
+
+
+def _too_much(key: str, needed: int) -> Issue:
+    most = (_most_memory.get() or 0) / 1e6
+    words = f"must need at most {most:.0f} MB for its dense matrices" if key == "scene" else (
+        f"must be so few that the dense matrices need at most {most:.0f} MB"
+    )  # fmt: skip
+    return refusal(f"/{key}", f"`{key}` {words}, got {needed / 1e6:.0f} MB")
 
 
 def size_issues(where: str, words: str, points: int, harmonics: int, dofs: int) -> list[Issue]:
@@ -70,14 +106,18 @@ def balance_issues(
     from solver.scene.annulus import sectors_needed
 
     large = _unknown_issues(scene, harmonics, sectors_needed(scene).sectors)
-    return large or size_issues(where, words, points, harmonics, dofs_solved(scene))
+    return (
+        large
+        or memory_issues(scene, harmonics)
+        or size_issues(where, words, points, harmonics, dofs_solved(scene))
+    )
 
 
 def annulus_issues(scene: Scene, harmonics: int) -> list[Issue]:
     """Refuse a balance of all sectors that is too large."""
     structure = scene.structure
     sectors = structure.sectors if isinstance(structure, CyclicStructure) else 1
-    return _unknown_issues(scene, harmonics, sectors)
+    return _unknown_issues(scene, harmonics, sectors) or memory_issues(scene, harmonics, every_sector=True)
 
 
 def contact_motions(scene: Scene) -> int:
@@ -119,7 +159,12 @@ def _unknown_issues(scene: Scene, harmonics: int, sectors: int) -> list[Issue]:
 
 
 def march_issues(scene: Scene, steps_per_period: int | None, max_periods: int) -> list[Issue]:
-    """Refuse a march of more steps than one job should make."""
+    """Refuse a march of more steps than one job should make, or of too large matrices."""
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from solver.studies.memory import march_bytes
+
+    if not _fits(needed := march_bytes(scene)):
+        return [_too_much("scene", needed)]
     dofs = whole_disk_dofs(scene)
     steps = (steps_per_period or FEWEST_STEPS) * max_periods * dofs
     if steps <= MOST_STEPS:

@@ -43,6 +43,7 @@ POINT_UNKNOWNS = 500
 FEW_MOTIONS = 8
 """Of contacts: so few are quick with all harmonics."""
 SAMPLES = 400
+LEAST_HZ = 1e-9
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "set": {"damper.N0": 80}, "client": "a1b2"}
 
 
@@ -129,6 +130,9 @@ def resolve_limits(request: LimitsPreviewRequest, source: SceneSource) -> Resolv
 
 def resolve_point(request: PointPreviewRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check its size, and choose the harmonics that can be kept in time."""
+    if request.frequency_hz < LEAST_HZ:
+        message = f"`frequency_hz` must be at least {LEAST_HZ:g}, got {request.frequency_hz!r}"
+        require([refusal("/frequency_hz", message)])
     scene = _scene(request, source, 1, request.harmonics)
     kept = harmonics_in_time(scene, request.harmonics, POINT_UNKNOWNS)
     return resolved(scene, harmonics=kept, frequency_hz=request.frequency_hz)

@@ -49,6 +49,7 @@ def plan(found: Json) -> None:
                 f"{found['unknowns']} ({found['contacts']} contacts, {found['n_harmonics']} harmonics)",
             ),
             ("linear DOFs", str(found["linear_dofs"])),
+            ("dense matrices", f"{found['estimated_dense_bytes'] / 1e6:.3g} MB"),
             ("estimated cost", f"{units.duration(found['estimated_seconds_a_point'])} a point of a branch"),
         ],
     )

@@ -5,7 +5,15 @@ import { state } from "../base/address.js";
 
 export const current = { body: null };
 
-export const listScenes = async () => (await request("/v1/scenes")).items;
+export async function listScenes() {
+  const items = [];
+  for (let path = "/v1/scenes"; path; ) {
+    const page = await request(path);
+    items.push(...page.items);
+    path = page.next;
+  }
+  return items;
+}
 
 export async function loadScene(name) {
   current.body = (await request(`/v1/scenes/${encodeURIComponent(name)}`)).scene;

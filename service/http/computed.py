@@ -1,0 +1,68 @@
+"""What a route has computed for its answer: beside the service, with what it looks up for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from service.auth.callers import Caller
+from service.errors import InvalidRequestError
+from service.jobs.answering import KIND, PREVIEW, RESOLVE, Prepared
+from service.jobs.registry import JobKind, SceneSource
+from service.jobs.strict_json import JsonText
+from service.queue.core import SOLVER_VERSION, Service
+
+_MOST_LOOKED_UP = 8
+"""Scenes and uploads of one request; shipped scenes need no looking up."""
+
+
+async def computed(
+    service: Service, caller: Caller, task: str, words: Mapping[str, Any], about: str = "/scene"
+) -> Any:
+    """What a task of `service.jobs.answering` finds.
+
+    Parameters
+    ----------
+    about : pointer of the field that makes it costly.
+
+    Raises
+    ------
+    InvalidRequestError, MalformedBodyError, BodyTooLargeError
+        What the task refuses; what takes more time or memory than an answer may.
+    TooManyRequestsError, QueueFullError
+        If the budget of the caller is used up, or too many wait.
+    """
+    source = service.scenes.of(caller)
+    spec: dict[str, Any] = {"words": words, "scenes": {}, "uploads": {}}
+    for _ in range(_MOST_LOOKED_UP + 1):
+        told = await service.answers.ask(task, spec, caller.owner, about)
+        if "needs" not in told:
+            return told["found"]
+        await service.lanes.reads.run(caller.owner, _look_up, told["needs"], source, spec)
+    raise RuntimeError(f"the task {task!r} looks up more than {_MOST_LOOKED_UP} scenes")
+
+
+async def prepared(
+    service: Service, caller: Caller, kind: JobKind, body: Mapping[str, Any], task: str = RESOLVE
+) -> Prepared:
+    """A request for a job or a preview, resolved; `computed` lists the errors."""
+    settings = service.settings
+    memory = settings.answer_memory_bytes if task == PREVIEW else settings.worker_memory_bytes or None
+    words = {
+        KIND: kind.name, "body": dict(body), "work": caller.limits.work, "memory": memory,
+        "version": SOLVER_VERSION,
+    }  # fmt: skip
+    found = await computed(service, caller, task, words)
+    return Prepared(**{**found, "spec": JsonText(found["spec"])})
+
+
+def _look_up(needs: Mapping[str, Any], source: SceneSource, spec: dict[str, Any]) -> None:
+    """Put what a task needs where it finds it."""
+    if "scene" in needs:
+        spec["scenes"][needs["scene"]] = source.scene_body(needs["scene"])
+        return
+    try:
+        found: dict[str, Any] = {"scene": source.with_uploads(needs["uploads"])}
+    except InvalidRequestError as error:
+        found = {"issues": [[issue.pointer, issue.message] for issue in error.issues]}
+    spec["uploads"][needs["as"]] = found

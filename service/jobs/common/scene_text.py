@@ -1,0 +1,95 @@
+"""Scenes as text: read from TOML or JSON with everything wrong in them."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Mapping
+from typing import Any
+
+from service.errors import InvalidRequestError, MalformedBodyError
+from service.jobs import strict_json
+from service.jobs.common.scenes import read_scene
+from service.jobs.registry import SceneSource
+from service.jobs.strict_json import MOST_DEPTH
+from solver.errors import Issue
+
+MOST_OF_TOML = 600_000
+"""Characters of a text in TOML, whose reader takes most of a second for so many."""
+
+_WORD = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
+# Without the limit a key of n words takes a time of n².
+_LONG_KEY = re.compile(rf"(?<![A-Za-z0-9_-])(?:{_WORD}[ \t]*+\.[ \t]*+){{{MOST_DEPTH},}}+")
+_LONG_INTEGER = re.compile(r"(?<![0-9A-Za-z_.])(?:0[xob][0-9A-Fa-f_]{250,}|[0-9][0-9_]{308,})")
+
+
+def read_text(text: str, form: str) -> dict[str, Any]:
+    """The tables of a scene in TOML or JSON, not yet checked; JSON values alone.
+
+    What JSON has no value for stands there as text: dates, and numbers that are not finite.
+
+    Raises
+    ------
+    MalformedBodyError
+        With line and column.
+    InvalidRequestError
+        A number of JSON that is not finite; a text that is too long.
+    """
+    raw = _toml(text) if form == "toml" else _json(text)
+    if not isinstance(raw, dict):
+        raise MalformedBodyError(f"a scene must be a table, got {type(raw).__name__}")
+    return raw
+
+
+def _json(text: str) -> object:
+    try:
+        return strict_json.loads(text.encode())
+    except InvalidRequestError as error:
+        raise InvalidRequestError(
+            [Issue(pointer="/text", message=one.message) for one in error.issues]
+        ) from error
+
+
+def _toml(text: str) -> object:
+    if len(text) > MOST_OF_TOML:
+        message = f"`text` in TOML may have {MOST_OF_TOML} characters, got {len(text)}"
+        raise InvalidRequestError([Issue(pointer="/text", message=message)])
+    too_long = _LONG_KEY.search(text)
+    if too_long:
+        line = _line(text, too_long.start())
+        raise MalformedBodyError(f"line {line} is nested too deeply: a key has {MOST_DEPTH} words at most")
+    try:
+        # Dates are TOML but no JSON.
+        written = json.dumps(tomllib.loads(text), default=str, check_circular=False)
+    except tomllib.TOMLDecodeError as error:
+        raise MalformedBodyError(f"this is not valid TOML: {error}") from error
+    except RecursionError as error:
+        detail = f"this is nested too deeply for a scene: {MOST_DEPTH} levels are the most"
+        raise MalformedBodyError(detail) from error
+    except ValueError as error:
+        raise MalformedBodyError(_about_number(text, error)) from error
+    return strict_json.marked(written.encode())
+
+
+def _about_number(text: str, error: ValueError) -> str:
+    found = _LONG_INTEGER.search(text)
+    if found is None:
+        return f"this is not valid TOML: {error}"
+    where = f"line {_line(text, found.start())}"
+    return f"{where} has an integer of {len(found[0])} digits, none may have more than 308"
+
+
+def _line(text: str, at: int) -> int:
+    return text.count("\n", 0, at) + 1
+
+
+def issues_of_scene(raw: Mapping[str, Any], source: SceneSource) -> list[Issue]:
+    """Everything wrong with a scene, whose uploads are looked up in `source`."""
+    found = strict_json.issues_of_numbers(raw)
+    known = {issue.pointer for issue in found}
+    try:
+        read_scene(source.with_uploads(raw))
+    except InvalidRequestError as error:
+        found += [issue for issue in error.issues if issue.pointer not in known]
+    return found

@@ -1,0 +1,79 @@
+"""Limits of a worker process: memory beyond what it has when it is ready, processor time of one task."""
+
+from __future__ import annotations
+
+import functools
+import gc
+import signal
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+_MATRICES = "solver.linear"
+"""The modules whose caches hold matrices and modes."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProcessLimits:
+    """What a worker process may use; where the system cannot limit it, nothing happens.
+
+    Attributes
+    ----------
+    memory_bytes : int or None
+        Address space beyond that of the process when it is ready: a task that wants more meets MemoryError.
+    processor_seconds : float or None
+        Of one task; the system ends the process that takes more, whatever it is at [s].
+    """
+
+    memory_bytes: int | None = None
+    processor_seconds: float | None = None
+
+    def confine(self) -> None:
+        """Limit the memory of this process, which is ready."""
+        if self.memory_bytes is None or sys.platform != "linux":
+            return
+        # Loaded here, as below: there is none on Windows.
+        import resource
+
+        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+        limit = _address_space() + self.memory_bytes
+        if hard != resource.RLIM_INFINITY:
+            limit = min(limit, hard)
+        resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+    def forget(self) -> None:
+        """Let go of the matrices that are kept for later tasks, if they take half of the memory."""
+        if self.memory_bytes is None or sys.platform != "linux":
+            return
+        import resource
+
+        if resource.getrlimit(resource.RLIMIT_AS)[0] - _address_space() > self.memory_bytes / 2:
+            return
+        for found in gc.get_objects():
+            if isinstance(found, functools._lru_cache_wrapper) and found.__module__.startswith(_MATRICES):
+                found.cache_clear()
+
+    def begin(self) -> None:
+        """A task begins: count its processor time from here."""
+        self._count(self.processor_seconds)
+
+    def end(self) -> None:
+        """A task ended."""
+        self._count(0.0)
+
+    def _count(self, seconds: float | None) -> None:
+        # No handler: what ends the process must not wait for the interpreter to look.
+        if self.processor_seconds is not None and sys.platform != "win32":
+            signal.setitimer(signal.ITIMER_PROF, seconds or 0.0)
+
+    def memory_told(self) -> str:
+        """The limit of memory, for people."""
+        return "there is" if self.memory_bytes is None else f"{self.memory_bytes / 1e6:.0f} MB"
+
+
+def _address_space() -> int:
+    """Bytes of address space of this process."""
+    import resource
+
+    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()

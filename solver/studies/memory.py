@@ -1,0 +1,125 @@
+"""How much memory solving a scene takes: the bytes of its dense matrices, from sizes alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.balance.simplifications import even_harmonics_reason
+from solver.linear.contact_table import port_counts
+from solver.scene.annulus import sectors_needed
+from solver.scene.harmonics import MULTIPLES, kept_harmonics
+from solver.scene.parts import CyclicStructure, MatricesStructure
+from solver.scene.scene import Scene
+
+_REAL, _COMPLEX = 8, 16
+# Matrices of n x n that are there together while a structure is decomposed: with damping that is diagonal in
+# the modes, and with the state matrix and both its eigenvectors. Measured, see docs/operations.md.
+_OF_MODES = 26
+_OF_POLES = 48
+_OF_A_MARCH = 8
+# Of the ports at each harmonic: receptance and slope; and what a Jacobian is condensed with.
+_OF_PORTS = 2
+_OF_CONDENSATION = 6
+# Resonances are looked for in many matrices of the modes kept at a time, with their eigenvectors.
+_LOOKED_AT = 2_000_000
+_OF_RESONANCES = 4
+_MODES_LOOKED_AT = 160
+_POINTS_LOOKED_AT = 20
+# The balance in which the error is estimated has H + max(H, 8) harmonics, and the receptance of four times as
+# many is looked at.
+_LEAST_BEYOND = 8
+_TAIL = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DenseBytes:
+    """The memory that dense matrices take [bytes].
+
+    Attributes
+    ----------
+    structure : int
+        Of the linear part: the matrices, their modes, and what finding these takes.
+    balance : int
+        Of the balance, of the larger one in which its error is estimated, and of what resonances are looked
+        for in.
+    """
+
+    structure: int
+    balance: int
+
+    @property
+    def total(self) -> int:
+        """Of both."""
+        return self.structure + self.balance
+
+
+def dense_bytes(scene: Scene, harmonics: int, *, every_sector: bool = False) -> DenseBytes:
+    """Return the memory that a response takes, whichever parameter it is followed in.
+
+    Nothing is built: sectors, DOFs, motions of contacts and harmonics are counted.
+
+    Parameters
+    ----------
+    scene : what vibrates.
+    harmonics : highest one kept.
+    every_sector : whether all sectors of a disk are solved though one would stand for them.
+    """
+    sectors = _sectors(scene, every_sector)
+    n, ports = _dofs(scene) * sectors, int(port_counts(scene).sum()) * sectors
+    odd = even_harmonics_reason(scene) is None
+    beyond = harmonics + max(harmonics, _LEAST_BEYOND)
+    kept = kept_harmonics(scene, (), harmonics, odd=odd)
+    more = kept_harmonics(scene, (), beyond, odd=odd, multiples=2 * MULTIPLES)
+    structures, number = 1, _REAL
+    if isinstance(scene.structure, CyclicStructure) and sectors == 1:
+        # One for each nodal diameter that is met.
+        structures = np.unique((kept * scene.engine_order) % scene.structure.sectors).size
+        number = _COMPLEX
+    modes = min(n, _MODES_LOOKED_AT)
+    resonances = min(_LOOKED_AT, _POINTS_LOOKED_AT * kept.size * modes**2)
+    return DenseBytes(
+        structure=structures * (_OF_MODES if _is_diagonal(scene) else _OF_POLES) * number * n**2,
+        balance=_balance(ports, kept)
+        + _balance(ports, more)
+        + _OF_PORTS * _COMPLEX * (_TAIL * beyond + 1) * ports**2
+        + _OF_RESONANCES * _COMPLEX * resonances,
+    )
+
+
+def march_bytes(scene: Scene) -> int:
+    """Return the memory that time marching takes, of all sectors [bytes]."""
+    n = _dofs(scene) * _sectors(scene, every_sector=True)
+    return _OF_A_MARCH * _REAL * n**2
+
+
+def _sectors(scene: Scene, every_sector: bool) -> int:
+    structure = scene.structure
+    if not isinstance(structure, CyclicStructure):
+        return 1
+    return structure.sectors if every_sector else sectors_needed(scene).sectors
+
+
+def _dofs(scene: Scene) -> int:
+    structure = scene.structure
+    return structure.n_coordinates if isinstance(structure, MatricesStructure) else len(structure.dofs)
+
+
+def _is_diagonal(scene: Scene) -> bool:
+    """Return whether it is sure, without looking at modes, that the damping does not couple them."""
+    structure = scene.structure
+    if isinstance(structure, MatricesStructure):
+        return structure.C is None
+    ratios = {spring.c / spring.k if spring.k else np.inf for spring in structure.springs if spring.c}
+    undamped = not all(spring.c for spring in structure.springs)
+    return not structure.dampers and (not ratios or (len(ratios) == 1 and not undamped))
+
+
+def _balance(ports: int, ks: np.ndarray) -> int:
+    """Return the bytes of `solver.contacts.kernels.system.Evaluation` and `Receptance`."""
+    coefficients = 2 * ks.size - int(ks[0] == 0)
+    unknowns = ports * coefficients
+    jacobian = unknowns**2 + (unknowns + 1) ** 2
+    at_contacts = 2 * ports * coefficients**2
+    return _REAL * (jacobian + at_contacts) + _COMPLEX * _OF_CONDENSATION * ks.size * ports**2

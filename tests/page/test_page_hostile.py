@@ -1,0 +1,103 @@
+"""Hostile names and data in a real Chromium: page and report show them, run nothing and fetch nothing."""
+
+from __future__ import annotations
+
+import re
+import sqlite3
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import httpx
+import pytest
+
+pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+
+from page_site import Site, opened
+from playwright.sync_api import expect
+
+import optim
+from service.rendering.report.design import design_report
+from service.rendering.report.sections import Designed
+from solver.scene.scene import load_scene
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+BAD = (
+    '"><img src=x onerror="window.hurt=1"><script src="http://evil.invalid/a.js"></script>'
+    '<svg onload="window.hurt=1"><a href="javascript:window.hurt=1">${window.hurt=1}'
+)
+SWEEP = {"kind": "sweep", "scene": "two-dof", "harmonics": 3}
+
+
+@pytest.fixture(scope="module")
+def poisoned(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """A service whose database somebody has filled with markup."""
+    folder = tmp_path_factory.mktemp("poisoned")
+    site = Site(folder)
+    site.start()
+    answer = httpx.post(f"{site.url}/v1/jobs", json=SWEEP, headers={"Prefer": "wait=60"}, timeout=120.0)
+    assert answer.status_code == 200
+    site.stop()
+    with sqlite3.connect(folder / "jobs.db") as connection:
+        for column in ("scene_name", "parameter", "status", "owner"):
+            connection.execute(f"UPDATE sweep SET {column} = ?", [BAD if column != "owner" else ""])
+        connection.execute("UPDATE sweep_contact SET name = ?", [BAD])
+        connection.execute("UPDATE job SET scene_name = ?", [BAD])
+    connection.close()
+    site.start()
+    yield site
+    site.stop()
+
+
+def unhurt(page: Page) -> None:
+    page.wait_for_timeout(300)
+    assert page.evaluate("window.hurt") is None
+    assert page.locator("img[src=x], script[src*='evil'], a[href^='javascript']").count() == 0
+
+
+def test_stored_markup_is_text_on_the_page(browser: Browser, poisoned: Site) -> None:
+    with opened(browser, poisoned) as (context, _):
+        page = context.new_page()
+        page.goto(f"{poisoned.url}/?scene=two-dof")
+        page.locator("html[data-ready]").wait_for(state="attached")
+        expect(page.locator("body")).to_contain_text("<img src=x onerror=")
+        unhurt(page)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [f"'{BAD}' = 1", f"name = '{BAD}'", f"[[contacts]]\nname = '{BAD}'", f"[structure]\nkind = '{BAD}'"],
+)
+def test_markup_in_a_scene_file_is_text_in_the_messages(browser: Browser, poisoned: Site, text: str) -> None:
+    with opened(browser, poisoned) as (context, watch):
+        watch.allowed = ("status of 4",)
+        page = context.new_page()
+        page.goto(f"{poisoned.url}/?scene=two-dof")
+        page.locator("html[data-ready]").wait_for(state="attached")
+        name = "<img src=x onerror=hurt=1>.toml"
+        file: Any = {"name": name, "mimeType": "text/plain", "buffer": text.encode()}
+        page.set_input_files("#file", [file])
+        expect(page.locator("#editor")).to_be_visible()
+        unhurt(page)
+
+
+def test_markup_in_a_result_is_text_in_a_report(browser: Browser, tmp_path: Path) -> None:
+    scene = load_scene("two-dof")
+    result = optim.design(scene, variables={"damper.N0": (20.0, 500.0)}, harmonics=3).to_json()
+    result |= {"status": BAD, "method": BAD}
+    problem = {"variables": {"damper.N0": [20.0, 500.0]}, "harmonics": 3}
+    written = tmp_path / "report.html"
+    written.write_text(design_report(Designed(scene=scene, problem=problem, result=result)), "utf-8")
+    asked: list[str] = []
+    context = browser.new_context()
+    try:
+        page = context.new_page()
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(written.as_uri())
+        expect(page.locator("body")).to_contain_text("<img src=x onerror=")
+        unhurt(page)
+    finally:
+        context.close()
+    assert [url for url in asked if not re.match(r"(file|data):", url)] == []

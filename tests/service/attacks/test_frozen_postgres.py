@@ -1,0 +1,75 @@
+"""PostgreSQL stands still, its connections open: requests end in time, and so does the service."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+from besieged import Besieged, besieged
+from postgresql_cluster import Cluster
+from service_helpers import until
+
+DATABASE_SECONDS = 2.0
+ANSWER_SECONDS = 5.0 * DATABASE_SECONDS
+EXIT_SECONDS = 10.0
+
+
+def processes_of(cluster: Cluster) -> list[int]:
+    """The server and every process it made."""
+    first = int((cluster.folder / "data" / "postmaster.pid").read_text().split()[0])
+    found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(first)], capture_output=True, check=False)
+    return [first, *map(int, found.stdout.split())]
+
+
+@contextmanager
+def frozen(cluster: Cluster) -> Iterator[None]:
+    """No process of the server runs."""
+    pids = processes_of(cluster)
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)
+
+
+def in_time(service: Besieged, method: str, path: str, status: int, **how: object) -> httpx.Response:
+    begun = time.monotonic()
+    answer = httpx.request(method, service.base + path, timeout=60.0, **how)
+    took = time.monotonic() - begun
+    assert answer.status_code == status, answer.text
+    assert took < ANSWER_SECONDS, f"{method} {path} took {took:.1f} s"
+    return answer
+
+
+def test_a_frozen_server_is_answered_in_time(cluster: Cluster, tmp_path: Path) -> None:
+    job = {"kind": "iteration", "fresh": True}
+    with (
+        cluster.database() as url,
+        besieged(tmp_path, url=url, database_seconds=DATABASE_SECONDS) as service,
+    ):
+        known = in_time(service, "POST", "/v1/jobs", 202, json=job).json()["id"]
+        with frozen(cluster):
+            in_time(service, "GET", f"/v1/jobs/{known}", 503)
+            in_time(service, "POST", "/v1/jobs", 503, json=job)
+            in_time(service, "GET", "/health/ready", 503)
+            in_time(service, "GET", "/health/live", 200)
+        until(lambda: httpx.get(f"{service.base}/health/ready").status_code == 200)
+        in_time(service, "POST", "/v1/jobs", 202, json=job)
+
+
+def test_a_frozen_server_does_not_hold_up_the_end(cluster: Cluster, tmp_path: Path) -> None:
+    with (
+        cluster.database() as url,
+        besieged(tmp_path, url=url, database_seconds=DATABASE_SECONDS) as service,
+    ):
+        in_time(service, "POST", "/v1/jobs", 202, json={"kind": "iteration", "seconds": 600.0})
+        with frozen(cluster):
+            assert service.terminate() < EXIT_SECONDS

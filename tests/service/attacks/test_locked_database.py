@@ -1,0 +1,77 @@
+"""A foreign program holds SQLite's file: requests end in time, readiness says so, and the service stops."""
+
+from __future__ import annotations
+
+import sqlite3
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+from besieged import Besieged, besieged
+from service_helpers import is_problem, until
+
+DATABASE_SECONDS = 1.0
+# A request waits for a connection, for the lock and for its statement, at most so long each.
+ANSWER_SECONDS = 4.0 * DATABASE_SECONDS
+EXIT_SECONDS = 10.0
+
+
+@contextmanager
+def locked(file: Path) -> Iterator[None]:
+    """A lock that keeps writers out."""
+    connection = sqlite3.connect(file, isolation_level=None, timeout=30.0)
+    try:
+        connection.execute("BEGIN IMMEDIATE")
+        yield
+    finally:
+        connection.rollback()
+        connection.close()
+
+
+def in_time(service: Besieged, method: str, path: str, status: int, **how: object) -> httpx.Response:
+    begun = time.monotonic()
+    answer = httpx.request(method, service.base + path, timeout=60.0, **how)
+    took = time.monotonic() - begun
+    assert answer.status_code == status, answer.text
+    assert took < ANSWER_SECONDS, f"{method} {path} took {took:.1f} s"
+    return answer
+
+
+def test_a_foreign_lock_is_answered_in_time(tmp_path: Path) -> None:
+    job = {"kind": "iteration", "fresh": True}
+    with besieged(tmp_path, database_seconds=DATABASE_SECONDS) as service:
+        known = in_time(service, "POST", "/v1/jobs?", 202, json=job).json()["id"]
+        with locked(tmp_path / "jobs.db"):
+            is_problem(in_time(service, "POST", "/v1/jobs", 503, json=job), 503)
+            in_time(service, "GET", f"/v1/jobs/{known}", 200)
+            in_time(service, "GET", "/v1/sweeps", 200)
+            assert not in_time(service, "GET", "/health/ready", 503).json()["ready"]
+            in_time(service, "GET", "/health/live", 200)
+        until(lambda: httpx.get(f"{service.base}/health/ready").status_code == 200)
+        in_time(service, "POST", "/v1/jobs", 202, json=job)
+
+
+def test_many_writers_behind_a_lock_are_answered_in_time(tmp_path: Path) -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    job = {"kind": "iteration", "fresh": True}
+    with (
+        besieged(tmp_path, database_seconds=DATABASE_SECONDS) as service,
+        ThreadPoolExecutor(64) as pool,
+        locked(tmp_path / "jobs.db"),
+    ):
+        asked = [pool.submit(in_time, service, "POST", "/v1/jobs", 503, json=job) for _ in range(64)]
+        for one in asked:
+            one.result()
+
+
+@pytest.mark.parametrize("busy", [False, True])
+def test_a_lock_does_not_hold_up_the_end(tmp_path: Path, busy: bool) -> None:
+    with besieged(tmp_path, database_seconds=DATABASE_SECONDS) as service:
+        if busy:
+            in_time(service, "POST", "/v1/jobs", 202, json={"kind": "iteration", "seconds": 600.0})
+        with locked(tmp_path / "jobs.db"):
+            assert service.terminate() < EXIT_SECONDS
