@@ -204,7 +204,7 @@ def test_parts_of_scenes_are_read() -> None:
     raw["excitation"] = {"dof": dofs[0], "amplitude": 1.0, "engine_order": 1}
     raw["observe"] = {"dof": dofs[0], "band": [10.0, 20.0]}
     laws = [contact.law for contact in solver.Scene.from_dict(raw).contacts]
-    assert laws == ["elastic-normal", "coulomb-2d", "gap", "polynomial"]
+    assert laws == ["elastic-normal", "coulomb-2d", "coulomb-3d", "gap", "polynomial"]
 
 
 def known(path: str) -> bool:

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 from pydantic import Field
 
-from solver.contacts.fields import Between, NonNegative, Real
+from solver.contacts.fields import NonNegative, Real
 from solver.contacts.kernels import columns
-from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.parts import Held, Row, Slider
+from solver.contacts.laws.plane import CIRCLE, SlidesInAPlane
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
     from solver.contacts.segments import Shares
 
 MOST_SAMPLES = 65_536
-DEFAULT_SAMPLES = 512
 Samples = Annotated[int, Field(strict=True, ge=32, le=MOST_SAMPLES)]
 
 
-class PlanarContact(FrictionContact):
+class PlanarContact(SlidesInAPlane):
     """A friction contact that slides in two directions.
 
     Attributes
@@ -31,19 +31,17 @@ class PlanarContact(FrictionContact):
     limit : "circle", "box" or None
         |T| <= mu N for the whole force (also if left out), or each direction by itself.
     samples : int or None
-        Samples a period that the circular limit is evaluated at; 512 if left out.
+        Samples a period that the circular limit is evaluated at; if left out it is not sampled, but exact to
+        rounding.
     """
 
     LAW: ClassVar[str] = "coulomb-2d"
     FORCE: ClassVar[str] = "friction in two directions with one limit"
     END_KEYS: ClassVar[tuple[str, ...]] = ("between", "between_second")
     HELD: ClassVar[tuple[Held, ...]] = (Held(columns.KT), Held(columns.KT))
-    RUBBING: ClassVar[tuple[int, ...]] = (0, 1)
 
     law: Literal["coulomb-2d"]
     N0: NonNegative
-    between_second: Between
-    limit: Literal["circle", "box"] | None = None
     samples: Samples | None = None
 
     @property
@@ -51,21 +49,17 @@ class PlanarContact(FrictionContact):
         """The kernel of its limit."""
         if self.limits_apart:
             return "solver.contacts.kernels.coulomb_ports:coulomb_ports"
-        return "solver.contacts.kernels.planar:coulomb_plane"
+        return CIRCLE if self.samples is None else "solver.contacts.kernels.planar:coulomb_plane"
 
     @property
-    def limits_apart(self) -> bool:
-        """Whether each direction has its own limit."""
-        return self.limit == "box"
+    def _sampled(self) -> int | None:
+        """Samples a period of a circular limit that is sampled."""
+        return None if self.limits_apart else self.samples
 
     @property
     def friction(self) -> Slider:
-        """Its slider; the force under a circular limit comes from samples."""
-        return replace(super().friction, limits_apart=self.limits_apart, sampled=not self.limits_apart)
-
-    @property
-    def _samples(self) -> int:
-        return self.samples or DEFAULT_SAMPLES
+        """Its slider."""
+        return replace(super().friction, sampled=self._sampled is not None)
 
     def fill(self, row: Real, highest: int) -> None:
         """Put its numbers into its row of the contact table.
@@ -73,35 +67,41 @@ class PlanarContact(FrictionContact):
         Four samples for the shortest wave at least: with fewer it would be taken for a longer one.
         """
         super().fill(row, highest)
-        row[columns.SAMPLES] = max(self._samples, 0 if self.limits_apart else 4 * highest)
+        row[columns.KT_SECOND] = math.nan
+        if self._sampled is not None:
+            row[columns.SAMPLES] = max(self._sampled, 4 * highest)
 
     def at(self, row: Real) -> Self:
         """The contact with the numbers of a row of the contact table."""
-        samples = None if self.limits_apart else int(row[columns.SAMPLES])
-        return super().at(row).model_copy(update={"samples": samples})
+        moved = super().at(row)
+        if self._sampled is None:
+            return moved
+        return moved.model_copy(update={"samples": int(row[columns.SAMPLES])})
 
     @property
     def evaluation(self) -> str:
         """How its force is found, in the words of a plan."""
         if self.limits_apart:
             return "a limit for each direction by itself: two contacts in closed form"
-        return f"circular limit, marched over {self._samples} samples a period, of second order"
+        if self.samples is None:
+            return "circular limit: closed form in stick, collocation in slip"
+        return f"circular limit, marched over {self.samples} samples a period, of second order"
 
     def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
         """Return the force along the first motion [N] at the angles `tau`, evenly spaced from 0."""
-        if self.limits_apart:
+        if self._sampled is None:
             return super().force_at(motions, load, tau)
         from solver.contacts.force_history import plane_force
 
-        return plane_force(motions, load, self.kt, self.mu, tau, self._samples)
+        return plane_force(motions, load, self.kt, self.mu, tau, self._sampled)
 
     def shares(self, motions: Real, load: Real) -> Shares:
         """Return the shares of the period in stick, slip and separation."""
-        from solver.contacts.segments import sampled_shares, segments_of, shares_of
+        if self._sampled is None:
+            return super().shares(motions, load)
+        from solver.contacts.segments import sampled_shares
 
-        if self.limits_apart:
-            return shares_of(*(segments_of(slip, load, self.kt, self.mu) for slip in motions))
-        return sampled_shares(motions, load, self.kt, self.mu, self._samples)
+        return sampled_shares(motions, load, self.kt, self.mu, self._sampled)
 
     def rows(self) -> tuple[Row, ...]:
         """Return its rows of the time march, one for each direction.
@@ -109,16 +109,14 @@ class PlanarContact(FrictionContact):
         Raises
         ------
         SettingError
-            A circular limit, which the march does not follow.
+            A circular limit that is sampled, which the march does not follow.
         """
-        if not self.limits_apart:
-            wanted = 'has a contact with a circular limit, which is not marched: try limit = "box"'
+        if self._sampled is not None:
+            wanted = (
+                "has a contact whose circular limit is sampled, which is not marched: leave out `samples`"
+            )
             raise SettingError("scene", self.name, wanted)
-        names = (self.name, f"{self.name} (second)")
-        return tuple(
-            Row(name=name, ends=ends, **self.row_numbers())
-            for name, ends in zip(names, self.pair_ends, strict=True)
-        )
+        return super().rows()
 
 
 LAW = PlanarContact

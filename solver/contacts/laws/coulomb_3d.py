@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import model_validator
 
 from solver.contacts.fields import Between, Positive, Real
 from solver.contacts.kernels import columns
 from solver.contacts.laws.friction import FrictionContact
-from solver.contacts.laws.parts import Follows, Held, Quantity, Row, Slider
-
-if TYPE_CHECKING:
-    from solver.contacts.segments import Shares
+from solver.contacts.laws.parts import Held, Quantity
+from solver.contacts.laws.plane import CIRCLE, SlidesInAPlane
 
 _CLOSED = (columns.N0, 1)
 
 
-class SpaceContact(FrictionContact):
+class SpaceContact(SlidesInAPlane):
     """A contact in space: two directions it slides in and, if given, a normal motion v that changes the load.
 
     N = N0 + N1 cos(omega t + N1_phase) + kn v; the friction force is 0 and the normal force too while N <= 0.
@@ -65,15 +61,12 @@ class SpaceContact(FrictionContact):
         "N0": "Mean load, or load at v = 0 [N]; -kn times the gap for an initial gap.",
     }
     END_KEYS: ClassVar[tuple[str, ...]] = ("between", "between_second", "normal_between")
-    RUBBING: ClassVar[tuple[int, ...]] = (0, 1)
 
     law: Literal["coulomb-3d"]
-    between_second: Between
     normal_between: Between | None = None
     kt_second: Positive | None = None
     kn: Positive | None = None
     prestressed: bool = False
-    limit: Literal["circle", "box"] | None = None
 
     @model_validator(mode="after")
     def _load_moves_or_is_given(self) -> SpaceContact:
@@ -114,22 +107,12 @@ class SpaceContact(FrictionContact):
     @property
     def stiffnesses(self) -> tuple[float, ...]:
         """A stiffness of each relative motion [N/m]: what holds it when the contact is closed and stuck."""
-        return (*self._tangential, *(() if self.kn is None else (self.kn,)))
+        return (*self.tangential, *(() if self.kn is None else (self.kn,)))
 
     @property
-    def _tangential(self) -> tuple[float, float]:
+    def tangential(self) -> tuple[float, float]:
+        """The stiffness of each direction [N/m]."""
         return self.kt, self.kt if self.kt_second is None else self.kt_second
-
-    @property
-    def limits_apart(self) -> bool:
-        """Whether each direction has its own limit."""
-        return self.limit == "box"
-
-    @property
-    def friction(self) -> Slider:
-        """Its slider."""
-        found = super().friction
-        return replace(found, kt_second=self.kt_second, limits_apart=self.limits_apart)
 
     # Contact table and kernel
 
@@ -138,12 +121,12 @@ class SpaceContact(FrictionContact):
         """The kernel of its limit."""
         if self.limits_apart:
             return "solver.contacts.kernels.coulomb_space_box:coulomb_box"
-        return "solver.contacts.kernels.coulomb_space:coulomb_circle"
+        return CIRCLE
 
     def value_of(self, key: str) -> float:
         """Value of a parameter; a second stiffness that is left out is the first."""
         if key == "kt_second":
-            return self._tangential[1]
+            return self.tangential[1]
         if key == "kn":
             return self.kn or 0.0
         return super().value_of(key)
@@ -181,47 +164,12 @@ class SpaceContact(FrictionContact):
             return f"contact in space, {load}: a limit for each direction, in closed form"
         return f"contact in space, {load}: circular limit, closed form in stick, collocation in slip"
 
-    # A periodic motion
-
-    def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
-        """Return the force along the first motion [N] at the angles `tau`."""
-        if self.limits_apart:
-            return super().force_at(motions, load, tau)
-        from solver.contacts.space_path import force_in_space, path_in_space
-
-        both = force_in_space(path_in_space(motions, load, *self._tangential, self.mu), tau)
-        return np.asarray(both[0])
-
-    def shares(self, motions: Real, load: Real) -> Shares:
-        """Return the shares of the period in stick, slip and separation."""
-        if self.limits_apart:
-            from solver.contacts.segments import segments_of, shares_of
-
-            pairs = zip(motions[:2], self._tangential, strict=True)
-            return shares_of(*(segments_of(slip, load, kt, self.mu) for slip, kt in pairs))
-        from solver.contacts.space_path import path_in_space, shares_in_space
-
-        return shares_in_space(path_in_space(motions, load, *self._tangential, self.mu))
-
-    def rows(self) -> tuple[Row, ...]:
-        """Return its rows of the time march, one for each direction; the first has the normal force."""
-        moves = self.normal_between is not None
-        given: dict[str, Any] = self.row_numbers()
-        if moves:
-            rest = max(self.N0, 0.0) if self.prestressed else 0.0
-            given |= {"normal_ends": self.pair_ends[2], "kn": self.kn, "rest": rest}
-        first = second = Follows.RUBBING if moves else Follows.FRICTION
-        if not self.limits_apart:
-            first, second = Follows.CIRCLE, Follows.CIRCLE_SECOND
-        pressing = 1.0 if moves else 0.0
-        along, across = self.pair_ends[:2]
-        return (
-            Row(name=self.name, ends=along, follows=first, presses=pressing, **given),
-            Row(
-                name=f"{self.name} (second)", ends=across, follows=second, presses=0.0,
-                **{**given, "kt": self._tangential[1]},
-            ),
-        )  # fmt: skip
+    def _normal_row(self) -> dict[str, Any]:
+        """Return what the rows of the time march have of a normal motion."""
+        if self.normal_between is None:
+            return {}
+        rest = max(self.N0, 0.0) if self.prestressed else 0.0
+        return {"normal_ends": self.pair_ends[2], "kn": self.kn, "rest": rest}
 
     def linear_limit(self, load: float, *, gone: bool) -> dict[str, Any]:
         """Return what makes it linear; a load that moves acts on the parts.

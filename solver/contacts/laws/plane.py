@@ -1,0 +1,82 @@
+"""What the laws of friction in two directions share: one circular limit for the force, or one for each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+
+from solver.contacts.fields import Between, Real
+from solver.contacts.laws.friction import FrictionContact
+from solver.contacts.laws.parts import Follows, Row, Slider
+
+if TYPE_CHECKING:
+    from solver.contacts.segments import Shares
+
+CIRCLE = "solver.contacts.kernels.coulomb_space:coulomb_circle"
+
+
+class SlidesInAPlane(FrictionContact):
+    """Friction in two directions."""
+
+    RUBBING: ClassVar[tuple[int, ...]] = (0, 1)
+
+    between_second: Between
+    limit: Literal["circle", "box"] | None = None
+
+    @property
+    def limits_apart(self) -> bool:
+        """Whether each direction has its own limit."""
+        return self.limit == "box"
+
+    @property
+    def tangential(self) -> tuple[float, float]:
+        """The stiffness of each direction [N/m]."""
+        return self.kt, self.kt
+
+    @property
+    def friction(self) -> Slider:
+        """Its slider."""
+        return replace(super().friction, kt_second=self.tangential[1], limits_apart=self.limits_apart)
+
+    def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
+        """Return the force along the first motion [N] at the angles `tau`."""
+        if self.limits_apart:
+            return super().force_at(motions, load, tau)
+        from solver.contacts.space_path import force_in_space, path_in_space
+
+        both = force_in_space(path_in_space(motions, load, *self.tangential, self.mu), tau)
+        return np.asarray(both[0])
+
+    def shares(self, motions: Real, load: Real) -> Shares:
+        """Return the shares of the period in stick, slip and separation."""
+        if self.limits_apart:
+            from solver.contacts.segments import segments_of, shares_of
+
+            pairs = zip(motions[:2], self.tangential, strict=True)
+            return shares_of(*(segments_of(slip, load, kt, self.mu) for slip, kt in pairs))
+        from solver.contacts.space_path import path_in_space, shares_in_space
+
+        return shares_in_space(path_in_space(motions, load, *self.tangential, self.mu))
+
+    def rows(self) -> tuple[Row, ...]:
+        """Return its rows of the time march, one for each direction; the first has the normal force."""
+        moves = self.normal_port is not None
+        given = {**self.row_numbers(), **self._normal_row()}
+        first = second = Follows.RUBBING if moves else Follows.FRICTION
+        if not self.limits_apart:
+            first, second = Follows.CIRCLE, Follows.CIRCLE_SECOND
+        pressing = 1.0 if moves else 0.0
+        along, across = self.pair_ends[:2]
+        return (
+            Row(name=self.name, ends=along, follows=first, presses=pressing, **given),
+            Row(
+                name=f"{self.name} (second)", ends=across, follows=second, presses=0.0,
+                **{**given, "kt": self.tangential[1]},
+            ),
+        )  # fmt: skip
+
+    def _normal_row(self) -> dict[str, Any]:
+        """Return what the rows of the time march have of a normal motion."""
+        return {}
