@@ -130,7 +130,7 @@ def panel_back(
     dtype, m, n = packed.dtype, eta.size, of_motion.size
     size = packed.shape[1]
     basis, at = np.empty((3, size), dtype), np.empty(CURVES, dtype)
-    e, de, kept = basis[0], basis[1], basis[2]
+    e, de, kept = basis[0], basis[1], basis[2, :n]
     matrix, first = np.empty((STAGES, STAGES), dtype), np.empty(STAGES, dtype)
     begin, h = panel[FROM], panel[TO] - panel[FROM]
     for i in range(STAGES):
