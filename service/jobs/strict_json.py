@@ -26,7 +26,12 @@ def stored(value: object) -> str:
 
 
 def encoded(value: object) -> JsonText:
-    """A result as the JSON of its column: null where a number is not finite, TypeError if it cannot be."""
+    """A result as the JSON of its column: null where a number is not finite, TypeError if it cannot be.
+
+    What is encoded already stays as it is.
+    """
+    if isinstance(value, JsonText):
+        return value
     try:
         return JsonText(json.dumps(value, separators=(",", ":"), allow_nan=False))
     except ValueError:

@@ -12,7 +12,7 @@ from solver.contacts.kernels.laws import law_force, law_number
 from solver.contacts.kernels.stick_slip_events import SEGMENT_COLUMNS
 from solver.jit import fourier
 
-COULOMB_BOX, ELASTIC_NORMAL, GAP_SPRING, POLYNOMIAL, COULOMB_PLANE, _ = columns.KERNELS
+COULOMB_BOX, ELASTIC_NORMAL, GAP_SPRING, POLYNOMIAL, COULOMB_PLANE = columns.KERNELS[:5]
 LOAD_KS = fourier.all_harmonics(1)
 
 

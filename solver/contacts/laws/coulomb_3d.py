@@ -61,6 +61,9 @@ class SpaceContact(SlidesInAPlane):
         "N0": "Mean load, or load at v = 0 [N]; -kn times the gap for an initial gap.",
     }
     END_KEYS: ClassVar[tuple[str, ...]] = ("between", "between_second", "normal_between")
+    HELD: ClassVar[tuple[Held, ...]] = (
+        Held(columns.KT, *_CLOSED), Held(columns.KT_SECOND, *_CLOSED), Held(columns.KN, *_CLOSED),
+    )  # fmt: skip
 
     law: Literal["coulomb-3d"]
     normal_between: Between | None = None
@@ -102,7 +105,7 @@ class SpaceContact(SlidesInAPlane):
         second = columns.KT if self.kt_second is None else columns.KT_SECOND
         if self.normal_between is None:
             return Held(columns.KT), Held(second)
-        return tuple(Held(column, *_CLOSED) for column in (columns.KT, second, columns.KN))
+        return self.HELD[0], Held(second, *_CLOSED), self.HELD[2]
 
     @property
     def stiffnesses(self) -> tuple[float, ...]:

@@ -270,9 +270,7 @@ def test_one_sector_stands_for_the_annulus(contact: dict[str, Any]):
     one = solve(ring, frequency_hz=0.2, harmonics=5)
     whole = solve(annulus(ring), frequency_hz=0.2, harmonics=5)
     assert one.converged
-    # The circular limit is sampled, and the sectors' phases are not whole samples apart.
-    sampled = contact.get("law") == "coulomb-2d" and "limit" not in contact
-    assert one.max_abs == pytest.approx(whole.max_abs, rel=2e-5 if sampled else 1e-7)
+    assert one.max_abs == pytest.approx(whole.max_abs, rel=1e-7)
 
 
 def test_plan_names_the_law():
@@ -284,6 +282,10 @@ def test_plan_names_the_law():
     assert build(duffing(), "cubic.a2", harmonics=3, frequency_hz=0.2).system.ks.tolist() == [0, 1, 2, 3]
 
 
-def test_a_circular_limit_is_not_marched():
-    with pytest.raises(SettingError, match="circular limit"):
-        march(scene(PLANE), frequency_hz=0.2)
+def test_a_circular_limit_is_marched_unless_it_is_sampled():
+    exact = solve(scene(PLANE), frequency_hz=0.2, harmonics=31)
+    assert march(scene(PLANE), frequency_hz=0.2).max_abs == pytest.approx(exact.max_abs, rel=1e-5)
+    sampled = scene({**PLANE, "samples": 2048})
+    assert solve(sampled, frequency_hz=0.2, harmonics=31).max_abs == pytest.approx(exact.max_abs, rel=1e-4)
+    with pytest.raises(SettingError, match="circular limit is sampled"):
+        march(sampled, frequency_hz=0.2)

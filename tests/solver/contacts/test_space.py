@@ -28,8 +28,18 @@ from space_referee import Contact, friction
 
 from solver.contacts.kernels import columns
 from solver.contacts.kernels.columns import COLUMNS, KN, KT, KT_SECOND, MU
-from solver.contacts.kernels.stick_slip_events import FAILED, LIFTING, SEPARATED, SLIPPING, STUCK
+from solver.contacts.kernels.coulomb_space import coulomb_circle
+from solver.contacts.kernels.stick_slip_events import (
+    FAILED,
+    LIFTING,
+    SEGMENT_COLUMNS,
+    SEPARATED,
+    SLIPPING,
+    STUCK,
+    segment_capacity,
+)
 from solver.jit import fourier
+from solver.jit.trig_polynomial import grid_size, grid_tables
 
 
 def integrated(element: Element) -> np.ndarray:
@@ -187,9 +197,7 @@ def test_second_derivatives_in_every_state():
 def one_direction(element: Element, port: int) -> np.ndarray:
     """Friction and normal force of the law for one direction."""
     row = any_row(KT=element.row[KT if port == 0 else KT_SECOND], MU=element.row[MU], KN=element.row[KN])
-    return any_law(
-        AnyElement(law=columns.ELASTIC_NORMAL, U=element.U[[port, 2]], load=element.load, row=row)
-    ).F
+    return any_law(AnyElement(law=columns.KERNELS[1], U=element.U[[port, 2]], load=element.load, row=row)).F
 
 
 def test_a_box_is_each_direction_by_itself():
@@ -289,3 +297,24 @@ def test_balance_agrees_with_the_reference(name: str):
         )
     )
     assert work == pytest.approx(case["work"], rel=1e-5)
+
+
+def test_harmonics_that_are_left_out_are_as_if_they_were_zero():
+    """Under a load that is given, odd harmonics may stand alone."""
+    rng, odd, top = np.random.default_rng(12), np.array([1, 3, 5]), 5
+    tables = grid_tables(grid_size(top), top)
+    kept = np.r_[1:3, 5:7, 9:11]
+    for _ in range(20):
+        U = rng.standard_normal((2, odd.size * 2)) * 2.0
+        answers = []
+        for motion, ks in ((U, odd), (fourier.to_full(U, odd, top), fourier.all_harmonics(top))):
+            n = motion.shape[1]
+            F, dF_dU = np.full((2, n), np.nan), np.full((4, n, n), np.nan)
+            segments = np.zeros((segment_capacity(top), SEGMENT_COLUMNS))
+            coulomb_circle(
+                motion, ks, np.array([0.8, 0.0, 0.0]), fourier.all_harmonics(1), row_of(2.0, 3.0, 0.2),
+                np.zeros(COLUMNS), np.zeros(3), *tables, segments, F, dF_dU, np.empty((2, n)),
+            )  # fmt: skip
+            answers.append((F, dF_dU))
+        np.testing.assert_allclose(answers[0][0], answers[1][0][:, kept], atol=1e-13)
+        np.testing.assert_allclose(answers[0][1], answers[1][1][:, kept][:, :, kept], atol=1e-12)

@@ -32,7 +32,7 @@ from solver.jit.fourier import to_full
 from solver.linear.assembly import linear_model
 from solver.marching import march as marching
 from solver.marching.kernels import taylor as kernel
-from solver.response.floquet import Growth, coulomb_pieces, growth_of, scene_monodromy
+from solver.response.floquet import Growth, growth_of, scene_monodromy
 from solver.response.monodromy import PERIOD, Element, Monodromy, Piece, Structure, monodromy
 from solver.response.solution import Solution
 
@@ -125,7 +125,7 @@ def with_damping(damping: float, harmonics: int) -> Balance:
 def negative_map(damping: float, frequency_hz: float, slip: np.ndarray) -> Monodromy:
     model = linear_model(UNSTABLE)
     structure = Structure(M=model.M, C=np.array([[damping]]), K=model.K0)
-    element = Element(ports=model.contact_here, pieces=coulomb_pieces(UNSTABLE.contacts[0], slip))
+    element = Element(ports=model.contact_here, pieces=UNSTABLE.contacts[0].pieces(slip))
     return monodromy(structure, (element,), PERIOD * frequency_hz)
 
 
@@ -175,7 +175,7 @@ def trajectory(point: Point, damping: float, move: np.ndarray, periods: int) -> 
     system = system._replace(B_value=np.full_like(system.B_value, damping / omega))
     orders = np.arange(1, point.slip.size // 2 + 1)
     x, v = point.slip[0] + point.slip[1::2].sum(), float(orders @ point.slip[2::2])
-    (here,) = [piece for piece in coulomb_pieces(contact, point.slip) if piece.holds_at(0.0)]
+    (here,) = [piece for piece in contact.pieces(point.slip) if piece.holds_at(0.0)]
     mode, force = (1 if v > 0.0 else -1), math.copysign(contact.mu * contact.N0, v)
     if here.grip is not None:
         onset = point.slip[0] + sum(
