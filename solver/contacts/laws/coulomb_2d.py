@@ -26,8 +26,8 @@ class PlanarContact(FrictionContact):
 
     Attributes
     ----------
-    between_second : (str, str)
-        The ends of the motion in the second direction.
+    between_second : (str, str) or None
+        The ends of the motion in the second direction. Left out where `normal` is given.
     limit : "circle", "box" or None
         |T| <= mu N for the whole force (also if left out), or each direction by itself.
     samples : int or None
@@ -37,12 +37,13 @@ class PlanarContact(FrictionContact):
     LAW: ClassVar[str] = "coulomb-2d"
     FORCE: ClassVar[str] = "friction in two directions with one limit"
     END_KEYS: ClassVar[tuple[str, ...]] = ("between", "between_second")
+    NEEDED_ENDS: ClassVar[tuple[str, ...]] = ("between_second",)
     HELD: ClassVar[tuple[Held, ...]] = (Held(columns.KT), Held(columns.KT))
     RUBBING: ClassVar[tuple[int, ...]] = (0, 1)
 
     law: Literal["coulomb-2d"]
     N0: NonNegative
-    between_second: Between
+    between_second: Between | None = None
     limit: Literal["circle", "box"] | None = None
     samples: Samples | None = None
 
@@ -75,10 +76,10 @@ class PlanarContact(FrictionContact):
         super().fill(row, highest)
         row[columns.SAMPLES] = max(self._samples, 0 if self.limits_apart else 4 * highest)
 
-    def at(self, row: Real) -> Self:
+    def with_numbers(self, row: Real) -> Self:
         """The contact with the numbers of a row of the contact table."""
         samples = None if self.limits_apart else int(row[columns.SAMPLES])
-        return super().at(row).model_copy(update={"samples": samples})
+        return super().with_numbers(row).model_copy(update={"samples": samples})
 
     @property
     def evaluation(self) -> str:
@@ -115,10 +116,7 @@ class PlanarContact(FrictionContact):
             wanted = 'has a contact with a circular limit, which is not marched: try limit = "box"'
             raise SettingError("scene", self.name, wanted)
         names = (self.name, f"{self.name} (second)")
-        return tuple(
-            Row(name=name, ends=ends, **self.row_numbers())
-            for name, ends in zip(names, self.pair_ends, strict=True)
-        )
+        return tuple(Row(name=name, port=port, **self.row_numbers()) for port, name in enumerate(names))
 
 
 LAW = PlanarContact
