@@ -26,16 +26,15 @@ def rows(contacts: tuple[AnyContact, ...]) -> tuple[Row, ...]:
 
 
 def columns(
-    contacts: tuple[AnyContact, ...], forms: tuple[tuple[Form, ...], ...], index: dict[str, int], n: int
+    placed: Sequence[tuple[Row, tuple[Form, ...]]], index: dict[str, int], n: int
 ) -> dict[str, NDArray[Any]]:
     """Return the arrays of `solver.marching.kernels.state.System` that belong to the contacts.
 
     Parameters
     ----------
-    forms : the relative motions of each contact.
+    placed : every row, and the relative motions of its contact.
     index : the coordinate of each DOF in use; n : how many coordinates there are.
     """
-    placed = [(row, own) for one, own in zip(contacts, forms, strict=True) for row in one.rows()]
     found = [row for row, _ in placed]
     L = selection([own[row.port] for row, own in placed], index, n)
     normal = [() if row.normal_port is None else own[row.normal_port] for row, own in placed]

@@ -273,6 +273,7 @@ def _system(scene: Scene, omega: float) -> tuple[kernel.System, int]:
     A, B, W, index = _equations(scene)
     A, B, W = A / omega**2, B / omega, W / omega**2
     forces = scene.forces
+    placed = [(row, own) for one, own in zip(scene.contacts, scene.forms, strict=True) for row in one.rows()]
     system = kernel.System(
         A_start=A.indptr.astype(np.int64),
         A_column=A.indices.astype(np.int64),
@@ -287,7 +288,7 @@ def _system(scene: Scene, omega: float) -> tuple[kernel.System, int]:
         force_amplitude=np.array([force.amplitude for force in forces]),
         force_phase=np.array([force.phase for force in forces]),
         force_harmonic=np.array([force.harmonic for force in forces], dtype=np.int64),
-        **columns(scene.contacts, scene.forms, index, A.shape[0]),
+        **columns(placed, index, A.shape[0]),
     )
     return system, index[scene.observe.dof]
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from cases.body_scenes import as_matrices, block_in_space, planar_wedge, sector_with_damper
+from cases.body_scenes import as_matrices, block_in_space, cylinder_in_space, planar_wedge, sector_with_damper
 
 from solver import Effects, Scene, solve
 from solver.marching.march import march
@@ -60,6 +60,29 @@ def test_a_block_in_space_agrees_with_the_march() -> None:
     assert marched.converged
     assert solution.converged
     assert solution.half_peak_to_peak == pytest.approx(marched.half_peak_to_peak, rel=1e-6)
+
+
+@pytest.mark.parametrize("limit", ["circle", "box"])
+def test_a_block_under_loads_that_move_agrees_with_the_march(limit: str) -> None:
+    raw = block_in_space(law="coulomb-3d", limit=limit, kn=3e6, N0=60.0, prestressed=True)
+    given = Scene.from_dict(raw)
+    marched = march(given, frequency_hz=240.0)
+    solution = solve(given, frequency_hz=240.0, harmonics=9)
+    assert marched.converged
+    assert solution.converged
+    assert solution.half_peak_to_peak == pytest.approx(marched.half_peak_to_peak, rel=1e-8)
+
+
+def test_a_pressed_cylinder_agrees_with_the_march() -> None:
+    """All six motions of a body, which contacts in space alone hold."""
+    raw = cylinder_in_space(law="coulomb-3d")
+    raw["structure"]["springs"] = [s for s in raw["structure"]["springs"] if "roll.z" not in s["between"]]
+    given = Scene.from_dict(raw)
+    marched = march(given, frequency_hz=240.0)
+    solution = solve(given, frequency_hz=240.0, harmonics=7)
+    assert marched.converged
+    assert solution.converged
+    assert solution.half_peak_to_peak == pytest.approx(marched.half_peak_to_peak, rel=1e-8)
 
 
 @pytest.mark.parametrize("form", ["matrices", "modes"])
