@@ -17,7 +17,6 @@ import numpy as np
 
 from optim.problem.variables import Real
 from solver.balance.balance import Balance
-from solver.balance.contact_hessian import check_laws
 from solver.continuation.branch import Edge, Peak
 from solver.errors import SettingError
 from solver.extrema.extrema import HALF_POWER
@@ -40,9 +39,9 @@ class Sensitivity:
 
     @property
     def has_second(self) -> bool:
-        """Whether the contacts' law has second derivatives here."""
+        """Whether the contacts' laws and the paths have second derivatives here."""
         try:
-            check_laws(self.amplitudes.balance.scene)
+            self.amplitudes.check_second()
         except SettingError:
             return False
         return True

@@ -18,6 +18,8 @@ from solver.linear.condensation import reduce_model
 from solver.linear.contact_table import contact_set, contact_table, port_stiffnesses
 from solver.scene.annulus import check_in_annulus, written_out
 from solver.scene.harmonics import MOST_HARMONICS, forced_harmonics, kept_harmonics
+from solver.scene.kinematics import static_forces
+from solver.scene.parameter_paths import AMPLITUDE
 from solver.scene.scene import Scene
 
 
@@ -128,6 +130,8 @@ def build(
         if frequency_hz is None:
             raise SettingError("frequency_hz", None, f"is needed when the parameter is `{path}`")
         omega = 2.0 * math.pi * check_frequency("frequency_hz", frequency_hz)
+    if parameter.kind is Kind.LEVEL:
+        check_level(scene)
     if parameter.kind is Kind.LEVEL and scene.value("excitation.amplitude") == 0.0:
         scene = scene.with_values({"excitation.amplitude": 1.0})
     system = _system(scene, parameter, ks, omega, effects)
@@ -149,6 +153,8 @@ def for_parameter(balance: Balance, path: str, frequency_hz: float) -> Balance:
         Even harmonics were left out, but λ calls for them: build the first balance with them.
     """
     parameter = resolve(balance.scene, path)
+    if parameter.kind is Kind.LEVEL:
+        check_level(balance.scene)
     omega = 2.0 * math.pi * frequency_hz
     reason = even_harmonics_reason(balance.scene, (path,))
     if reason is not None and balance.system.ks[0] != 0:
@@ -182,8 +188,19 @@ def with_harmonics(balance: Balance, ks: Integer) -> Balance:
     cos_table, sin_table = grid_tables(grid_size(highest), highest)
     rows = {name: getattr(system, name) for name in ("modal_forces", "forces")}
     rows = {name: np.ascontiguousarray(row[at]) if row.shape[0] else row for name, row in rows.items()}
+    if system.dforces.size:
+        rows["dforces"] = np.ascontiguousarray(system.dforces[:, at])
     smaller = system._replace(ks=ks, which=system.which[at], cos_table=cos_table, sin_table=sin_table, **rows)
     return replace(balance, system=smaller, n_harmonics=min(balance.n_harmonics, int(ks[-1])))
+
+
+def check_level(scene: Scene) -> None:
+    """Raise SettingError where constant forces are partly excitation, which has a level, and partly loads."""
+    if static_forces(scene) and any(force.harmonic == 0 for force in scene.excitation):
+        raise SettingError(
+            "parameter", AMPLITUDE,
+            "scales static forces of the excitation but no loads: write those as [[loads]] too",
+        )  # fmt: skip
 
 
 def _level(scene: Scene) -> float:
@@ -197,6 +214,9 @@ def _system(
     """Put the arrays of the compiled loops together."""
     model = linear_model(scene)
     derivative = structure_derivative(scene, parameter.name) if parameter.kind is Kind.STRUCTURE else None
+    if derivative is not None and derivative.contact_here is not None:
+        wanted = "moves the contacts, which are followed in gradients and designs, not continued in"
+        raise SettingError("parameter", parameter.path, wanted)
     reduced = reduce_model(
         model, ks, port_stiffnesses(scene, model), derivative, whole_matrices=effects.whole_matrices
     )  # fmt: skip
@@ -215,5 +235,5 @@ def _system(
         contact_modes=reduced.contact_modes, contact_duals=reduced.contact_duals,
         observe_modes=reduced.observe_modes, modal_forces=reduced.modal_forces, K=reduced.K, C=reduced.C,
         M=reduced.M, dK=reduced.dK, dC=reduced.dC, dM=reduced.dM, L=reduced.L, observe=reduced.observe,
-        forces=reduced.forces,
+        forces=reduced.forces, dforces=reduced.dforces, constant_mean=int(bool(static_forces(scene))),
     )  # fmt: skip

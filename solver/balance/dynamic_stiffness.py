@@ -7,7 +7,7 @@ DOF, so one class serves both. Only a structural parameter needs the matrices th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -27,6 +27,7 @@ class WholeMotion:
     inverse : Z⁻¹.
     by_omega, by_omega_twice : ∂Z/∂ω, ∂²Z/∂ω².
     by_structure : (∂Z/∂q, ∂²Z/∂q∂ω) of each structural path by its number; ∂²Z/∂q² = 0.
+    forces_by, motions_by : ∂f/∂q (nk, N) and ∂L/∂q (nk, nc, N) of those that change them.
     contact : (nk, nc, N) u = L x; back : (nk, nc, N) the rows of (Lᴴ)ᵀ.
     observe, forces : (nk, N).
     """
@@ -39,6 +40,24 @@ class WholeMotion:
     back: Complex
     observe: Complex
     forces: Complex
+    forces_by: dict[int, Complex] = field(default_factory=dict)
+    motions_by: dict[int, Complex] = field(default_factory=dict)
+
+    def push(self, i: int, x: Complex, forces: Complex) -> Complex:
+        """Return what path i pushes at the motion x: ∂f/∂q − (∂L/∂q)ᴴ F − (∂Z/∂q) x, (nk, N).
+
+        `forces` (nc, nk) are those of the contacts less the stiffness that was moved into Z.
+        """
+        total = -times(self.by_structure[i][0], x)
+        if i in self.forces_by:
+            total = total + self.forces_by[i]
+        if i in self.motions_by:
+            total = total - np.einsum("kcn,ck->kn", self.motions_by[i].conj(), forces)
+        return np.asarray(total)
+
+    def moved(self, i: int, x: Complex) -> Complex | None:
+        """Return (∂L/∂q) x, (nc, nk), where path i moves the contacts."""
+        return np.asarray(np.einsum("kcn,kn->ck", self.motions_by[i], x)) if i in self.motions_by else None
 
     def solve(self, phi: Complex) -> Complex:
         """Return Z⁻¹ φ, (..., nk, N)."""
@@ -130,4 +149,5 @@ def _of_matrices(matrices: Matrices, k: Real, omega: float) -> WholeMotion:
         by_omega=1j * k * C - 2.0 * k * speed * M, by_omega_twice=-2.0 * k**2 * M + 0.0j, by_structure=by,
         contact=matrices.L, back=matrices.L.conj(),
         observe=np.broadcast_to(matrices.observe, matrices.forces.shape), forces=matrices.forces,
+        forces_by=matrices.forces_by, motions_by=matrices.motions_by,
     )  # fmt: skip

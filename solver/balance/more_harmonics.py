@@ -78,7 +78,7 @@ def _extended(balance: Balance, ks: Integer) -> System | None:
     That is a nodal diameter not met so far, or a force with one of the further harmonics.
     """
     scene, system = balance.scene, balance.system
-    if any(force.harmonic in ks and force.harmonic not in system.ks for force in scene.excitation):
+    if any(force.harmonic in ks and force.harmonic not in system.ks for force in scene.forces):
         return None
     sectors = scene.structure.sectors if isinstance(scene.structure, CyclicStructure) else 1
     known, wanted = ((each * scene.engine_order) % sectors for each in (system.ks, ks))
@@ -90,6 +90,9 @@ def _extended(balance: Balance, ks: Integer) -> System | None:
         ks=ks, which=np.array([structures[int(d)] for d in wanted], dtype=np.int64),
         modal_forces=_padded_rows(system.modal_forces, at, ks.size),
         forces=_padded_rows(system.forces, at, ks.size),
+        dforces=np.array([_padded_rows(each, at, ks.size) for each in system.dforces]).reshape(
+            (2, ks.size, -1) if system.dforces.size else (0, 0, 0)
+        ),
     )  # fmt: skip
 
 

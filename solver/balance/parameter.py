@@ -12,8 +12,11 @@ from solver.contacts.kernels import columns
 from solver.contacts.kernels import system as kernel
 from solver.errors import SettingError
 from solver.jit.fourier import Real
+from solver.scene.body_paths import is_body_path, least_value, unit_of
 from solver.scene.parameter_paths import has_parameter
 from solver.scene.scene import Scene
+from solver.scene.shape_parts import contact_shares, least_shape_value, shape_of, shape_unit
+from solver.scene.shapes import POINTS
 
 
 class Kind(IntEnum):
@@ -43,7 +46,7 @@ class Parameter:
     kind : Kind
         What it changes.
     active : (n_contacts,) array
-        1.0 for the contacts it acts on, else 0.0.
+        Its share in the number of each contact it acts on (1.0 but for faces with several points), else 0.0.
     column : int
         Of the contact table, if it is a parameter of contacts.
     name : str
@@ -112,6 +115,14 @@ def resolve(scene: Scene, path: str) -> Parameter:
     nobody = np.zeros(len(scene.contacts))
     if path == "frequency":
         return _parameter(path, Kind.FREQUENCY, nobody)
+    shape = shape_of(scene, path)
+    if shape is not None:
+        return _of_shape(scene, path, shape[1])
+    if is_body_path(scene, path):
+        return Parameter(
+            path=path, kind=Kind.STRUCTURE, active=nobody, name=path, unit=unit_of(path),
+            least=least_value(path),
+        )  # fmt: skip
     owner, _, key = path.rpartition(".")
     if owner == "excitation":
         return _parameter(path, Kind.LEVEL if key == "amplitude" else Kind.FORCE_PHASE, nobody)
@@ -126,6 +137,24 @@ def resolve(scene: Scene, path: str) -> Parameter:
     return Parameter(
         path=path, kind=Kind.CONTACTS, active=np.array(acts, dtype=np.float64), name="", unit=members[0].unit,
         least=max(member.least for member in members), column=members[0].column,
+    )  # fmt: skip
+
+
+def _of_shape(scene: Scene, path: str, key: str) -> Parameter:
+    """Return what a path of a damper given by its shape means: its contacts' numbers, or its structure."""
+    if key == POINTS:
+        raise SettingError("path", path, "must be a number that changes without steps: set it in the scene")
+    shares = contact_shares(scene, path)
+    if shares is None:
+        nobody = np.zeros(len(scene.contacts))
+        return Parameter(
+            path=path, kind=Kind.STRUCTURE, active=nobody, name=path, unit=shape_unit(key),
+            least=least_shape_value(key),
+        )  # fmt: skip
+    quantity = next(c.PARAMETERS[key] for c in scene.contacts if c.name in shares)
+    return Parameter(
+        path=path, kind=Kind.CONTACTS, active=np.array([shares.get(c.name, 0.0) for c in scene.contacts]),
+        name="", unit=quantity.unit, least=quantity.least, column=quantity.column,
     )  # fmt: skip
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.balance.balance import Balance
+from solver.balance.balance import Balance, check_level
 from solver.balance.parameter import Kind, Parameter, resolve
 from solver.balance.simplifications import even_harmonics_reason
 from solver.contacts.kernels.columns import COLUMNS, N0, N1, PHASE, RATIO
@@ -15,10 +15,11 @@ from solver.contacts.kernels.system import LOAD_COEFFICIENTS, MODES
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model, structure_derivative
-from solver.linear.condensation import reduce_model
+from solver.linear.condensation import reduce_model, term_amplitudes
 from solver.linear.contact_table import port_stiffnesses
+from solver.scene.body_paths import FORCE
 from solver.scene.parameter_paths import PROPORTIONAL
-from solver.scene.scene import MatricesStructure
+from solver.scene.scene import MatricesStructure, Scene
 
 
 def resolved(balance: Balance, paths: Sequence[str]) -> tuple[Parameter, ...]:
@@ -34,6 +35,8 @@ def resolved(balance: Balance, paths: Sequence[str]) -> tuple[Parameter, ...]:
         parameter = resolve(scene, path)
         if parameter.kind is Kind.FREQUENCY:
             raise SettingError("paths", path, "must be a value of the scene; the frequency is not")
+        if parameter.kind is Kind.LEVEL:
+            check_level(scene)
         reason = even_harmonics_reason(scene, (path,)) if balance.system.ks[0] != 0 else None
         if reason is not None:
             raise SettingError("paths", path, f"needs a balance with even harmonics: {reason}")
@@ -57,7 +60,7 @@ def contact_slopes(balance: Balance, parameters: Sequence[Parameter]) -> tuple[R
         if not acts.any():
             continue
         column = parameter.column
-        slope[acts, column] = 1.0
+        slope[acts, column] = parameter.active[acts]
         if column == N0:
             slope[:, N1] = np.nan_to_num(rows[:, RATIO]) * slope[:, N0]
         elif column == RATIO:
@@ -85,6 +88,8 @@ class Matrices:
         Complex force amplitudes [N].
     by : mapping
         (dK, dC, dM) of each structural path by its number, (nk, n, n) each.
+    forces_by, motions_by : mapping
+        Derivatives of the forces (nk, n) and of L (nk, nc, n) by those paths that change them.
     """
 
     K: Complex
@@ -94,6 +99,8 @@ class Matrices:
     observe: Complex
     forces: Complex
     by: dict[int, tuple[Complex, Complex, Complex]]
+    forces_by: dict[int, Complex] = field(default_factory=dict)
+    motions_by: dict[int, Complex] = field(default_factory=dict)
 
 
 def modal_dampings(balance: Balance, parameters: Sequence[Parameter]) -> dict[int, Complex]:
@@ -104,6 +111,8 @@ def modal_dampings(balance: Balance, parameters: Sequence[Parameter]) -> dict[in
     """
     system, structure = balance.system, balance.scene.structure
     if not isinstance(structure, MatricesStructure) or system.form != MODES or system.shift.any():
+        return {}
+    if balance.scene.bodies:  # which have no such damping
         return {}
     stiffness, mass = PROPORTIONAL
     values = {stiffness: system.eigenvalues, mass: np.ones_like(system.eigenvalues)}
@@ -120,16 +129,45 @@ def matrices_of_paths(balance: Balance, parameters: Sequence[Parameter]) -> Matr
     dense = reduce_model(model, ks, port_stiffnesses(scene, model), whole_matrices=True)
     diameters = (ks * model.engine_order) % model.sectors
     turn = np.exp(2j * np.pi * diameters / model.sectors)[:, None, None]
-    by = {}
+    which = dense.which
+    L, shift = dense.L[which], balance.system.shift
+    by, forces_by, motions_by = {}, {}, {}
     for i, name in structural.items():
         d = structure_derivative(scene, name)
-        by[i] = (
-            d.dK0 + d.dKp * turn + d.dKp.T * turn.conj(),
-            d.dC0 + d.dCp * turn + d.dCp.T * turn.conj(),
-            d.dM + 0.0 * turn,
-        )
-    which = dense.which
+        dK = d.dK0 + d.dKp * turn + d.dKp.T * turn.conj()
+        if d.contact_here is not None and d.contact_next is not None:
+            dL = motions_by[i] = d.contact_here + d.contact_next * turn
+            dK = dK + _stiffness(dL, shift, L) + _stiffness(L, shift, dL)
+        by[i] = (dK, d.dC0 + d.dCp * turn + d.dCp.T * turn.conj(), d.dM + 0.0 * turn)
+        if d.forces:
+            forces_by[i] = term_amplitudes(d.forces, dense.observe.size, ks)
+    # The stiffness moved from the contacts into the structure is that of the balance.
+    K = dense.K[which] + _stiffness(L, shift - dense.shift, L)
     return Matrices(
-        K=dense.K[which], C=dense.C[which], M=dense.M[which], L=dense.L[which], observe=dense.observe,
-        forces=dense.forces, by=by,
+        K=K, C=dense.C[which], M=dense.M[which], L=L, observe=dense.observe,
+        forces=dense.forces, by=by, forces_by=forces_by, motions_by=motions_by,
     )  # fmt: skip
+
+
+def check_smooth_structure(scene: Scene, parameters: Sequence[Parameter]) -> None:
+    """Raise SettingError where forces or places of contacts have second derivatives by the paths.
+
+    By the speed and by a radius of rotation the centrifugal load has: they are for gradients.
+    """
+    structural = [p for p in parameters if p.kind is Kind.STRUCTURE]
+    bent = [p.path for p in structural if _is_bent(scene, p.name)]
+    pulling = [p.path for p in structural if structure_derivative(scene, p.name).forces]
+    if bent or len([path for path in pulling if not path.endswith(f".{FORCE}")]) > 1:
+        raise SettingError(
+            "paths", bent or pulling, "must not change loads or places together: only gradients"
+        )
+
+
+def _is_bent(scene: Scene, name: str) -> bool:
+    found = structure_derivative(scene, name)
+    return bool(found.second_forces) or found.contact_here is not None
+
+
+def _stiffness(left: Complex, k: Real, right: Complex) -> Complex:
+    """Return leftᴴ k right of each harmonic, (nk, n, n)."""
+    return np.asarray(np.einsum("kci,c,kcj->kij", left.conj(), k, right))

@@ -14,6 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 
 from solver.errors import SettingError
+from solver.scene.body_paths import changes_loads
 from solver.scene.parameter_paths import changed_quantities
 from solver.scene.scene import Scene
 
@@ -77,11 +78,13 @@ def even_harmonics_reason(scene: Scene, paths: Iterable[str] = ()) -> str | None
         reason = contact.answers_unlike or contact.several_responses
         if reason is not None:
             return reason
-    for force in scene.excitation:
+    for force in scene.forces:
         if force.harmonic % 2 == 0:
             kind = "static" if force.harmonic == 0 else f"of harmonic {force.harmonic}"
             return f"the force on {force.dof} is {kind}"
     for path in paths:
+        if changes_loads(scene, path):
+            return f"{path} changes a constant force"
         for quantity in changed_quantities(scene, path):
             if quantity.unlike_half_waves:
                 return f"{path} {quantity.unlike_half_waves}"
@@ -95,6 +98,6 @@ def breaks_symmetry(scene: Scene, paths: Iterable[str] = ()) -> bool:
     """
     if any(contact.answers_unlike is not None for contact in scene.contacts):
         return True
-    if any(force.harmonic % 2 == 0 for force in scene.excitation):
+    if any(force.harmonic % 2 == 0 for force in scene.forces):
         return True
     return any(quantity.breaks_symmetry for path in paths for quantity in changed_quantities(scene, path))

@@ -10,7 +10,7 @@ from solver.balance.balance import Balance, fewer_harmonics
 from solver.balance.closed_loop_poles import ClosedLoop
 from solver.balance.kernels.jacobian import fill_jacobian
 from solver.balance.kernels.locate import slope_by_parameter
-from solver.balance.kernels.newton import from_stuck, ladder, newton
+from solver.balance.kernels.newton import from_stuck, ladder, newton, stuck_start
 from solver.balance.kernels.output import MEASURES
 from solver.balance.kernels.residual import evaluate
 from solver.contacts.kernels.system import (
@@ -141,6 +141,9 @@ class Workspace:
                 return PointSolution(converged=True, u=u, iterations=spent, residual=norm)
         good, more, norm = from_stuck(system, linear, u, p, point)
         spent += more
+        if not good and self.balance.system.constant_mean:
+            good, more, norm = self._by_level(u, p, at_rest=True)
+            spent += more
         if not good:
             ks, coarse = self._with_fewer_harmonics(p)
             spent += coarse.iterations
@@ -244,17 +247,24 @@ class Workspace:
         moved[::n] += far * way
         return moved
 
-    def _by_level(self, u: Real, p: float) -> tuple[bool, int, float]:
-        """Raise the excitation from nothing, the result in `u`; as `newton`."""
+    def _by_level(self, u: Real, p: float, *, at_rest: bool = False) -> tuple[bool, int, float]:
+        """Raise the excitation from nothing, the result in `u`; as `newton`.
+
+        With `at_rest` the constant forces stay, and the static equilibrium under them comes first: what
+        presses and what is open is known before anything moves.
+        """
         reached, step, spent, norm = 0.0, 0.1, 0, np.inf
         kept = np.zeros(u.size)
+        if at_rest:
+            self._scaled_receptance(p, 0.0, at_rest=True)
+            stuck_start(self.system, self.linear, p, kept)
+            good, spent, norm = newton(self.system, self.linear, kept, p, 0.0, self.point)
+            if not good:
+                return False, spent, norm
         while reached < 1.0 and step > _LEAST_RISE:
             level = min(1.0, reached + step)
-            u[:] = kept * (level / reached) if reached > 0.0 else kept
-            receptance(self.system, p, self.linear)
-            linear = receptance_by_value(self.linear)
-            linear.u_linear[...] *= level
-            linear.x_linear[...] *= level
+            u[:] = kept * (level / reached) if reached > 0.0 and not at_rest else kept
+            self._scaled_receptance(p, level, at_rest=at_rest)
             good, more, norm = newton(self.system, self.linear, u, p, 0.0, self.point)
             spent += more
             if good:
@@ -263,6 +273,14 @@ class Workspace:
                 step *= 0.5
         receptance(self.system, p, self.linear)
         return reached == 1.0, spent, norm
+
+    def _scaled_receptance(self, p: float, level: float, *, at_rest: bool) -> None:
+        """Fill the receptance with all forces at a level, or (`at_rest`) all but the constant ones."""
+        receptance(self.system, p, self.linear)
+        linear = receptance_by_value(self.linear)
+        scaled = np.where(self.balance.system.ks > 0, level, 1.0 if at_rest else level)
+        linear.u_linear[...] *= scaled[:, None]
+        linear.x_linear[...] *= scaled
 
     def _with_fewer_harmonics(self, p: float) -> tuple[Integer, PointSolution]:
         """Solve with about two thirds of the harmonics, found in the same way from still fewer.

@@ -15,11 +15,15 @@ NEXT = "next"
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+\z", max_length=100)]
 MemberName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(@[0-9]+)?\z", max_length=100)]
-EndName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(@([0-9]+|next))?\z", max_length=105)]
+DofName = Annotated[
+    str, Field(pattern=r"^[A-Za-z0-9_-]+(\.r?[xyz])?(@[0-9]+)?\z", max_length=103)
+]  # `.x` … `.rz` are of a body
+EndName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(\.r?[xyz])?(@([0-9]+|next))?\z", max_length=108)]
 Between = tuple[EndName, EndName]
 NonNegative = Annotated[float, Field(strict=True, ge=0.0, le=LARGEST, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, gt=0.0, le=LARGEST, allow_inf_nan=False)]
 Signed = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+Vector = tuple[Signed, Signed, Signed]
 Friction = Annotated[float, Field(strict=True, ge=0.0, le=100.0, allow_inf_nan=False)]
 Angle = Annotated[float, Field(strict=True, ge=-1e4, le=1e4, allow_inf_nan=False)]
 

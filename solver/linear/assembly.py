@@ -6,9 +6,7 @@ has its derivative from the same lines that give the value.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -16,120 +14,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.errors import SettingError
-from solver.linear.matrix_model import matrix_model
+from solver.linear.body_matrices import bodies_mass, mass_derivative, matrices_with_bodies
+from solver.linear.model import ForceTerm as ForceTerm
+from solver.linear.model import LinearModel as LinearModel
+from solver.linear.model import LinearModelDerivative as LinearModelDerivative
 from solver.scene.annulus import written_out
+from solver.scene.bodies import MOMENTS, Body
+from solver.scene.body_paths import is_body_path
+from solver.scene.kinematics import Form, dof_names, force_derivatives
 from solver.scene.parameter_paths import PROPORTIONAL, share, structure_names
 from solver.scene.scene import (
     CyclicStructure,
     Damper,
     End,
+    Excitation,
     LumpedStructure,
     Mass,
     MatricesStructure,
     Scene,
     Spring,
-    parse_end,
 )
+from solver.scene.shape_parts import motion_derivatives
 from solver.scene.validation import listing, nearest
 
 FloatArray = NDArray[np.float64]
 _Ends = tuple[End, End]
 _Assembled = LumpedStructure | CyclicStructure
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ForceTerm:
-    """One force amplitude * cos(harmonic * omega t + phase) along `vector`.
-
-    Attributes
-    ----------
-    vector : (n,) array
-        Selects the DOF.
-    amplitude : float
-        Force [N].
-    phase : float
-        Phase [rad].
-    harmonic : int
-        Multiple of the excitation frequency; 0 is a static load.
-    """
-
-    vector: FloatArray
-    amplitude: float
-    phase: float
-    harmonic: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LinearModel:
-    """The structure without its contacts: one sector of a tuned disk, or the whole structure.
-
-    A matrix at interblade phase theta is X(theta) = X0 + Xp e^{j theta} + Xp^T e^{-j theta}; the neighbour
-    x of the next sector is X e^{j k i phi} for harmonic k, engine order i and phi = 2 pi / sectors. All
-    arrays are read-only.
-
-    Attributes
-    ----------
-    dofs : tuple of str
-        Names of the DOFs.
-    shapes : (n_dofs, n) array
-        The DOFs in the coordinates of the matrices: the identity, or what a structure given by matrices or
-        modes names.
-    M : (n, n) array
-        Mass [kg].
-    C0, Cp : (n, n) array
-        Damping [N s/m]; `Cp` couples to the next sector, 0 if lumped.
-    K0, Kp : (n, n) array
-        Stiffness [N/m]; `Kp` couples to the next sector, 0 if lumped.
-    contact_here, contact_next : (n_ports, n) array
-        L(theta) = contact_here + contact_next e^{j theta}; relative motions u = L x, x the coordinates.
-    forces : tuple of ForceTerm
-        The excitation.
-    observe : (n,) array
-        Selects the observed DOF.
-    engine_order : int
-        Engine order of the excitation, 0 if lumped.
-    sectors : int
-        Number of sectors, 1 if lumped.
-    """
-
-    dofs: tuple[str, ...]
-    shapes: FloatArray
-    M: FloatArray
-    C0: FloatArray
-    Cp: FloatArray
-    K0: FloatArray
-    Kp: FloatArray
-    contact_here: FloatArray
-    contact_next: FloatArray
-    forces: tuple[ForceTerm, ...]
-    observe: FloatArray
-    engine_order: int
-    sectors: int
-
-    @property
-    def interblade_phase(self) -> float:
-        """Phase of harmonic 1 from one sector to the next [rad]."""
-        return 2.0 * math.pi * self.engine_order / self.sectors
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LinearModelDerivative:
-    """Derivatives of a `LinearModel` by one structural parameter, in units per unit of the parameter.
-
-    Attributes
-    ----------
-    dM, dC0, dCp, dK0, dKp : (n, n) array
-        Derivatives of the matrices; read-only.
-    affine : bool
-        The matrices are affine in this parameter, so these derivatives are constant.
-    """
-
-    dM: FloatArray
-    dC0: FloatArray
-    dCp: FloatArray
-    dK0: FloatArray
-    dKp: FloatArray
-    affine: bool
 
 
 class _Topology(NamedTuple):
@@ -164,27 +74,24 @@ def linear_model(scene: Scene) -> LinearModel:
     scene = written_out(scene)
     structure = scene.structure
     if isinstance(structure, MatricesStructure):
-        found = matrix_model(structure)
+        found = matrices_with_bodies(structure, scene.bodies)
         nothing = _nothing(found.M.shape[0])
         return _model(scene, _Matrices(found.M, found.C, nothing, found.K, nothing), found.shapes)
-    matrices = _matrices(_topology(structure), _numbers(structure))
-    return _model(scene, matrices, _identity(len(structure.dofs)))
+    topology = _topology(structure, scene.bodies)
+    matrices = _matrices(topology, _numbers(structure, scene.bodies), scene.bodies)
+    return _model(scene, matrices, _identity(len(topology.dofs)))
 
 
 def _model(scene: Scene, matrices: _Matrices, shapes: FloatArray) -> LinearModel:
     """Add contacts and forces to the matrices."""
     structure = scene.structure
-    dofs = tuple(structure.dofs)
-    here, beyond = _contact_selection(dofs, tuple(pair for c in scene.contacts for pair in c.pairs))
+    dofs = scene.dofs
+    here, beyond = _contact_selection(dofs, tuple(form for forms in scene.forms for form in forms))
     whole = isinstance(structure, MatricesStructure)
 
     def rows(selected: FloatArray) -> FloatArray:
         return _frozen(selected @ shapes) if whole else selected
 
-    forces = tuple(
-        ForceTerm(vector=rows(_unit(dofs, e.dof)), amplitude=e.amplitude, phase=e.phase, harmonic=e.harmonic)
-        for e in scene.excitation
-    )
     return LinearModel(
         dofs=dofs,
         shapes=shapes,
@@ -195,10 +102,24 @@ def _model(scene: Scene, matrices: _Matrices, shapes: FloatArray) -> LinearModel
         Kp=matrices.Kp,
         contact_here=rows(here),
         contact_next=rows(beyond),
-        forces=forces,
+        forces=_terms(scene.forces, dofs, shapes if whole else None),
         observe=rows(_unit(dofs, scene.observe.dof)),
         engine_order=scene.engine_order,
         sectors=structure.sectors if isinstance(structure, CyclicStructure) else 1,
+    )
+
+
+def _terms(
+    forces: tuple[Excitation, ...], dofs: tuple[str, ...], shapes: FloatArray | None
+) -> tuple[ForceTerm, ...]:
+    """Forces on DOFs in the coordinates of the matrices."""
+
+    def vector(dof: str) -> FloatArray:
+        return _unit(dofs, dof) if shapes is None else _frozen(_unit(dofs, dof) @ shapes)
+
+    return tuple(
+        ForceTerm(vector=vector(e.dof), amplitude=e.amplitude, phase=e.phase, harmonic=e.harmonic)
+        for e in forces
     )
 
 
@@ -215,7 +136,8 @@ def _identity(n: int) -> FloatArray:
 def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
     """Derivatives of the matrices by the structural parameter `name` (without ``structure.``).
 
-    By the value of a group they are the sum of those by its members, times their factors.
+    By the value of a group they are the sum of those by its members, times their factors. Of a body, a load
+    or the speed the name is the path, and the forces have derivatives too.
 
     Raises
     ------
@@ -223,30 +145,83 @@ def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
         The structure has no parameter of that name.
     """
     structure = scene.structure
+    slopes = motion_derivatives(scene, name)
+    if slopes is not None:
+        return _of_motions(scene, slopes)
+    if is_body_path(scene, name):
+        return _of_bodies(scene, name)
     if isinstance(structure, MatricesStructure):
-        return _proportional(structure, name)
+        return _proportional(structure, scene.bodies, name)
     parts: tuple[Mass | Spring | Damper, ...] = (*structure.masses, *structure.springs, *structure.dampers)
     shares = [(i, weight) for i, part in enumerate(parts) if name and (weight := share(part, name))]
     if not shares:
         raise _unknown(name, structure_names(structure))
-    topology, numbers = _topology(structure), _numbers(structure)
+    topology, numbers = _topology(structure, scene.bodies), _numbers(structure, scene.bodies)
+    behind = len(topology.dofs) - len(
+        structure.dofs
+    )  # places of the bodies' DOFs, between masses and springs
+    shares = [(i if i < len(structure.masses) else i + behind, weight) for i, weight in shares]
     members = [(_derivative(topology, numbers, i), weight) for i, weight in shares]
-    matrices = {
-        key: _frozen(
+
+    def total(key: str) -> FloatArray:
+        return _frozen(
             sum((weight * getattr(d, key) for d, weight in members), np.zeros(members[0][0].dM.shape))
         )
-        for key in ("dM", "dC0", "dCp", "dK0", "dKp")
-    }
-    return LinearModelDerivative(**matrices, affine=all(d.affine for d, _ in members))
+
+    return LinearModelDerivative(
+        dM=total("dM"), dC0=total("dC0"), dCp=total("dCp"), dK0=total("dK0"), dKp=total("dKp"),
+        affine=all(d.affine for d, _ in members),
+    )  # fmt: skip
 
 
-def _proportional(structure: MatricesStructure, name: str) -> LinearModelDerivative:
+def _of_motions(scene: Scene, slopes: Mapping[str, tuple[Form, ...]]) -> LinearModelDerivative:
+    """Derivatives where contacts are moved: of their motions alone."""
+    dofs, shapes = scene.dofs, _shapes(scene)
+    forms = [slopes.get(c.name, ((),) * len(c.directions)) for c in scene.contacts]
+    here, beyond = _contact_selection(dofs, tuple(form for each in forms for form in each))
+    if shapes is not None:
+        here, beyond = _frozen(here @ shapes), _frozen(beyond @ shapes)
+    nothing = _nothing(here.shape[1])
+    return LinearModelDerivative(
+        dM=nothing, dC0=nothing, dCp=nothing, dK0=nothing, dKp=nothing, affine=False,
+        contact_here=here, contact_next=beyond,
+    )  # fmt: skip
+
+
+def _shapes(scene: Scene) -> FloatArray | None:
+    """The DOFs in the coordinates of the matrices; None where they are the coordinates."""
+    if not isinstance(scene.structure, MatricesStructure):
+        return None
+    return matrices_with_bodies(scene.structure, scene.bodies).shapes
+
+
+def _of_bodies(scene: Scene, path: str) -> LinearModelDerivative:
+    """Derivatives by a number of bodies or loads, or by the speed: of the mass, and of constant forces."""
+    dofs, shapes = scene.dofs, _shapes(scene)
+    n = len(dofs) if shapes is None else shapes.shape[1]
+    owner, _, key = path.rpartition(".")
+    behind = sum(len(body.dofs) for body in scene.bodies)
+    massive = key == "mass" or key in MOMENTS
+    nothing = _nothing(n)
+    first, second = force_derivatives(scene, path)
+    return LinearModelDerivative(
+        dM=mass_derivative(n - behind, scene.bodies, owner, key) if massive else nothing,
+        dC0=nothing, dCp=nothing, dK0=nothing, dKp=nothing, affine=True,
+        forces=_terms(first, dofs, shapes), second_forces=_terms(second, dofs, shapes),
+    )  # fmt: skip
+
+
+def _proportional(structure: MatricesStructure, bodies: tuple[Body, ...], name: str) -> LinearModelDerivative:
     """Derivatives by the proportional damping, the only parameter of a structure given by its matrices."""
     if name not in PROPORTIONAL:
         raise _unknown(name, PROPORTIONAL)
-    found = matrix_model(structure)
+    found = matrices_with_bodies(structure, bodies)
     nothing = _nothing(found.M.shape[0])
     dC = found.K if name == PROPORTIONAL[0] else found.M
+    if bodies:  # which have no such damping
+        dC = dC.copy()
+        dC[-sum(len(body.dofs) for body in bodies) :] = 0.0
+        dC = _frozen(dC)
     return LinearModelDerivative(dM=nothing, dC0=dC, dCp=nothing, dK0=nothing, dKp=nothing, affine=True)
 
 
@@ -254,15 +229,20 @@ def _unknown(name: str, known: Sequence[str]) -> SettingError:
     return SettingError("name", name, f"must be one of {listing(known)}", nearest(str(name), known))
 
 
-def _topology(structure: _Assembled) -> _Topology:
+def _topology(structure: _Assembled, bodies: tuple[Body, ...]) -> _Topology:
     springs = tuple(spring.ends for spring in structure.springs)
-    return _Topology(structure.dofs, springs, tuple(damper.ends for damper in structure.dampers))
+    dampers = tuple(damper.ends for damper in structure.dampers)
+    return _Topology(dof_names(structure, bodies), springs, dampers)
 
 
-def _numbers(structure: _Assembled) -> tuple[float, ...]:
-    """All numbers: masses, stiffnesses, dashpots, dashpots of springs, proportional damping."""
+def _numbers(structure: _Assembled, bodies: tuple[Body, ...]) -> tuple[float, ...]:
+    """All numbers: masses, stiffnesses, dashpots, dashpots of springs, proportional damping.
+
+    The mass of a body is no point mass and stands apart: 0 here.
+    """
     return (
         *(mass.m for mass in structure.masses),
+        *(0.0 for body in bodies for _ in body.dofs),
         *(spring.k for spring in structure.springs),
         *(damper.c for damper in structure.dampers),
         *(spring.c for spring in structure.springs),
@@ -315,9 +295,12 @@ def _join(X0: Any, Xp: Any, ends: _Ends, value: Any, index: dict[str, int]) -> N
 
 
 @lru_cache(maxsize=256)
-def _matrices(topology: _Topology, numbers: tuple[float, ...]) -> _Matrices:
+def _matrices(topology: _Topology, numbers: tuple[float, ...], bodies: tuple[Body, ...]) -> _Matrices:
     n = len(topology.dofs)
-    return _Matrices(*map(_frozen, _assembled(topology, numbers, np.zeros((n, n)))))
+    M, *others = _assembled(topology, numbers, np.zeros((n, n)))
+    if bodies:
+        M += bodies_mass(n - sum(len(body.dofs) for body in bodies), bodies)
+    return _Matrices(*map(_frozen, (M, *others)))
 
 
 @lru_cache(maxsize=256)
@@ -345,14 +328,11 @@ def _derivative_function(topology: _Topology, i: int) -> tuple[Any, bool]:
 
 
 @lru_cache(maxsize=256)
-def _contact_selection(
-    dofs: tuple[str, ...], betweens: tuple[tuple[str, str], ...]
-) -> tuple[FloatArray, FloatArray]:
-    here, beyond = np.zeros((len(betweens), len(dofs))), np.zeros((len(betweens), len(dofs)))
-    for row, between in enumerate(betweens):
-        for end, sign in zip(map(parse_end, between), (1.0, -1.0), strict=True):
-            if end.dof is not None:
-                (beyond if end.next else here)[row, dofs.index(end.dof)] += sign
+def _contact_selection(dofs: tuple[str, ...], forms: tuple[Form, ...]) -> tuple[FloatArray, FloatArray]:
+    here, beyond = np.zeros((len(forms), len(dofs))), np.zeros((len(forms), len(dofs)))
+    for row, form in enumerate(forms):
+        for dof, ahead, factor in form:
+            (beyond if ahead else here)[row, dofs.index(dof)] += factor
     return _frozen(here), _frozen(beyond)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from solver.contacts.kernels.system import DENSE
 from solver.jit.fourier import Complex, Integer, Real
-from solver.linear.assembly import LinearModel, LinearModelDerivative, linear_model
+from solver.linear.assembly import ForceTerm, LinearModel, LinearModelDerivative, linear_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.modal import Decomposition, Held, decompose, held_alone, held_by, matrices_of
 from solver.linear.rigid_body_modes import loose_motions
@@ -49,6 +49,7 @@ class Reduced:
     L: Complex
     observe: Complex
     forces: Complex
+    dforces: Complex
 
 
 def reduce_model(
@@ -93,6 +94,8 @@ def reduce_model(
     if found is None:
         modes: dict[str, Any] = _no_modes(theta.size, ks.size, kt.size)
         dense: dict[str, Any] = _dense(held, theta, L, model, forces, derivative)
+        given = ((), ()) if derivative is None else (derivative.forces, derivative.second_forces)
+        dense["dforces"] = np.array([term_amplitudes(each, model.observe.size, ks) for each in given])
     else:
         modes = _projected(found, L, model.observe, forces, which)
         dense = {name: np.zeros((0,) * axes, np.complex128) for name, axes in _DENSE_AXES.items()}
@@ -130,8 +133,13 @@ def loose_ports(scene: Scene) -> tuple[Real, Real]:
 
 def force_amplitudes(model: LinearModel, ks: Integer) -> Complex:
     """Return the complex force amplitudes f̂_k, (nk, n), of cos(hωt + phase) terms: amplitude·e^{i phase}."""
-    amplitudes = np.zeros((ks.size, model.observe.size), dtype=np.complex128)
-    for term in model.forces:
+    return term_amplitudes(model.forces, model.observe.size, ks)
+
+
+def term_amplitudes(forces: tuple[ForceTerm, ...], n: int, ks: Integer) -> Complex:
+    """Return the same of force terms along vectors of n coordinates."""
+    amplitudes = np.zeros((ks.size, n), dtype=np.complex128)
+    for term in forces:
         rows = np.flatnonzero(ks == term.harmonic)
         turn = np.exp(1j * term.phase) if term.harmonic else 1.0
         amplitudes[rows] += term.amplitude * turn * term.vector
@@ -180,7 +188,10 @@ def _no_modes(n_structures: int, n_harmonics: int, n_contacts: int) -> dict[str,
     }
 
 
-_DENSE_AXES = {"K": 3, "C": 3, "M": 3, "dK": 3, "dC": 3, "dM": 3, "L": 3, "observe": 1, "forces": 2}
+_DENSE_AXES = {
+    "K": 3, "C": 3, "M": 3, "dK": 3, "dC": 3, "dM": 3, "L": 3, "observe": 1, "forces": 2,
+    "dforces": 3,
+}  # fmt: skip
 
 
 def _dense(

@@ -52,7 +52,7 @@ def contact_set(scene: Scene) -> ContactSet:
 
 def port_counts(scene: Scene) -> Integer:
     """Return how many relative motions the force of every contact depends on, (n_contacts,)."""
-    return np.array([len(contact.pairs) for contact in scene.contacts], dtype=np.int64)
+    return np.array([len(contact.end_keys) for contact in scene.contacts], dtype=np.int64)
 
 
 def contact_table(scene: Scene, highest: int) -> Real:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
-from solver.contacts.fields import End
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Row
-
-_Pair = tuple[End, End]
+from solver.scene.kinematics import Form
 
 
 def rows(contacts: tuple[AnyContact, ...]) -> tuple[Row, ...]:
@@ -25,25 +25,39 @@ def rows(contacts: tuple[AnyContact, ...]) -> tuple[Row, ...]:
     return tuple(row for contact in contacts for row in contact.rows())
 
 
-def columns(found: tuple[Row, ...], index: dict[str, int]) -> dict[str, NDArray[Any]]:
-    """Return the arrays of `solver.marching.kernels.state.System` that belong to the contacts."""
-    first, second = _places([row.ends for row in found], index)
-    ground = (End(None, False), End(None, False))
-    normal_first, normal_second = _places([row.normal_ends or ground for row in found], index)
+def columns(
+    placed: Sequence[tuple[Row, tuple[Form, ...]]], index: dict[str, int], n: int
+) -> dict[str, NDArray[Any]]:
+    """Return the arrays of `solver.marching.kernels.state.System` that belong to the contacts.
+
+    Parameters
+    ----------
+    placed : every row, and the relative motions of its contact.
+    index : the coordinate of each DOF in use; n : how many coordinates there are.
+    """
+    found = [row for row, _ in placed]
+    L = selection([own[row.port] for row, own in placed], index, n)
+    normal = [() if row.normal_port is None else own[row.normal_port] for row, own in placed]
     degree = max((len(row.powers) for row in found), default=0)
     powers = np.zeros((len(found), max(degree, 1)))
     for i, row in enumerate(found):
         powers[i, : len(row.powers)] = row.powers
     scalars = ("kt", "mu", "N0", "N1", "N1_phase", "kn", "rest", "presses", "gap")
     numbers = {name: np.array([getattr(row, name) for row in found], dtype=np.float64) for name in scalars}
+    laws = np.array([row.follows.value for row in found], dtype=np.int64)
+    motions = {**_compressed("L", L), **_compressed("normal", selection(normal, index, n))}
+    return {**numbers, **motions, "law": laws, "powers": powers}
+
+
+def selection(forms: Sequence[Form], index: dict[str, int], n: int) -> csr_array:
+    """Return relative motions as rows over the coordinates."""
+    terms = [(row, index[t.dof], t.factor) for row, form in enumerate(forms) for t in form]
+    row, column, factor = np.array(terms, dtype=float).reshape(-1, 3).T
+    return csr_array((factor, (row.astype(np.int64), column.astype(np.int64))), shape=(len(forms), n))
+
+
+def _compressed(name: str, matrix: csr_array) -> dict[str, NDArray[Any]]:
     return {
-        **numbers, "law": np.array([row.follows.value for row in found], dtype=np.int64), "first": first,
-        "second": second, "normal_first": normal_first, "normal_second": normal_second, "powers": powers,
+        f"{name}_start": matrix.indptr.astype(np.int64), f"{name}_column": matrix.indices.astype(np.int64),
+        f"{name}_value": matrix.data,
     }  # fmt: skip
-
-
-def _places(pairs: list[_Pair], index: dict[str, int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the DOF of both ends of every pair; -1 is the ground."""
-    places = [[-1 if end.dof is None else index[end.dof] for end in pair] for pair in pairs]
-    first, second = np.array(places, dtype=np.int64).reshape(-1, 2).T
-    return first.copy(), second.copy()

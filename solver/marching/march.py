@@ -9,22 +9,24 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from numbers import Integral, Real
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import block_diag, csr_array, diags_array
 
 from solver.errors import SettingError
 from solver.linear.first_order import equations
-from solver.marching.contacts import columns, rows
+from solver.marching.contacts import columns, rows, selection
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
 from solver.marching.result import MarchResult, MarchStatus, describe
 from solver.scene.annulus import annulus
-from solver.scene.scene import CyclicStructure, End, Excitation, LumpedStructure, MatricesStructure, Scene
+from solver.scene.bodies import Body
+from solver.scene.kinematics import dof_names, pair_form
+from solver.scene.scene import CyclicStructure, Excitation, LumpedStructure, MatricesStructure, Scene
 from solver.scene.validation import listing
 
 FloatArray = NDArray[np.float64]
@@ -121,7 +123,7 @@ def march(
     whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
     omega = 2.0 * math.pi * frequency_hz
     system, dof = _system(whole, omega)
-    steps = _steps(system, scene.excitation, steps_per_period)
+    steps = _steps(system, scene.forces, steps_per_period)
     plan = _Plan(
         system=system,
         dof=dof,
@@ -163,7 +165,7 @@ def _check(frequency_hz: float, tolerance: float, max_periods: int) -> None:
 
 def _steps(system: kernel.System, forces: tuple[Excitation, ...], wanted: int | None) -> int:
     """Steps of the finer run: the fastest motion turns less than 0.375 rad in one of them."""
-    full = system.W_value.size > system.W_start.size - 1
+    full = system.W_value.size > system.W_start.size - 1 or bool(np.any(np.abs(system.L_value) != 1.0))
     turns = 2.0 * math.pi * _fastest(system, BALANCING if full else 1)
     least = max(LEAST_STEPS, 2 * math.ceil(turns / 1.5), 16 * max(force.harmonic for force in forces))
     chosen = max(2 * LEAST_STEPS, 2 * least) if wanted is None else wanted
@@ -177,20 +179,27 @@ def _fastest(system: kernel.System, products: int) -> float:
     """Bound of the largest rate of the motion with every contact stuck, per omega: vibration or decay."""
     n = system.A_start.size - 1
     sizes = [
-        csr_array((np.abs(value), column, start), shape=(n, n))
+        _sizes(start, column, value, n)
         for start, column, value in (
             (system.A_start, system.A_column, system.A_value),
             (system.B_start, system.B_column, system.B_value),
             (system.W_start, system.W_column, system.W_value),
         )
     ]
-    stuck = np.zeros(n)
-    tangential, normal = (system.first, system.second), (system.normal_first, system.normal_second)
-    for k, pairs in ((system.kt, tangential), (system.kn, normal)):
-        for ends in pairs:
-            np.add.at(stuck, ends[ends >= 0], 2.0 * k[ends >= 0])
-    stiffness = _largest(sizes[0] + sizes[2] @ diags_array(stuck), products)
+    L = _sizes(system.L_start, system.L_column, system.L_value, n)
+    normal = _sizes(system.normal_start, system.normal_column, system.normal_value, n)
+    stuck = csr_array((n, n))
+    for motions, k in ((L, system.kt), (normal, system.kn)):
+        # Against the ground as if against another part.
+        k = np.where(np.diff(motions.indptr) == 1, 2.0, 1.0) * k
+        stuck = stuck + motions.T @ diags_array(k) @ motions
+    stiffness = _largest(sizes[0] + sizes[2] @ stuck, products)
     return float(max(math.sqrt(stiffness), _largest(sizes[1], products)))
+
+
+def _sizes(start: NDArray[np.int64], column: NDArray[np.int64], value: FloatArray, n: int) -> csr_array:
+    """The absolute values of compressed sparse rows."""
+    return csr_array((np.abs(value), column, start), shape=(start.size - 1, n))
 
 
 def _largest(matrix: csr_array, products: int) -> float:
@@ -202,35 +211,25 @@ def _largest(matrix: csr_array, products: int) -> float:
     least = float("inf")
     for _ in range(products):
         grown = matrix @ scale
-        least = min(least, float(np.max(grown / scale, initial=0.0)))
+        rates = np.divide(grown, scale, out=np.zeros_like(grown), where=scale > 0.0)
+        least = min(least, float(np.max(rates, initial=0.0)))
         if least == 0.0:
             break
         scale = grown / grown.max() + 1e-12 * scale
     return least
 
 
-def _rows(dofs: tuple[str, ...], ends: Sequence[tuple[End, End]]) -> csr_array:
-    """Relative displacement x(first) - x(second) of each pair of ends as rows."""
-    index = {dof: i for i, dof in enumerate(dofs)}
-    signed = [
-        (row, index[end.dof], sign)
-        for row, pair in enumerate(ends)
-        for end, sign in zip(pair, (1.0, -1.0), strict=True)
-        if end.dof is not None
-    ]
-    row, column, sign = np.array(signed, dtype=float).reshape(-1, 3).T
-    places = (row.astype(np.int64), column.astype(np.int64))
-    return csr_array((sign, places), shape=(len(ends), len(index)))
-
-
-def _matrices(structure: LumpedStructure) -> tuple[FloatArray, csr_array, csr_array]:
-    """Masses [kg], damping and stiffness of a lumped structure."""
+def _matrices(
+    structure: LumpedStructure, bodies: tuple[Body, ...]
+) -> tuple[FloatArray, csr_array, csr_array]:
+    """Masses [kg] of the points, and damping and stiffness of a lumped structure with bodies."""
     M = np.array([mass.m for mass in structure.masses])
     k = np.array([spring.k for spring in structure.springs])
     c = np.array([spring.c for spring in structure.springs]) + structure.stiffness_proportional_damping * k
     dashpots = np.array([damper.c for damper in structure.dampers])
-    springs = _rows(structure.dofs, [spring.ends for spring in structure.springs])
-    dampers = _rows(structure.dofs, [damper.ends for damper in structure.dampers])
+    index = {dof: i for i, dof in enumerate(dof_names(structure, bodies))}
+    springs = selection([pair_form(spring.between) for spring in structure.springs], index, len(index))
+    dampers = selection([pair_form(damper.between) for damper in structure.dampers], index, len(index))
     K = springs.T @ diags_array(k) @ springs
     C = springs.T @ diags_array(c) @ springs + dampers.T @ diags_array(dashpots) @ dampers
     return M, csr_array(C), csr_array(K)
@@ -238,26 +237,43 @@ def _matrices(structure: LumpedStructure) -> tuple[FloatArray, csr_array, csr_ar
 
 def _equations(scene: Scene) -> tuple[csr_array, csr_array, csr_array, dict[str, int]]:
     """A = M⁻¹ K, B = M⁻¹ C, W = M⁻¹ and the coordinate of each DOF in use."""
-    structure = scene.structure
+    structure, bodies = scene.structure, scene.bodies
+    inertias = [csr_array(np.linalg.inv(body.mass_matrix())) for body in bodies]
     if isinstance(structure, MatricesStructure):
-        pairs = [pair for contact in scene.contacts for pair in contact.pair_ends]
-        ends = [end.dof for pair in pairs for end in pair if end.dof is not None]
-        used = [*ends, *(force.dof for force in scene.excitation), scene.observe.dof]
-        found = equations(structure, used)
-        return csr_array(found.A), csr_array(found.B), csr_array(found.W), found.index
+        return _of_matrices(scene, structure, inertias)
     if not isinstance(structure, LumpedStructure):
         raise SettingError("scene", scene.name, "must be written out as its annulus to be marched")
-    M, C, K = _matrices(structure)
+    M, C, K = _matrices(structure, bodies)
     inverse = diags_array(1.0 / M)
-    index = {dof: i for i, dof in enumerate(structure.dofs)}
+    if bodies:
+        inverse = block_diag([inverse, *inertias], format="csr")
+    index = {dof: i for i, dof in enumerate(scene.dofs)}
     return csr_array(inverse @ K), csr_array(inverse @ C), csr_array(inverse), index
+
+
+def _of_matrices(
+    scene: Scene, structure: MatricesStructure, inertias: list[csr_array]
+) -> tuple[csr_array, csr_array, csr_array, dict[str, int]]:
+    """The same of a structure given by matrices, the bodies behind its coordinates."""
+    own = [dof for body in scene.bodies for dof in body.dofs]
+    ends = [term.dof for forms in scene.forms for form in forms for term in form]
+    used = [*ends, *(force.dof for force in scene.forces), scene.observe.dof]
+    found = equations(structure, [dof for dof in used if dof not in own])
+    A, B, W = (csr_array(each) for each in (found.A, found.B, found.W))
+    if not own:
+        return A, B, W, found.index
+    nothing, n = csr_array((len(own), len(own))), A.shape[0]
+    A, B = (csr_array(block_diag([each, nothing])) for each in (A, B))
+    W = csr_array(block_diag([W, *inertias]))
+    return A, B, W, found.index | {dof: n + i for i, dof in enumerate(own)}
 
 
 def _system(scene: Scene, omega: float) -> tuple[kernel.System, int]:
     """The equations of a scene in the angle tau = omega t, and the coordinate observed."""
     A, B, W, index = _equations(scene)
     A, B, W = A / omega**2, B / omega, W / omega**2
-    forces = scene.excitation
+    forces = scene.forces
+    placed = [(row, own) for one, own in zip(scene.contacts, scene.forms, strict=True) for row in one.rows()]
     system = kernel.System(
         A_start=A.indptr.astype(np.int64),
         A_column=A.indices.astype(np.int64),
@@ -272,7 +288,7 @@ def _system(scene: Scene, omega: float) -> tuple[kernel.System, int]:
         force_amplitude=np.array([force.amplitude for force in forces]),
         force_phase=np.array([force.phase for force in forces]),
         force_harmonic=np.array([force.harmonic for force in forces], dtype=np.int64),
-        **columns(rows(scene.contacts), index),
+        **columns(placed, index, A.shape[0]),
     )
     return system, index[scene.observe.dof]
 

@@ -42,7 +42,7 @@ def time_history(solution: Solution, dof: str, *, samples: int = 512) -> tuple[R
     SettingError
         The solution did not converge, an unknown DOF, or a bad number of samples.
     """
-    dofs = solution.scene.structure.dofs
+    dofs = solution.scene.dofs
     if dof not in dofs:
         raise SettingError("dof", dof, f"must be one of {listing(dofs)}")
     tau = _angles(samples)

@@ -209,7 +209,7 @@ def contact_index(balance: Balance, contact: str) -> int:
 
 def period_shares(cycle: Cycle, e: int) -> Shares | None:
     """Return the shares of the period in stick, slip and separation; None of a law that knows no such."""
-    contact, ports = cycle.balance.scene.contacts[e].at(cycle.table[e]), cycle.ports(e)
+    contact, ports = cycle.balance.scene.contacts[e].with_numbers(cycle.table[e]), cycle.ports(e)
     return contact.shares(cycle.full(cycle.U[ports.start : ports.stop]), cycle.normal_load(e))
 
 

@@ -12,13 +12,18 @@ from typing import TypeVar
 
 from solver.errors import SettingError
 from solver.results.told import Piece
+from solver.scene.kinematics import forms_of, written_form
 from solver.scene.scene import (
+    AnyContact,
+    Body,
     ContactOfAnyLaw,
     CyclicStructure,
     Damper,
     Excitation,
+    Load,
     LumpedStructure,
     Mass,
+    Node,
     Observe,
     Scene,
     Spring,
@@ -153,7 +158,7 @@ def annulus(scene: Scene) -> Scene:
         contacts=tuple(
             _contact(c, j, _turn(order * j, n), standing=standing)
             for j in sectors
-            for c in _placed(scene.contacts, j, n)
+            for c in _placed(scene, j, n)
         ),
         excitation=tuple(
             _force(e, j, _turn(e.harmonic * order * j, n), standing=standing)
@@ -163,6 +168,10 @@ def annulus(scene: Scene) -> Scene:
         observe=Observe(
             dof=observed if "@" in observed else _in_sector(observed, 0), band=scene.observe.band
         ),
+        bodies=tuple(_body(b, j) for j in sectors for b in scene.bodies),
+        nodes=tuple(_node(node, j) for j in sectors for node in scene.nodes),
+        loads=tuple(_load(load, j) for j in sectors for load in scene.loads),
+        speed=scene.speed,
     )
 
 
@@ -218,21 +227,62 @@ def _joining(parts: tuple[_JoinT, ...], j: int, n: int) -> tuple[_JoinT, ...]:
     return tuple(part.model_copy(update={"between": ends}) for part, ends in placed if ends[0] != ends[1])
 
 
-def _placed(contacts: tuple[ContactOfAnyLaw, ...], j: int, n: int) -> tuple[ContactOfAnyLaw, ...]:
+def _placed(scene: Scene, j: int, n: int) -> tuple[ContactOfAnyLaw, ...]:
     """The contacts of sector j between their ends in the annulus."""
     placed = []
-    for contact in contacts:
-        pairs = {
-            key: (_end(pair[0], j, n), _end(pair[1], j, n))
-            for key, pair in zip(contact.end_keys, contact.pairs, strict=True)
-        }
-        joined = [ends for ends in pairs.values() if ends[0] != ends[1]]
-        if joined and len(joined) < len(pairs):
+    for contact in scene.contacts:
+        in_space = contact.normal is not None or contact.motions is not None
+        update, moving = _moving(scene, contact, j, n) if in_space else _between(contact, j, n)
+        if any(moving) and not all(moving):
             wanted = f"must have two sectors or more: `{contact.name}` joins one to itself in one direction"
             raise SettingError("sectors", n, wanted)
-        if joined:
-            placed.append(contact.model_copy(update=pairs))
+        if any(moving):
+            placed.append(contact.model_copy(update=update))
     return tuple(placed)
+
+
+def _between(contact: AnyContact, j: int, n: int) -> tuple[dict[str, object], list[bool]]:
+    """The ends of a contact in sector j, and whether each pair can move apart."""
+    pairs = {
+        key: (_end(pair[0], j, n), _end(pair[1], j, n))
+        for key, pair in zip(contact.end_keys, contact.pairs, strict=True)
+    }
+    return dict(pairs), [ends[0] != ends[1] for ends in pairs.values()]
+
+
+def _moving(scene: Scene, contact: AnyContact, j: int, n: int) -> tuple[dict[str, object], list[bool]]:
+    """The same of one in space, whose motions are written out: each sector has its own axes."""
+    motions = []
+    for form in forms_of(scene, contact):
+        sums: dict[str, float] = {}
+        for text, factor in written_form(form):
+            dof = _end(text, j, n)
+            sums[dof] = sums.get(dof, 0.0) + factor
+        motions.append(tuple((dof, factor) for dof, factor in sums.items() if factor != 0.0))
+    ends = tuple(_end(text, j, n) for text in contact.between)
+    update: dict[str, object] = {
+        "between": ends,
+        "motions": tuple(motions),
+        "at": None,
+        "normal": None,
+        "tangents": None,
+    }
+    return update, [bool(motion) for motion in motions]
+
+
+def _body(body: Body, j: int) -> Body:
+    return body.model_copy(update={"name": _in_sector(body.name, j), "group": body.group or body.name})
+
+
+def _node(node: Node, j: int) -> Node:
+    dofs = tuple((component, _in_sector(dof, j)) for component, dof in node.dofs)
+    return node.model_copy(update={"name": _in_sector(node.name, j), "dofs": dofs})
+
+
+def _load(load: Load, j: int) -> Load:
+    places = {key: _in_sector(place, j) for key in ("dof", "on") if (place := getattr(load, key))}
+    named = {} if load.name is None else {"name": _in_sector(load.name, j)}
+    return load.model_copy(update={**places, **named})
 
 
 def _renamed(part: _NamedT, j: int) -> _NamedT:

@@ -6,12 +6,13 @@ from typing import Any
 
 WORDS: dict[str, dict[str, str]] = {
     "*": {
-        "between": "The two ends: names of DOFs, or \"ground\"; \"tip@next\" is the tip of the "
-        "next sector of a cyclic structure.",
+        "between": "The two ends: names of DOFs (with `normal`: of bodies and nodes), or \"ground\"; "
+        "\"tip@next\" is the tip of the next sector of a cyclic structure.",
         "k": "Stiffness [N/m].",
         "c": "Damping [N s/m].",
         "m": "Mass [kg].",
         "kind": "lumped: point masses; cyclic: one sector of a disk; matrices: from files.",
+        "shape": "wedge, cylinder, asymmetric, split-ring or shroud.",
         "masses": "DOF to its mass [kg], or to a table with m, name, group and factor.",
         "springs": "Springs, each with `between` and `k` [N/m], and `c` [N s/m] of a dashpot beside it.",
         "dampers": "Dashpots, each with `between` and `c` [N s/m].",
@@ -25,6 +26,11 @@ WORDS: dict[str, dict[str, str]] = {
         "contacts": "Where friction, gaps and nonlinear springs act.",
         "excitation": "The force, or several.",
         "observe": "The DOF whose amplitude counts, and the band of frequencies.",
+        "bodies": "Rigid bodies, held by contacts and springs.",
+        "nodes": "Positions of DOFs, for contacts with a place.",
+        "loads": "Constant forces.",
+        "dampers": "Dampers by their shape, which make their bodies and contacts themselves.",
+        "speed": "Speed of rotation [1/min]: loads bodies with a radius_of_rotation.",
     },
     "Observe": {
         "dof": "The DOF whose amplitude counts; \"tip@3\" is the tip of sector 3.",
@@ -54,6 +60,8 @@ EXAMPLES: dict[str, list[Any]] = {
     "N0": [200.0],
     "N1_ratio": [0.3],
     "band": [[500.0, 900.0]],
+    "normal": [[0.0, 1.0, 0.0]],
+    "inertia": [[2e-8, 2e-8, 3e-8]],
     "amplitude": [50.0],
     "engine_order": [1],
     "sectors": [8],

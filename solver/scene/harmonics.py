@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from solver.jit.fourier import Flags, Integer, Real
+from solver.scene.body_paths import changes_loads
 from solver.scene.parameter_paths import changed_quantities
 from solver.scene.scene import Scene
 
@@ -51,11 +52,13 @@ def kept_harmonics(
 
 def forced_harmonics(scene: Scene, paths: Iterable[str] = ()) -> tuple[int, ...]:
     """Return the harmonics of the forces and of the normal loads that vary, ascending."""
-    found = {force.harmonic for force in scene.excitation}
+    found = {force.harmonic for force in scene.forces}
     loads = [contact.load for contact in scene.contacts]
     varies = any(load is not None and load.amplitude != 0.0 for load in loads)
     if varies or any(changed.varies_load for path in paths for changed in changed_quantities(scene, path)):
         found |= {0, 1}
+    if any(changes_loads(scene, path) for path in paths):
+        found.add(0)
     return tuple(sorted(found))
 
 

@@ -17,14 +17,17 @@ from pydantic_core import core_schema
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.registry import laws
 from solver.matrices.load_set import UNITS
+from solver.scene import bodies as scene_bodies
 from solver.scene import matrices_structure as matrices_part
 from solver.scene import parts as scene_parts
+from solver.scene import shapes as scene_shapes
+from solver.scene.body_validation import further_ends
 from solver.scene.descriptions import EXAMPLES, WORDS
 from solver.scene.scene import Scene
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*\n((?:    .*\n?)+)", re.MULTILINE)
-_HOMES = (scene_parts, matrices_part)
+_HOMES = (scene_parts, scene_bodies, scene_shapes, matrices_part)
 
 
 class _Generator(GenerateJsonSchema):
@@ -54,6 +57,10 @@ def scene_schema() -> dict[str, Any]:
     for definition in definitions.values():
         if {"N1", "N1_ratio"} <= set(definition["properties"]):
             definition["not"] = {"required": ["N1", "N1_ratio"]}
+    for word, law in laws().items():
+        if ends := further_ends(word):
+            ways = (list(ends), ["normal"], ["motions"])
+            definitions[law.__name__]["anyOf"] = [{"required": keys} for keys in ways]
     forces = found["properties"]["excitation"]
     forces.pop("type")
     many = {"type": "array", "minItems": 1, "items": forces.pop("items")}

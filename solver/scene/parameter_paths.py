@@ -12,6 +12,8 @@ from solver.contacts.fields import LARGEST, Part
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Quantity
 from solver.errors import SettingError
+from solver.scene.bodies import Body, Load, Node
+from solver.scene.body_paths import body_paths, body_value, changed_bodies, is_body_path
 from solver.scene.parts import (
     Damper,
     Excitation,
@@ -20,6 +22,8 @@ from solver.scene.parts import (
     Spring,
     Structure,
 )
+from solver.scene.shape_parts import own_parts, shape_of, shape_paths, shape_value, with_shape_value
+from solver.scene.shapes import AnyShape
 from solver.scene.validation import listing, nearest
 
 FREQUENCY = "frequency"
@@ -52,6 +56,26 @@ class HasParts(Protocol):
     def excitation(self) -> tuple[Excitation, ...]:
         """Every force."""
 
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """Every rigid body."""
+
+    @property
+    def nodes(self) -> tuple[Node, ...]:
+        """Every position."""
+
+    @property
+    def loads(self) -> tuple[Load, ...]:
+        """Every constant force."""
+
+    @property
+    def dampers(self) -> tuple[AnyShape, ...]:
+        """Every damper given by its shape."""
+
+    @property
+    def speed(self) -> float | None:
+        """Speed of rotation [1/min]."""
+
     def model_copy(self, *, update: Mapping[str, Any] | None = None) -> Self:
         """Return a copy with other parts."""
 
@@ -61,11 +85,14 @@ _SceneT = TypeVar("_SceneT", bound=HasParts)
 
 def parameter_paths(scene: HasParts) -> tuple[str, ...]:
     """Every path that has a value in the scene."""
+    own = own_parts(scene)["contacts"] if scene.dampers else scene.contacts
     contacts = dict.fromkeys(
-        f"{contact.group}.{key}" for contact in scene.contacts if contact.group for key in contact.PARAMETERS
+        f"{contact.group}.{key}" for contact in own if contact.group for key in contact.PARAMETERS
     )
-    contacts |= dict.fromkeys(f"{c.name}.{key}" for c in scene.contacts for key in c.PARAMETERS)
-    return (AMPLITUDE, PHASE, *contacts, *(f"structure.{name}" for name in structure_names(scene.structure)))
+    contacts |= dict.fromkeys(f"{c.name}.{key}" for c in own for key in c.PARAMETERS)
+    structural = (f"structure.{name}" for name in structure_names(scene.structure))
+    others = dict.fromkeys((*shape_paths(scene), *body_paths(scene)))
+    return (AMPLITUDE, PHASE, *contacts, *structural, *others)
 
 
 def structure_names(structure: Structure) -> tuple[str, ...]:
@@ -112,6 +139,11 @@ def value(scene: HasParts, path: str) -> float:
         return scene.excitation[0].amplitude
     if path == PHASE:
         return next((force.phase for force in scene.excitation if force.harmonic), 0.0)
+    shape = shape_of(scene, path) if isinstance(path, str) else None
+    if shape is not None:
+        return shape_value(*shape)
+    if isinstance(path, str) and is_body_path(scene, path):
+        return body_value(scene, path)
     owner, _, key = path.rpartition(".") if isinstance(path, str) else ("", "", "")
     if owner == "structure" and isinstance(scene.structure, MatricesStructure) and key in PROPORTIONAL:
         return cast(float, getattr(scene.structure, key))
@@ -139,10 +171,15 @@ def _with_value(scene: _SceneT, path: str, new: float) -> _SceneT:
     if path in (AMPLITUDE, PHASE):
         change = _with_amplitude if path == AMPLITUDE else _with_phase
         return scene.model_copy(update={"excitation": change(scene.excitation, new)})
+    if shape_of(scene, path) is not None:
+        return scene.model_copy(update=with_shape_value(scene, path, new))
+    if is_body_path(scene, path):
+        return scene.model_copy(update=changed_bodies(scene, path, new))
     owner, _, key = path.rpartition(".")
     if owner == "structure":
         return scene.model_copy(update={"structure": _with_structure(scene, path, key, new)})
-    if not any(has_parameter(contact, owner, key) for contact in scene.contacts):
+    own = own_parts(scene)["contacts"] if scene.dampers else scene.contacts
+    if not any(has_parameter(contact, owner, key) for contact in own):
         raise _unknown(scene, path)
     contacts = tuple(
         _changed(contact, contact.changed_by(key, new), path, new, contact.PARAMETERS[key].wanted)

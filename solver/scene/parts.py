@@ -14,7 +14,18 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, core_schema
 
-from solver.contacts.fields import Angle, Element, MemberName, Name, NonNegative, Part, Positive, Signed
+from solver.contacts.fields import (
+    Angle,
+    DofName,
+    Element,
+    MemberName,
+    Name,
+    NonNegative,
+    Part,
+    Positive,
+    Signed,
+    Vector,
+)
 from solver.scene.matrices_structure import MatricesStructure as MatricesStructure
 from solver.scene.matrices_structure import Reduction as Reduction
 
@@ -178,11 +189,18 @@ class CyclicStructure(_Structure):
     """One sector of a disk of `sectors` sectors; ``X@next`` is DOF X of the next one.
 
     The sectors are equal but for `mistuning`.
+
+    Attributes
+    ----------
+    axis : (3,) tuple or None
+        Direction of the axis the sectors are turned about, through the origin of all positions; needed where
+        contacts with a position reach into the next sector, which is turned by 2 pi / sectors.
     """
 
     kind: Literal["cyclic"]
     sectors: Sectors
     mistuning: Mistuning | None = None
+    axis: Vector | None = None
 
 
 Structure = LumpedStructure | CyclicStructure | MatricesStructure
@@ -211,7 +229,7 @@ class Excitation(Part):
         that run forward and backward. The loads of the contacts follow the same pattern.
     """
 
-    dof: MemberName
+    dof: DofName
     amplitude: Signed
     phase: Angle = 0.0
     harmonic: HarmonicIndex = 1
@@ -231,7 +249,7 @@ class Observe(Part):
     ``tip@3`` in a cyclic scene is the tip of sector 3, ``tip`` that of sector 0.
     """
 
-    dof: MemberName
+    dof: DofName
     band: tuple[Positive, Positive]
 
     @field_validator("band")

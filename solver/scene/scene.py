@@ -14,7 +14,7 @@ from pydantic import (
     model_validator,
 )
 
-from solver.contacts.fields import End, Name, Part, parse_end
+from solver.contacts.fields import End, Name, NonNegative, Part, parse_end
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.coulomb import Contact
 from solver.contacts.laws.coulomb_2d import PlanarContact
@@ -24,10 +24,14 @@ from solver.contacts.laws.gap import GapSpring
 from solver.contacts.laws.polynomial import PolynomialSpring
 from solver.contacts.laws.registry import on_change
 from solver.errors import Issue, SceneError
+from solver.scene import kinematics
 from solver.scene import parameter_paths as scene_paths
+from solver.scene.bodies import Body, Load, Node
+from solver.scene.body_validation import body_issues
 from solver.scene.contacts import ContactOfAnyLaw
 from solver.scene.cyclic_validation import cyclic_issues
 from solver.scene.io import load_raw, scene_folder, shipped_scenes
+from solver.scene.kinematics import Form
 from solver.scene.parts import (
     KINDS,
     CyclicStructure,
@@ -41,11 +45,14 @@ from solver.scene.parts import (
     Spring,
     Structure,
 )
+from solver.scene.shape_parts import own_parts, with_shapes
+from solver.scene.shapes import AnyShape
 from solver.scene.validation import cross_issues, field_issues, plain
 
 __all__ = [
     "KINDS",
     "AnyContact",
+    "Body",
     "Contact",
     "ContactOfAnyLaw",
     "CyclicStructure",
@@ -55,10 +62,12 @@ __all__ = [
     "Excitation",
     "FrictionContact",
     "GapSpring",
+    "Load",
     "LumpedStructure",
     "Mass",
     "MatricesStructure",
     "Mistuning",
+    "Node",
     "Observe",
     "PlanarContact",
     "PolynomialSpring",
@@ -71,6 +80,7 @@ __all__ = [
 ]
 
 
+_OPTIONAL = ("bodies", "nodes", "loads", "dampers")  # tables that are left out where they are empty
 _FEW = 6  # contacts that are named where a scene says what it is
 
 
@@ -89,6 +99,16 @@ class Scene(Part):
         The forces, at least one. A single one may be given without a list.
     observe : Observe
         The DOF whose amplitude counts, and the band of frequencies [Hz].
+    bodies : tuple of Body
+        Rigid bodies, held by contacts and springs; their DOFs stand behind those of the structure.
+    nodes : tuple of Node
+        Positions of DOFs, for contacts with a place.
+    loads : tuple of Load
+        Constant forces.
+    dampers : tuple of Wedge, Cylinder, Asymmetric, SplitRing and Shroud
+        Dampers by their shape; their bodies and contacts are among `bodies` and `contacts`.
+    speed : float or None
+        Speed of rotation [1/min] of which bodies with a `radius_of_rotation` are loaded.
 
     Raises
     ------
@@ -104,6 +124,11 @@ class Scene(Part):
     contacts: tuple[ContactOfAnyLaw, ...] = ()
     excitation: tuple[Excitation, ...]
     observe: Observe
+    bodies: tuple[Body, ...] = ()
+    nodes: tuple[Node, ...] = ()
+    loads: tuple[Load, ...] = ()
+    dampers: tuple[AnyShape, ...] = ()
+    speed: NonNegative | None = None
 
     def __repr__(self) -> str:
         """Say in a line what it is; `to_dict` has all of it."""
@@ -112,7 +137,7 @@ class Scene(Part):
             names = f"{len(self.contacts)} of them"
         low, high = self.observe.band
         return (
-            f"<Scene {self.name}: {self.structure.kind}, {len(self.structure.dofs)} DOFs, contacts {names}, "
+            f"<Scene {self.name}: {self.structure.kind}, {len(self.dofs)} DOFs, contacts {names}, "
             f"{self.observe.dof} observed from {low:g} to {high:g} Hz>"
         )
 
@@ -144,10 +169,10 @@ class Scene(Part):
             scene, issues = handler(data), []
         except ValidationError as error:
             scene, issues = None, field_issues(error, raw)
-        issues = [*issues, *cross_issues(raw), *cyclic_issues(raw)]
+        issues = [*issues, *cross_issues(raw), *cyclic_issues(raw), *body_issues(raw)]
         if scene is None or issues:
             raise SceneError(issues)
-        return scene
+        return scene if not scene.dampers else scene.model_copy(update=with_shapes(scene))
 
     @classmethod
     def from_dict(cls, obj: Mapping[str, object]) -> Scene:
@@ -162,10 +187,27 @@ class Scene(Part):
 
     def to_dict(self) -> dict[str, object]:
         """The scene as tables and lists for JSON; `from_dict` gives back an equal scene."""
-        obj: dict[str, Any] = self.model_dump(mode="json", exclude_none=True)
+        own = self.model_copy(update=own_parts(self)) if self.dampers else self
+        empty = {key for key in _OPTIONAL if not getattr(own, key)}
+        obj: dict[str, Any] = own.model_dump(mode="json", exclude_none=True, exclude=empty)
         if len(self.excitation) == 1:
             obj["excitation"] = obj["excitation"][0]
         return obj
+
+    @property
+    def dofs(self) -> tuple[str, ...]:
+        """Names of all degrees of freedom: of the structure, then of the bodies."""
+        return kinematics.dof_names(self.structure, self.bodies)
+
+    @property
+    def forms(self) -> tuple[tuple[Form, ...], ...]:
+        """The relative motions of every contact as sums of DOFs."""
+        return kinematics.contact_forms(self)
+
+    @property
+    def forces(self) -> tuple[Excitation, ...]:
+        """The excitation, and the constant forces of loads and of rotation, each on a DOF."""
+        return (*self.excitation, *kinematics.static_forces(self))
 
     @property
     def engine_order(self) -> int:

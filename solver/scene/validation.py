@@ -17,6 +17,7 @@ from pydantic_core import ErrorDetails
 from solver.contacts.fields import GROUND, parse_end
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.errors import Issue
+from solver.scene.bodies import Body, Load, Node, body_dofs
 from solver.scene.contacts import LAW_TAG
 from solver.scene.parts import (
     KINDS,
@@ -30,10 +31,13 @@ from solver.scene.parts import (
     Reduction,
     Spring,
 )
+from solver.scene.shapes import SHAPES, WITH_BODY
 
 MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
-RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe")
-_SCENE_KEYS = ("name", "structure", "contacts", "excitation", "observe")
+RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe", "speed")
+_SCENE_KEYS = (
+    "name", "structure", "contacts", "excitation", "observe", "bodies", "nodes", "loads", "dampers", "speed",
+)  # fmt: skip
 _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     (): ("a scene", _SCENE_KEYS),
     ("structure", "lumped"): ("a lumped structure", tuple(LumpedStructure.model_fields)),
@@ -46,12 +50,25 @@ _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     ("structure", "mistuning"): ("mistuning", tuple(Mistuning.model_fields)),
     ("excitation",): ("an excitation", tuple(Excitation.model_fields)),
     ("observe",): ("observe", tuple(Observe.model_fields)),
+    ("bodies",): ("a body", tuple(Body.model_fields)),
+    ("nodes",): ("a node", tuple(Node.model_fields)),
+    ("loads",): ("a load", tuple(Load.model_fields)),
+    **{
+        ("dampers", shape): (f"a damper of the shape `{shape}`", tuple(each.model_fields))
+        for shape, each in SHAPES.items()
+    },
 }
 
 
 def between_keys() -> tuple[str, ...]:
     """The keys of ends of a contact, of whatever law."""
     return tuple(dict.fromkeys(key for law in laws().values() for key in law.END_KEYS))
+
+
+def _tags(table: str) -> tuple[str, tuple[str, ...]]:
+    """The key that tells the kinds of a table apart, and its words."""
+    words = {"contacts": ("law", tuple(laws())), "dampers": ("shape", tuple(SHAPES))}
+    return words.get(table, ("kind", KINDS))
 
 
 def _contact_keys() -> dict[tuple[str, ...], tuple[str, tuple[str, ...]]]:
@@ -136,7 +153,7 @@ def _field_issue(found: ErrorDetails, raw: dict[str, Any]) -> Issue:
         known = f"known keys: {listing(keys)}{nearest(key, keys)}"
         message = f"`{key}` = {quoted(last)} is not a key of {table}; {known}"
     elif kind in ("union_tag_invalid", "union_tag_not_found"):
-        tag, tags = ("law", tuple(laws())) if steps[:1] == ["contacts"] else ("kind", KINDS)
+        tag, tags = _tags(str(steps[0]) if steps else "")
         got = last.get(tag) if isinstance(last, dict) else None
         steps = [*steps, tag]
         hint = nearest(got, tags) if isinstance(got, str) else ""
@@ -150,7 +167,7 @@ def _field_issue(found: ErrorDetails, raw: dict[str, Any]) -> Issue:
         message = f"`{key}` {_WANTED[kind]}, got {quoted(last)}"
     else:
         message = f"`{key}`: {found['msg']}, got {quoted(last)}"
-    return Issue(pointer=_pointer(steps), message=message)
+    return Issue(pointer=pointer_of(steps), message=message)
 
 
 def _key(steps: Sequence[int | str]) -> str:
@@ -181,7 +198,8 @@ def _table(loc: tuple[int | str, ...]) -> tuple[str, tuple[str, ...]]:
     return _KEYS[()]
 
 
-def _pointer(steps: Iterable[int | str]) -> str:
+def pointer_of(steps: Iterable[int | str]) -> str:
+    """A JSON pointer."""
     return "".join("/" + str(step).replace("~", "~0").replace("/", "~1") for step in steps)
 
 
@@ -190,13 +208,13 @@ def cross_issues(raw: dict[str, Any]) -> list[Issue]:
     structure = raw.get("structure")
     structure = structure if isinstance(structure, dict) else {}
     table = "dofs" if structure.get("kind") == "matrices" else "masses"
-    dofs = _dof_names(structure.get(table), table)
+    dofs = dofs_of(raw)
     cyclic = structure.get("kind") == "cyclic"
     found = chain(
         _reserved_dofs(dofs or (), table, cyclic),
         _end_issues(raw, structure, dofs, cyclic),
         _dof_issues(raw, dofs, structure.get("sectors") if cyclic else 0),
-        _duplicates(_structure_names(structure), "structure"),
+        duplicates(_structure_names(structure), "structure"),
         _contact_name_issues(raw, cyclic),
         _engine_order_issues(raw, structure.get("kind")),
     )
@@ -204,6 +222,20 @@ def cross_issues(raw: dict[str, Any]) -> list[Issue]:
 
 
 _Known = dict[str, None]
+
+
+def dofs_of(raw: dict[str, Any]) -> _Known | None:
+    """The names of all DOFs, those of bodies behind the structure's; None if they cannot be told."""
+    structure = raw.get("structure")
+    structure = structure if isinstance(structure, dict) else {}
+    table = "dofs" if structure.get("kind") == "matrices" else "masses"
+    own = _dof_names(structure.get(table), table)
+    if own is None:
+        return None
+    shapes = [row for _, row in rows_of(raw, "dampers") if row.get("shape") in WITH_BODY]
+    bodies = [*(row for _, row in rows_of(raw, "bodies")), *shapes]
+    bodies = [row for row in bodies if isinstance(row.get("name"), str)]
+    return own | dict.fromkeys(dof for row in bodies for dof in body_dofs(row["name"], row.get("plane")))
 
 
 def _dof_names(given: object, table: str) -> _Known | None:
@@ -217,7 +249,7 @@ def _dof_names(given: object, table: str) -> _Known | None:
 
 def _reserved_dofs(dofs: Iterable[str], table: str, cyclic: bool) -> Iterator[Issue]:
     for dof in dofs:
-        pointer = _pointer(["structure", table, dof])
+        pointer = pointer_of(["structure", table, dof])
         if dof == GROUND:
             what = "mass" if table == "masses" else "DOF"
             yield Issue(pointer=pointer, message=f"`{GROUND}` is reserved: give the {what} another name")
@@ -225,7 +257,7 @@ def _reserved_dofs(dofs: Iterable[str], table: str, cyclic: bool) -> Iterator[Is
             yield Issue(pointer=pointer, message=f"`{dof}`: no '@' in a DOF of a cyclic structure")
 
 
-def _rows(table: dict[str, Any], key: str) -> Iterator[tuple[list[int | str], dict[str, Any]]]:
+def rows_of(table: dict[str, Any], key: str) -> Iterator[tuple[list[int | str], dict[str, Any]]]:
     """The tables under `key`, whether one or a list, with their steps."""
     rows = table.get(key)
     if isinstance(rows, dict):
@@ -235,13 +267,21 @@ def _rows(table: dict[str, Any], key: str) -> Iterator[tuple[list[int | str], di
             yield [key, i], row
 
 
+def in_space(contact: dict[str, Any]) -> bool:
+    """Whether a contact is one between bodies and nodes, not DOFs."""
+    return contact.get("normal") is not None or contact.get("motions") is not None
+
+
 def _end_issues(
     raw: dict[str, Any], structure: dict[str, Any], dofs: _Known | None, cyclic: bool
 ) -> Iterator[Issue]:
     elements = [
-        (["structure", *steps], row) for key in ("springs", "dampers") for steps, row in _rows(structure, key)
+        (["structure", *steps], row)
+        for key in ("springs", "dampers")
+        for steps, row in rows_of(structure, key)
     ]
-    for steps, row in [*elements, *_rows(raw, "contacts")]:
+    contacts = [each for each in rows_of(raw, "contacts") if not in_space(each[1])]
+    for steps, row in [*elements, *contacts]:
         for key in between_keys():
             yield from _pair_issues([*steps, key], row.get(key), dofs, cyclic)
 
@@ -252,10 +292,10 @@ def _pair_issues(steps: list[int | str], pair: object, dofs: _Known | None, cycl
         return
     key = steps[-1]
     if pair[0] == pair[1]:
-        yield Issue(pointer=_pointer(steps), message=f"`{key}` must join two different ends, got {pair!r}")
+        yield Issue(pointer=pointer_of(steps), message=f"`{key}` must join two different ends, got {pair!r}")
     elif all(parse_end(end).next for end in pair):
         message = f"`{key}` must have one end in this sector, got {pair!r}"
-        yield Issue(pointer=_pointer(steps), message=message)
+        yield Issue(pointer=pointer_of(steps), message=message)
     for i, end in enumerate(pair):
         yield from _one_end([*steps, i], end, dofs, cyclic)
 
@@ -264,26 +304,27 @@ def _one_end(steps: list[int | str], text: str, dofs: _Known | None, cyclic: boo
     end, key = parse_end(text), str(steps[-2])
     if end.next and not cyclic:
         message = f"`{key}`: {text!r} needs a cyclic structure; this one has no next sector"
-        yield Issue(pointer=_pointer(steps), message=message)
+        yield Issue(pointer=pointer_of(steps), message=message)
     if end.dof is not None and dofs is not None and end.dof not in dofs:
-        yield Issue(pointer=_pointer(steps), message=_unknown_dof(key, text, end.dof, [*dofs, GROUND]))
+        yield Issue(pointer=pointer_of(steps), message=unknown_dof(key, text, end.dof, [*dofs, GROUND]))
 
 
-def _unknown_dof(key: str, text: str, dof: str, known: Sequence[str]) -> str:
+def unknown_dof(key: str, text: str, dof: str, known: Sequence[str]) -> str:
+    """What to say of a DOF that does not exist."""
     return f"`{key}`: there is no DOF {quoted(text)}; known: {listing(known)}{nearest(dof, known)}"
 
 
 def _dof_issues(raw: dict[str, Any], dofs: _Known | None, sectors: object) -> Iterator[Issue]:
     if dofs is None:
         return
-    for steps, row in [*_rows(raw, "excitation"), *_rows(raw, "observe")]:
+    for steps, row in [*rows_of(raw, "excitation"), *rows_of(raw, "observe")]:
         dof = row.get("dof")
         if isinstance(dof, str) and steps[0] == "observe" and isinstance(sectors, int):
             base, _, sector = dof.rpartition("@")
             if base in dofs and sector.isdecimal() and int(sector[:10]) < sectors:
                 continue
         if isinstance(dof, str) and dof not in dofs:
-            yield Issue(pointer=_pointer([*steps, "dof"]), message=_unknown_dof("dof", dof, dof, list(dofs)))
+            yield Issue(pointer=pointer_of([*steps, "dof"]), message=unknown_dof("dof", dof, dof, list(dofs)))
 
 
 _Named = list[tuple[list[int | str], str]]
@@ -294,7 +335,7 @@ def _structure_names(structure: dict[str, Any]) -> _Named:
     rows: list[tuple[list[int | str], Any]] = [
         (["masses", dof], mass) for dof, mass in (masses.items() if isinstance(masses, dict) else ())
     ]
-    rows += [row for key in ("springs", "dampers") for row in _rows(structure, key)]
+    rows += [row for key in ("springs", "dampers") for row in rows_of(structure, key)]
     return [
         (["structure", *steps, "name"], row["name"])
         for steps, row in rows
@@ -302,10 +343,11 @@ def _structure_names(structure: dict[str, Any]) -> _Named:
     ]
 
 
-def _duplicates(named: _Named, what: str) -> Iterator[Issue]:
+def duplicates(named: _Named, what: str) -> Iterator[Issue]:
+    """Names that are given twice."""
     seen: dict[str, str] = {}
     for steps, name in named:
-        pointer = _pointer(steps)
+        pointer = pointer_of(steps)
         if name in seen:
             message = f"`name` = {name!r} is taken by {seen[name]}: names in {what} must differ"
             yield Issue(pointer=pointer, message=message)
@@ -313,29 +355,31 @@ def _duplicates(named: _Named, what: str) -> Iterator[Issue]:
 
 
 def _contact_name_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
-    rows = list(_rows(raw, "contacts"))
+    rows = list(rows_of(raw, "contacts"))
     names: _Named = [([*s, "name"], row["name"]) for s, row in rows if isinstance(row.get("name"), str)]
     groups: _Named = [([*s, "group"], row["group"]) for s, row in rows if isinstance(row.get("group"), str)]
-    yield from _duplicates(names, "contacts")
+    yield from duplicates(names, "contacts")
     taken = {name for _, name in names}
     for steps, name in [*names, *groups]:
         key = steps[-1]
         if name in RESERVED_PREFIXES:
             message = f"`{key}` = {name!r} is reserved in parameter paths: give the contact another {key}"
-            yield Issue(pointer=_pointer(steps), message=message)
+            yield Issue(pointer=pointer_of(steps), message=message)
         if key == "group" and name in taken:
-            yield Issue(pointer=_pointer(steps), message=f"`group` = {name!r} is also the name of a contact")
+            yield Issue(
+                pointer=pointer_of(steps), message=f"`group` = {name!r} is also the name of a contact"
+            )
         if cyclic and "@" in name:
-            yield Issue(pointer=_pointer(steps), message=f"`{key}` = {name!r}: no '@' in a cyclic scene")
+            yield Issue(pointer=pointer_of(steps), message=f"`{key}` = {name!r}: no '@' in a cyclic scene")
 
 
 def _engine_order_issues(raw: dict[str, Any], kind: object) -> Iterator[Issue]:
     first: object = None
-    for steps, row in _rows(raw, "excitation"):
+    for steps, row in rows_of(raw, "excitation"):
         order = row.get("engine_order")
         if order is None:
             continue
-        pointer = _pointer([*steps, "engine_order"])
+        pointer = pointer_of([*steps, "engine_order"])
         if kind in ("lumped", "matrices"):
             message = (
                 f"`engine_order` = {quoted(order)} needs a cyclic structure; remove it from a {kind} one"

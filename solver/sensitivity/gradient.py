@@ -21,7 +21,13 @@ from solver.balance.dynamic_stiffness import WholeMotion, times, whole_motion
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Kind
-from solver.balance.parameter_derivatives import contact_slopes, matrices_of_paths, modal_dampings, resolved
+from solver.balance.parameter_derivatives import (
+    check_smooth_structure,
+    contact_slopes,
+    matrices_of_paths,
+    modal_dampings,
+    resolved,
+)
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.laws import law_force
@@ -181,11 +187,11 @@ class Sensitivities:
         Raises
         ------
         SettingError
-            A contact that is not elastic Coulomb friction under a given load, or paths of one load that
-            contradict each other.
+            A contact that is not elastic Coulomb friction under a given load, paths of one load that
+            contradict each other, or paths on which loads or places of contacts do not depend linearly.
         """
         system = self.balance.system
-        check_laws(self.balance.scene)
+        self.check_second()
         check_loads(system, self._parameters, self._slopes)
         u, omega = np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz
         found = self._slopes_of(u, omega)
@@ -214,6 +220,11 @@ class Sensitivities:
             by_frequency_twice=float(twice[0, 0]) * TWO_PI**2, mixed=twice[0, 1:] * TWO_PI,
             hessian=twice[1:, 1:],
         )  # fmt: skip
+
+    def check_second(self) -> None:
+        """Raise SettingError where laws or paths have no exact second derivatives here."""
+        check_laws(self.balance.scene)
+        check_smooth_structure(self.balance.scene, self._parameters)
 
     def peak_hessian(self, solution: Real, at_hz: float) -> PeakHessian:
         """Return a peak, where the amplitude is stationary in the frequency, to second order; as `hessian`.
@@ -254,13 +265,16 @@ class Sensitivities:
             return None
         if factorise(workspace.system, workspace.linear, workspace.point, u, 0.0, 0.0) == 0.0:
             return None
-        x = motion.solve(motion.forces - motion.pushed(amplitudes.of(contacts.F - shift * contacts.U)))
-        rates = along.level[:, None] + 1j * along.phase[:, None] * (amplitudes.ks > 0)
+        forces = amplitudes.of(contacts.F - shift * contacts.U)
+        x = motion.solve(motion.forces - motion.pushed(forces))
+        moving = amplitudes.ks > 0
+        scaled = moving if self.balance.system.constant_mean else np.ones(moving.shape)
+        rates = along.level[:, None] * scaled + 1j * along.phase[:, None] * moving
         pushes = rates[:, :, None] * motion.forces
         pushes -= motion.pushed(amplitudes.of(contacts.along(along.slopes, along.loads)))
         pushes[0] -= times(motion.by_omega, x)
-        for i, (by_q, _) in motion.by_structure.items():
-            pushes[i + 1] -= times(by_q, x)
+        for i in motion.by_structure:
+            pushes[i + 1] += motion.push(i, x, forces)
         v = motion.solve(pushes)
         dU = amplitudes.coefficients(motion.relative(v))
         for row in dU.reshape(len(dU), u.size):
@@ -309,17 +323,22 @@ class Sensitivities:
             slopes[i] += float(np.sum(weights[begin:end] * point.dF_dp[begin:end]))
 
     def _add_structure(self, u: Real, omega: float, top: int, slopes: Real) -> None:
-        """Add −Re yᵀ (∂Z/∂q) x of every harmonic."""
+        """Add Re yᵀ (∂f/∂q − (∂L/∂q)ᴴ F − (∂Z/∂q) x) − Re λᵀ (∂L/∂q) x of every harmonic."""
         try:
             motion = whole_motion(self.balance.system, self._matrices, self._dampings, omega)
         except np.linalg.LinAlgError:
             slopes[[p.kind is Kind.STRUCTURE for p in self._parameters]] = math.nan
             return
         shifted = self._point.F - self.balance.system.shift[:, None] * u.reshape(self._weights[top].shape)
-        x = motion.solve(motion.forces - motion.pushed(self._amplitudes.of(shifted)))
+        forces = self._amplitudes.of(shifted)
+        x = motion.solve(motion.forces - motion.pushed(forces))
         y = self._adjoint_motion(motion, top)
-        for i, (by_q, _) in motion.by_structure.items():
-            slopes[i] -= np.vdot(y.conj(), times(by_q, x)).real
+        for i in motion.by_structure:
+            slopes[i] += np.vdot(y.conj(), motion.push(i, x, forces)).real
+            moved = motion.moved(i, x)
+            if moved is not None:
+                pulls = self._amplitudes.of(self._pulls[top].reshape(self._weights[top].shape))
+                slopes[i] -= np.vdot(pulls, moved).real
 
     def _adjoint_motion(self, motion: WholeMotion, top: int) -> Complex:
         """Return y = Z⁻ᵀ η, η the weights of the motion in the amplitude and the balance."""

@@ -133,7 +133,7 @@ def blade_peaks(
     """
     name = scene.observe.dof.partition("@")[0] if dof is None else dof
     structure = scene.structure
-    names, repeats = [scene.structure.dofs[i] for i in _rows(scene, name)], 1
+    names, repeats = [scene.dofs[i] for i in _rows(scene, name)], 1
     if isinstance(structure, CyclicStructure):
         names, repeats = [name], structure.sectors
         if sectors_needed(_observing(scene, name)).sectors > 1:
@@ -249,7 +249,7 @@ def blade_amplitudes(solution: Solution, dof: str | None = None) -> BladeAmplitu
 
 def _rows(scene: Scene, name: str) -> list[int]:
     """Index of a DOF in each sector; in a cyclic scene the same one again and again."""
-    dofs, structure = scene.structure.dofs, scene.structure
+    dofs, structure = scene.dofs, scene.structure
     if isinstance(structure, CyclicStructure):
         rows = [dofs.index(name)] * structure.sectors if name in dofs else []
     else:

@@ -167,9 +167,11 @@ def _condensation(balance: Balance) -> Effect:
 
 
 def _linear_dofs(scene: Scene) -> int:
-    """DOFs of the structure, of which a structure given by matrices names only those in use."""
-    structure = scene.structure
-    return structure.n_coordinates if isinstance(structure, MatricesStructure) else len(structure.dofs)
+    """DOFs of structure and bodies; a structure given by matrices names only those in use."""
+    structure, named = scene.structure, len(scene.dofs)
+    if isinstance(structure, MatricesStructure):
+        return structure.n_coordinates + named - len(structure.dofs)
+    return named
 
 
 def _reduction(scene: Scene) -> tuple[Effect, ...]:

@@ -14,7 +14,7 @@ from solver.contacts.laws.parts import Follows, Row
 from solver.marching.contacts import columns
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels.taylor import run_periods
-from solver.scene.scene import End
+from solver.scene.kinematics import Term
 
 DATA = json.loads((Path(__file__).parent.parent / "data" / "three_d.json").read_text())
 CASES: dict[str, Any] = DATA["cases"]
@@ -38,22 +38,16 @@ def matrices(scene: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 def contact_rows(contact: dict[str, Any]) -> tuple[Row, ...]:
     """The rows of a contact in space: two, of which the first presses."""
-
-    def pair(dof: str) -> tuple[End, End]:
-        return End(dof, False), End(None, False)
-
     box = contact["limit"] == "box"
     given: dict[str, Any] = {
         "kt": contact["kt"], "mu": contact["mu"], "N0": contact["N0"], "N1": contact["N1"],
-        "kn": contact["kn"], "normal_ends": pair("z"),
+        "kn": contact["kn"], "normal_port": 2,
     }  # fmt: skip
     rest = max(contact["N0"], 0.0) if contact["prestressed"] else 0.0
     follows = (Follows.RUBBING,) * 2 if box else (Follows.CIRCLE, Follows.CIRCLE_SECOND)
-    first = Row(name="rub", ends=pair("x"), follows=follows[0], rest=rest, **given)
+    first = Row(name="rub", follows=follows[0], rest=rest, **given)
     given["kt"] = contact.get("kt_second", contact["kt"])
-    return first, Row(
-        name="rub (second)", ends=pair("y"), follows=follows[1], rest=rest, presses=0.0, **given
-    )
+    return first, Row(name="rub (second)", port=1, follows=follows[1], rest=rest, presses=0.0, **given)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +73,7 @@ def march_case(scene: dict[str, Any], frequency_hz: float, tolerance: float = 1e
     parts = (inverse @ K / omega**2, inverse @ C / omega, inverse / omega**2)
     flat = [array for part in parts for array in sparse(part)]
     index = {dof: i for i, dof in enumerate(DOFS)}
+    forms = tuple((Term(dof, False, 1.0),) for dof in DOFS)
     forces = scene["excitation"]
     arrays = dict(zip(kernel.System._fields[:9], flat, strict=True))
     system = kernel.System(
@@ -87,7 +82,7 @@ def march_case(scene: dict[str, Any], frequency_hz: float, tolerance: float = 1e
         force_amplitude=np.array([force["amplitude"] for force in forces]),
         force_phase=np.array([force["phase"] for force in forces]),
         force_harmonic=np.ones(len(forces), np.int64),
-        **columns(contact_rows(scene["contacts"][0]), index),
+        **columns([(row, forms) for row in contact_rows(scene["contacts"][0])], index, 3),
     )
     state = kernel.State(np.zeros(3), np.zeros(3), np.zeros(2), np.full(2, kernel.STICK))
     nothing = kernel.Record(np.empty(0), np.empty(0), *(np.empty((2, 0)) for _ in range(3)))

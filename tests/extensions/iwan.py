@@ -108,6 +108,6 @@ class IwanContact(AnyContact):
 
     def rows(self) -> tuple[Row, ...]:
         return tuple(
-            Row(name=f"{self.name} ({i + 1})", ends=self.pair_ends[0], kt=self.k / SLIDERS, mu=1.0, N0=limit)
+            Row(name=f"{self.name} ({i + 1})", kt=self.k / SLIDERS, mu=1.0, N0=limit)
             for i, limit in enumerate(self.limits)
         )

@@ -69,7 +69,7 @@ def test_json_and_toml_are_read() -> None:
     assert all(json.loads(text) for text in blocks("json"))
     assert all(tomllib.loads(text) for text in blocks("toml"))
     starts = {next(line for line in text.splitlines() if not line.startswith("#")) for text in blocks("toml")}
-    known = ("name = ", "scene = ", "[structure.mistuning]", "[[contacts]]")
+    known = ("name = ", "scene = ", "[structure.mistuning]", "[[contacts]]", "[[dampers]]")
     assert [start for start in starts if not start.startswith(known)] == []
 
 

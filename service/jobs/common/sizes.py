@@ -179,10 +179,10 @@ def dofs_solved(scene: Scene) -> int:
     # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
     from solver.scene.annulus import sectors_needed
 
-    return len(scene.structure.dofs) * sectors_needed(scene).sectors
+    return len(scene.dofs) * sectors_needed(scene).sectors
 
 
 def whole_disk_dofs(scene: Scene) -> int:
     """The DOFs of all sectors."""
     structure = scene.structure
-    return len(structure.dofs) * (structure.sectors if isinstance(structure, CyclicStructure) else 1)
+    return len(scene.dofs) * (structure.sectors if isinstance(structure, CyclicStructure) else 1)

@@ -154,8 +154,8 @@ def _issues(request: MistuningRequest, scene: Scene, start: float, stop: float) 
     issues += size_issues("/samples", words, sweeps, request.harmonics, whole_disk_dofs(scene))
     # Drawn only if there are not too many.
     issues = issues or _factor_issues(request, scene)
-    if request.dof is not None and request.dof not in structure.dofs:
-        known = ", ".join(structure.dofs)
+    if request.dof is not None and request.dof not in scene.dofs:
+        known = ", ".join(scene.dofs)
         issues.append(
             refusal("/dof", f"`dof` must be a DOF of every sector, one of {known}, got {request.dof!r}")
         )

@@ -115,7 +115,7 @@ def scene_section(scene: Scene) -> str:
         contacts.append([contact.name, " – ".join(contact.between), ", ".join(values)])
     low, high = scene.observe.band
     about = [
-        ("structure", f"{scene.structure.kind}, {len(scene.structure.dofs)} DOFs"),
+        ("structure", f"{scene.structure.kind}, {len(scene.dofs)} DOFs"),
         *(("force", f"{force.amplitude:g} N on {force.dof}") for force in scene.excitation),
         ("observed", f"{scene.observe.dof}, {low:g} to {high:g} Hz"),
     ]

@@ -27,7 +27,7 @@ def scenes(known: Sequence[Scene]) -> None:
         (
             scene.name,
             scene.structure.kind,
-            str(len(scene.structure.dofs)),
+            str(len(scene.dofs)),
             ", ".join(contact.name for contact in scene.contacts),
             scene.observe.dof,
             f"{scene.observe.band[0]:g} to {scene.observe.band[1]:g} Hz",

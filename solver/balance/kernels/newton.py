@@ -146,6 +146,8 @@ def arc_newton(
 def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
     """Fill `u` with the response of fully stuck contacts; return the load that must be added to keep it so.
 
+    Contacts that open and close begin closed where loads press the parts together.
+
     (I + A kt) u = ū harmonic by harmonic; a contact stays stuck while max|kt u| ≤ μ (N0 − |N1| + added).
     """
     nc, n = system.owner.size, coefficient_count(system.ks)
@@ -155,7 +157,7 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
         for c in range(nc):
             for d in range(nc):
                 e = system.owner[d]
-                held = _held_stiffness(table[e], system.held[d])
+                held = _held_stiffness(table[e], system.held[d], system.constant_mean)
                 matrix[c, d] = linear.A[0, i, c, d] * (held - system.shift[d])
             matrix[c, c] += 1.0
         good = invert(matrix, inverse)
@@ -181,9 +183,12 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
 
 
 @compiled
-def _held_stiffness(row: Real, held: Integer) -> float:
-    """Return the stiffness [N/m] a port begins with: closed and stuck if it presses at rest, else open."""
-    if held[2] != 0 and held[2] * row[held[1]] <= 0.0:
+def _held_stiffness(row: Real, held: Integer, pressed: int) -> float:
+    """Return the stiffness [N/m] a port begins with: closed and stuck if it presses at rest, else open.
+
+    Where loads press the parts together (`pressed`) contacts begin closed.
+    """
+    if pressed == 0 and held[2] != 0 and held[2] * row[held[1]] <= 0.0:
         return 0.0
     return float(row[held[0]])
 

@@ -33,7 +33,7 @@ def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, 
         tied = not math.isnan(row[RATIO])
         if system.active[c] > 0.0 and system.kind >= COLUMN_KIND:
             column = system.kind - COLUMN_KIND
-            row[column], d[column] = p, 1.0
+            row[column], d[column] = system.active[c] * p, system.active[c]
             tied = column == RATIO or (tied and column != N1)
         if tied:
             row[N1] = row[RATIO] * row[N0]

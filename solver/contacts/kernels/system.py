@@ -57,7 +57,7 @@ class System(NamedTuple):
     rubs: Integer  # (nc,) 1: friction, which a larger normal load would hold, else 0
     held: Integer  # (nc, 3) of the stiffness at rest: its column, and the column and sign of what must be > 0
     contacts: Real  # (ne, COLUMNS) kt, mu, N0, N1, N1_ratio (NaN: not tied), N1_phase, and a law's own
-    active: Real  # (ne,) 1.0 where λ acts
+    active: Real  # (ne,) share of λ in the number it changes, 0.0 where it does not act
     shift: Real  # (nc,) stiffness moved into the structure [N/m]
     loose: Real  # (nr, nc) ports' part in the rigid-body motions of what contacts alone hold, see `loose`
     hold: int  # 1: where no contact holds such a part, a constant force does
@@ -66,6 +66,7 @@ class System(NamedTuple):
     kind: int  # what λ is
     omega: float  # rad/s, when λ is not the frequency
     level_reference: float  # N, the excitation amplitude at level 1
+    constant_mean: int  # 1: constant forces are loads, which the level of the excitation leaves alone
     phase_reference: float  # rad
     parameter_reference: float  # the value of a structural parameter at which K, M, C stand
     least_size: float  # m, motions of the contacts far below it are rounding of what cancels in ū
@@ -85,6 +86,7 @@ class System(NamedTuple):
     L: Complex  # (ns, nc, n)
     observe: Complex  # (n,)
     forces: Complex  # (nk, n) f̂_k at level 1
+    dforces: Complex  # (2, nk, n) first and second derivatives by the structural parameter
 
 
 class Receptance(NamedTuple):

@@ -14,7 +14,10 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
-from solver.contacts.fields import Between, Element, End, MemberName, Name, Real, parse_end
+from pydantic import model_validator
+
+from solver.contacts.fields import Between, Element, MemberName, Name, Real
+from solver.contacts.frames import NORMAL, TANGENT_1, TANGENT_2, InSpace
 from solver.contacts.laws.parts import Held, Motion, NormalLoad, Piece, Quantity, Row, Slider
 from solver.errors import SettingError
 
@@ -22,7 +25,10 @@ if TYPE_CHECKING:
     from solver.contacts.segments import Shares
 
 
-class AnyContact(Element):
+_ALONG = {"between": TANGENT_1, "between_second": TANGENT_2, "normal_between": NORMAL}
+
+
+class AnyContact(Element, InSpace):
     """What all contacts have.
 
     Attributes
@@ -47,6 +53,10 @@ class AnyContact(Element):
     """What the schema of scenes says of keys, in place of the docstring's words."""
     END_KEYS: ClassVar[tuple[str, ...]] = ("between",)
     """The keys of the ends of each relative motion the force depends on, port after port."""
+    NEEDED_ENDS: ClassVar[tuple[str, ...]] = ()
+    """Those beside `between` that may not be left out, but in space."""
+    DIRECTIONS: ClassVar[tuple[int, ...]] = ()
+    """The direction of each of these in space; told by the keys if left out."""
     HELD: ClassVar[tuple[Held, ...]]
     """What each port begins with at rest."""
 
@@ -66,12 +76,27 @@ class AnyContact(Element):
     name: MemberName
     group: Name | None = None
 
+    @model_validator(mode="after")
+    def _a_motion_each(self) -> Self:
+        count = len(self.end_keys)
+        if self.motions is not None and len(self.motions) != count:
+            raise ValueError(
+                f"`motions` of contact `{self.name}` must be {count}, one for each relative motion of its "
+                f"law, got {len(self.motions)}"
+            )
+        return self
+
     # Ports
 
     @property
     def end_keys(self) -> tuple[str, ...]:
-        """The keys of the ends of its relative motions, port after port: those of `END_KEYS` it was given."""
+        """The keys of the ends of its relative motions, port after port: those of `END_KEYS` it has."""
         return self.END_KEYS
+
+    @property
+    def directions(self) -> tuple[int, ...]:
+        """The direction of each relative motion of a contact with a `normal`."""
+        return self.DIRECTIONS or tuple(_ALONG.get(key, TANGENT_1) for key in self.end_keys)
 
     @property
     def held(self) -> tuple[Held, ...]:
@@ -87,13 +112,8 @@ class AnyContact(Element):
 
     @property
     def pairs(self) -> tuple[Between, ...]:
-        """The ends of each relative motion the force depends on."""
+        """The ends of each relative motion the force depends on, DOFs; of a contact without a `normal`."""
         return tuple(getattr(self, key) for key in self.end_keys)
-
-    @property
-    def pair_ends(self) -> tuple[tuple[End, End], ...]:
-        """The same, read."""
-        return tuple((parse_end(first), parse_end(second)) for first, second in self.pairs)
 
     def value_of(self, key: str) -> float:
         """Value of a parameter.
@@ -139,7 +159,7 @@ class AnyContact(Element):
     @property
     def stiffnesses(self) -> tuple[float, ...]:
         """A stiffness of each relative motion [N/m]: what holds it when the contact is closed and stuck."""
-        return (0.0,) * len(self.pairs)
+        return (0.0,) * len(self.end_keys)
 
     def fill(self, row: Real, highest: int) -> None:
         """Put its numbers into its row of the contact table, for harmonics up to `highest`."""
@@ -147,7 +167,7 @@ class AnyContact(Element):
         for key, quantity in self.PARAMETERS.items():
             row[quantity.column] = self.value_of(key)
 
-    def at(self, row: Real) -> Self:
+    def with_numbers(self, row: Real) -> Self:
         """The contact with the numbers of a row of the contact table."""
         numbers = {key: float(row[quantity.column]) for key, quantity in self.PARAMETERS.items()}
         return self.model_copy(update=numbers)

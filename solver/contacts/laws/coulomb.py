@@ -96,7 +96,7 @@ class Contact(SlidesOnALine):
 
     def rows(self) -> tuple[Row, ...]:
         """Return its row of the time march."""
-        return (Row(name=self.name, ends=self.pair_ends[0], **self.row_numbers()),)
+        return (Row(name=self.name, **self.row_numbers()),)
 
 
 LAW = Contact

@@ -26,8 +26,8 @@ class PlanarContact(SlidesInAPlane):
 
     Attributes
     ----------
-    between_second : (str, str)
-        The ends of the motion in the second direction.
+    between_second : (str, str) or None
+        The ends of the motion in the second direction. Left out where `normal` is given.
     limit : "circle", "box" or None
         |T| <= mu N for the whole force (also if left out), or each direction by itself.
     samples : int or None
@@ -38,6 +38,7 @@ class PlanarContact(SlidesInAPlane):
     LAW: ClassVar[str] = "coulomb-2d"
     FORCE: ClassVar[str] = "friction in two directions with one limit"
     END_KEYS: ClassVar[tuple[str, ...]] = ("between", "between_second")
+    NEEDED_ENDS: ClassVar[tuple[str, ...]] = ("between_second",)
     HELD: ClassVar[tuple[Held, ...]] = (Held(columns.KT), Held(columns.KT))
 
     law: Literal["coulomb-2d"]
@@ -71,9 +72,9 @@ class PlanarContact(SlidesInAPlane):
         if self._sampled is not None:
             row[columns.SAMPLES] = max(self._sampled, 4 * highest)
 
-    def at(self, row: Real) -> Self:
+    def with_numbers(self, row: Real) -> Self:
         """The contact with the numbers of a row of the contact table."""
-        moved = super().at(row)
+        moved = super().with_numbers(row)
         if self._sampled is None:
             return moved
         return moved.model_copy(update={"samples": int(row[columns.SAMPLES])})

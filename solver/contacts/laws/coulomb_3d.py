@@ -24,15 +24,16 @@ class SpaceContact(SlidesInAPlane):
 
     Attributes
     ----------
-    between_second : (str, str)
-        The ends of the motion in the second direction.
+    between_second : (str, str) or None
+        The ends of the motion in the second direction. Left out where `normal` is given.
     normal_between : (str, str) or None
-        The ends of the normal motion v = x(first) - x(second), v > 0 presses; None: the load is given.
+        The ends of the normal motion v = x(first) - x(second), v > 0 presses; None: the load is given. Left
+        out where `normal` is given: the load then moves if there is a `kn`.
     kt, kt_second : float
         Tangential stiffness of the first and of the second direction [N/m]; the second is the first's if
         left out.
     kn : float or None
-        Normal contact stiffness [N/m]; given together with `normal_between`.
+        Normal contact stiffness [N/m]; given together with `normal_between` or `normal`.
     N0 : float
         Mean load, or load at v = 0 [N]; -kn * gap for an initial gap.
     prestressed : bool
@@ -61,6 +62,7 @@ class SpaceContact(SlidesInAPlane):
         "N0": "Mean load, or load at v = 0 [N]; -kn times the gap for an initial gap.",
     }
     END_KEYS: ClassVar[tuple[str, ...]] = ("between", "between_second", "normal_between")
+    NEEDED_ENDS: ClassVar[tuple[str, ...]] = ("between_second",)
     HELD: ClassVar[tuple[Held, ...]] = (
         Held(columns.KT, *_CLOSED), Held(columns.KT_SECOND, *_CLOSED), Held(columns.KN, *_CLOSED),
     )  # fmt: skip
@@ -73,17 +75,18 @@ class SpaceContact(SlidesInAPlane):
 
     @model_validator(mode="after")
     def _load_moves_or_is_given(self) -> SpaceContact:
-        if (self.normal_between is None) != (self.kn is None):
+        in_space = self.normal is not None or self.motions is not None
+        if not in_space and (self.normal_between is None) != (self.kn is None):
             missing, given = ("kn", "normal_between") if self.kn is None else ("normal_between", "kn")
             raise ValueError(
                 f"`{missing}` of contact `{self.name}` is missing beside `{given}`: give both for a load "
                 "that moves with the parts, or neither for one that is given"
             )
-        if self.normal_between is None and self.N0 < 0.0:
+        if self.kn is None and self.N0 < 0.0:
             raise ValueError(
                 f"`N0` of contact `{self.name}` must be >= 0 where the load is given, got {self.N0!r}"
             )
-        if self.normal_between is None and self.prestressed:
+        if self.kn is None and self.prestressed:
             raise ValueError(f"`prestressed` of contact `{self.name}` needs `normal_between` and `kn`")
         return self
 
@@ -92,18 +95,18 @@ class SpaceContact(SlidesInAPlane):
     @property
     def end_keys(self) -> tuple[str, ...]:
         """The keys of the ends of its relative motions."""
-        return self.END_KEYS if self.normal_between is not None else self.END_KEYS[:2]
+        return self.END_KEYS if self.kn is not None else self.END_KEYS[:2]
 
     @property
     def normal_port(self) -> int | None:
         """The port whose motion changes its normal load, or None."""
-        return None if self.normal_between is None else 2
+        return None if self.kn is None else 2
 
     @property
     def held(self) -> tuple[Held, ...]:
         """What each of its ports begins with at rest."""
         second = columns.KT if self.kt_second is None else columns.KT_SECOND
-        if self.normal_between is None:
+        if self.kn is None:
             return Held(columns.KT), Held(second)
         return self.HELD[0], Held(second, *_CLOSED), self.HELD[2]
 
@@ -146,16 +149,16 @@ class SpaceContact(SlidesInAPlane):
         if self.kt_second is None:
             row[columns.KT_SECOND] = math.nan
 
-    def at(self, row: Real) -> SpaceContact:
+    def with_numbers(self, row: Real) -> SpaceContact:
         """The contact with the numbers of a row of the contact table."""
-        moved = super().at(row)
+        moved = super().with_numbers(row)
         left_out = {key: None for key in ("kt_second", "kn") if getattr(self, key) is None}
         return moved.model_copy(update=left_out)
 
     @property
     def separation(self) -> tuple[bool, str]:
         """Whether it may open, and why."""
-        if self.normal_between is not None:
+        if self.kn is not None:
             return True, f"{self.name} opens and closes as it moves"
         return super().separation
 
@@ -169,10 +172,10 @@ class SpaceContact(SlidesInAPlane):
 
     def _normal_row(self) -> dict[str, Any]:
         """Return what the rows of the time march have of a normal motion."""
-        if self.normal_between is None:
+        if self.kn is None:
             return {}
         rest = max(self.N0, 0.0) if self.prestressed else 0.0
-        return {"normal_ends": self.pair_ends[2], "kn": self.kn, "rest": rest}
+        return {"normal_port": 2, "kn": self.kn, "rest": rest}
 
     def linear_limit(self, load: float, *, gone: bool) -> dict[str, Any]:
         """Return what makes it linear; a load that moves acts on the parts.
@@ -180,7 +183,7 @@ class SpaceContact(SlidesInAPlane):
         Removed it never closes, stuck it counts from the pressed state.
         """
         found = super().linear_limit(load, gone=gone)
-        if self.normal_between is None:
+        if self.kn is None:
             return found
         return {**found, **({"N0": -load} if gone else {"prestressed": True})}
 

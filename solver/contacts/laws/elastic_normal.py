@@ -21,8 +21,9 @@ class ElasticNormalContact(SlidesOnALine):
 
     Attributes
     ----------
-    normal_between : (str, str)
-        The ends of the normal motion v = x(first) - x(second); v > 0 presses.
+    normal_between : (str, str) or None
+        The ends of the normal motion v = x(first) - x(second); v > 0 presses. Left out where `normal` is
+        given.
     kn : float
         Normal contact stiffness [N/m].
     N0 : float
@@ -53,12 +54,13 @@ class ElasticNormalContact(SlidesOnALine):
         "N0": "Load [N] at v = 0; -kn times the gap for an initial gap.",
     }
     END_KEYS: ClassVar[tuple[str, ...]] = ("between", "normal_between")
+    NEEDED_ENDS: ClassVar[tuple[str, ...]] = ("normal_between",)
     HELD: ClassVar[tuple[Held, ...]] = (Held(columns.KT, *_CLOSED), Held(columns.KN, *_CLOSED))
     OPENS: ClassVar[bool] = True
     NORMAL_PORT: ClassVar[int | None] = 1
 
     law: Literal["elastic-normal"]
-    normal_between: Between
+    normal_between: Between | None = None
     kn: Positive
     prestressed: bool = False
 
@@ -80,10 +82,9 @@ class ElasticNormalContact(SlidesOnALine):
     def rows(self) -> tuple[Row, ...]:
         """Return its row of the time march."""
         rest = max(self.N0, 0.0) if self.prestressed else 0.0
-        tangential, normal = self.pair_ends
         return (
             Row(
-                name=self.name, ends=tangential, follows=Follows.RUBBING, normal_ends=normal, kn=self.kn,
+                name=self.name, follows=Follows.RUBBING, normal_port=1, kn=self.kn,
                 rest=rest, **self.row_numbers(),
             ),
         )  # fmt: skip

@@ -80,7 +80,7 @@ class FrictionContact(AnyContact):
     @property
     def stiffnesses(self) -> tuple[float, ...]:
         """A stiffness of each relative motion [N/m]: what holds it when the contact is closed and stuck."""
-        return (self.kt,) * len(self.pairs)
+        return (self.kt,) * len(self.END_KEYS)
 
     @property
     def friction(self) -> Slider:
@@ -135,9 +135,9 @@ class FrictionContact(AnyContact):
                 row[quantity.column] = self.value_of(key)
         row[columns.RATIO] = math.nan if self.N1_ratio is None else self.N1_ratio
 
-    def at(self, row: Real) -> Self:
+    def with_numbers(self, row: Real) -> Self:
         """The contact with the numbers of a row of the contact table."""
-        moved = super().at(row)
+        moved = super().with_numbers(row)
         tied = not math.isnan(row[columns.RATIO])
         return moved.model_copy(update={"N1": None} if tied else {"N1_ratio": None})
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 
 from solver.contacts.fields import NonNegative, Real, Signed
+from solver.contacts.frames import NORMAL
 from solver.contacts.kernels import columns
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Follows, Held, Motion, Quantity, Row
@@ -36,6 +37,7 @@ class GapSpring(AnyContact):
         ),
         "gap": Quantity(column=columns.GAP, unit="m", wanted="must be a number from -1e15 to 1e15 [m]"),
     }
+    DIRECTIONS: ClassVar[tuple[int, ...]] = (NORMAL,)
     HELD: ClassVar[tuple[Held, ...]] = (Held(columns.K_GAP, columns.GAP, -1),)
     OPENS: ClassVar[bool] = True
 
@@ -83,7 +85,7 @@ class GapSpring(AnyContact):
     def rows(self) -> tuple[Row, ...]:
         """Return its row of the time march."""
         return (
-            Row(name=self.name, ends=self.pair_ends[0], follows=Follows.GAP, kt=self.k, gap=self.gap),
+            Row(name=self.name, follows=Follows.GAP, kt=self.k, gap=self.gap),
         )  # fmt: skip
 
 

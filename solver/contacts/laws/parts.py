@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.contacts.fields import End, Real
+from solver.contacts.fields import Real
 
 SHORTEST = 1e-12  # rad; a state of a contact that lasts no longer does nothing
 
@@ -187,12 +187,12 @@ class Row:
     ----------
     name : str
         As the march calls it.
-    ends : (End, End)
-        Of its relative motion.
+    port : int
+        Which of the contact's relative motions it pulls along.
     kt, mu, N0, N1, N1_phase : float
         Stiffness [N/m], friction coefficient, normal load [N, rad].
-    normal_ends, kn, rest : of a row that rubs
-        Ends of the normal motion, its stiffness [N/m], and the part of the normal force that is in
+    normal_port, kn, rest : of a row that rubs
+        Which of them is the normal motion, its stiffness [N/m], and the part of the normal force that is in
         equilibrium at rest [N].
     presses : float
         0.0 where another row has the normal force already, else 1.0.
@@ -203,14 +203,14 @@ class Row:
     """
 
     name: str
-    ends: tuple[End, End]
+    port: int = 0
     follows: Follows = Follows.FRICTION
     kt: float = 0.0
     mu: float = 0.0
     N0: float = 0.0
     N1: float = 0.0
     N1_phase: float = 0.0
-    normal_ends: tuple[End, End] | None = None
+    normal_port: int | None = None
     kn: float = 0.0
     rest: float = 0.0
     presses: float = 1.0

@@ -22,7 +22,7 @@ class SlidesInAPlane(FrictionContact):
 
     RUBBING: ClassVar[tuple[int, ...]] = (0, 1)
 
-    between_second: Between
+    between_second: Between | None = None
     limit: Literal["circle", "box"] | None = None
 
     @property
@@ -68,11 +68,10 @@ class SlidesInAPlane(FrictionContact):
         if not self.limits_apart:
             first, second = Follows.CIRCLE, Follows.CIRCLE_SECOND
         pressing = 1.0 if moves else 0.0
-        along, across = self.pair_ends[:2]
         return (
-            Row(name=self.name, ends=along, follows=first, presses=pressing, **given),
+            Row(name=self.name, follows=first, presses=pressing, **given),
             Row(
-                name=f"{self.name} (second)", ends=across, follows=second, presses=0.0,
+                name=f"{self.name} (second)", port=1, follows=second, presses=0.0,
                 **{**given, "kt": self.tangential[1]},
             ),
         )  # fmt: skip

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import model_validator
 
 from solver.contacts.fields import Real, Signed
+from solver.contacts.frames import NORMAL
 from solver.contacts.kernels import columns
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Follows, Held, Quantity, Row
@@ -33,6 +34,7 @@ class PolynomialSpring(AnyContact):
     WORDS: ClassVar[Mapping[str, str]] = {
         f"a{j}": f"Coefficient of u^{j} [N/m^{j}]." for j in range(1, columns.MOST_DEGREE + 1)
     }
+    DIRECTIONS: ClassVar[tuple[int, ...]] = (NORMAL,)
     HELD: ClassVar[tuple[Held, ...]] = (Held(columns.A_1),)
 
     law: Literal["polynomial"]
@@ -103,7 +105,7 @@ class PolynomialSpring(AnyContact):
         powers = self.coefficients
         return (
             Row(
-                name=self.name, ends=self.pair_ends[0], follows=Follows.POLYNOMIAL, kt=abs(powers[0]),
+                name=self.name, follows=Follows.POLYNOMIAL, kt=abs(powers[0]),
                 powers=powers,
             ),
         )  # fmt: skip

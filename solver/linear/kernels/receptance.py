@@ -25,8 +25,13 @@ BLOCK = 512  # modes summed at a time: their weights stay in the near cache
 
 
 @compiled
-def excitation(system: System, p: float) -> tuple[complex, complex]:
-    """Return the complex factor on the unit excitation at λ = p and its derivative by λ."""
+def excitation(system: System, p: float, k: int) -> tuple[complex, complex]:
+    """Return the complex factor on the unit excitation of harmonic k at λ = p and its derivative by λ.
+
+    A static force has no phase to turn; the level scales it all the same, unless it is a load.
+    """
+    if k == 0 and (system.kind == FORCE_PHASE or system.constant_mean == 1):
+        return complex(1.0), complex(0.0)
     if system.kind == LEVEL:
         return complex(p / system.level_reference), complex(1.0 / system.level_reference)
     if system.kind == FORCE_PHASE:
@@ -43,12 +48,8 @@ def receptance(system: System, p: float, out: Receptance) -> None:
         _dense_receptance(system, p, out)
     else:
         _modal_receptance(system, p, out)
-    factor, slope = excitation(system, p)
     for k in range(system.ks.size):
-        # A static load (harmonic 0) has no phase to turn; its level scales all the same.
-        f, df = factor, slope
-        if system.ks[k] == 0 and system.kind == FORCE_PHASE:
-            f, df = complex(1.0), complex(0.0)
+        f, df = excitation(system, p, system.ks[k])
         out.x_linear[1, k] = f * out.x_linear[1, k] + df * out.x_linear[0, k]
         out.x_linear[0, k] *= f
         for c in range(out.B.shape[2]):
@@ -259,8 +260,12 @@ def _dense_receptance(system: System, p: float, out: Receptance) -> None:
             green[0, 0, 0] = np.nan
         _product(dZ, green[0], half)
         _product(green[0], half, green[1])
+        force, rise = np.empty(n, np.complex128), np.empty(n, np.complex128)
+        fill_forces(system, i, moved, force, rise)
         for order in range(2):
-            _project(system, s, i, 1.0 - 2.0 * order, green[order], order, out)
+            _project(system, s, force, 1.0 - 2.0 * order, green[order], i, order, out)
+        if system.kind == STRUCTURE:
+            add_driven(system, s, rise, green[0], out.u_linear[1, i], out.x_linear[1, i : i + 1])
 
 
 @compiled
@@ -278,8 +283,31 @@ def _product(left: Complex, right: Complex, out: Complex) -> None:
 
 
 @compiled
+def fill_forces(system: System, i: int, moved: float, force: Complex, rise: Complex) -> None:
+    """Fill in the forces of harmonic number i where the structural parameter has moved, and their slope."""
+    for a in range(force.size):
+        force[a], rise[a] = system.forces[i, a], 0.0
+        if system.kind == STRUCTURE:
+            first, second = system.dforces[0, i, a], system.dforces[1, i, a]
+            force[a] += moved * (first + 0.5 * moved * second)
+            rise[a] = first + moved * second
+
+
+@compiled
+def add_driven(system: System, s: int, force: Complex, green: Complex, u: Complex, x: Complex) -> None:
+    """Add the motions of contacts (nc,) and observed DOF (1,) under forces, through Z⁻¹ or a derivative."""
+    for a in range(force.size):
+        motion = complex(0.0)
+        for b in range(force.size):
+            motion += green[a, b] * force[b]
+        x[0] += system.observe[a] * motion
+        for c in range(u.size):
+            u[c] += system.L[s, c, a] * motion
+
+
+@compiled
 def _project(
-    system: System, s: int, i: int, sign: float, green: Complex, order: int, out: Receptance
+    system: System, s: int, force: Complex, sign: float, green: Complex, i: int, order: int, out: Receptance
 ) -> None:
     """Project Z⁻¹ (or its derivative) of harmonic number i on contacts, excitation and observed DOF."""
     nc, n = out.B.shape[2], green.shape[0]
@@ -292,7 +320,7 @@ def _project(
     for a in range(n):
         for b in range(n):
             value = sign * green[a, b]
-            driven = value * system.forces[i, b]
+            driven = value * force[b]
             out.x_linear[order, i] += system.observe[a] * driven
             for c in range(nc):
                 out.u_linear[order, i, c] += system.L[s, c, a] * driven

@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 from numba.experimental import structref
 
-from solver.contacts.kernels.system import DENSE, FORCE_PHASE, MODES, STRUCTURE, System
+from solver.contacts.kernels.system import DENSE, MODES, STRUCTURE, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex
 from solver.jit.lapack import invert
 from solver.jit.reference import Reference
 from solver.jit.separate import apart
-from solver.linear.kernels.receptance import excitation
+from solver.linear.kernels.receptance import add_driven, excitation, fill_forces
 
 # First index of every array.
 VALUE, BY_OMEGA, BY_OMEGA_TWICE, BY_P, BY_BOTH = 0, 1, 2, 3, 4
@@ -66,13 +66,9 @@ def fill_jets(system: System, omega: float, p: float, out: Jets) -> None:
         _dense(system, omega, p, out)
     else:
         _modal(system, omega, out)
-    factor, slope = excitation(system, p)
     nc = out.u_linear.shape[2]
     for i in range(system.ks.size):
-        # A static load (harmonic 0) has no phase to turn; its level scales all the same.
-        f, df = factor, slope
-        if system.ks[i] == 0 and system.kind == FORCE_PHASE:
-            f, df = complex(1.0), complex(0.0)
+        f, df = excitation(system, p, system.ks[i])
         x = out.x_linear[:, i]
         x[BY_BOTH] = f * x[BY_BOTH] + df * x[BY_OMEGA]
         x[BY_P] = f * x[BY_P] + df * x[VALUE]
@@ -148,6 +144,7 @@ def _dense(system: System, omega: float, p: float, out: Jets) -> None:
         np.empty((n, n), np.complex128),
         np.empty((n, n), np.complex128),
     )
+    force, rise = np.empty(n, np.complex128), np.empty(n, np.complex128)
     for i in range(system.ks.size):
         k, s = system.ks[i], system.which[i]
         speed = k * omega
@@ -180,9 +177,13 @@ def _dense(system: System, omega: float, p: float, out: Jets) -> None:
             _more(G[BY_BOTH], -1.0, two)
             _sandwich(green, Z[BY_P], G[BY_OMEGA], half, two)
             _more(G[BY_BOTH], -1.0, two)
+        fill_forces(system, i, moved, force, rise)
         for order in range(ORDERS):
             if structural or order < BY_P:
-                _project(system, s, i, G[order], order, out)
+                _project(system, s, force, G[order], i, order, out)
+        if structural:
+            for order, by in ((BY_P, VALUE), (BY_BOTH, BY_OMEGA)):
+                add_driven(system, s, rise, G[by], out.u_linear[order, i], out.x_linear[order, i : i + 1])
 
 
 @apart
@@ -222,13 +223,13 @@ def _more(target: Complex, factor: float, source: Complex) -> None:
 
 
 @apart
-def _project(system: System, s: int, i: int, green: Complex, order: int, out: Jets) -> None:
+def _project(system: System, s: int, force: Complex, green: Complex, i: int, order: int, out: Jets) -> None:
     """Add Z⁻¹ (or a derivative) of harmonic number i, seen from contacts, excitation and observed DOF."""
     nc, n = out.u_linear.shape[2], green.shape[0]
     for a in range(n):
         for b in range(n):
             value = green[a, b]
-            driven = value * system.forces[i, b]
+            driven = value * force[b]
             out.x_linear[order, i] += system.observe[a] * driven
             for c in range(nc):
                 out.u_linear[order, i, c] += system.L[s, c, a] * driven

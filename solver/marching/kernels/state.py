@@ -29,10 +29,11 @@ RAN, SETTLED, CHATTER, NOT_FINITE = 0, 1, 2, 3
 class System(NamedTuple):
     """The equations in tau: x'' = W (force - L^T F) - A x - B x', with A, B and W as compressed sparse rows.
 
-    W is the inverse of the mass matrix times omega^-2. `kt` is also the stiffness of a gap spring. Of the
-    laws elastic-normal and circle: the ends of the normal motion, its stiffness, and the part of the normal
-    force that is in equilibrium at rest; `presses` is 0 where another row has that force already. `powers`
-    (n_contacts, degree) are the coefficients of polynomial springs.
+    W is the inverse of the mass matrix times omega^-2. L is that of the motions along which contacts pull,
+    `kt` is also the stiffness of a gap spring. Of the laws elastic-normal and circle: the normal motions,
+    their stiffness, and the part of the normal force that is in equilibrium at rest; `presses` is 0 where
+    another row has that force already. `powers` (n_contacts, degree) are the coefficients of polynomial
+    springs.
     """
 
     A_start: Whole
@@ -48,16 +49,18 @@ class System(NamedTuple):
     force_amplitude: Real
     force_phase: Real
     force_harmonic: Whole
-    first: Whole
-    second: Whole
+    L_start: Whole
+    L_column: Whole
+    L_value: Real
     kt: Real
     mu: Real
     N0: Real
     N1: Real
     N1_phase: Real
     law: Whole
-    normal_first: Whole
-    normal_second: Whole
+    normal_start: Whole
+    normal_column: Whole
+    normal_value: Real
     kn: Real
     rest: Real
     presses: Real
@@ -161,9 +164,15 @@ def product(start: Whole, column: Whole, value: Real, x: Real, row: int) -> floa
 
 @compiled
 def slip(system: System, x: Real, c: int) -> float:
-    """Return x(first end) - x(second end) of contact c; an end of -1 is the ground."""
-    first, second = system.first[c], system.second[c]
-    return (x[first] if first >= 0 else 0.0) - (x[second] if second >= 0 else 0.0)
+    """Return the relative motion of contact c."""
+    return product(system.L_start, system.L_column, system.L_value, x, c)
+
+
+@compiled
+def pull_back(start: Whole, column: Whole, value: Real, row: int, force: float, pull: Real) -> None:
+    """Subtract a force along a relative motion from what pulls at each DOF."""
+    for j in range(start[row], start[row + 1]):
+        pull[column[j]] -= value[j] * force
 
 
 @compiled
@@ -176,9 +185,8 @@ def wave(k: int, angle: float) -> float:
 
 @compiled
 def normal_slip(system: System, x: Real, c: int) -> float:
-    """Return x(first) - x(second) of the normal pair of contact c."""
-    first, second = system.normal_first[c], system.normal_second[c]
-    return (x[first] if first >= 0 else 0.0) - (x[second] if second >= 0 else 0.0)
+    """Return the normal motion of contact c."""
+    return product(system.normal_start, system.normal_column, system.normal_value, x, c)
 
 
 @compiled

@@ -50,6 +50,7 @@ from solver.marching.kernels.state import (
     normal_slip,
     power_series,
     product,
+    pull_back,
     slip,
     wave,
 )
@@ -105,17 +106,10 @@ def _pull(system: System, tau: float, k: int, scale: float, series: Series) -> N
         turn = wave(k, harmonic * tau + system.force_phase[e])
         pull[system.force_dof[e]] += system.force_amplitude[e] * turn * scale * float(harmonic) ** k
     for c in range(system.kt.size):
-        first, second = system.first[c], system.second[c]
-        if first >= 0:
-            pull[first] -= f[c]
-        if second >= 0:
-            pull[second] += f[c]
+        pull_back(system.L_start, system.L_column, system.L_value, c, f[c], pull)
         if system.law[c] in (ELASTIC_NORMAL, CIRCLE) and system.presses[c] > 0.0:
-            first, second = system.normal_first[c], system.normal_second[c]
-            if first >= 0:
-                pull[first] -= series.normal[k, c]
-            if second >= 0:
-                pull[second] += series.normal[k, c]
+            force = series.normal[k, c]
+            pull_back(system.normal_start, system.normal_column, system.normal_value, c, force, pull)
 
 
 @apart
@@ -151,10 +145,8 @@ def _limit(system: System, series: Series, c: int, direction: int, q: Real) -> N
 @compiled
 def _drive(system: System, series: Series, h: float, c: int, direction: int, q: Real) -> None:
     """Put direction * kt u' - mu N' of contact c into q: while positive, it goes on slipping."""
-    first, second = system.first[c], system.second[c]
     for k in range(q.size - 1):
-        speed = series.v[k, first] if first >= 0 else 0.0
-        speed -= series.v[k, second] if second >= 0 else 0.0
+        speed = slip(system, series.v[k], c)
         rise = (k + 1) * series.load[k + 1, c] / h
         q[k] = direction * system.kt[c] * speed - system.mu[c] * rise
     q[q.size - 1] = 0.0
@@ -262,9 +254,10 @@ def _sample(system: System, series: Series, place: float, index: int, dof: int, 
     record.x[index] = value_at(series.x[:, dof], place)
     record.v[index] = value_at(series.v[:, dof], place)
     for c in range(system.kt.size):
-        first, second = system.first[c], system.second[c]
-        motion = value_at(series.x[:, first], place) if first >= 0 else 0.0
-        record.slip[c, index] = motion - (value_at(series.x[:, second], place) if second >= 0 else 0.0)
+        motion = 0.0
+        for j in range(system.L_start[c], system.L_start[c + 1]):
+            motion += system.L_value[j] * value_at(series.x[:, system.L_column[j]], place)
+        record.slip[c, index] = motion
         record.force[c, index] = value_at(series.force[:, c], place)
         record.load[c, index] = max(value_at(series.load[:, c], place), 0.0)
 

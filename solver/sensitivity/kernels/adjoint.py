@@ -158,7 +158,8 @@ def _by_linear_part(
             by_omega += weight.real * (point.F[d, here] - system.shift[d] * u[at])
             if k > 0:
                 by_omega += weight.imag * (point.F[d, here + 1] - system.shift[d] * u[at + 1])
-        level += driven.real
+        if k > 0 or system.constant_mean == 0:
+            level += driven.real
         if k > 0:
             phase -= driven.imag
     first = system.laws.size * PER_ELEMENT

@@ -55,7 +55,7 @@ def test_a_contact_comes_back_from_its_row(case: str) -> None:
     row = np.full(columns.COLUMNS, np.nan)
     contact.fill(row, 5)
     again = np.full(columns.COLUMNS, np.nan)
-    contact.at(row).fill(again, 5)
+    contact.with_numbers(row).fill(again, 5)
     np.testing.assert_array_equal(again, row)
 
 
@@ -68,7 +68,7 @@ def test_a_row_changes_the_contact_it_is_read_into(case: str) -> None:
         row[quantity.column] += 0.25
         if not np.isnan(row[quantity.column]):
             tied = contact.load is not None and contact.load.ratio is not None and key == "N1"
-            assert tied or contact.at(row).value_of(key) == pytest.approx(row[quantity.column])
+            assert tied or contact.with_numbers(row).value_of(key) == pytest.approx(row[quantity.column])
 
 
 def test_two_laws_of_one_word_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

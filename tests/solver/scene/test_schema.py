@@ -50,7 +50,12 @@ def test_the_scenes_of_the_pages_pass(block: dict[str, Any]) -> None:
 
 def test_parts_of_scenes_on_the_pages_pass() -> None:
     """A page that shows one table of a scene shows one that fits."""
-    shown = [(key, b[key]) for b in BLOCKS for key in ("contacts", "observe") if key in b and "name" not in b]
+    shown = [
+        (key, b[key])
+        for b in BLOCKS
+        for key in ("contacts", "observe", "dampers")
+        if key in b and "name" not in b
+    ]
     assert shown
     for key, value in shown:
         part = {**SCENE.schema["properties"][key], "$defs": SCENE.schema["$defs"]}

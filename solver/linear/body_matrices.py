@@ -1,0 +1,52 @@
+"""What rigid bodies add to the matrices of a structure."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from solver.linear.matrix_model import MatrixModel, matrix_model
+from solver.scene.bodies import Body
+from solver.scene.parts import MatricesStructure
+
+FloatArray = NDArray[np.float64]
+
+
+@lru_cache(maxsize=64)
+def bodies_mass(n: int, bodies: tuple[Body, ...]) -> FloatArray:
+    """Mass matrix of the bodies behind `n` DOFs of the structure, which have none of it; read-only."""
+    return _frozen(block_diag(np.zeros((n, n)), *(body.mass_matrix() for body in bodies)))
+
+
+def mass_derivative(n: int, bodies: tuple[Body, ...], owner: str, key: str) -> FloatArray:
+    """Derivative of `bodies_mass` by a number of the bodies of that name or group; read-only."""
+    blocks = [
+        body.mass_derivative(key) if owner in (body.name, body.group) else np.zeros((len(body.dofs),) * 2)
+        for body in bodies
+    ]
+    return _frozen(block_diag(np.zeros((n, n)), *blocks))
+
+
+def matrices_with_bodies(structure: MatricesStructure, bodies: tuple[Body, ...]) -> MatrixModel:
+    """The matrices of a structure and of bodies behind it; the same arrays each time, as `matrix_model`."""
+    return _with_bodies(structure, bodies) if bodies else matrix_model(structure)
+
+
+@lru_cache(maxsize=16)
+def _with_bodies(structure: MatricesStructure, bodies: tuple[Body, ...]) -> MatrixModel:
+    own = matrix_model(structure)
+    n = sum(len(body.dofs) for body in bodies)
+    nothing = np.zeros((n, n))
+    mass = bodies_mass(0, bodies)
+    return MatrixModel(
+        M=_frozen(block_diag(own.M, mass)), C=_frozen(block_diag(own.C, nothing)),
+        K=_frozen(block_diag(own.K, nothing)), shapes=_frozen(block_diag(own.shapes, np.eye(n))),
+    )  # fmt: skip
+
+
+def _frozen(array: FloatArray) -> FloatArray:
+    array.setflags(write=False)
+    return array
