@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
@@ -26,13 +26,18 @@ from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from optim.methods.peak_tracking import Tracked
+    from optim.problem.keyword_types import DesignKeywords
 
 SAME_HEIGHT = 1e-9  # relative, of two levels that are one
 
 
 @keywords(DesignKeys, without=ROBUST)
 def design(
-    scene: Scene, *, on_progress: OnProgress = None, should_stop: ShouldStop = None, **problem: Any
+    scene: Scene,
+    *,
+    on_progress: OnProgress = None,
+    should_stop: ShouldStop = None,
+    **problem: Unpack[DesignKeywords],
 ) -> DesignResult:
     """Choose parameters within bounds so that the highest peak over the scene's band is least.
 

@@ -16,7 +16,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Unpack
 
 from optim.criteria.peak import PEAK
 from optim.errors import DesignError
@@ -38,6 +38,9 @@ from optim.robust.worst_case import Aspect, UnknownScenarioError
 from optim.search import solve_problem
 from solver.scene.scene import Scene
 
+if TYPE_CHECKING:
+    from optim.problem.keyword_types import DesignKeywords
+
 SAMPLES = {Aim.WORST_CASE: 32, Aim.MEAN: 64, Aim.QUANTILE: 64}
 
 
@@ -52,7 +55,7 @@ def robust_design(
     seed: int = SEED,
     on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
-    **problem: Any,
+    **problem: Unpack[DesignKeywords],
 ) -> RobustResult:
     """Choose parameters so that the peak is least over an uncertainty, and compare with the nominal optimum.
 

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from scipy.optimize import linprog
@@ -35,6 +35,9 @@ from optim.search import judge, local_search_of, solve_problem
 from optim.studies.pareto_result import ParetoPoint, ParetoResult, ParetoStatus, front_of
 from solver.scene.scene import Scene
 
+if TYPE_CHECKING:
+    from optim.problem.keyword_types import FrontKeywords
+
 FAR_APART = 0.02  # scaled distance from which the optima of two neighbours are both searched from
 JUMP = 0.01  # share of the band's range within which two neighbours need no point between them
 RESIDUAL = 1e-6  # of the first-order conditions, relative objective per scaled variable
@@ -50,7 +53,7 @@ def pareto_front(
     points: int = POINTS,
     on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
-    **problem: Any,
+    **problem: Unpack[FrontKeywords],
 ) -> ParetoResult:
     """Return the designs of which none has both a lower peak and a narrower band than another.
 

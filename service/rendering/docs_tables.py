@@ -1,7 +1,7 @@
-"""Tables of the docs that follow from the code: ``python -m service.rendering.docs_tables`` brings them up to
-date.
+"""Files that follow from the code: ``python -m service.rendering.docs_tables`` brings them up to date.
 
-Each stands between two marks, ``<!-- NAME: begin -->`` and ``<!-- NAME: end -->``.
+Each table of the docs stands between two marks, ``<!-- NAME: begin -->`` and ``<!-- NAME: end -->``; a source
+is written as a whole.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from optim.criteria.table import criteria_table
+from optim.problem.keyword_source import keyword_source
 from service.rendering.problem_table import problem_table
 from service.settings.table import settings_table
 from solver.contacts.laws.table import laws_table
@@ -22,6 +23,8 @@ TABLES: Mapping[str, Mapping[str, Callable[[], str]]] = {
     "operations.md": {"settings": settings_table},
 }
 """Page of docs/, name of the mark, table."""
+SOURCES: Mapping[str, Callable[[], str]] = {"optim/problem/keyword_types.py": keyword_source}
+"""File, its text."""
 
 
 def with_tables(text: str, tables: Mapping[str, Callable[[], str]]) -> str:
@@ -35,10 +38,12 @@ def with_tables(text: str, tables: Mapping[str, Callable[[], str]]) -> str:
 
 
 def main() -> None:
-    """Bring the tables up to date."""
+    """Bring tables and sources up to date."""
     for name, tables in TABLES.items():
         page = Path("docs") / name
         page.write_text(with_tables(page.read_text(encoding="utf-8"), tables), encoding="utf-8")
+    for file, source in SOURCES.items():
+        Path(file).write_text(source(), encoding="utf-8")
 
 
 if __name__ == "__main__":

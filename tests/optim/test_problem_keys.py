@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import Any, get_args
+from typing import Any, get_args, get_type_hints
 
 import pytest
 
@@ -13,6 +13,7 @@ import solver
 from optim.errors import DesignError
 from optim.problem.issues import problem_issues, uncertainty_issues
 from optim.problem.keys import ROBUST, DesignKeys, FrontKeys, options
+from optim.problem.keyword_types import DesignKeywords, FrontKeywords
 from optim.problem.problem import pose
 from optim.problem.words import Aim, AimWord, Method, MethodWord, Scaling, ScalingWord
 
@@ -33,6 +34,11 @@ def test_the_arguments_are_the_keys(function: Callable[..., Any], keys: set[str]
     text = inspect.getdoc(function) or ""
     assert [key for key in keys if f"\n{key} : " not in text] == []
     assert "**problem" not in text
+
+
+def test_checkers_know_the_keys() -> None:
+    assert set(get_type_hints(DesignKeywords)) == set(DesignKeys.model_fields) - set(ROBUST)
+    assert set(get_type_hints(FrontKeywords)) == set(FrontKeys.model_fields) - {"points"}
 
 
 def test_no_two_keys_share_an_option() -> None:

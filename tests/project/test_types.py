@@ -34,16 +34,44 @@ def test_public_functions_have_types_and_a_text(package: object) -> None:
             assert (bare, signature.return_annotation is inspect.Signature.empty) == ([], False), name
 
 
+WRONG = """import optim
+import solver
+scene = solver.load_scene("two-dof")
+bounds = {"damper.N0": (20, 1000)}
+optim.design(scene, variabels=bounds)
+optim.design(scene, variables=["damper.N0"])
+optim.design(scene, method="trakced")
+optim.robust_design(scene, uncertain={"damper.mu": [0.2, 0.4]}, max_peak="1e-4")
+optim.pareto_front(scene, variables=bounds, max_band_hz=3.0)
+optim.design(scene, variables=bounds, limit=1e-4, method="minimax", weights={"peak": 1, "band": 1e-6})
+"""
+
+
+def mypy(source: str, folder: Path) -> str:
+    """What mypy says of a user's script under its strictest rules, as of an installed package."""
+    pytest.importorskip("mypy")
+    (folder / "script.py").write_text(source, "utf-8")
+    # Only what is wrong in the script itself is told.
+    words = ["--strict", "--follow-imports", "silent", "--config-file", os.devnull, "--cache-dir", "cache"]
+    return subprocess.run(
+        [sys.executable, "-m", "mypy", *words, "script.py"], cwd=folder, capture_output=True, text=True,
+        check=False, env={**os.environ, "MYPYPATH": str(SCRIPT.parent.parent.parent)},
+    ).stdout  # fmt: skip
+
+
 @pytest.mark.long
 def test_a_script_of_a_user_is_clean_under_strict_rules(tmp_path: Path) -> None:
-    pytest.importorskip("mypy")
     pytest.importorskip("xarray")
-    source = tmp_path / SCRIPT.name
-    source.write_text(SCRIPT.read_text("utf-8"), "utf-8")
-    # As of an installed package, only what is wrong in the script itself is told.
-    words = ["--strict", "--follow-imports", "silent", "--config-file", os.devnull, "--cache-dir", "cache"]
-    done = subprocess.run(
-        [sys.executable, "-m", "mypy", *words, source.name], cwd=tmp_path, capture_output=True, text=True,
-        check=False, env={**os.environ, "MYPYPATH": str(SCRIPT.parent.parent.parent)},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout
+    told = mypy(SCRIPT.read_text("utf-8"), tmp_path)
+    assert told.startswith("Success"), told
+
+
+@pytest.mark.long
+def test_a_checker_finds_wrong_keywords_and_types(tmp_path: Path) -> None:
+    told = mypy(WRONG, tmp_path).splitlines()
+    found = {int(line.split(":")[1]): line for line in told if " error: " in line}
+    assert sorted(found) == [5, 6, 7, 8, 9]
+    assert 'Unexpected keyword argument "variabels"' in found[5]
+    assert 'Unexpected keyword argument "max_band_hz"' in found[9]
+    for line, argument in ((6, "variables"), (7, "method"), (8, "max_peak")):
+        assert f'Argument "{argument}"' in found[line]

@@ -1,4 +1,4 @@
-"""Tables in the docs say what the code says."""
+"""Tables in the docs, and sources that are generated, say what the code says."""
 
 from __future__ import annotations
 
@@ -6,12 +6,19 @@ from pathlib import Path
 
 import pytest
 
-from service.rendering.docs_tables import TABLES, with_tables
+from service.rendering.docs_tables import SOURCES, TABLES, with_tables
 
-DOCS = Path(__file__).resolve().parent.parent.parent.parent / "docs"
+ROOT = Path(__file__).resolve().parent.parent.parent.parent
+DOCS = ROOT / "docs"
 
 
 @pytest.mark.parametrize("page", TABLES)
 def test_tables_are_up_to_date(page: str) -> None:
     text = (DOCS / page).read_text(encoding="utf-8")
     assert text == with_tables(text, TABLES[page]), "run: python -m service.rendering.docs_tables"
+
+
+@pytest.mark.parametrize("file", SOURCES)
+def test_generated_sources_are_up_to_date(file: str) -> None:
+    text = (ROOT / file).read_text(encoding="utf-8")
+    assert text == SOURCES[file](), "run: python -m service.rendering.docs_tables"

@@ -1,0 +1,57 @@
+"""The keys of a design problem as keyword arguments, for type checkers: ``**problem: Unpack[…]``.
+
+Written by ``python -m service.rendering.docs_tables`` from `optim.problem.keys`; not to be edited. A key of a
+criterion from outside the package is none of these: pass it in a ``**dict[str, Any]``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal, TypedDict
+
+from optim.problem.words import Method, MethodWord, ScalingWord
+
+
+class ProblemKeywords(TypedDict, total=False):
+    """Those of a design and of a front."""
+
+    harmonics: int | None
+    """Highest harmonic of the balance."""
+    variables: Mapping[str, Sequence[float]] | None
+    """Variable to [low, high]: a parameter path, or several that share a value, separated by commas. The
+    normal load of the contact whose load varies if left out."""
+    scaling: Mapping[str, ScalingWord] | None
+    """Whether equal steps or equal ratios of a variable count equally; by its bounds."""
+    cases: Sequence[Mapping[str, object]] | None
+    """The responses that count; the scene as it is if left out."""
+    limit: float | None
+    """Amplitude [m] above which the resonance band is measured; half power of the peak."""
+    start: Mapping[str, float] | None
+    """A design to start from, variable to value."""
+    method: MethodWord | Method | None
+    """How the optimum is searched."""
+    max_peak: float | None
+    """Largest amplitude allowed [m]."""
+    forbidden_hz: Sequence[Sequence[float]] | None
+    """Ranges [Hz] in which the amplitude stays below `limit`."""
+    speeds_rpm: Sequence[Sequence[float]] | None
+    """Ranges of running speed [1/min]; times the order of each case they are forbidden too."""
+    max_friction_work: float | Mapping[str, float] | None
+    """Largest friction work in a cycle [J], of every friction contact or by contact (wear)."""
+    contact_states: Mapping[str, Literal["never-separates"]] | None
+    """What a contact must never do: contact to `never-separates`."""
+
+
+class DesignKeywords(ProblemKeywords, total=False):
+    """Those of a design without uncertainty."""
+
+    basins: int | None
+    """How many local optima are looked for; 2."""
+    max_band_hz: float | None
+    """Largest width of the resonance band allowed [Hz]."""
+    weights: Mapping[str, float] | None
+    """What is minimised: peak [1/m], band [1/Hz], each times its weight; the peak alone."""
+
+
+class FrontKeywords(ProblemKeywords, total=False):
+    """Those of a front but the number of its points."""
