@@ -35,6 +35,7 @@ from service.schemas.answers import (
     SweepPage,
 )
 from service.schemas.event_answers import END, EventData, JobPoints, JobProgress, told
+from service.schemas.law_answers import LawAnswer, LawList
 from service.schemas.matrix_answers import FormatAnswer, FormatsAnswer, MatricesAnswer
 from service.schemas.upload_answers import NewUpload, UploadAnswer, UploadPage
 
@@ -100,6 +101,10 @@ class Client:
     def kinds(self) -> list[KindAnswer]:
         """The kinds of job of the service, with the schemas of their bodies and results."""
         return self._get(KindList, "/v1/kinds").items
+
+    def laws(self) -> list[LawAnswer]:
+        """The contact laws of the service, with their parameters."""
+        return self._get(LawList, "/v1/laws").items
 
     def job(self, job_id: str) -> JobAnswer:
         """How a job is."""

@@ -25,6 +25,7 @@ from service.http.routes import (
     health,
     jobs,
     kinds,
+    laws,
     matrices,
     metrics,
     page,
@@ -99,8 +100,8 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     events.install(app)
     app.include_router(jobs.submissions(service.registry))
     for module in (
-        jobs, kinds, events, designs, sweeps, scene_text, scenes, uploads, matrices, plan, previews, health,
-        metrics, reference, page,
+        jobs, kinds, laws, events, designs, sweeps, scene_text, scenes, uploads, matrices, plan, previews,
+        health, metrics, reference, page,
     ):  # fmt: skip
         app.include_router(module.router)
     openapi.install(app, service.registry)

@@ -234,6 +234,15 @@ def test_the_service_computes_and_plans_it(client: Client) -> None:
     assert "law of joint" in [effect["name"] for effect in planned["effects"]]
 
 
+def test_the_service_tells_its_parameters(client: Client) -> None:
+    (law,) = (law for law in client.laws() if law.name == "iwan")
+    assert [(one.name, one.unit) for one in law.parameters] == [("k", "N/m"), ("limit", "N")]
+    limit = law.parameters[1]
+    assert limit.words == "Force at which all of it slips [N]."
+    assert limit.slider is not None
+    assert (limit.slider.of, limit.slider.low, limit.slider.high) == ("limit", 0.05, 20.0)
+
+
 def test_the_page_reads_and_previews_it(client: Client) -> None:
     assert client.read_scene(json.dumps(SCENE), "json") == {"scene": SCENE, "issues": []}
     shown = client.preview(

@@ -7,6 +7,8 @@ import { designView, startDesign } from "./views/design.js";
 import { edit, editCurrent, openText } from "./scene/editor.js";
 import { on, tell } from "./base/events.js";
 import { frontView, startFront } from "./views/front.js";
+import { unitOf } from "./base/format.js";
+import { loadLaws } from "./scene/laws.js";
 import { forget, resume, run, startJobs } from "./network/jobs.js";
 import { openLibrary, startLibrary } from "./views/library.js";
 import { showResponse, startLive } from "./views/live.js";
@@ -17,7 +19,7 @@ import { startNotices } from "./base/notices.js";
 import { offerOthers, startOthers } from "./views/others.js";
 import { referee, startPoint } from "./views/point.js";
 import { startResponse, sweepView } from "./views/response.js";
-import { asked, current, defaultRange, frictionContacts, listScenes, loadScene, shownScene, variable } from "./scene/scenes.js";
+import { asked, chooseVariable, current, defaultRange, listScenes, loadScene, shownScene, variable, variables, variedContacts } from "./scene/scenes.js";
 import { contactTable, drawStructure } from "./scene/structure.js";
 import { accuracyView, campbellBody, campbellView, startStudies } from "./views/studies.js";
 import { startTheme } from "./base/theme.js";
@@ -45,9 +47,9 @@ async function scenes() {
 
 async function open() {
   await loadScene(state.scene);
-  const names = frictionContacts().map((c) => c.name);
-  if (!names.includes(state.contact)) state.contact = names[0] ?? "";
-  fillDesign(names);
+  const names = variedContacts().map((c) => c.name);
+  if (!names.includes(state.contact)) Object.assign(state, { contact: names[0] ?? "", variable: "" });
+  fillDesign();
   write();
   states = { states: null, at: null };
   drawScene();
@@ -55,12 +57,14 @@ async function open() {
   for (const [kind, view] of Object.entries(VIEWS)) if (view) resume(kind, view);
 }
 
-function fillDesign(names) {
-  show(byId("variable"), names.map((name) => el("option", { value: name }, `${name}.N0`)));
-  byId("variable").value = state.contact;
-  byId("study").disabled = names.length === 0;
-  if (!names.length) say("study-status", "The scene has no friction contact to design.");
-  state.range ??= names.length ? defaultRange() : null;
+function fillDesign() {
+  const path = variable();
+  show(byId("variable"), variables().map((each) => el("option", { value: each }, each)));
+  byId("variable").value = path;
+  byId("variable-unit").textContent = unitOf(path);
+  byId("study").disabled = !path;
+  if (!path) say("study-status", "The scene has no contact to design.");
+  state.range ??= path ? defaultRange() : null;
   if (state.range) [byId("low").value, byId("high").value] = state.range.map(String);
   byId("harmonics").value = String(state.harmonics);
 }
@@ -78,7 +82,7 @@ function drawScene() {
 
 async function change(name) {
   for (const kind of new Set([...Object.keys(VIEWS), ...Object.keys(state.jobs)])) forget(kind);
-  Object.assign(state, { scene: name, set: {}, contact: "", range: null, at: null, jobs: {} });
+  Object.assign(state, { scene: name, set: {}, contact: "", variable: "", range: null, at: null, jobs: {} });
   studies += 1;
   say("study-status", "");
   await open().catch(failed);
@@ -88,7 +92,7 @@ async function change(name) {
 function study() {
   const [low, high] = [byId("low").valueAsNumber, byId("high").valueAsNumber];
   const harmonics = byId("harmonics").valueAsNumber;
-  if (!(low > 0 && high > low)) return say("study-status", "The range of the load must have 0 < from < to.", true);
+  if (!(low > 0 && high > low)) return say("study-status", "The range of the variable must have 0 < from < to.", true);
   if (!(harmonics >= 1 && harmonics <= 200)) return say("study-status", "Harmonics must be a whole number from 1 to 200.", true);
   Object.assign(state, { range: [low, high], harmonics, at: null });
   write();
@@ -127,8 +131,9 @@ function controls() {
   byId("scene").addEventListener("change", () => change(byId("scene").value));
   byId("study").addEventListener("click", study);
   byId("variable").addEventListener("change", () => {
-    Object.assign(state, { contact: byId("variable").value, range: null });
-    fillDesign(frictionContacts().map((c) => c.name));
+    chooseVariable(byId("variable").value);
+    state.range = null;
+    fillDesign();
     write();
     tell("scene-contact");
     tell("values");
@@ -185,6 +190,7 @@ function failed(error) {
 
 async function begin() {
   try {
+    await patiently(loadLaws);
     await patiently(scenes);
     await patiently(open);
     await patiently(offerOthers);
@@ -217,7 +223,7 @@ function start() {
     drawScene();
   });
   on("sweep-wanted", sweepAlone);
-  on("contact", () => fillDesign(frictionContacts().map((c) => c.name)));
+  on("contact", fillDesign);
   on("scene-stored", async (name) => {
     await scenes().catch(failed);
     byId("scene").value = name;

@@ -51,7 +51,8 @@ class SpaceContact(SlidesInAPlane):
     PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
         **FrictionContact.PARAMETERS,
         "kt_second": Quantity(
-            column=columns.KT_SECOND, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]"
+            column=columns.KT_SECOND, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]",
+            otherwise=("kt",),
         ),
         "kn": Quantity(
             column=columns.KN, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]"

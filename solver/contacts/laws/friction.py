@@ -12,7 +12,7 @@ from pydantic import model_validator
 from solver.contacts.fields import Angle, Friction, Positive, Real, Signed
 from solver.contacts.kernels import columns
 from solver.contacts.laws.base import AnyContact
-from solver.contacts.laws.parts import Held, NormalLoad, Quantity, Slider
+from solver.contacts.laws.parts import Held, NormalLoad, Quantity, Slider, Span
 from solver.errors import SettingError
 
 _LEAST_FRICTION = 0.1  # in a linear limit: what must stick does so with a load of reason
@@ -30,18 +30,22 @@ class FrictionContact(AnyContact):
         "N1": Quantity(
             column=columns.N1, unit="N", wanted="must be a number from -1e15 to 1e15 [N]",
             unlike_half_waves=_VARIATION, breaks_symmetry=True, varies_load=True,
+            otherwise=("N1_ratio", "N0"), covered=Span(low=0.0, high=4.0, of="N0"),
         ),
         "N1_ratio": Quantity(
             column=columns.RATIO, unit="", unlike_half_waves=_VARIATION, breaks_symmetry=True,
-            varies_load=True,
+            varies_load=True, by_hand=False,
         ),
         "N1_phase": Quantity(
-            column=columns.PHASE, unit="rad", wanted="must be a number from -1e4 to 1e4 [rad]"
+            column=columns.PHASE, unit="rad", wanted="must be a number from -1e4 to 1e4 [rad]", by_hand=False
         ),
         "kt": Quantity(
             column=columns.KT, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]"
         ),
-        "mu": Quantity(column=columns.MU, unit="", least=0.0, wanted="must be a number >= 0 and <= 100"),
+        "mu": Quantity(
+            column=columns.MU, unit="", least=0.0, wanted="must be a number >= 0 and <= 100", symbol="μ",
+            covered=Span(low=0.0, high=1.0),
+        ),
     }  # fmt: skip
     WORDS: ClassVar[Mapping[str, str]] = {
         "kt": "Tangential contact stiffness [N/m].",

@@ -11,7 +11,28 @@ import numpy as np
 
 from solver.contacts.fields import Real
 
+_AROUND, _BOTH_WAYS = 20.0, 4.0  # times its value, how far a parameter is varied by hand
 SHORTEST = 1e-12  # rad; a state of a contact that lasts no longer does nothing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Span:
+    """What a slider of a parameter covers.
+
+    Attributes
+    ----------
+    low, high : float
+        Its ends.
+    of : str or None
+        The parameter of whose absolute value they are multiples; None: they are values as they stand.
+    logarithmic : bool
+        Whether equal steps are equal ratios.
+    """
+
+    low: float
+    high: float
+    of: str | None = None
+    logarithmic: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +55,14 @@ class Quantity:
         Whether with it a motion and its negative half a period later are answered differently.
     varies_load : bool
         Whether it makes the normal load vary.
+    symbol : str
+        How people write it; as its key if empty.
+    otherwise : tuple of str or None
+        The parameters whose product it is where a scene leaves it out; None: it is then not there.
+    by_hand : bool
+        Whether it is worth a slider.
+    covered : Span or None
+        What its slider covers; None: values of the size it has, of both signs if it may have both.
     """
 
     column: int
@@ -43,6 +72,18 @@ class Quantity:
     unlike_half_waves: str = ""
     breaks_symmetry: bool = False
     varies_load: bool = False
+    symbol: str = ""
+    otherwise: tuple[str, ...] | None = None
+    by_hand: bool = True
+    covered: Span | None = None
+
+    def span(self, key: str) -> Span | None:
+        """Return what its slider covers as the parameter `key`; None without a slider."""
+        if not self.by_hand or self.covered is not None:
+            return self.covered if self.by_hand else None
+        if self.least >= 0.0:
+            return Span(low=1.0 / _AROUND, high=_AROUND, of=key, logarithmic=True)
+        return Span(low=-_BOTH_WAYS, high=_BOTH_WAYS, of=key)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

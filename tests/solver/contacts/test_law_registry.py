@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import runpy
 import subprocess
 import sys
@@ -22,7 +23,7 @@ from solver.scene.json_schema import scene_schema
 COULOMB: dict[str, Any] = {"kt": 2.0, "mu": 0.4, "N0": 1.0, "N1": 0.3, "N1_phase": 0.2}
 CONTACTS = {
     "coulomb": COULOMB, "tied": {"kt": 2.0, "mu": 0.4, "N0": 1.0, "N1_ratio": 0.3}, "elastic-normal": RUB,
-    "coulomb-2d": PLANE, "gap": GAP, "polynomial": CUBIC,
+    "coulomb-2d": PLANE, "gap": GAP, "polynomial": CUBIC, "coulomb-3d": {**PLANE, "law": "coulomb-3d"},
 }  # fmt: skip
 
 
@@ -42,6 +43,28 @@ def test_no_two_parameters_of_a_law_share_a_column() -> None:
 def test_every_parameter_is_a_field_of_the_scene() -> None:
     for law in laws().values():
         assert law.PARAMETERS.keys() <= law.model_fields.keys()
+
+
+@pytest.mark.parametrize("case", CONTACTS)
+def test_what_is_left_out_is_the_product_said(case: str) -> None:
+    (contact,) = scene(CONTACTS[case]).contacts
+    for key, quantity in contact.PARAMETERS.items():
+        if quantity.otherwise is not None and getattr(contact, key) is None:
+            product = math.prod(getattr(contact, other) or 0.0 for other in quantity.otherwise)
+            assert contact.value_of(key) == pytest.approx(product)
+
+
+@pytest.mark.parametrize("case", CONTACTS)
+def test_sliders_cover_values_that_a_scene_may_have(case: str) -> None:
+    found = scene(CONTACTS[case])
+    (contact,) = found.contacts
+    for key, quantity in contact.PARAMETERS.items():
+        span = quantity.span(key)
+        if span is not None and (quantity.otherwise is not None or getattr(contact, key) is not None):
+            size = 1.0 if span.of is None else abs(contact.value_of(span.of))
+            for end in (span.low * size, span.high * size):
+                path = f"{contact.name}.{key}"
+                assert found.with_values({path: end}).value(path) == pytest.approx(end)
 
 
 def test_kernels_of_the_package_have_numbers_that_stay() -> None:

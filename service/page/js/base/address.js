@@ -1,7 +1,7 @@
 // What is seen, in the address: a reload goes on, and a link shows another the same.
 
 // Every other word is the name of a kind of job, with the id of its job.
-const WORDS = ["scene", "contact", "set", "harmonics", "at", "range", "compare"];
+const WORDS = ["scene", "contact", "variable", "set", "harmonics", "at", "range", "compare"];
 const KIND = /^[a-z][a-z0-9-]{0,31}$/;
 const ID = /^[0-9a-f-]{36}$/;
 
@@ -9,6 +9,7 @@ export const state = {
   scene: "",
   set: {},
   contact: "",
+  variable: "",
   range: null,
   harmonics: 11,
   at: null,
@@ -20,6 +21,7 @@ export function read() {
   const words = new URLSearchParams(location.search);
   state.scene = words.get("scene") ?? "";
   state.contact = words.get("contact") ?? "";
+  state.variable = words.get("variable") ?? "";
   state.set = pairs(words.get("set") ?? "");
   state.harmonics = whole(words.get("harmonics"), 11);
   state.at = positive(words.get("at"));
@@ -38,6 +40,7 @@ export function write() {
   const set = Object.entries(state.set).map(([path, value]) => `${path}:${value}`);
   if (set.length) words.set("set", set.join(","));
   if (state.contact) words.set("contact", state.contact);
+  if (state.variable) words.set("variable", state.variable);
   if (state.range) words.set("range", state.range.join(":"));
   if (state.harmonics !== 11) words.set("harmonics", state.harmonics);
   if (state.at !== null) words.set("at", Number(state.at.toPrecision(9)));

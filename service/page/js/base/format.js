@@ -6,7 +6,10 @@ const LENGTHS = [
   [1e-7, "µm", 1e6],
   [0, "nm", 1e9],
 ];
-const UNITS = { frequency: "Hz", N0: "N", N1: "N", N1_phase: "rad", kt: "N/m", amplitude: "N", phase: "rad" };
+const UNITS = new Map([["frequency", "Hz"], ["amplitude", "N"], ["phase", "rad"]]);
+
+// Units of the parameters of contacts.
+export const learnUnits = (found) => found.forEach(([name, unit]) => UNITS.set(name, unit));
 
 export const number = (value, digits = 4) => {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
@@ -31,7 +34,7 @@ export const length = (metres) => {
   return `${number(metres * unit.perMetre)} ${unit.name}`;
 };
 
-export const unitOf = (path) => (path.startsWith("structure.") ? "" : (UNITS[path.split(".").pop()] ?? ""));
+export const unitOf = (path) => (path.startsWith("structure.") ? "" : (UNITS.get(path.split(".").pop()) ?? ""));
 
 export const withUnit = (path) => (unitOf(path) ? `${path} [${unitOf(path)}]` : path);
 

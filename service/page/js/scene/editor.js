@@ -4,6 +4,7 @@ import { Problem, post } from "../network/api.js";
 import { byId, el, say, show } from "../base/dom.js";
 import { tell } from "../base/events.js";
 import { current } from "./scenes.js";
+import { parameterOf } from "./laws.js";
 
 const escaped = (key) => String(key).replaceAll("~", "~0").replaceAll("/", "~1");
 let draft = null;
@@ -108,10 +109,15 @@ function read(text, before) {
 
 // What a number of a scene is counted in, by the end of its pointer.
 const UNITS = [
-  [/\/(kt|k|kn|ktx|kty)$/, "N/m"], [/\/c$/, "N s/m"], [/\/masses\/(?!.*\/(name|dof|between))/, "kg"], [/\/(N0|N1|amplitude)$/, "N"],
-  [/\/band\/\d$/, "Hz"], [/phase$/, "rad"], [/stiffness_proportional_damping$/, "s"], [/mass_proportional_damping$/, "1/s"], [/\/gap$/, "m"],
+  [/\/k$/, "N/m"], [/\/c$/, "N s/m"], [/\/masses\/(?!.*\/(name|dof|between))/, "kg"], [/\/amplitude$/, "N"],
+  [/\/band\/\d$/, "Hz"], [/phase$/, "rad"], [/stiffness_proportional_damping$/, "s"], [/mass_proportional_damping$/, "1/s"],
 ];
-const unitOf = ({ pointer, value }) => (typeof value === "number" && UNITS.find(([end]) => end.test(pointer))?.[1]) || "";
+
+function unitOf({ pointer, owner, key, value }) {
+  if (typeof value !== "number") return "";
+  const known = pointer.startsWith("/contacts/") ? parameterOf(owner, key)?.unit : UNITS.find(([end]) => end.test(pointer))?.[1];
+  return known ?? "";
+}
 
 // "/structure/springs/0/k" is "springs 1 › k" in its group, "/contacts/0/mu" is "mu".
 function nameOf(pointer) {

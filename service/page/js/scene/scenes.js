@@ -2,6 +2,7 @@
 
 import { request } from "../network/api.js";
 import { state } from "../base/address.js";
+import { givenValue, parameterOf, parametersOf } from "./laws.js";
 
 export const current = { body: null };
 
@@ -20,7 +21,13 @@ export async function loadScene(name) {
   return current.body;
 }
 
-export const frictionContacts = () => (current.body?.contacts ?? []).filter((c) => c.kt !== undefined && c.mu !== undefined);
+const contactOf = (path) => (current.body?.contacts ?? []).find(({ name }) => name === path.split(".")[0]);
+
+// The paths of a contact that are varied by hand.
+const pathsOf = (contact) =>
+  parametersOf(contact).filter(({ slider }) => slider).map(({ name }) => `${contact.name}.${name}`).filter((path) => ownValue(path) !== null);
+
+export const variedContacts = () => (current.body?.contacts ?? []).filter((contact) => pathsOf(contact).length);
 
 export const firstForce = () => {
   const { excitation } = current.body;
@@ -31,15 +38,40 @@ export const firstForce = () => {
 export function ownValue(path) {
   if (path === "excitation.amplitude") return firstForce().amplitude;
   const [name, keyName] = path.split(".");
-  const contact = current.body.contacts.find((c) => c.name === name);
-  if (!contact) return null;
-  if (keyName === "N1") return contact.N1 ?? (contact.N1_ratio ?? 0) * value(`${name}.N0`);
-  return contact[keyName] ?? null;
+  const contact = contactOf(path);
+  return contact ? givenValue(contact, keyName, (other) => value(`${name}.${other}`)) : null;
 }
 
 export const value = (path) => state.set[path] ?? ownValue(path);
 
-export const variable = () => `${state.contact}.N0`;
+// What the sliders of a contact cover: a path, its words, its ends.
+export function ranges(name) {
+  const contact = contactOf(name);
+  return contact ? pathsOf(contact).map((path) => range(contact, path)) : [];
+}
+
+function range(contact, path) {
+  const { name, symbol, words, slider } = parameterOf(contact, path.split(".")[1]);
+  const size = slider.of === null ? 1 : Math.abs(ownValue(`${contact.name}.${slider.of}`)) || 1;
+  const negative = ownValue(path) < 0;
+  const [low, high] = [negative ? -slider.high : slider.low, slider.high].map((end) => end * size);
+  return { path, low, high, log: slider.logarithmic && !negative, text: `${symbol} of ${contact.name}`, words: words || name };
+}
+
+// What may be designed: what is positive, or may be.
+export const variables = () =>
+  variedContacts().flatMap(({ name }) => ranges(name)).filter(({ path, log }) => log || ownValue(path) > 0).map(({ path }) => path);
+
+// The path that is designed: the one chosen, else the first of the contact.
+export function variable() {
+  const known = variables().filter((path) => path.startsWith(`${state.contact}.`));
+  return known.find((path) => path === `${state.contact}.${state.variable}`) ?? known[0] ?? "";
+}
+
+export function chooseVariable(path) {
+  [state.contact, state.variable] = path.split(".");
+  if (variables().find((other) => other.startsWith(`${state.contact}.`)) === path) state.variable = "";
+}
 
 // What a request about this scene says.
 export const asked = () => ({ scene: state.scene, set: { ...state.set }, harmonics: state.harmonics });
@@ -58,6 +90,8 @@ export function shownScene() {
 }
 
 export function defaultRange() {
-  const load = Math.abs(ownValue(variable())) || 100;
-  return [Number((load / 10).toPrecision(3)), Number((load * 15).toPrecision(3))];
+  const path = variable();
+  const size = Math.abs(ownValue(path)) || 100;
+  const { log, high } = ranges(state.contact).find((each) => each.path === path);
+  return [size / 10, log ? size * 15 : Math.min(size * 15, high)].map((end) => Number(end.toPrecision(3)));
 }

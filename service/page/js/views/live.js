@@ -6,7 +6,7 @@ import { byId, el, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
 import { length, lengthUnit, number, quantity, unitOf } from "../base/format.js";
 import { previewer } from "../network/previews.js";
-import { asked, current, frictionContacts, ownValue, value } from "../scene/scenes.js";
+import { asked, current, ownValue, ranges, value, variedContacts } from "../scene/scenes.js";
 
 const STEPS = 400;
 const RATE_WINDOW = 20;
@@ -30,6 +30,7 @@ export function startLive() {
     buildSliders();
     refresh();
   });
+  on("scene-contact", buildSliders);
   on("values", () => {
     fillSliders();
     refresh();
@@ -101,24 +102,9 @@ export function responseOf(answer, more = []) {
   };
 }
 
-function ranges() {
-  const c = state.contact;
-  const logs = (path) => {
-    const middle = Math.abs(ownValue(path)) || 1;
-    return { path, log: true, low: middle / 20, high: middle * 20 };
-  };
-  const found = [];
-  if (c) {
-    const load = Math.abs(ownValue(`${c}.N0`)) || 1;
-    found.push(
-      { ...logs(`${c}.N0`), text: `N0 of ${c}` },
-      { path: `${c}.N1`, low: 0, high: 4 * load, text: `N1 of ${c}` },
-      { ...logs(`${c}.kt`), text: `kt of ${c}` },
-      { path: `${c}.mu`, low: 0, high: 1, text: `μ of ${c}` },
-    );
-  }
-  found.push({ ...logs("excitation.amplitude"), text: "f0, the force" });
-  return found;
+function allRanges() {
+  const force = Math.abs(ownValue("excitation.amplitude")) || 1;
+  return [...ranges(state.contact), { path: "excitation.amplitude", log: true, low: force / 20, high: force * 20, text: "f0, the force" }];
 }
 
 const toStep = ({ log, low, high }, number) =>
@@ -130,13 +116,13 @@ const fromStep = ({ log, low, high }, step) =>
 let sliders = [];
 
 function buildSliders() {
-  sliders = ranges().map((range) => {
+  sliders = allRanges().map((range) => {
     const id = `slide-${range.path.replace(".", "-")}`;
     const slide = el("input", { type: "range", id, min: 0, max: STEPS, step: 1, "aria-describedby": "live-status" });
     const box = el("input", { type: "number", step: "any", "aria-label": `${range.text}, number` });
     slide.addEventListener("input", () => put(range, fromStep(range, Number(slide.value)), true));
     box.addEventListener("change", () => box.value !== "" && Number.isFinite(box.valueAsNumber) && put(range, box.valueAsNumber));
-    const node = el("div", { class: "slider" }, el("label", { for: id }, range.text), el("span", { class: "pair" }, box, el("span", {}, unitOf(range.path))), slide);
+    const node = el("div", { class: "slider" }, el("label", { for: id, title: range.words }, range.text), el("span", { class: "pair" }, box, el("span", {}, unitOf(range.path))), slide);
     return { range, slide, box, node };
   });
   const reset = el("button", { type: "button", onclick: () => putAll({}) }, "Values of the scene");
@@ -146,11 +132,11 @@ function buildSliders() {
 }
 
 function contactChooser() {
-  const names = frictionContacts().map((c) => c.name);
+  const names = variedContacts().map((c) => c.name);
   if (names.length < 2) return null;
   const choose = el("select", { id: "contact" }, names.map((name) => el("option", { value: name, selected: name === state.contact }, name)));
   choose.addEventListener("change", () => {
-    state.contact = choose.value;
+    Object.assign(state, { contact: choose.value, variable: "" });
     state.range = null;
     write();
     tell("contact");

@@ -1,0 +1,134 @@
+"""Sliders, design variables and fields of the page follow from the contact laws, also from outside."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import httpx
+import pytest
+from page_site import Site, opened
+from page_visits import visit
+
+expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+JOINED: dict[str, Any] = {
+    "name": "joined",
+    "structure": {
+        "kind": "lumped",
+        "masses": {"a": 1.0, "b": 0.6},
+        "springs": [
+            {"between": ["a", "ground"], "k": 1.0, "c": 0.02},
+            {"between": ["a", "b"], "k": 0.8, "c": 0.02},
+        ],
+    },
+    "contacts": [{"name": "joint", "law": "iwan", "between": ["b", "ground"], "k": 0.7, "limit": 0.8}],
+    "excitation": {"dof": "a", "amplitude": 1.0},
+    "observe": {"dof": "b", "band": [0.1, 0.3]},
+}
+IN_SPACE: dict[str, Any] = {
+    "name": "in-space",
+    "structure": {
+        "kind": "lumped",
+        "masses": {"x": 1.0, "y": 1.0, "z": 1.0},
+        "springs": [{"between": [dof, "ground"], "k": 10.0, "c": 0.05} for dof in "xyz"],
+    },
+    "contacts": [
+        {
+            "name": "pad", "law": "coulomb-3d", "between": ["x", "ground"], "between_second": ["y", "ground"],
+            "normal_between": ["z", "ground"], "kt": 5.0, "kn": 8.0, "mu": 0.3, "N0": 2.0,
+        },
+        {"name": "stop", "law": "gap", "between": ["y", "ground"], "k": 3.0, "gap": 0.5},
+        {"name": "rubber", "law": "polynomial", "between": ["x", "ground"], "a1": 1.0, "a3": 0.1},
+    ],
+    "excitation": {"dof": "x", "amplitude": 0.5},
+    "observe": {"dof": "x", "band": [0.4, 0.8]},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def outside(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """A service that knows a law from outside the package, with scenes stored."""
+    paths = os.pathsep.join((str(ROOT), str(ROOT / "tests" / "extensions")))
+    named = json.dumps(["iwan:IwanContact"])
+    made = Site(tmp_path_factory.mktemp("laws"), STICKSLIP_EXTENSIONS=named, PYTHONPATH=paths)
+    made.start()
+    for scene in (JOINED, IN_SPACE):
+        assert httpx.post(f"{made.url}/v1/scenes", json=scene, timeout=60.0).status_code == 201
+    yield made
+    made.stop()
+
+
+@pytest.fixture
+def page_of(browser: Browser, outside: Site) -> Iterator[Any]:
+    """Visits to the page with a scene."""
+    with opened(browser, outside) as (context, _):
+        yield lambda scene: visit(context, outside, f"?scene={scene}")
+
+
+def sliders(page: Page) -> list[str]:
+    return page.locator("#sliders .slider label").all_inner_texts()
+
+
+def variables(page: Page) -> list[str]:
+    return page.locator("#variable option").all_inner_texts()
+
+
+def test_coulomb_friction_has_the_sliders_it_had(page_of: Any) -> None:
+    page = page_of("two-dof")
+    assert sliders(page) == ["N0 of damper", "N1 of damper", "kt of damper", "μ of damper", "f0, the force"]
+    assert variables(page)[0] == page.input_value("#variable") == "damper.N0"
+    assert (page.input_value("#low"), page.input_value("#high")) == ("10", "1500")
+    # The load's amplitude is tied to its mean.
+    assert page.input_value("#slide-damper-N1 >> xpath=../span/input") == "30"
+    page.fill("#slide-damper-N0 >> xpath=../span/input", "200")
+    page.press("#slide-damper-N0 >> xpath=../span/input", "Tab")
+    assert page.input_value("#slide-damper-N1 >> xpath=../span/input") == "60"
+
+
+def test_a_law_from_outside_has_sliders_and_is_designed(page_of: Any) -> None:
+    page = page_of("joined")
+    assert sliders(page) == ["k of joint", "limit of joint", "f0, the force"]
+    assert variables(page) == ["joint.k", "joint.limit"]
+    expect(page.locator("#live-status")).to_contain_text("peak 4.298 m")
+    page.focus("#slide-joint-limit")
+    page.keyboard.press("Home")
+    expect(page.locator("#live-status")).not_to_contain_text("peak 4.298 m")
+    expect(page).to_have_url(re.compile(r"set=joint\.limit:0\.04&"))
+    page.select_option("#variable", "joint.limit")
+    expect(page.locator("#variable-unit")).to_have_text("N")
+    page.click("#study")
+    expect(page.locator("#design-facts")).to_contain_text("joint.limit", timeout=120_000)
+    assert "variable=limit" in page.url
+    page.reload()
+    page.locator("html[data-ready]").wait_for(state="attached")
+    assert page.input_value("#variable") == "joint.limit"
+
+
+def test_every_law_has_its_sliders_and_units(page_of: Any) -> None:
+    page = page_of("in-space")
+    pad = ["N0", "N1", "kt", "μ", "kt_second", "kn"]
+    assert sliders(page) == [*(f"{name} of pad" for name in pad), "f0, the force"]
+    for contact, names in (("stop", ["k", "gap"]), ("rubber", ["a1", "a3"])):
+        page.select_option("#contact", contact)
+        assert sliders(page) == [*(f"{name} of {contact}" for name in names), "f0, the force"]
+        assert page.input_value("#variable") == f"{contact}.{names[0]}"
+    assert {"pad.kn", "pad.kt_second", "stop.gap", "rubber.a3"} <= set(variables(page))
+    page.click("#edit-scene")
+    fields = page.locator("#editor label").all_inner_texts()
+    assert {"kn [N/m]", "gap [m]", "a3 [N/m^3]"} <= set(fields)
+
+
+def test_what_is_left_out_follows_what_it_is_taken_from(page_of: Any) -> None:
+    page = page_of("in-space")
+    page.fill("#slide-pad-kt >> xpath=../span/input", "6")
+    page.press("#slide-pad-kt >> xpath=../span/input", "Tab")
+    assert page.input_value("#slide-pad-kt_second >> xpath=../span/input") == "6"
