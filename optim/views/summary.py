@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from solver.continuation.certificate import unsettled
 from solver.results import units
 from solver.results.told import Summary
+from solver.scene.parameter_units import parameter
 from solver.views.summary import Pairs, made
 
 if TYPE_CHECKING:
@@ -22,9 +23,9 @@ _MOST_ROWS = 12
 
 def of_design(result: DesignResult) -> Summary:
     """The optimum, its peak and band, and what holds it."""
-    pairs: Pairs = [(name, units.parameter(name, value)) for name, value in result.optimum.items()]
+    pairs: Pairs = [(name, parameter(name, value)) for name, value in result.optimum.items()]
     for name, (low, high) in result.plateau.items():
-        pairs.append((f"{name}, as good", f"{units.parameter(name, low)} to {units.parameter(name, high)}"))
+        pairs.append((f"{name}, as good", f"{parameter(name, low)} to {parameter(name, high)}"))
     if result.chosen_by is not None:
         pairs.append(("chosen by", result.chosen_by))
     if result.peak is not None:
@@ -47,7 +48,7 @@ def of_robust(result: RobustResult) -> Summary:
     pairs: Pairs = []
     for name, side in (("nominal", result.nominal), ("robust", result.robust)):
         if side is not None:
-            values = ", ".join(f"{path} = {units.parameter(path, v)}" for path, v in side.values.items())
+            values = ", ".join(f"{path} = {parameter(path, v)}" for path, v in side.values.items())
             worst = "unknown" if math.isnan(side.worst_peak) else units.length(side.worst_peak)
             pairs.append((f"{name} optimum", f"{values}: peak {units.length(side.peak)}, worst {worst}"))
     pairs += [("warning", words) for words in result.design.warnings]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.results import units
 from solver.results.dataset import Dataset, Variable
+from solver.scene.parameter_units import parameter_unit
 from solver.views.to_dataset import attributes, column
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def _values(
     return {
         v.name: column(
             dim, np.array([values[v.name] for values in designs], dtype=np.float64),
-            units.parameter_unit(v.paths[0]), "design variable",
+            parameter_unit(v.paths[0]), "design variable",
         )
         for v in variables
     }  # fmt: skip

@@ -10,7 +10,7 @@ from service.db.repositories import SweepRepository
 from service.jobs.arrays import decode
 from service.jobs.strict_json import digest
 from solver.results.dataset import Dataset
-from solver.results.units import parameter_unit
+from solver.scene.parameter_units import parameter_unit
 from solver.scene.scene import Scene
 from solver.views.to_dataset import attributes, point_variables
 

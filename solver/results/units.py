@@ -1,13 +1,10 @@
-"""How amplitudes and parameters are shown to people: in the unit that fits, with the digits that count."""
+"""How amplitudes and numbers are shown to people: in the unit that fits, with the digits that count."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-_UNITS = {
-    "frequency": "Hz", "N0": "N", "N1": "N", "N1_phase": "rad", "kt": "N/m", "amplitude": "N", "phase": "rad",
-}  # fmt: skip
 _DIGITS = 4
 
 
@@ -39,17 +36,6 @@ def length_unit(largest: float) -> LengthUnit:
 def length(metres: float) -> str:
     """An amplitude [m] in the unit that fits."""
     return length_unit(metres).show(metres)
-
-
-def parameter_unit(path: str) -> str:
-    """The unit of the values of a parameter path; empty where there is none, or it depends on the scene."""
-    owner, _, key = path.rpartition(".")
-    return "" if owner == "structure" else _UNITS.get(key, "")
-
-
-def parameter(path: str, value: float) -> str:
-    """A value of a parameter path with its unit."""
-    return f"{number(value, digits=6)} {parameter_unit(path)}".rstrip()
 
 
 def number(value: float, digits: int = _DIGITS) -> str:

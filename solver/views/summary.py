@@ -11,6 +11,7 @@ from solver.continuation.branch import BranchStatus
 from solver.results import units
 from solver.results.notes import BAND_OPEN, between_points, flag_words
 from solver.results.told import Summary
+from solver.scene.parameter_units import parameter
 
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
@@ -37,11 +38,11 @@ def of_branch(branch: Branch) -> Summary:
     path, pairs = branch.parameter, []
     if branch.peak is not None:
         height = units.length(branch.peak.value)
-        pairs.append(("peak", f"{height} at {units.parameter(path, branch.peak.at)}"))
+        pairs.append(("peak", f"{height} at {parameter(path, branch.peak.at)}"))
         if math.isfinite(branch.error_estimate):
             pairs.append(("estimated error", units.length(branch.error_estimate)))
     if branch.band is not None:
-        width = units.parameter(path, branch.band.width)
+        width = parameter(path, branch.band.width)
         pairs.append(("band", f"{width} above {units.length(branch.band.limit)}"))
     pairs += _branch_notes(branch)
     pairs += [("points", str(len(branch.values))), ("time", units.duration(branch.seconds))]
@@ -118,7 +119,7 @@ def _least(track: PeakTrack) -> Pairs:
     best = track.optimum
     if not math.isfinite(best.at):
         return []
-    return [("least peak", f"{units.length(best.peak)} at {units.parameter(track.parameter_path, best.at)}")]
+    return [("least peak", f"{units.length(best.peak)} at {parameter(track.parameter_path, best.at)}")]
 
 
 def of_accuracy(study: AccuracyStudy) -> Summary:

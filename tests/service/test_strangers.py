@@ -73,6 +73,7 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     "GET /v1/uploads/{upload_id}": (OWNED, None),
     "GET /v1/matrices/formats": (LISTED, None),
     "GET /v1/kinds": (LISTED, None),
+    "GET /v1/laws": (LISTED, None),
     # Of another's upload it is said that there is none.
     "POST /v1/matrices": (
         (401, 401, 422, 401, 401, 403, 200, 200),

@@ -12,6 +12,7 @@ from service.cli.options.inputs import number, whole_number
 from service.errors import InputError
 from service.rendering.tables.text import print_json, print_table
 from solver.results import units
+from solver.scene.parameter_units import parameter
 
 if TYPE_CHECKING:
     from service.client.client import Client
@@ -90,4 +91,4 @@ def show(found: Mapping[str, Any], *, as_json: bool) -> None:
 
 
 def _chosen(name: str, value: float | None) -> str:
-    return name if value is None else f"{name} = {units.parameter(name, value)}"
+    return name if value is None else f"{name} = {parameter(name, value)}"

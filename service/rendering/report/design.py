@@ -21,6 +21,7 @@ from service.rendering.report.sections import (
 )
 from service.rendering.tables.design import design_tables
 from solver.results import units
+from solver.scene.parameter_units import parameter
 from solver.views.plots import style
 from solver.views.plots.html import image, page, pairs, table
 
@@ -85,8 +86,8 @@ def _figures(given: Designed, chosen: Json, lines: Sequence[Line], where: str) -
     rows: list[list[Any]] = []
     for name, value in chosen["optimum"].items():
         path = name.split(",")[0].strip()
-        before = units.parameter(path, given.scene.value(path))
-        rows.append([name, before, units.parameter(path, value), bounds_of(given, name)])
+        before = parameter(path, given.scene.value(path))
+        rows.append([name, before, parameter(path, value), bounds_of(given, name)])
     return (
         f"<h2>Optimum</h2>{table(['variable', 'as given', 'optimum', 'bounds'], rows)}"
         f"<h2>Before and after{escape(where)}</h2>{branch_table(lines)}"

@@ -23,6 +23,7 @@ from service.rendering.report.sections import (
 from service.rendering.tables.robust import effort_pairs, side_lines, uncertain_rows
 from solver.continuation.branch import Branch
 from solver.results import units
+from solver.scene.parameter_units import parameter
 from solver.scene.scene import Scene
 from solver.views.plots import style
 from solver.views.plots.html import image, page, pairs, table
@@ -109,8 +110,8 @@ def _optima(given: Designed) -> str:
     rows: list[list[Any]] = []
     for name in given.result["optimum"]:
         path = name.split(",")[0].strip()
-        values = [units.parameter(path, side["values"][name]) for _, side in sides]
-        rows.append([name, units.parameter(path, given.scene.value(path)), *values, bounds_of(given, name)])
+        values = [parameter(path, side["values"][name]) for _, side in sides]
+        rows.append([name, parameter(path, given.scene.value(path)), *values, bounds_of(given, name)])
     heads = ["variable", "as given", *(f"{name} optimum" for name, _ in sides), "bounds"]
     return f"<h2>Optimum</h2>{table(heads, rows)}" if rows else ""
 

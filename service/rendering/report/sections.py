@@ -14,6 +14,7 @@ from service.rendering.report.responses import Line, comparison_figure
 from solver.continuation.branch import Branch
 from solver.results import units
 from solver.results.notes import flag_words
+from solver.scene.parameter_units import parameter
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
 from solver.views.plots.html import image, pairs, table
@@ -55,7 +56,7 @@ def bounds_of(given: Designed, name: str) -> str:
     """The bounds of a variable, with its unit; empty if they were not given."""
     bounds = (given.problem.get("variables") or {}).get(name)
     path = name.split(",")[0].strip()
-    return "" if bounds is None else f"{units.number(bounds[0], 6)} to {units.parameter(path, bounds[1])}"
+    return "" if bounds is None else f"{units.number(bounds[0], 6)} to {parameter(path, bounds[1])}"
 
 
 def branch_table(lines: Sequence[Line]) -> str:
@@ -108,7 +109,7 @@ def scene_section(scene: Scene) -> str:
     contacts: list[list[Any]] = []
     for contact in scene.contacts:
         values = [
-            f"{key} = {units.parameter(f'{contact.name}.{key}', value)}"
+            f"{key} = {parameter(f'{contact.name}.{key}', value)}"
             for key in contact.PARAMETERS
             if (value := getattr(contact, key)) is not None
         ]

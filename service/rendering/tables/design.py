@@ -9,6 +9,7 @@ from typing import Any
 
 from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
+from solver.scene.parameter_units import parameter
 
 Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]
@@ -57,7 +58,7 @@ def front(found: Json) -> None:
     metres = _price(min((point["peak"] for point in points), default=1.0))
     rows: list[tuple[str, ...]] = [
         (
-            *(units.parameter(name, point["values"][name]) for name in names),
+            *(parameter(name, point["values"][name]) for name in names),
             units.length(point["peak"]),
             f"{units.number(point['band_hz'])} Hz",
             "" if point["slope"] is None else units.length(abs(point["slope"]) * hertz),
@@ -83,7 +84,7 @@ def _price(size: float) -> float:
 
 def values(optimum: Json) -> Pairs:
     """The variables with their units."""
-    return [(path, units.parameter(path, value)) for path, value in optimum.items()]
+    return [(path, parameter(path, value)) for path, value in optimum.items()]
 
 
 def amount(value: float, unit: str) -> str:
@@ -138,7 +139,7 @@ def further(found: Json) -> list[Json]:
 def _plateau(found: Json) -> Pairs:
     """How far other values are as good, and what the design was chosen by among them."""
     ends = [
-        (f"{path}, as good", f"{units.parameter(path, low)} to {units.parameter(path, high)}")
+        (f"{path}, as good", f"{parameter(path, low)} to {parameter(path, high)}")
         for path, (low, high) in found.get("plateau", {}).items()
     ]
     by = found.get("chosen_by")
@@ -160,7 +161,7 @@ def _checked(found: Json) -> Table | None:
     names = tuple(checked[0]["values"])
     rows: list[tuple[str, ...]] = [
         (
-            *(units.parameter(name, one["values"][name]) for name in names),
+            *(parameter(name, one["values"][name]) for name in names),
             str(one["n_harmonics"]),
             "unknown" if one["peak"] is None else units.length(one["peak"]),
             "yes" if one["feasible"] else "no",
@@ -225,7 +226,7 @@ def _basins(found: Json) -> Table | None:
     names = tuple(basins[0]["values"])
     rows: list[tuple[str, ...]] = [
         (
-            *(units.parameter(name, basin["values"][name]) for name in names),
+            *(parameter(name, basin["values"][name]) for name in names),
             units.length(basin["peak"]),
             "yes" if basin["settled"] else "no",
             "yes" if basin.get("proven", True) else "no",

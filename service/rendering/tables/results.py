@@ -9,6 +9,7 @@ from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
 from solver.results.notes import BAND_OPEN, FLAGS, between_points, flag_words
 from solver.results.views import on_demand
+from solver.scene.parameter_units import parameter
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -92,7 +93,7 @@ def branch(found: Json) -> None:
     pairs.append(("time", units.duration(found["seconds"])))
     title = f"{found['scene']}, {path}"
     if values:
-        title += f" from {units.parameter(path, values[0])} to {units.parameter(path, values[-1])}"
+        title += f" from {parameter(path, values[0])} to {parameter(path, values[-1])}"
     print_pairs(f"{title}, {found['n_harmonics']} harmonics", pairs)
 
 
@@ -186,7 +187,7 @@ def _peaks(found: Json, path: str) -> Pairs:
     highest = "peak" if peak in interior else "highest, at an end"
     others = [other for other in interior if other != peak]
     named = [(highest, peak), *(("further peak", other) for other in others)]
-    return [(name, f"{units.length(p['value'])} at {units.parameter(path, p['at'])}") for name, p in named]
+    return [(name, f"{units.length(p['value'])} at {parameter(path, p['at'])}") for name, p in named]
 
 
 def _band(found: Json) -> str:

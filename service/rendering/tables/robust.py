@@ -7,6 +7,7 @@ from typing import Any
 
 from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
+from solver.scene.parameter_units import parameter
 
 Json = Mapping[str, Any]
 
@@ -19,7 +20,7 @@ def robust(found: Json) -> None:
     rows: list[tuple[str, ...]] = []
     if sides:
         for path in sides[0][1]["values"]:
-            rows.append((path, *(units.parameter(path, side["values"][path]) for _, side in sides)))
+            rows.append((path, *(parameter(path, side["values"][path]) for _, side in sides)))
         rows += [(name, *(show(side) for _, side in sides)) for name, show in _LINES]
     aim = found["aim"] if found["quantile"] is None else f"{100.0 * found['quantile']:g} % {found['aim']}"
     title = f"Robust damper of {found['scene']}, {aim}"
@@ -65,7 +66,7 @@ def uncertain_rows(found: Json) -> list[tuple[str, str]]:
         elif how == "deviation":
             said.append((one["path"], f"{low:+.4g} to {high:+.4g} from the design"))
         else:
-            ends = [units.parameter(one["path"], end) for end in (low, high)]
+            ends = [parameter(one["path"], end) for end in (low, high)]
             said.append((one["path"], f"from {ends[0]} to {ends[1]}"))
     if "samples" in found:
         said.append(("samples", str(len(found["samples"]))))

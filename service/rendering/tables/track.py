@@ -7,6 +7,7 @@ from typing import Any
 
 from service.rendering.tables.text import print_pairs
 from solver.results import units
+from solver.scene.parameter_units import parameter
 
 Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]
@@ -34,7 +35,7 @@ def response_map(found: Json) -> None:
     pairs = [("points", f"{size}, {len(known)} solved, largest residual {found['largest_residual']:.1e}")]
     if known:
         value, frequency, at = max(known)
-        place = f"{frequency:.6g} Hz, {path} {units.parameter(path, at)}"
+        place = f"{frequency:.6g} Hz, {path} {parameter(path, at)}"
         pairs.append(("highest of the grid", f"{units.length(value)} at {place}"))
     if found["ridge"] is not None:
         pairs += [*_ridge(found["ridge"]), *_plateau(found["ridge"]), *_sure(found["ridge"])]
@@ -48,7 +49,7 @@ def _title(found: Json) -> str:
     path, values = found["parameter_path"], found["parameter"]
     title = f"{found['scene']}, {path}"
     if values:
-        title += f" from {units.parameter(path, values[0])} to {units.parameter(path, values[-1])}"
+        title += f" from {parameter(path, values[0])} to {parameter(path, values[-1])}"
     return f"{title}, {found['n_harmonics']} harmonics"
 
 
@@ -61,11 +62,11 @@ def _ridge(found: Json) -> Pairs:
             pairs.append((name, f"{units.length(value)} at {frequency:.6g} Hz"))
     for exchange in found["exchanges"]:
         height = units.length(exchange["peak"])
-        pairs.append(("exchange", f"at {units.parameter(path, exchange['at'])}, both {height}"))
+        pairs.append(("exchange", f"at {parameter(path, exchange['at'])}, both {height}"))
     if best["at"] is not None:
         held = ", ".join(f"{peak['frequency']:.6g} Hz" for peak in best["active"])
         height = units.length(best["peak"])
-        pairs.append(("least peak", f"{height} at {path} = {units.parameter(path, best['at'])} ({held})"))
+        pairs.append(("least peak", f"{height} at {path} = {parameter(path, best['at'])} ({held})"))
     return pairs
 
 
@@ -74,7 +75,7 @@ def _plateau(found: Json) -> Pairs:
     path, best = found["parameter_path"], found["optimum"]
     if best.get("plateau") is None:
         return []
-    low, high = (units.parameter(path, end) for end in best["plateau"])
+    low, high = (parameter(path, end) for end in best["plateau"])
     return [("as good", f"{low} to {high}"), ("chosen by", best["chosen_by"])]
 
 

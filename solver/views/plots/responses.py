@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from solver.results import units
+from solver.scene.parameter_units import parameter_unit
 from solver.views.plots import style
 from solver.views.plots.curves import FloatArray, Response
 from solver.views.plots.style import Into
@@ -161,7 +162,7 @@ def peak_figure(
 
 def axis_name(path: str) -> str:
     """A parameter path with its unit."""
-    unit = units.parameter_unit(path)
+    unit = parameter_unit(path)
     return f"{path} [{unit}]" if unit else path
 
 

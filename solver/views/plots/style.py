@@ -17,6 +17,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from solver.errors import SettingError
 from solver.results import units
+from solver.scene.parameter_units import parameter_unit
 
 # Okabe and Ito's colours, which the colour-blind can tell apart (jfly.uni-koeln.de/color).
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
@@ -115,7 +116,7 @@ def label(axes: Axes, x: str, y: str) -> None:
 
 def quantity(path: str, value: float, digits: int) -> str:
     """A parameter value with its unit, rounded for a picture."""
-    return f"{units.number(value, digits)} {units.parameter_unit(path)}".rstrip()
+    return f"{units.number(value, digits)} {parameter_unit(path)}".rstrip()
 
 
 def plain_log(axis: Axis) -> None:

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 import solver
 from solver.results import units
 from solver.results.files import whole
+from solver.scene.parameter_units import parameter
 from solver.views.plots import SUFFIXES, saving, style
 from solver.views.plots.curves import Response, above, with_peak
 from solver.views.plots.motion import Motion, motion_figure
@@ -177,10 +178,11 @@ def test_lengths_have_the_unit_that_fits(metres: float, shown: str) -> None:
 @pytest.mark.parametrize(
     ("path", "shown"),
     [("frequency", "1.5 Hz"), ("shroud.N0", "1.5 N"), ("shroud.N1_ratio", "1.5"), ("structure.k1", "1.5"),
-     ("shroud.kt", "1.5 N/m"), ("shroud.N1_phase", "1.5 rad"), ("excitation.amplitude", "1.5 N")],
+     ("shroud.kt", "1.5 N/m"), ("shroud.N1_phase", "1.5 rad"),
+     ("seal.gap", "1.5 m"), ("seal.a3", "1.5 N/m^3"), ("excitation.amplitude", "1.5 N")],
 )  # fmt: skip
 def test_parameters_have_their_unit(path: str, shown: str) -> None:
-    assert units.parameter(path, 1.5) == shown
+    assert parameter(path, 1.5) == shown
 
 
 heights = st.lists(st.floats(0.0, 10.0), min_size=2, max_size=30)
