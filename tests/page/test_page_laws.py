@@ -78,6 +78,11 @@ def sliders(page: Page) -> list[str]:
     return page.locator("#sliders .slider label").all_inner_texts()
 
 
+def columns(page: Page) -> list[str]:
+    """Of the table of contacts, those behind the state."""
+    return page.locator("#structure-states th").all_inner_texts()[3:]
+
+
 def variables(page: Page) -> list[str]:
     return page.locator("#variable option").all_inner_texts()
 
@@ -86,6 +91,7 @@ def test_coulomb_friction_has_the_sliders_it_had(page_of: Any) -> None:
     page = page_of("two-dof")
     assert sliders(page) == ["N0 of damper", "N1 of damper", "kt of damper", "μ of damper", "f0, the force"]
     assert variables(page)[0] == page.input_value("#variable") == "damper.N0"
+    assert columns(page) == ["N0", "kt", "μ"]
     assert (page.input_value("#low"), page.input_value("#high")) == ("10", "1500")
     # The load's amplitude is tied to its mean.
     assert page.input_value("#slide-damper-N1 >> xpath=../span/input") == "30"
@@ -98,6 +104,7 @@ def test_a_law_from_outside_has_sliders_and_is_designed(page_of: Any) -> None:
     page = page_of("joined")
     assert sliders(page) == ["k of joint", "limit of joint", "f0, the force"]
     assert variables(page) == ["joint.k", "joint.limit"]
+    assert columns(page) == ["k", "limit"]
     expect(page.locator("#live-status")).to_contain_text("peak 4.298 m")
     page.focus("#slide-joint-limit")
     page.keyboard.press("Home")
@@ -122,6 +129,7 @@ def test_every_law_has_its_sliders_and_units(page_of: Any) -> None:
         assert sliders(page) == [*(f"{name} of {contact}" for name in names), "f0, the force"]
         assert page.input_value("#variable") == f"{contact}.{names[0]}"
     assert {"pad.kn", "pad.kt_second", "stop.gap", "rubber.a3"} <= set(variables(page))
+    assert columns(page) == ["law", "N0", "kt", "μ", "kn", "k", "gap", "a1", "a3"]
     page.click("#edit-scene")
     fields = page.locator("#editor label").all_inner_texts()
     assert {"kn [N/m]", "gap [m]", "a3 [N/m^3]"} <= set(fields)

@@ -2,6 +2,7 @@
 
 import { el, show, svg, table } from "../base/dom.js";
 import { number } from "../base/format.js";
+import { parametersOf } from "./laws.js";
 import { GROUND, chain, ownName, partsOf, ring } from "./layout.js";
 
 export const STATES = {
@@ -59,20 +60,24 @@ function legend() {
 export function contactTable(scene, states, at) {
   const parts = partsOf(scene);
   if (!parts.contacts.length) return el("p", { class: "note" }, "The scene has no contacts: it is linear.");
+  const columns = columnsOf(parts.contacts);
+  const laws = new Set(parts.contacts.map(({ law }) => law)).size > 1;
   const rows = parts.contacts.map((c) => [
     c.name,
     c.between.join(" – "),
     statesOf(states, c.name),
-    { text: c.N0 === undefined ? (c.law ?? "") : `${number(c.N0)} N`, number: true },
-    { text: c.kt === undefined ? "" : `${number(c.kt)} N/m`, number: true },
-    { text: c.mu === undefined ? "" : number(c.mu), number: true },
+    ...(laws ? [c.law ?? ""] : []),
+    ...columns.map(({ name, unit }) => ({ text: typeof c[name] === "number" ? `${number(c[name])} ${unit}`.trim() : "", number: true })),
   ]);
   const where = at ? `Contacts at ${number(at, 5)} Hz` : "Contacts";
-  return table(
-    ["contact", "between", at ? `at ${number(at, 5)} Hz` : "state", { text: "N0", number: true }, { text: "kt", number: true }, { text: "μ", number: true }],
-    rows,
-    where,
-  );
+  const heads = columns.map(({ symbol }) => ({ text: symbol, number: true }));
+  return table(["contact", "between", at ? `at ${number(at, 5)} Hz` : "state", ...(laws ? ["law"] : []), ...heads], rows, where);
+}
+
+// The parameters that the contacts of a scene have of their own, each once, whatever their laws.
+function columnsOf(contacts) {
+  const own = contacts.flatMap((c) => parametersOf(c).filter(({ name, slider, otherwise }) => slider && !otherwise && typeof c[name] === "number"));
+  return [...new Map(own.map((parameter) => [parameter.name, parameter])).values()];
 }
 
 // The state of a contact in sector j; of a disk written out every sector has its own.
