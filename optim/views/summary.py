@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from solver.continuation.certificate import unsettled
 from solver.results import units
 from solver.results.told import Summary
-from solver.scene.parameter_units import parameter
+from solver.views.parameter_units import parameter
 from solver.views.summary import Pairs, made
 
 if TYPE_CHECKING:

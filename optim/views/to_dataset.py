@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.results.dataset import Dataset, Variable
-from solver.scene.parameter_units import parameter_unit
+from solver.views.parameter_units import parameter_unit
 from solver.views.to_dataset import attributes, column
 
 if TYPE_CHECKING:

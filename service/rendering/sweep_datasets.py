@@ -10,8 +10,8 @@ from service.db.repositories import SweepRepository
 from service.jobs.arrays import decode
 from service.jobs.strict_json import digest
 from solver.results.dataset import Dataset
-from solver.scene.parameter_units import parameter_unit
 from solver.scene.scene import Scene
+from solver.views.parameter_units import parameter_unit
 from solver.views.to_dataset import attributes, point_variables
 
 _COLUMNS = ("parameter", "amplitude", "half_peak_to_peak", "mean", "residual")

@@ -12,7 +12,7 @@ from service.cli.options.inputs import number, whole_number
 from service.errors import InputError
 from service.rendering.tables.text import print_json, print_table
 from solver.results import units
-from solver.scene.parameter_units import parameter
+from solver.views.parameter_units import parameter
 
 if TYPE_CHECKING:
     from service.client.client import Client

@@ -21,7 +21,7 @@ from service.rendering.report.sections import (
 )
 from service.rendering.tables.design import design_tables
 from solver.results import units
-from solver.scene.parameter_units import parameter
+from solver.views.parameter_units import parameter
 from solver.views.plots import style
 from solver.views.plots.html import image, page, pairs, table
 

@@ -14,9 +14,9 @@ from service.rendering.report.responses import Line, comparison_figure
 from solver.continuation.branch import Branch
 from solver.results import units
 from solver.results.notes import flag_words
-from solver.scene.parameter_units import parameter
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
+from solver.views.parameter_units import parameter
 from solver.views.plots.html import image, pairs, table
 
 Json = Mapping[str, Any]

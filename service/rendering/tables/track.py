@@ -7,7 +7,7 @@ from typing import Any
 
 from service.rendering.tables.text import print_pairs
 from solver.results import units
-from solver.scene.parameter_units import parameter
+from solver.views.parameter_units import parameter
 
 Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]
