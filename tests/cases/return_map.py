@@ -12,6 +12,7 @@ from solver import (
 )
 from solver.linear.assembly import linear_model
 from solver.marching import march as marching
+from solver.marching.equations import equations_of_motion
 from solver.marching.kernels import taylor as kernel
 from solver.scene.scene import CyclicStructure
 
@@ -21,7 +22,7 @@ class Return:
 
     def __init__(self, scene: Scene, frequency_hz: float, steps: int = 1024) -> None:
         whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
-        self.system, _ = marching._system(whole, 2.0 * math.pi * frequency_hz)
+        self.system, _ = equations_of_motion(whole, 2.0 * math.pi * frequency_hz)
         self.steps = steps
         self.orbit = marching._at_rest(self.system)
         code, _ = self.march(self.orbit, 5000, 1e-13)

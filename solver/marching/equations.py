@@ -1,0 +1,91 @@
+"""The equations of motion of a scene as the time march reads them: sparse rows in the angle tau = omega t."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import block_diag, csr_array, diags_array
+
+from solver.errors import SettingError
+from solver.linear.first_order import equations
+from solver.marching.contacts import columns, selection
+from solver.marching.kernels import state as kernel
+from solver.scene.bodies import Body
+from solver.scene.kinematics import dof_names, pair_form
+from solver.scene.scene import LumpedStructure, MatricesStructure, Scene
+
+FloatArray = NDArray[np.float64]
+
+
+def _matrices(
+    structure: LumpedStructure, bodies: tuple[Body, ...]
+) -> tuple[FloatArray, csr_array, csr_array]:
+    """Masses [kg] of the points, and damping and stiffness of a lumped structure with bodies."""
+    M = np.array([mass.m for mass in structure.masses])
+    k = np.array([spring.k for spring in structure.springs])
+    c = np.array([spring.c for spring in structure.springs]) + structure.stiffness_proportional_damping * k
+    dashpots = np.array([damper.c for damper in structure.dampers])
+    index = {dof: i for i, dof in enumerate(dof_names(structure, bodies))}
+    springs = selection([pair_form(spring.between) for spring in structure.springs], index, len(index))
+    dampers = selection([pair_form(damper.between) for damper in structure.dampers], index, len(index))
+    K = springs.T @ diags_array(k) @ springs
+    C = springs.T @ diags_array(c) @ springs + dampers.T @ diags_array(dashpots) @ dampers
+    return M, csr_array(C), csr_array(K)
+
+
+def _equations(scene: Scene) -> tuple[csr_array, csr_array, csr_array, dict[str, int]]:
+    """A = M⁻¹ K, B = M⁻¹ C, W = M⁻¹ and the coordinate of each DOF in use."""
+    structure, bodies = scene.structure, scene.bodies
+    inertias = [csr_array(np.linalg.inv(body.mass_matrix())) for body in bodies]
+    if isinstance(structure, MatricesStructure):
+        return _of_matrices(scene, structure, inertias)
+    if not isinstance(structure, LumpedStructure):
+        raise SettingError("scene", scene.name, "must be written out as its annulus to be marched")
+    M, C, K = _matrices(structure, bodies)
+    inverse = diags_array(1.0 / M)
+    if bodies:
+        inverse = block_diag([inverse, *inertias], format="csr")
+    index = {dof: i for i, dof in enumerate(scene.dofs)}
+    return csr_array(inverse @ K), csr_array(inverse @ C), csr_array(inverse), index
+
+
+def _of_matrices(
+    scene: Scene, structure: MatricesStructure, inertias: list[csr_array]
+) -> tuple[csr_array, csr_array, csr_array, dict[str, int]]:
+    """The same of a structure given by matrices, the bodies behind its coordinates."""
+    own = [dof for body in scene.bodies for dof in body.dofs]
+    ends = [term.dof for forms in scene.forms for form in forms for term in form]
+    used = [*ends, *(force.dof for force in scene.forces), scene.observe.dof]
+    found = equations(structure, [dof for dof in used if dof not in own])
+    A, B, W = (csr_array(each) for each in (found.A, found.B, found.W))
+    if not own:
+        return A, B, W, found.index
+    nothing, n = csr_array((len(own), len(own))), A.shape[0]
+    A, B = (csr_array(block_diag([each, nothing])) for each in (A, B))
+    W = csr_array(block_diag([W, *inertias]))
+    return A, B, W, found.index | {dof: n + i for i, dof in enumerate(own)}
+
+
+def equations_of_motion(scene: Scene, omega: float) -> tuple[kernel.System, int]:
+    """The equations of a scene in the angle tau = omega t, and the coordinate observed."""
+    A, B, W, index = _equations(scene)
+    A, B, W = A / omega**2, B / omega, W / omega**2
+    forces = scene.forces
+    placed = [(row, own) for one, own in zip(scene.contacts, scene.forms, strict=True) for row in one.rows()]
+    system = kernel.System(
+        A_start=A.indptr.astype(np.int64),
+        A_column=A.indices.astype(np.int64),
+        A_value=A.data,
+        B_start=B.indptr.astype(np.int64),
+        B_column=B.indices.astype(np.int64),
+        B_value=B.data,
+        W_start=W.indptr.astype(np.int64),
+        W_column=W.indices.astype(np.int64),
+        W_value=W.data,
+        force_dof=np.array([index[force.dof] for force in forces], dtype=np.int64),
+        force_amplitude=np.array([force.amplitude for force in forces]),
+        force_phase=np.array([force.phase for force in forces]),
+        force_harmonic=np.array([force.harmonic for force in forces], dtype=np.int64),
+        **columns(placed, index, A.shape[0]),
+    )
+    return system, index[scene.observe.dof]
