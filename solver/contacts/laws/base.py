@@ -47,6 +47,8 @@ class AnyContact(Element, InSpace):
     """The force in a line of Markdown, for the table of docs/laws.md."""
     KERNEL: ClassVar[str]
     """``module:NAME`` of the kernel."""
+    SECOND: ClassVar[str | None] = None
+    """``module:NAME`` of the kernel of its second derivatives (`solver.contacts.kernels.second_laws`)."""
     PARAMETERS: ClassVar[Mapping[str, Quantity]] = {}
     """Its numbers that are parameter paths."""
     WORDS: ClassVar[Mapping[str, str]] = {}
@@ -63,8 +65,8 @@ class AnyContact(Element, InSpace):
     JENKINS: ClassVar[bool] = False
     """Whether the force is that of one spring kt and one slider μN under the given load (`friction`).
 
-    What is known in closed form of this element is then used: second derivatives, its events, and that it is
-    a spring between nothing and kt.
+    What is known in closed form of this element is then used: its events, and that it is a spring between
+    nothing and kt.
     """
     OPENS: ClassVar[bool] = False
     """Whether it opens and closes as the parts move."""
@@ -150,6 +152,11 @@ class AnyContact(Element, InSpace):
     def kernel(self) -> str:
         """``module:NAME`` of the kernel for its settings."""
         return self.KERNEL
+
+    @property
+    def second_kernel(self) -> str | None:
+        """``module:NAME`` of the kernel of its second derivatives for its settings; None: it has none."""
+        return self.SECOND
 
     @property
     def sampled_kernel(self) -> str | None:

@@ -129,6 +129,13 @@ class SpaceContact(SlidesInAPlane):
             return "solver.contacts.kernels.coulomb_space_box:coulomb_box"
         return CIRCLE
 
+    @property
+    def second_kernel(self) -> str:
+        """The kernel of the second derivatives of its limit."""
+        if self.limits_apart:
+            return "solver.contacts.kernels.rubbing_second:box_second"
+        return "solver.contacts.kernels.circle_second_law:circle_law_second"
+
     def value_of(self, key: str) -> float:
         """Value of a parameter; a second stiffness that is left out is the first."""
         if key == "kt_second":
