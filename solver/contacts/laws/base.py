@@ -11,7 +11,7 @@ Importing a law must not load Numba: what computes is imported inside the method
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 from pydantic import model_validator
@@ -300,3 +300,8 @@ class AnyContact(Element, InSpace):
         """Return the derivative of the least normal load of a given load by a parameter of its own."""
         del key
         return math.nan
+
+
+def without_second(contacts: Iterable[AnyContact]) -> str:
+    """Return the contacts whose law has no second derivatives, with the law; empty if there are none."""
+    return ", ".join(f"{one.name} ({one.LAW})" for one in contacts if one.second_kernel is None)

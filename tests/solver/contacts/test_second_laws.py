@@ -98,8 +98,8 @@ def gradient(law: Law, at: Point, w: np.ndarray) -> tuple[np.ndarray, tuple[int,
     ways += [(np.zeros(COLUMNS), np.eye(3)[j]) for j in range(3)]
     for slope, dload in ways:
         here = law_force(
-            law_number(law.force), at.U, fourier.all_harmonics(at.top), at.load, LOAD_KS, at.row, slope, dload,
-            *tables, segments, F, dF_dU, dF_dp,
+            law_number(law.force), at.U, fourier.all_harmonics(at.top), at.load, LOAD_KS, at.row, slope,
+            dload, *tables, segments, F, dF_dU, dF_dp,
         )  # fmt: skip
         assert here[0] != FAILED
         parts.append(np.sum(w * dF_dp))
