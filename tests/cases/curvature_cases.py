@@ -45,6 +45,7 @@ def error_of_hessian(scene: Scene, hz: float, paths: tuple[str, ...], effects: E
     size = np.append(0.1 * hz, sizes(scene, paths))
     exact = np.block([[np.array([[found.by_frequency_twice]]), found.mixed[None]],
                       [found.mixed[:, None], found.hessian]])  # fmt: skip
+    assert np.isfinite(exact).all()
     scale = max(found.value, float(np.abs(exact * np.outer(size, size)).max()))
 
     def slopes(there: Scene, at: float) -> np.ndarray:
@@ -62,5 +63,5 @@ def error_of_hessian(scene: Scene, hz: float, paths: tuple[str, ...], effects: E
 
         wanted = exact[i] * size
         error = np.abs(difference(moved, wanted, size[i]) - wanted) * size[i]
-        worst = max(worst, float(error.max()) / scale)
+        worst = float(np.maximum(worst, error.max() / scale))
     return worst

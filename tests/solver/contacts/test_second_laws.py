@@ -148,6 +148,7 @@ def random_way(rng: np.random.Generator, law: Law, at: Point) -> Point:
 def error_of(law: Law, at: Point, w: np.ndarray, way: Point) -> float:
     """Largest error in the sizes of the numbers, at the best step that stays on the smooth piece."""
     exact, (_, here) = second(law, at, w, way), gradient(law, at, w)
+    assert np.isfinite(exact).all()
     sizes = np.concatenate([
         np.broadcast_to(np.abs(at.U).max(axis=1, keepdims=True), at.U.shape).ravel(),
         np.abs(at.row[list(law.columns)]), np.full(3, np.abs(at.load).max()),
