@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from curvature_cases import ALL, HARMONICS, difference, error_of_hessian, sizes, solved
 from law_scene_cases import CUBIC, GAP, PLANE, RUB, scene
+from space_cases import MOVING, SPACE, in_space
 
 import solver
 from solver.balance.simplifications import Effects
@@ -16,40 +15,6 @@ from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
 
 PLAIN = {"kt": 1.0, "mu": 0.3, "N0": 0.4}
-_SPACE: dict[str, Any] = {
-    "law": "coulomb-3d", "between": ["u", "ground"], "between_second": ["w", "ground"], "kt": 2.0, "mu": 0.4,
-    "N0": 0.6,
-}  # fmt: skip
-MOVING: dict[str, Any] = {**_SPACE, "normal_between": ["v", "ground"], "kn": 1.5, "prestressed": True}
-
-
-def in_space(contact: dict[str, Any], amplitude: float = 1.0) -> Scene:
-    """One mass with a motion in each direction, coupled, all driven; the contact holds it to the ground."""
-    return Scene.from_dict(
-        {
-            "name": "in-space",
-            "structure": {
-                "kind": "lumped",
-                "masses": {"u": 1.0, "v": 1.3, "w": 1.1},
-                "springs": [
-                    {"between": ["u", "ground"], "k": 1.0, "c": 0.06},
-                    {"between": ["v", "ground"], "k": 1.6, "c": 0.08},
-                    {"between": ["w", "ground"], "k": 1.3, "c": 0.07},
-                    {"between": ["u", "v"], "k": 0.4, "c": 0.02},
-                    {"between": ["u", "w"], "k": 0.2, "c": 0.02},
-                ],
-            },
-            "contacts": [{"name": "c0", **contact}],
-            "excitation": [
-                {"dof": "u", "amplitude": amplitude},
-                {"dof": "v", "amplitude": 0.6 * amplitude, "phase": 0.9},
-                {"dof": "w", "amplitude": 0.5 * amplitude, "phase": -0.7},
-            ],
-            "observe": {"dof": "u", "band": [0.05, 0.5]},
-        }
-    )
-
-
 _BOX = {"limit": "box", "kt_second": 1.2}
 CASES: dict[str, tuple[Scene, tuple[str, ...]]] = {
     "elastic-normal": (scene(RUB), ("c0.kt", "c0.mu", "c0.N0", "c0.kn", "excitation.amplitude")),
@@ -62,7 +27,7 @@ CASES: dict[str, tuple[Scene, tuple[str, ...]]] = {
                                     ("c0.kt", "c0.kt_second", "c0.N1", "c0.kn")),
     "coulomb-3d, opening": (in_space({**MOVING, "N0": 0.1, "prestressed": False}),
                             ("c0.kt", "c0.mu", "c0.N0", "c0.kn")),
-    "coulomb-3d, given load": (in_space({**_SPACE, "N1_ratio": 0.4}),
+    "coulomb-3d, given load": (in_space({**SPACE, "N1_ratio": 0.4}),
                                ("c0.kt", "c0.mu", "c0.N0", "c0.N1_ratio")),
     "coulomb-3d, box": (in_space({**MOVING, **_BOX}), ("c0.kt", "c0.kt_second", "c0.mu", "c0.N0", "c0.kn")),
     "gap": (scene(GAP, PLAIN), ("c0.k", "c0.gap", "c1.N0", "excitation.amplitude")),
@@ -116,7 +81,7 @@ def test_gradient_and_hessian_of_a_peak_equal_differences_of_sweeps(case: str) -
 
 def test_the_hessian_in_space_without_even_harmonics() -> None:
     """Under a constant load: the balance keeps odd harmonics alone."""
-    there = in_space(_SPACE)
+    there = in_space(SPACE)
     for hz in (0.13, 0.19, 0.27):
         assert error_of_hessian(there, hz, ("c0.kt", "c0.mu", "c0.N0"), Effects()) <= 1e-6
 
