@@ -12,7 +12,7 @@ from solver.contacts.fields import Between, Positive, Real
 from solver.contacts.kernels import columns
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.parts import Held, Quantity
-from solver.contacts.laws.plane import CIRCLE, SlidesInAPlane
+from solver.contacts.laws.plane import CIRCLE, CIRCLE_SECOND, SlidesInAPlane
 
 _CLOSED = (columns.N0, 1)
 
@@ -134,7 +134,7 @@ class SpaceContact(SlidesInAPlane):
         """The kernel of the second derivatives of its limit."""
         if self.limits_apart:
             return "solver.contacts.kernels.rubbing_second:box_second"
-        return "solver.contacts.kernels.circle_second_law:circle_law_second"
+        return CIRCLE_SECOND
 
     def value_of(self, key: str) -> float:
         """Value of a parameter; a second stiffness that is left out is the first."""

@@ -70,7 +70,7 @@ def test_the_design_search_tracks_a_load_that_moves() -> None:
 
 
 def test_peaks_of_a_law_without_second_derivatives_are_refused() -> None:
-    there = scene(PLANE)
+    there = scene({**PLANE, "samples": 512})
     with pytest.raises(SettingError, match=r"no second derivatives.*c0 \(coulomb-2d\)"):
         track_peak(there, "c0.N0", 0.1, 1.0)
     with pytest.raises(DesignError, match=r"second derivatives, which c0 \(coulomb-2d\)"):

@@ -188,7 +188,7 @@ def test_what_breaks_a_symmetry_has_a_kink_and_no_hessian() -> None:
 
 
 def test_what_has_no_hessian_is_refused_by_name() -> None:
-    other = two_directions(PLANE, {"kt": 1.0, "mu": 0.3, "N0": 0.4})
+    other = two_directions({**PLANE, "samples": 512}, {"kt": 1.0, "mu": 0.3, "N0": 0.4})
     balance, u = solved(other, 0.2, ALL)
     with pytest.raises(SettingError, match=r"no second derivatives: c0 \(coulomb-2d\)"):
         Sensitivities(balance, ["c1.N0"]).hessian(u, 0.2)

@@ -22,6 +22,7 @@ CASES: dict[str, tuple[Scene, tuple[str, ...]]] = {
                                     ("c0.kn", "c0.N1", "c0.N1_phase", "c0.mu")),
     "elastic-normal beside coulomb": (scene(RUB, PLAIN), ("c0.kn", "c1.N0", "c1.kt", "c0.N0")),
     "coulomb-2d, box": (scene({**PLANE, "limit": "box"}), ("c0.kt", "c0.mu", "c0.N0")),
+    "coulomb-2d": (scene(PLANE), ("c0.kt", "c0.mu", "c0.N0", "excitation.amplitude")),
     "coulomb-3d": (in_space(MOVING), ("c0.kt", "c0.mu", "c0.N0", "c0.kn", "excitation.amplitude")),
     "coulomb-3d, two stiffnesses": (in_space({**MOVING, "kt_second": 1.2, "N1": 0.2, "N1_phase": 0.5}),
                                     ("c0.kt", "c0.kt_second", "c0.N1", "c0.kn")),
@@ -87,7 +88,7 @@ def test_the_hessian_in_space_without_even_harmonics() -> None:
 
 
 def test_a_law_without_second_derivatives_is_named() -> None:
-    other = scene(PLANE, PLAIN)
+    other = scene({**PLANE, "samples": 512}, PLAIN)
     balance, u = solved(other, 0.2, ALL)
     with pytest.raises(SettingError, match=r"no second derivatives: c0 \(coulomb-2d\)"):
         Sensitivities(balance, ["c1.N0"]).hessian(u, 0.2)
