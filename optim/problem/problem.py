@@ -16,6 +16,7 @@ from optim.problem.numbers import is_number, positive
 from optim.problem.variables import Variable, check_variables
 from optim.problem.words import Method as Method
 from solver.balance.balance import check_harmonics
+from solver.contacts.laws.base import without_second
 from solver.scene.scene import Scene
 
 
@@ -63,9 +64,9 @@ class Problem(Goals):
             return "tracked is for the highest peak of one case alone, without limits"
         if len(self.paths) != 1:
             return "tracked takes one variable with one parameter path"
-        others = [contact.name for contact in self.scene.contacts if not contact.JENKINS]
+        others = without_second(self.scene.contacts)
         if others:
-            return f"tracked knows the law coulomb alone, not that of {', '.join(others)}"
+            return f"tracked needs laws with second derivatives, which {others} has not"
         return None
 
 

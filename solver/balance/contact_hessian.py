@@ -1,13 +1,11 @@
-"""The forces of elastic Coulomb contacts with all they need to be differentiated twice by any numbers.
+"""The forces of all contacts with all they need to be differentiated twice by any numbers.
 
-The force depends on X = kt U and Y = μ N alone. A change of kt is therefore one of U by U dkt/kt, a change of
-μ one of N by N dμ/μ, and `solver.contacts.kernels.coulomb_hessian` along (U, N) gives every second
-derivative.
+What differs from law to law is behind `solver.contacts.kernels.second_laws`; here stands what the numbers of
+a scene do to rows, loads and excitation.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,11 +13,12 @@ import numpy as np
 
 from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Parameter
-from solver.contacts.kernels.columns import KT, MU, N0, N1, PHASE, RATIO
-from solver.contacts.kernels.coulomb import contact_force
-from solver.contacts.kernels.coulomb_hessian import second_along
+from solver.contacts.kernels.columns import COLUMNS, N0, N1, PHASE, RATIO
+from solver.contacts.kernels.laws import law_force
+from solver.contacts.kernels.second_laws import law_second
 from solver.contacts.kernels.stick_slip_events import FAILED, SEGMENT_COLUMNS, segment_capacity
 from solver.contacts.kernels.system import LOAD_COEFFICIENTS, System
+from solver.contacts.laws.base import without_second
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Integer, Real
 from solver.scene.scene import Scene
@@ -27,83 +26,100 @@ from solver.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContactForces:
-    """The forces of all contacts at a solution, with their derivatives and what the second ones need."""
+    """The forces of all contacts at a solution with their derivatives; ne elements with nc ports in all."""
 
     system: System
-    load: Real  # (nc, 3)
+    seconds: Integer  # (ne,) numbers of the kernels of second derivatives
+    table: Real  # (ne, COLUMNS)
+    load: Real  # (ne, 3)
     U: Real  # (nc, n)
     F: Real  # (nc, n)
-    dF_dU: Real  # (nc, n, n)
-    dF_dN: Real  # (nc, n, 3)
-    dF_dkt: Real  # (nc, n)
-    dF_dmu: Real  # (nc, n)
-    states: Integer  # (nc,)
-    counts: Integer  # (nc,)
-    segments: Real  # (nc, capacity, columns)
+    dF_dU: Real  # (blocks, n, n)
+    dF_dN: Real  # (nc, n, 3) by the given load
+
+    def ports(self, e: int) -> slice:
+        """Return the ports of an element."""
+        return slice(int(self.system.first_port[e]), int(self.system.first_port[e + 1]))
+
+    def times(self, dU: Real) -> Real:
+        """Return ∂F/∂U dU, (P, nc, n), of motions (P, nc, n)."""
+        product = np.empty(dU.shape)
+        for e in range(self.system.laws.size):
+            ports, first = self.ports(e), int(self.system.first_block[e])
+            m = ports.stop - ports.start
+            blocks = self.dF_dU[first : first + m * m].reshape(m, m, *self.dF_dU.shape[1:])
+            product[:, ports] = np.einsum("abij,pbj->pai", blocks, dU[:, ports])
+        return product
 
     def along(self, slopes: Real, loads: Real) -> Real:
-        """Return ∂F/∂p, (n_paths, nc, n), for derivatives of the contact table and of the loads."""
-        return np.asarray(
-            slopes[..., KT, None] * self.dF_dkt
-            + slopes[..., MU, None] * self.dF_dmu
-            + np.einsum("cij,pcj->pci", self.dF_dN, loads)
-        )
+        """Return ∂F/∂p, (P, nc, n), for derivatives of the contact table and of the loads."""
+        found = np.einsum("cij,pcj->pci", self.dF_dN, loads[:, self.system.owner])
+        for e in range(self.system.laws.size):
+            for i in np.flatnonzero(np.any(slopes[:, e] != 0.0, axis=1)):
+                found[i, self.ports(e)] += self._law(e, slopes[i, e], np.zeros(LOAD_COEFFICIENTS))[2]
+        return np.asarray(found)
 
-    def second(self, c: int, w: Real, dU: Real, dN: Real, dkt: float, dmu: float) -> tuple[Real, Real, Real]:
-        """Differentiate the gradient of w·F of contact `c` by U, N and (kt, μ) along a direction."""
-        system = self.system
-        kt, mu = float(system.contacts[c, KT]), float(system.contacts[c, MU])
-        by_U, by_N = np.empty(w.size), np.empty(LOAD_COEFFICIENTS)
-        stretch = dkt / kt
-        swell = 0.0 if dmu == 0.0 else dmu / mu if mu != 0.0 else math.nan
-        by_kt, by_mu = second_along(
-            self.U[c], system.ks, self.load[c], system.load_ks, kt, mu, self.states[c], self.segments[c],
-            self.counts[c], self.dF_dU[c], self.dF_dN[c], w, dU + stretch * self.U[c],
-            dN + swell * self.load[c], by_U, by_N,
+    def second(self, e: int, w: Real, dU: Real, drow: Real, dload: Real) -> tuple[Real, Real, Real]:
+        """Differentiate the gradient of w·F of an element by motions, row and load along a direction."""
+        system, U = self.system, self.U[self.ports(e)]
+        by_U, by_row, by_load = np.empty(U.shape), np.empty(COLUMNS), np.empty(LOAD_COEFFICIENTS)
+        state = law_second(
+            self.seconds[e], U, system.ks, self.load[e], system.load_ks, self.table[e], system.cos_table,
+            system.sin_table, w, dU, drow, dload, by_U, by_row, by_load,
         )  # fmt: skip
-        if dkt != 0.0:
-            by_U += stretch * (w @ self.dF_dU[c])
-            by_kt -= stretch * float(w @ self.dF_dkt[c])
-        if dmu != 0.0:
-            by_N += swell * (w @ self.dF_dN[c])
-            by_mu -= swell * float(w @ self.dF_dmu[c])
-        return by_U, by_N, np.array([by_kt, by_mu])
+        if state == FAILED:
+            raise FloatingPointError("a contact force has no answer")
+        return by_U, by_row, by_load
+
+    def _law(self, e: int, slope: Real, dload: Real) -> tuple[Real, Real, Real]:
+        """Return force, Jacobian and derivative along a change of row and load."""
+        system, U = self.system, self.U[self.ports(e)]
+        m, n = U.shape
+        F, dF_dU, dF_dp = np.empty((m, n)), np.empty((m * m, n, n)), np.empty((m, n))
+        segments = np.zeros((segment_capacity(max(int(system.ks[-1]), 1)), SEGMENT_COLUMNS))
+        state, _ = law_force(
+            system.laws[e], U, system.ks, self.load[e], system.load_ks, self.table[e], slope, dload,
+            system.cos_table, system.sin_table, segments, F, dF_dU, dF_dp,
+        )  # fmt: skip
+        if state == FAILED:
+            raise FloatingPointError("a contact force has no answer")
+        return F, dF_dU, dF_dp
+
+    def fill(self) -> None:
+        """Evaluate all contacts."""
+        for e in range(self.system.laws.size):
+            ports, blocks = self.ports(e), slice(*map(int, self.system.first_block[e : e + 2]))
+            for j in range(LOAD_COEFFICIENTS):
+                self.F[ports], self.dF_dU[blocks], self.dF_dN[ports, :, j] = self._law(
+                    e, np.zeros(COLUMNS), np.eye(LOAD_COEFFICIENTS)[j]
+                )
 
 
-def contact_forces(system: System, u: Real) -> ContactForces:
-    """Evaluate all contacts of a system whose contacts are elastic Coulomb ones.
+def contact_forces(system: System, seconds: Integer, u: Real) -> ContactForces:
+    """Evaluate all contacts of a system whose laws have second derivatives, by the kernels `seconds`.
 
     Raises
     ------
     FloatingPointError
-        The law has no answer at `u`.
+        A law has no answer at `u`.
     """
-    nc, n, m = system.laws.size, u.size // max(system.laws.size, 1), LOAD_COEFFICIENTS
-    rows, U = system.contacts, u.reshape(nc, n)
-    _, load, _, _ = contact_values(system, 0.0, 0.0)
-    F, dF_dU, dF_dN = np.empty((nc, n)), np.empty((nc, n, n)), np.empty((nc, n, m))
-    dF_dkt, dF_dmu = np.empty((nc, n)), np.empty((nc, n))
-    states, counts = np.zeros(nc, np.int64), np.zeros(nc, np.int64)
-    segments = np.zeros((nc, segment_capacity(max(int(system.ks[-1]), 1)), SEGMENT_COLUMNS))
-    for c in range(nc):
-        states[c], counts[c] = contact_force(
-            U[c], system.ks, load[c], system.load_ks, rows[c, KT], rows[c, MU], system.cos_table,
-            system.sin_table, segments[c], dF_dU[c], dF_dkt[c], dF_dmu[c], dF_dN[c], F[c],
-        )  # fmt: skip
-        if states[c] == FAILED:
-            raise FloatingPointError("a contact force has no answer")
-    return ContactForces(
-        system=system, load=load, U=U, F=F, dF_dU=dF_dU, dF_dN=dF_dN, dF_dkt=dF_dkt, dF_dmu=dF_dmu,
-        states=states, counts=counts, segments=segments,
+    nc = system.owner.size
+    n = u.size // max(nc, 1)
+    table, load, _, _ = contact_values(system, 0.0, 0.0)
+    found = ContactForces(
+        system=system, seconds=seconds, table=table, load=load, U=u.reshape(nc, n), F=np.empty((nc, n)),
+        dF_dU=np.empty((int(system.first_block[-1]), n, n)), dF_dN=np.empty((nc, n, LOAD_COEFFICIENTS)),
     )  # fmt: skip
+    found.fill()
+    return found
 
 
 def check_laws(scene: Scene) -> None:
-    """Raise SettingError if a contact is not elastic Coulomb friction under a given load."""
-    others = [contact.name for contact in scene.contacts if not contact.JENKINS]
+    """Raise SettingError if the law of a contact has no second derivatives."""
+    others = without_second(scene.contacts)
     if others:
-        wanted = f"has contacts with another law than coulomb ({', '.join(others)})"
-        raise SettingError("scene", scene.name, f"{wanted}, so only its gradient is exact here")
+        wanted = f"has contacts whose law has no second derivatives: {others}"
+        raise SettingError("scene", scene.name, f"{wanted}; only its gradient is exact here")
 
 
 def check_loads(system: System, parameters: Sequence[Parameter], slopes: Real) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from solver.contacts.kernels import columns
 from solver.contacts.kernels.laws import law_number
+from solver.contacts.kernels.second_laws import second_number
 from solver.jit.fourier import Integer, Real
 from solver.linear.assembly import LinearModel
 from solver.scene.scene import Scene
@@ -48,6 +49,12 @@ def contact_set(scene: Scene) -> ContactSet:
         first_block=np.append(0, np.cumsum(ports**2)), owner=np.repeat(np.arange(ports.size), ports),
         rubs=rubs, held=np.array(held, dtype=np.int64).reshape(-1, 3),
     )  # fmt: skip
+
+
+def second_numbers(scene: Scene) -> Integer:
+    """Return the kernels of the second derivatives of all contacts, (n_contacts,), which all have some."""
+    kernels = [contact.second_kernel for contact in scene.contacts]
+    return np.array([second_number(kernel) for kernel in kernels if kernel is not None], dtype=np.int64)
 
 
 def port_counts(scene: Scene) -> Integer:

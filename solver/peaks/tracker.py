@@ -16,6 +16,7 @@ import numpy as np
 
 from solver.balance.simplifications import Effects
 from solver.contacts.kernels.system import System, by_reference
+from solver.contacts.laws.base import without_second
 from solver.continuation.branch import Peak
 from solver.errors import SettingError
 from solver.extrema.candidates import Rival, rivals
@@ -31,8 +32,17 @@ from solver.extrema.kernels.peak_continuation import (
     polish,
     track,
 )
-from solver.extrema.kernels.peak_state import PAUSE, SIGN, SPENT, Summit, new_summit, summit_numbers
+from solver.extrema.kernels.peak_state import (
+    PAUSE,
+    SIGN,
+    SPENT,
+    Summit,
+    new_summit,
+    summit_numbers,
+    summit_seconds,
+)
 from solver.jit.fourier import Integer, Real
+from solver.linear.contact_table import second_numbers
 from solver.peaks.seeds import CROSSING, Crossing, Seed, crossings, entries, fitted, leavings, nearest, passes
 from solver.peaks.survey import SAME, Looking
 from solver.peaks.track import EVERYWHERE, Glance, Line, LineEnd, Look, Pace
@@ -62,19 +72,17 @@ _ENDS = {
 
 
 def check_laws(scene: Scene) -> None:
-    """Refuse contacts whose force has no exact second derivatives here.
+    """Refuse contacts whose force has no exact second derivatives.
 
     Raises
     ------
     SettingError
-        A contact that is not elastic Coulomb friction under a given load.
+        A contact with such a law.
     """
-    others = [contact.name for contact in scene.contacts if not contact.JENKINS]
+    others = without_second(scene.contacts)
     if others:
-        wanted = (
-            f"has contacts with another law than coulomb ({', '.join(others)}), so its peaks are not tracked"
-        )
-        raise SettingError("scene", scene.name, f"{wanted}: use sweeps, or a map without the ridge")
+        wanted = f"has contacts whose law has no second derivatives, so its peaks are not tracked: {others}"
+        raise SettingError("scene", scene.name, f"{wanted}; use sweeps, or a map without the ridge")
 
 
 class Tracker(Looking):
@@ -90,6 +98,7 @@ class Tracker(Looking):
         self.exact_between: set[tuple[float, float, float]] = set()  # z, z and height of rows: cubics hold
         self._system: System = by_reference(self.balance.system)
         self._summit: Summit = new_summit(self._system)
+        summit_seconds(self._summit)[:] = second_numbers(self.balance.scene)
         self._crossings: list[Crossing] = []
         self._at_once = _FIRST_AT_ONCE
         self._asked_at: Counter[float] = Counter()

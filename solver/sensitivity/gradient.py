@@ -33,7 +33,8 @@ from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.laws import law_force
 from solver.contacts.kernels.system import evaluation_by_value
 from solver.errors import SettingError
-from solver.jit.fourier import Complex, Real, cosine_position
+from solver.jit.fourier import Complex, Integer, Real, cosine_position
+from solver.linear.contact_table import second_numbers
 from solver.results.told import Piece
 from solver.sensitivity.hessian import (
     Adjoint,
@@ -149,6 +150,7 @@ class Sensitivities:
         self._x, self._tops = np.zeros(n), np.zeros((2, EXTREME_COLUMNS))
         self._weights, self._pulls = np.zeros((2, nc, n)), np.zeros((2, nc * n))
         self._by = np.zeros((2, ne * PER_ELEMENT + BESIDES))
+        self._seconds: Integer | None = None
 
     def gradient(self, solution: Real, at_hz: float) -> Gradient:
         """Return the amplitude and its derivatives at a solution.
@@ -187,12 +189,14 @@ class Sensitivities:
         Raises
         ------
         SettingError
-            A contact that is not elastic Coulomb friction under a given load, paths of one load that
-            contradict each other, or paths on which loads or places of contacts do not depend linearly.
+            A contact whose law has no second derivatives, paths of one load that contradict each other, or
+            paths on which loads or places of contacts do not depend linearly.
         """
         system = self.balance.system
         self.check_second()
         check_loads(system, self._parameters, self._slopes)
+        if self._seconds is None:
+            self._seconds = second_numbers(self.balance.scene)
         u, omega = np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz
         found = self._slopes_of(u, omega)
         if not found:
@@ -200,17 +204,17 @@ class Sensitivities:
         try:
             motion, contacts = (
                 whole_motion(system, self._matrices, self._dampings, omega),
-                contact_forces(system, u),
+                contact_forces(system, self._seconds, u),
             )
+            turn = self._tops[0, SIGN] * self._amplitudes.turn(self._tops[0, TAU])
+            adjoint = Adjoint(w=self._weights[0].copy(), y=self._adjoint_motion(motion, 0), turn=turn)
+            along = self._directions()
+            responses = self._responses(u, omega, motion, contacts, along)
+            if responses is None:
+                return no_hessian(len(self.paths))
+            twice = lagrangian_hessian(self._amplitudes.ks, motion, contacts, along, responses, adjoint)
         except (np.linalg.LinAlgError, FloatingPointError):
             return no_hessian(len(self.paths))
-        turn = self._tops[0, SIGN] * self._amplitudes.turn(self._tops[0, TAU])
-        adjoint = Adjoint(w=self._weights[0].copy(), y=self._adjoint_motion(motion, 0), turn=turn)
-        along = self._directions()
-        responses = self._responses(u, omega, motion, contacts, along)
-        if responses is None:
-            return no_hessian(len(self.paths))
-        twice = lagrangian_hessian(self._amplitudes.ks, motion, contacts, along, responses, adjoint)
         by_frequency, gradient = found[0]
         for _, other in found[1:]:
             kinks = np.flatnonzero(np.abs(other - gradient) > _KINK * np.abs(gradient).clip(np.abs(other)))
@@ -279,7 +283,7 @@ class Sensitivities:
         dU = amplitudes.coefficients(motion.relative(v))
         for row in dU.reshape(len(dU), u.size):
             step_back(workspace.system, workspace.point, row)
-        dF = np.einsum("cij,pcj->pci", contacts.dF_dU, dU) - shift * dU
+        dF = contacts.times(dU) - shift * dU
         return Responses(x=x, dx=v - motion.solve(motion.pushed(amplitudes.of(dF))), dU=dU)
 
     def _one(self, u: Real, omega: float, top: int) -> tuple[float, Real]:

@@ -21,7 +21,6 @@ import numpy as np
 
 from solver.balance.contact_hessian import ContactForces, second_forces, second_loads
 from solver.balance.dynamic_stiffness import WholeMotion, times, times_transposed
-from solver.contacts.kernels.columns import KT, MU
 from solver.jit.fourier import Complex, Integer, Real
 from solver.results.told import Piece
 
@@ -229,13 +228,16 @@ def _dot(y: Complex, x: Complex) -> float:
 
 def _of_contacts(contacts: ContactForces, along: Directions, dU: Real, w: Real) -> Real:
     """Return w·F_ij of all contacts along the directions."""
-    total = np.einsum("cn,cnm,ijcm->ij", w, contacts.dF_dN, second_loads(contacts.system, along.slopes))
-    for c in range(w.shape[0]):
-        numbers = along.slopes[:, c, [KT, MU]]
+    pulls = np.einsum("cn,cnm->cm", w, contacts.dF_dN)
+    twice = second_loads(contacts.system, along.slopes)
+    total = np.einsum("cm,ijcm->ij", pulls, twice[:, :, contacts.system.owner])
+    for e in range(along.slopes.shape[1]):
+        ports, slopes, loads = contacts.ports(e), along.slopes[:, e], along.loads[:, e]
+        acting = np.flatnonzero(np.any(slopes != 0.0, axis=0))
         for i in range(dU.shape[0]):
-            by_U, by_N, by_numbers = contacts.second(c, w[c], dU[i, c], along.loads[i, c], *numbers[i])
-            total[i] += dU[:, c] @ by_U + along.loads[:, c] @ by_N
-            for column in range(2):
-                acts = numbers[:, column] != 0.0
-                total[i, acts] += by_numbers[column] * numbers[acts, column]
+            by_U, by_row, by_load = contacts.second(e, w[ports], dU[i, ports], slopes[i], loads[i])
+            total[i] += np.einsum("pan,an->p", dU[:, ports], by_U) + loads @ by_load
+            for column in acting:
+                acts = slopes[:, column] != 0.0
+                total[i, acts] += by_row[column] * slopes[acts, column]
     return np.asarray(total)

@@ -36,3 +36,12 @@ KERNELS = (
     "solver.contacts.kernels.coulomb_space:coulomb_circle",
     "solver.contacts.kernels.coulomb_space_box:coulomb_box",
 )
+# Likewise those of second derivatives.
+SECOND_KERNELS = (
+    "solver.contacts.kernels.rubbing_second:ports_second",
+    "solver.contacts.kernels.rubbing_second:elastic_normal_second",
+    "solver.contacts.kernels.rubbing_second:box_second",
+    "solver.contacts.kernels.circle_second_law:circle_law_second",
+    "solver.contacts.kernels.springs_second:gap_second",
+    "solver.contacts.kernels.springs_second:polynomial_second",
+)

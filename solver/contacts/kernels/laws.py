@@ -10,8 +10,8 @@ one of `solver.contacts.kernels.stick_slip_events` or of `solver.contacts.kernel
 the smooth piece of the law. `segments` is scratch; the law of a Jenkins element leaves its segments there.
 
 Columns beyond those of the elastic Coulomb law: each law has its own meaning for them. A law's class
-(`solver.contacts.laws`) names its kernel, which is called by its number. Second derivatives are no part of
-the contract: of a Jenkins element `solver.contacts.kernels.coulomb_hessian` has them.
+(`solver.contacts.laws`) names its kernel, which is called by its number. Second derivatives have a contract
+of their own, `solver.contacts.kernels.second_laws`.
 """
 
 from __future__ import annotations

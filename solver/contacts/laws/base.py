@@ -11,7 +11,7 @@ Importing a law must not load Numba: what computes is imported inside the method
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 from pydantic import model_validator
@@ -47,6 +47,8 @@ class AnyContact(Element, InSpace):
     """The force in a line of Markdown, for the table of docs/laws.md."""
     KERNEL: ClassVar[str]
     """``module:NAME`` of the kernel."""
+    SECOND: ClassVar[str | None] = None
+    """``module:NAME`` of the kernel of its second derivatives (`solver.contacts.kernels.second_laws`)."""
     PARAMETERS: ClassVar[Mapping[str, Quantity]] = {}
     """Its numbers that are parameter paths."""
     WORDS: ClassVar[Mapping[str, str]] = {}
@@ -63,8 +65,8 @@ class AnyContact(Element, InSpace):
     JENKINS: ClassVar[bool] = False
     """Whether the force is that of one spring kt and one slider μN under the given load (`friction`).
 
-    What is known in closed form of this element is then used: second derivatives, its events, and that it is
-    a spring between nothing and kt.
+    What is known in closed form of this element is then used: its events, and that it is a spring between
+    nothing and kt.
     """
     OPENS: ClassVar[bool] = False
     """Whether it opens and closes as the parts move."""
@@ -150,6 +152,11 @@ class AnyContact(Element, InSpace):
     def kernel(self) -> str:
         """``module:NAME`` of the kernel for its settings."""
         return self.KERNEL
+
+    @property
+    def second_kernel(self) -> str | None:
+        """``module:NAME`` of the kernel of its second derivatives for its settings; None: it has none."""
+        return self.SECOND
 
     @property
     def sampled_kernel(self) -> str | None:
@@ -293,3 +300,8 @@ class AnyContact(Element, InSpace):
         """Return the derivative of the least normal load of a given load by a parameter of its own."""
         del key
         return math.nan
+
+
+def without_second(contacts: Iterable[AnyContact]) -> str:
+    """Return the contacts whose law has no second derivatives, with the law; empty if there are none."""
+    return ", ".join(f"{one.name} ({one.LAW})" for one in contacts if one.second_kernel is None)

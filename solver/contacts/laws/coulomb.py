@@ -53,6 +53,7 @@ class Contact(SlidesOnALine):
         "stick `kt u + c`, slip `± μN`, nothing while `N <= 0`; `N = N0 + N1 cos(ωt + N1_phase)`"
     )
     KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb_ports:coulomb_ports"
+    SECOND: ClassVar[str | None] = "solver.contacts.kernels.rubbing_second:ports_second"
     JENKINS: ClassVar[bool] = True
 
     law: Literal["coulomb"] | None = None

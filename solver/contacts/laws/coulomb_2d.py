@@ -11,7 +11,7 @@ from pydantic import Field
 from solver.contacts.fields import NonNegative, Real
 from solver.contacts.kernels import columns
 from solver.contacts.laws.parts import Held, Row, Slider
-from solver.contacts.laws.plane import CIRCLE, SlidesInAPlane
+from solver.contacts.laws.plane import CIRCLE, CIRCLE_SECOND, SlidesInAPlane
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
@@ -51,6 +51,13 @@ class PlanarContact(SlidesInAPlane):
         if self.limits_apart:
             return "solver.contacts.kernels.coulomb_ports:coulomb_ports"
         return CIRCLE if self.samples is None else "solver.contacts.kernels.planar:coulomb_plane"
+
+    @property
+    def second_kernel(self) -> str | None:
+        """The kernel of its second derivatives; a force from samples has none."""
+        if self.limits_apart:
+            return "solver.contacts.kernels.rubbing_second:ports_second"
+        return CIRCLE_SECOND if self.samples is None else None
 
     @property
     def _sampled(self) -> int | None:

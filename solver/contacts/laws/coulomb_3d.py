@@ -12,7 +12,7 @@ from solver.contacts.fields import Between, Positive, Real
 from solver.contacts.kernels import columns
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.parts import Held, Quantity
-from solver.contacts.laws.plane import CIRCLE, SlidesInAPlane
+from solver.contacts.laws.plane import CIRCLE, CIRCLE_SECOND, SlidesInAPlane
 
 _CLOSED = (columns.N0, 1)
 
@@ -129,6 +129,13 @@ class SpaceContact(SlidesInAPlane):
         if self.limits_apart:
             return "solver.contacts.kernels.coulomb_space_box:coulomb_box"
         return CIRCLE
+
+    @property
+    def second_kernel(self) -> str:
+        """The kernel of the second derivatives of its limit."""
+        if self.limits_apart:
+            return "solver.contacts.kernels.rubbing_second:box_second"
+        return CIRCLE_SECOND
 
     def value_of(self, key: str) -> float:
         """Value of a parameter; a second stiffness that is left out is the first."""

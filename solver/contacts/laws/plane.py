@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from solver.contacts.segments import Shares
 
 CIRCLE = "solver.contacts.kernels.coulomb_space:coulomb_circle"
+CIRCLE_SECOND = "solver.contacts.kernels.circle_second_law:circle_law_second"
 
 
 class SlidesInAPlane(FrictionContact):

@@ -8,8 +8,9 @@ g = da/dω = L_ω and da/dp = L_p, and its Hessian along (du/dω, 1, dτ/dω) th
 
 Every term is linear in the contact forces or in λ, so with z = Aᵀλ − ξ Bᵀ e(τ*) (a weight for each force
 coefficient, differentiated with A and B) L = λ·u + ξ e·x_linear − λ·ū + z·(F − shift u), and wᵀ∂²F comes from
-`solver.contacts.kernels.coulomb_hessian`. Sums over harmonics are real parts: harmonic k of a vector v has v̂
-= v_c − i v_s.
+`solver.contacts.kernels.coulomb_hessian` for elastic Coulomb contacts, whose events are known already, and
+from `solver.contacts.kernels.second_laws` for the others. Sums over harmonics are real parts: harmonic k of a
+vector v has v̂ = v_c − i v_s.
 """
 
 from __future__ import annotations
@@ -21,11 +22,9 @@ import numpy as np
 from solver.balance.kernels.jacobian import factorise, step_back, step_back_transposed
 from solver.balance.kernels.output import extremes
 from solver.balance.kernels.residual import contact_values, least_size
-from solver.contacts.kernels.columns import KT, MU
-from solver.contacts.kernels.coulomb import contact_force
-from solver.contacts.kernels.coulomb_hessian import inner, second_along
-from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED, piece_of
-from solver.contacts.kernels.system import LOAD_COEFFICIENTS, System
+from solver.contacts.kernels.coulomb_hessian import inner
+from solver.contacts.kernels.system import System
+from solver.extrema.kernels.contact_curvatures import add_slopes_times, forces_at, second_forces_at
 from solver.extrema.kernels.peak_state import (
     AMPLITUDE,
     CURVE,
@@ -40,7 +39,7 @@ from solver.extrema.kernels.peak_state import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real, coefficient_count, cosine_position
-from solver.jit.lapack import copy_block
+from solver.jit.lapack import copy_block, fill, fill_block
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance_derivatives import (
     BY_BOTH,
@@ -57,7 +56,6 @@ _TURNS = 12
 @apart
 def balance_at(system: System, u: Real, omega: float, p: float, at: Summit) -> float:
     """Evaluate the residual and its slopes at (u, ω, p); return its relative size (NaN if that failed)."""
-    nc, n = system.shift.size, coefficient_count(system.ks)
     at.numbers[SPENT] += 1.0
     fill_jets(system, omega, p, at.jets)
     for i in range(system.ks.size):
@@ -68,26 +66,8 @@ def balance_at(system: System, u: Real, omega: float, p: float, at: Summit) -> f
     copy_block(at.load, load)
     copy_block(at.slope, slope)
     copy_block(at.dload, dload)
-    for c in range(nc):
-        U = u[c * n : (c + 1) * n]
-        state, count = contact_force(
-            U, system.ks, load[c], system.load_ks, table[c, KT], table[c, MU], system.cos_table,
-            system.sin_table, at.segments[c], at.dF_dU[c], at.dF_dkt[c], at.dF_dmu[c], at.dF_dN[c], at.F[c],
-        )  # fmt: skip
-        at.states[c], at.counts[c], at.pieces[c] = state, count, piece_of(at.segments[c], count)
-        if state == FAILED:
-            return np.nan
-        at.point.slopes[c] = np.nan
-        if state == SEPARATED:
-            at.point.slopes[c] = 0.0
-        elif state == STUCK and at.segments[c, 0, BEGAN] == UNLOADED:
-            at.point.slopes[c] = table[c, KT]
-        for i in range(n):
-            total = slope[c, KT] * at.dF_dkt[c, i] + slope[c, MU] * at.dF_dmu[c, i]
-            for j in range(LOAD_COEFFICIENTS):
-                total += at.dF_dN[c, i, j] * dload[c, j]
-            at.dF_dp[c, i] = total
-            at.F[c, i] -= system.shift[c] * U[i]
+    if not forces_at(system, u, at):
+        return np.nan
     return _assemble(system, u, least_size(system, p), at)
 
 
@@ -225,12 +205,8 @@ def slopes_at(system: System, at: Summit) -> bool:
             if k > 0:
                 z[d, here + 1] = weight.imag
     # r_uᵀ λ = −a_u, and a_u = (∂F/∂U − shift)ᵀ z as long as z has no λ in it.
-    for d in range(nc):
-        for j in range(n):
-            total = -system.shift[d] * z[d, j]
-            for i in range(n):
-                total += at.dF_dU[d, i, j] * z[d, i]
-            at.adjoint[d * n + j] = -total
+    fill(at.adjoint, 0.0)
+    add_slopes_times(system, at, True, -1.0, z, at.adjoint.reshape((nc, n)))
     if nc > 0:
         step_back_transposed(system, at.point, at.adjoint)
     numbers[G] = _linear_part(system, at, BY_OMEGA)
@@ -270,13 +246,8 @@ def _linear_part(system: System, at: Summit, order: int) -> float:
 def _along_response(system: System, at: Summit) -> None:
     """Fill dF/dω and dx/dω along the response, and dτ*/dω = −x'_ω/x''."""
     nc, n = system.shift.size, coefficient_count(system.ks)
-    du = at.rhs[1]  # −du/dω
-    for d in range(nc):
-        for i in range(n):
-            total = system.shift[d] * du[d * n + i]
-            for j in range(n):
-                total -= at.dF_dU[d, i, j] * du[d * n + j]
-            at.along[d, i] = total
+    fill_block(at.along, 0.0)
+    add_slopes_times(system, at, False, -1.0, at.rhs[1].reshape((nc, n)), at.along)  # of −du/dω
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
         has_sine = system.ks[i] > 0
@@ -322,32 +293,17 @@ def curvatures_at(system: System, u: Real, at: Summit) -> None:
     _along_response(system, at)
     k = _linear_part(system, at, BY_OMEGA_TWICE)
     m = _linear_part(system, at, BY_BOTH)
-    turned, along, out_U = np.empty((nc, n)), np.empty(n), np.empty(n)
-    none, out_N = np.zeros(LOAD_COEFFICIENTS), np.empty(LOAD_COEFFICIENTS)
+    turned, h = np.empty((nc, n)), at.h.reshape((nc, n))
     k += numbers[DTAU] * _turned(system, at, BY_OMEGA, turned)
     m += numbers[DTAU] * _turned(system, at, BY_P, turned)
     _turned(system, at, VALUE, turned)
     for d in range(nc):
-        U, weights = u[d * n : (d + 1) * n], at.z[VALUE, d]
         for i in range(n):
-            along[i] = -at.rhs[1, d * n + i]
             turned[d, i] = at.z[BY_OMEGA, d, i] + numbers[DTAU] * turned[d, i]
         k += inner(at.z[BY_OMEGA_TWICE, d], at.F[d]) + inner(at.z[BY_OMEGA, d], at.along[d])
         m += inner(at.z[BY_BOTH, d], at.F[d]) + inner(at.z[BY_P, d], at.along[d])
         m += inner(turned[d], at.dF_dp[d])
-        by_kt, by_mu = second_along(
-            U, system.ks, at.load[d], system.load_ks, at.table[d, KT], at.table[d, MU], at.states[d],
-            at.segments[d], at.counts[d], at.dF_dU[d], at.dF_dN[d], weights, along, none, out_U, out_N,
-        )  # fmt: skip
-        m += inner(out_N, at.dload[d])
-        if at.slope[d, KT] != 0.0:
-            m += by_kt * at.slope[d, KT]
-        if at.slope[d, MU] != 0.0:
-            m += by_mu * at.slope[d, MU]
-        for j in range(n):
-            total = out_U[j] - system.shift[d] * turned[d, j]
-            for i in range(n):
-                total += at.dF_dU[d, i, j] * turned[d, i]
-            at.h[d * n + j] = total
+    m += second_forces_at(system, u, at)
+    add_slopes_times(system, at, True, 1.0, turned, h)
     numbers[CURVE] = k - inner(at.h, at.rhs[1])
     numbers[DG_DP] = m - inner(at.h, at.rhs[2])

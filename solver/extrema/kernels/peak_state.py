@@ -32,25 +32,25 @@ NUMBERS = 14
 
 
 class Summit(NamedTuple):
-    """Everything at one (u, ω, p); nt unknowns, nc contacts, n coefficients each."""
+    """Everything at one (u, ω, p); nt unknowns, ne elements with nc ports in all, n coefficients each."""
 
     jets: Jets
     linear: Receptance  # the first two orders of the jets
     point: Evaluation  # what the factors of the condensed Jacobian are made of
     F: Real  # (nc, n) forces less shift · u
-    dF_dU: Real  # (nc, n, n) slopes of the forces themselves; those of `point`
-    dF_dN: Real  # (nc, n, 3)
-    dF_dkt: Real  # (nc, n)
-    dF_dmu: Real  # (nc, n)
+    dF_dU: Real  # (blocks, n, n) slopes of the forces themselves; those of `point`
     dF_dp: Real  # (nc, n)
-    states: Integer  # (nc,)
-    counts: Integer  # (nc,) segments of each
-    pieces: Integer  # (nc,)
-    segments: Real  # (nc, capacity, columns)
-    table: Real  # (nc, COLUMNS) contacts at p, their loads, and both differentiated by p
-    load: Real  # (nc, 3)
-    slope: Real  # (nc, COLUMNS)
-    dload: Real  # (nc, 3)
+    seconds: Integer  # (ne,) numbers of the kernels of second derivatives; Jenkins elements need none
+    dF_dN: Real  # (ne, n, 3) of the Jenkins elements, likewise the five below
+    dF_dkt: Real  # (ne, n)
+    dF_dmu: Real  # (ne, n)
+    states: Integer  # (ne,)
+    counts: Integer  # (ne,) segments of each
+    segments: Real  # (ne, capacity, columns)
+    table: Real  # (ne, COLUMNS) contacts at p, their loads, and both differentiated by p
+    load: Real  # (ne, 3)
+    slope: Real  # (ne, COLUMNS)
+    dload: Real  # (ne, 3)
     rhs: Real  # (3, nt) the solutions of J x = r, dr/dω, dr/dp
     adjoint: Real  # (nt,) λ
     h: Real  # (nt,) change of g by u
@@ -77,17 +77,17 @@ _new: Callable[..., Summit] = _SummitReference
 
 @compiled
 def new_summit(system: System) -> Summit:
-    """Return empty arrays for `system`."""
-    nc, n = system.shift.size, coefficient_count(system.ks)
+    """Return empty arrays for `system`; the numbers of the second derivatives are not in place yet."""
+    ne, nc, n = system.laws.size, system.shift.size, coefficient_count(system.ks)
     nt, m = nc * n, LOAD_COEFFICIENTS
     capacity = segment_capacity(max(system.ks[-1], system.load_ks[-1]))
     jets, point = new_jets(system), new_evaluation(system)
     linear = receptance_over(jets.A, jets.u_linear, jets.B, jets.x_linear)
     return _new(
-        jets, linear, point, np.zeros((nc, n)), point.dF_dU, np.zeros((nc, n, m)), np.zeros((nc, n)),
-        np.zeros((nc, n)), np.zeros((nc, n)), np.zeros(nc, np.int64), np.zeros(nc, np.int64),
-        np.zeros(nc, np.int64), np.zeros((nc, capacity, SEGMENT_COLUMNS)), np.zeros((nc, COLUMNS)),
-        np.zeros((nc, m)), np.zeros((nc, COLUMNS)), np.zeros((nc, m)), np.zeros((3, nt)), np.zeros(nt),
+        jets, linear, point, np.zeros((nc, n)), point.dF_dU, np.zeros((nc, n)), np.full(ne, -1, np.int64),
+        np.zeros((ne, n, m)), np.zeros((ne, n)), np.zeros((ne, n)), np.zeros(ne, np.int64),
+        np.zeros(ne, np.int64), np.zeros((ne, capacity, SEGMENT_COLUMNS)), np.zeros((ne, COLUMNS)),
+        np.zeros((ne, m)), np.zeros((ne, COLUMNS)), np.zeros((ne, m)), np.zeros((3, nt)), np.zeros(nt),
         np.zeros(nt), np.zeros(n), np.zeros(n), np.zeros((nc, n)), np.zeros((5, nc, n)), np.zeros(NUMBERS),
     )  # fmt: skip
 
@@ -96,6 +96,12 @@ def new_summit(system: System) -> Summit:
 def summit_numbers(at: Summit) -> Real:
     """Return the numbers of a summit as Python can read them (a view)."""
     return at.numbers
+
+
+@compiled
+def summit_seconds(at: Summit) -> Integer:
+    """Return the numbers of the second derivatives of a summit as Python can set them (a view)."""
+    return at.seconds
 
 
 @compiled

@@ -1,0 +1,94 @@
+"""Hessians and gradients of amplitudes and peaks for the laws beside `coulomb`: against the whole solve."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from curvature_cases import ALL, HARMONICS, difference, error_of_hessian, sizes, solved
+from law_scene_cases import CUBIC, GAP, PLANE, RUB, scene
+from space_cases import MOVING, SPACE, in_space
+
+import solver
+from solver.balance.simplifications import Effects
+from solver.errors import SettingError
+from solver.scene.scene import Scene
+from solver.sensitivity.gradient import Sensitivities
+
+PLAIN = {"kt": 1.0, "mu": 0.3, "N0": 0.4}
+_BOX = {"limit": "box", "kt_second": 1.2}
+CASES: dict[str, tuple[Scene, tuple[str, ...]]] = {
+    "elastic-normal": (scene(RUB), ("c0.kt", "c0.mu", "c0.N0", "c0.kn", "excitation.amplitude")),
+    "elastic-normal, load varies": (scene({**RUB, "N1": 0.15, "N1_phase": 0.6, "prestressed": True}),
+                                    ("c0.kn", "c0.N1", "c0.N1_phase", "c0.mu")),
+    "elastic-normal beside coulomb": (scene(RUB, PLAIN), ("c0.kn", "c1.N0", "c1.kt", "c0.N0")),
+    "coulomb-2d, box": (scene({**PLANE, "limit": "box"}), ("c0.kt", "c0.mu", "c0.N0")),
+    "coulomb-2d": (scene(PLANE), ("c0.kt", "c0.mu", "c0.N0", "excitation.amplitude")),
+    "coulomb-3d": (in_space(MOVING), ("c0.kt", "c0.mu", "c0.N0", "c0.kn", "excitation.amplitude")),
+    "coulomb-3d, two stiffnesses": (in_space({**MOVING, "kt_second": 1.2, "N1": 0.2, "N1_phase": 0.5}),
+                                    ("c0.kt", "c0.kt_second", "c0.N1", "c0.kn")),
+    "coulomb-3d, opening": (in_space({**MOVING, "N0": 0.1, "prestressed": False}),
+                            ("c0.kt", "c0.mu", "c0.N0", "c0.kn")),
+    "coulomb-3d, given load": (in_space({**SPACE, "N1_ratio": 0.4}),
+                               ("c0.kt", "c0.mu", "c0.N0", "c0.N1_ratio")),
+    "coulomb-3d, box": (in_space({**MOVING, **_BOX}), ("c0.kt", "c0.kt_second", "c0.mu", "c0.N0", "c0.kn")),
+    "gap": (scene(GAP, PLAIN), ("c0.k", "c0.gap", "c1.N0", "excitation.amplitude")),
+    "polynomial": (scene(CUBIC, PLAIN), ("c0.a1", "c0.a2", "c0.a3", "c0.a5", "c1.mu")),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("hz", [0.13, 0.19, 0.27])
+@pytest.mark.parametrize("case", CASES)
+def test_the_hessian_of_a_law_equals_differences_of_the_gradient(case: str, hz: float) -> None:
+    assert error_of_hessian(CASES[case][0], hz, CASES[case][1]) <= 1e-6
+
+
+@pytest.mark.parametrize("law", CASES)
+def test_hessians_of_random_scenes_equal_differences(law: str) -> None:
+    """Loads, stiffnesses and amplitudes drawn over a decade; contacts that stick, slip and open."""
+    rng, errors = np.random.default_rng(9), []
+    base, paths = CASES[law]
+    for _ in range(12):
+        drawn = {path: base.value(path) * 10.0 ** rng.uniform(-0.5, 0.5) for path in paths}
+        errors.append(error_of_hessian(base.with_values(drawn), float(rng.uniform(0.1, 0.3)), paths))
+    assert max(errors) <= 1e-5, sorted(errors)[-3:]
+
+
+def peak_of(there: Scene, near: float) -> tuple[solver.Branch, solver.Peak]:
+    branch = solver.sweep(there, harmonics=HARMONICS, effects=ALL)
+    assert branch.completed
+    return branch, min((p for p in branch.peaks if p.interior), key=lambda p: abs(p.at - near))
+
+
+@pytest.mark.parametrize("case", ["elastic-normal", "coulomb-3d", "gap"])
+def test_gradient_and_hessian_of_a_peak_equal_differences_of_sweeps(case: str) -> None:
+    there, paths = CASES[case][0], CASES[case][1][:3]
+    branch, peak = peak_of(there, 0.2)
+    found = Sensitivities(branch.balance, paths).peak_hessian(peak.solution, peak.at)
+    assert np.isfinite(found.hessian).all()
+    size = sizes(there, paths)
+    scale = max(1.0, float(np.abs(found.hessian * np.outer(size, size)).max()) / peak.value)
+    for i, path in enumerate(paths):
+
+        def moved(x: float, path: str = path) -> np.ndarray:
+            swept, shifted = peak_of(there.with_values({path: there.value(path) + x}), peak.at)
+            slopes = Sensitivities(swept.balance, paths).gradient(shifted.solution, shifted.at).by_parameters
+            return np.append(slopes * size / peak.value, [shifted.at / peak.at, shifted.value / peak.value])
+
+        wanted = np.append(found.hessian[i] * size / peak.value,
+                           [found.drift[i] / peak.at, found.gradient[i] / peak.value])  # fmt: skip
+        error = np.abs(difference(moved, wanted, size[i]) - wanted) * size[i]
+        assert error.max() <= 1e-6 * scale, (case, path, error)
+
+
+def test_the_hessian_in_space_without_even_harmonics() -> None:
+    """Under a constant load: the balance keeps odd harmonics alone."""
+    there = in_space(SPACE)
+    for hz in (0.13, 0.19, 0.27):
+        assert error_of_hessian(there, hz, ("c0.kt", "c0.mu", "c0.N0"), Effects()) <= 1e-6
+
+
+def test_a_law_without_second_derivatives_is_named() -> None:
+    other = scene({**PLANE, "samples": 512}, PLAIN)
+    balance, u = solved(other, 0.2, ALL)
+    with pytest.raises(SettingError, match=r"no second derivatives: c0 \(coulomb-2d\)"):
+        Sensitivities(balance, ["c1.N0"]).hessian(u, 0.2)
