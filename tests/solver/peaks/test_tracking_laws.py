@@ -26,7 +26,7 @@ RANGES: dict[str, tuple[Scene, str, float, float]] = {
     "coulomb-2d, box": (scene({**PLANE, "limit": "box"}), "c0.N0", 0.05, 5.0),
     "coulomb-3d": (in_space(SPACE), "c0.N0", 0.05, 20.0),
     "coulomb-3d, box": (in_space({**SPACE, "limit": "box"}), "c0.N0", 0.05, 20.0),
-    "coulomb-3d, moving load": (in_space({**MOVING, "kn": 0.3}), "c0.mu", 0.05, 1.5),
+    "coulomb-3d, moving load": (in_space({**MOVING, "kn": 0.05}), "c0.N0", 5.0, 9.0),
 }
 
 
