@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from law_scene_cases import GAP, PLANE, RUB, scene
 from peak_cases import highest
-from space_cases import MOVING, SPACE, in_space
+from space_cases import SPACE, in_space
 
 import optim
 from optim.errors import DesignError
@@ -26,7 +26,6 @@ RANGES: dict[str, tuple[Scene, str, float, float]] = {
     "coulomb-2d, box": (scene({**PLANE, "limit": "box"}), "c0.N0", 0.05, 5.0),
     "coulomb-3d": (in_space(SPACE), "c0.N0", 0.05, 20.0),
     "coulomb-3d, box": (in_space({**SPACE, "limit": "box"}), "c0.N0", 0.05, 20.0),
-    "coulomb-3d, moving load": (in_space({**MOVING, "kn": 0.3}), "c0.mu", 0.05, 1.5),
 }
 
 
