@@ -29,7 +29,10 @@ RANGES: dict[str, tuple[Scene, str, float, float]] = {
 }
 
 
-@pytest.mark.parametrize("law", RANGES)
+@pytest.mark.parametrize(
+    "law",
+    [law if law != "coulomb-3d" else pytest.param(law, marks=pytest.mark.long) for law in RANGES],
+)
 def test_the_least_peak_of_a_law_is_that_of_brute_force(law: str) -> None:
     """No sweep anywhere is lower; a fine search around the least agrees to 1e-6."""
     there, path, low, high = RANGES[law]
@@ -42,7 +45,9 @@ def test_the_least_peak_of_a_law_is_that_of_brute_force(law: str) -> None:
     assert min(around) == pytest.approx(best.peak, rel=1e-6)
 
 
-@pytest.mark.parametrize("law", ["elastic-normal", "gap", "coulomb-3d"])
+@pytest.mark.parametrize(
+    "law", ["elastic-normal", "gap", pytest.param("coulomb-3d", marks=pytest.mark.long)]
+)
 def test_a_track_of_a_law_is_the_highest_peak_of_sweeps(law: str) -> None:
     """Height and slope: the slope against differences of sweeps."""
     there, path, low, high = RANGES[law]
