@@ -6,7 +6,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from solver.linear.matrix_model import MatrixModel, matrix_model
 from solver.scene.bodies import Body
@@ -45,6 +44,16 @@ def _with_bodies(structure: MatricesStructure, bodies: tuple[Body, ...]) -> Matr
         M=_frozen(block_diag(own.M, mass)), C=_frozen(block_diag(own.C, nothing)),
         K=_frozen(block_diag(own.K, nothing)), shapes=_frozen(block_diag(own.shapes, np.eye(n))),
     )  # fmt: skip
+
+
+def block_diag(*blocks: FloatArray) -> FloatArray:
+    """Return the matrix with these blocks on its diagonal: `scipy.linalg` takes longer to load than this."""
+    rows, columns = (sum(block.shape[axis] for block in blocks) for axis in (0, 1))
+    out, row, column = np.zeros((rows, columns)), 0, 0
+    for block in blocks:
+        out[row : row + block.shape[0], column : column + block.shape[1]] = block
+        row, column = row + block.shape[0], column + block.shape[1]
+    return out
 
 
 def _frozen(array: FloatArray) -> FloatArray:

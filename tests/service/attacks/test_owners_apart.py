@@ -26,7 +26,7 @@ def matrix_market(size: int) -> str:
 
 @pytest.mark.parametrize("number", [1000, pytest.param(10_000, marks=pytest.mark.long)])
 def test_a_long_queue_of_one_owner_keeps_nobody_waiting(tmp_path: Path, number: int) -> None:
-    with besieged(tmp_path, "ann", "bob", workers=1, owner_waiting=0) as service:
+    with besieged(tmp_path, "ann", "bob", workers=1, owner_waiting=0, queue_limit=2 * number) as service:
         url = f"sqlite:///{tmp_path}/jobs.db"
         other = Database(url)
         spec = {"size": 20, "seed": 0, "seconds": 0.05, "pid_file": None, "sweeps": 0, "tells": False}
