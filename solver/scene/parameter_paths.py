@@ -12,8 +12,8 @@ from solver.contacts.fields import LARGEST, Part
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Quantity
 from solver.errors import SettingError
-from solver.scene.bodies import Body, Load, Node
 from solver.scene.body_paths import body_paths, body_value, changed_bodies, is_body_path
+from solver.scene.kinematics import HasBodies
 from solver.scene.parts import (
     Damper,
     Excitation,
@@ -41,12 +41,8 @@ _PartT = TypeVar("_PartT", bound=Part)
 _Named = Mass | Spring | Damper
 
 
-class HasParts(Protocol):
+class HasParts(HasBodies, Protocol):
     """What a scene holds, as far as parameter paths go; see `solver.scene.scene.Scene`."""
-
-    @property
-    def structure(self) -> Structure:
-        """The linear part."""
 
     @property
     def contacts(self) -> tuple[AnyContact, ...]:
@@ -57,24 +53,8 @@ class HasParts(Protocol):
         """Every force."""
 
     @property
-    def bodies(self) -> tuple[Body, ...]:
-        """Every rigid body."""
-
-    @property
-    def nodes(self) -> tuple[Node, ...]:
-        """Every position."""
-
-    @property
-    def loads(self) -> tuple[Load, ...]:
-        """Every constant force."""
-
-    @property
     def dampers(self) -> tuple[AnyShape, ...]:
         """Every damper given by its shape."""
-
-    @property
-    def speed(self) -> float | None:
-        """Speed of rotation [1/min]."""
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None) -> Self:
         """Return a copy with other parts."""

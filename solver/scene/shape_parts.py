@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any, Protocol
 
 from pydantic import TypeAdapter, ValidationError
@@ -20,7 +20,6 @@ _UNITS = {
     **dict.fromkeys(("angle", "curved_angle"), "rad"), **dict.fromkeys(("width", "length", "radius"), "m"),
     "kt": "N/m", "kn": "N/m", "mu": "", "N0": "N", POINTS: "", **BODY_UNITS,
 }  # fmt: skip
-_ONE: TypeAdapter[Any] = TypeAdapter(ContactOfAnyLaw)
 
 
 class HasShapes(HasBodies, Protocol):
@@ -31,10 +30,16 @@ class HasShapes(HasBodies, Protocol):
         """Every damper given by its shape."""
 
 
+@cache
+def _reader() -> TypeAdapter[Any]:
+    """Reads a contact; made when first used, because laws from outside import this package."""
+    return TypeAdapter(ContactOfAnyLaw)
+
+
 @lru_cache(maxsize=256)
 def contacts_of(shape: AnyShape) -> tuple[AnyContact, ...]:
     """The contacts a shape yields."""
-    return tuple(_ONE.validate_python(table) for table in shape.contacts())
+    return tuple(_reader().validate_python(table) for table in shape.contacts())
 
 
 def with_shapes(scene: HasShapes) -> dict[str, Any]:

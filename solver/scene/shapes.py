@@ -9,6 +9,7 @@ N = load / (2 cos a) each. Stiffness and preload of a face are shared out evenly
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
@@ -100,9 +101,9 @@ class _Shape(Part):
             raise ValueError(f"`axial` must be perpendicular to `out`, got {list(self.axial)!r}")
         return self
 
+    @abstractmethod
     def spots(self, values: Mapping[str, Any]) -> Iterator[Spot]:
         """The points of every face, with `values` for the parameters of `GEOMETRY`."""
-        raise NotImplementedError
 
     @property
     def geometry(self) -> dict[str, float]:

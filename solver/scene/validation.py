@@ -17,6 +17,7 @@ from pydantic_core import ErrorDetails
 from solver.contacts.fields import GROUND, parse_end
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.errors import Issue
+from solver.errors import pointer as json_pointer
 from solver.scene.bodies import Body, Load, Node, body_dofs
 from solver.scene.contacts import LAW_TAG
 from solver.scene.parts import (
@@ -200,7 +201,7 @@ def _table(loc: tuple[int | str, ...]) -> tuple[str, tuple[str, ...]]:
 
 def pointer_of(steps: Iterable[int | str]) -> str:
     """A JSON pointer."""
-    return "".join("/" + str(step).replace("~", "~0").replace("/", "~1") for step in steps)
+    return json_pointer(*steps)
 
 
 def cross_issues(raw: dict[str, Any]) -> list[Issue]:

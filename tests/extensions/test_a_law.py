@@ -10,12 +10,12 @@ import os
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from contact_cases import central_difference
 from iwan import LIMIT, SLIDERS, IwanContact, K
+from joined_scene import JOINED as SCENE
 from launch import COMMAND, served
 from law_cases import Element, evaluate, jacobian
 
@@ -31,20 +31,6 @@ from solver.scene.json_schema import scene_schema
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 NAMED = {extensions.VARIABLE: json.dumps(["iwan:IwanContact"])}
-SCENE: dict[str, Any] = {
-    "name": "joined",
-    "structure": {
-        "kind": "lumped",
-        "masses": {"a": 1.0, "b": 0.6},
-        "springs": [
-            {"between": ["a", "ground"], "k": 1.0, "c": 0.02},
-            {"between": ["a", "b"], "k": 0.8, "c": 0.02},
-        ],
-    },
-    "contacts": [{"name": "joint", "law": "iwan", "between": ["b", "ground"], "k": 0.7, "limit": 0.8}],
-    "excitation": {"dof": "a", "amplitude": 1.0},
-    "observe": {"dof": "b", "band": [0.1, 0.3]},
-}
 HZ, HARMONICS = 0.19, 21
 
 

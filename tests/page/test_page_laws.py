@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import httpx
 import pytest
+from joined_scene import JOINED
 from page_site import Site, opened
 from page_visits import visit
 
@@ -20,20 +21,6 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-JOINED: dict[str, Any] = {
-    "name": "joined",
-    "structure": {
-        "kind": "lumped",
-        "masses": {"a": 1.0, "b": 0.6},
-        "springs": [
-            {"between": ["a", "ground"], "k": 1.0, "c": 0.02},
-            {"between": ["a", "b"], "k": 0.8, "c": 0.02},
-        ],
-    },
-    "contacts": [{"name": "joint", "law": "iwan", "between": ["b", "ground"], "k": 0.7, "limit": 0.8}],
-    "excitation": {"dof": "a", "amplitude": 1.0},
-    "observe": {"dof": "b", "band": [0.1, 0.3]},
-}
 IN_SPACE: dict[str, Any] = {
     "name": "in-space",
     "structure": {

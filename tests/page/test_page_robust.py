@@ -94,7 +94,7 @@ def test_a_study_that_falls_short_says_so(profile: Profile, site: Site) -> None:
 def test_the_service_stopped_and_started_under_the_page(profile: Profile, site: Site) -> None:
     context, watch = profile
     watch.allowed = AWAY
-    job = submit(site, steps=40, frequencies=400)
+    job = submit(site, steps=200, frequencies=400)
     page = visit(context, site, f"?scene=two-dof&map={job}")
     expect(page.locator("#map-status")).to_contain_text("Map")
     site.stop()

@@ -20,23 +20,20 @@ ANSWER_SECONDS = 5.0 * DATABASE_SECONDS
 EXIT_SECONDS = 10.0
 
 
-def processes_of(cluster: Cluster) -> list[int]:
-    """The server and every process it made."""
-    first = int((cluster.folder / "data" / "postmaster.pid").read_text().split()[0])
-    found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(first)], capture_output=True, check=False)
-    return [first, *map(int, found.stdout.split())]
-
-
 @contextmanager
 def frozen(cluster: Cluster) -> Iterator[None]:
-    """No process of the server runs."""
-    pids = processes_of(cluster)
-    for pid in pids:
-        os.kill(pid, signal.SIGSTOP)
+    """No process of the server runs: the first, so that it makes no more, then each that it made."""
+    first = int((cluster.folder / "data" / "postmaster.pid").read_text().split()[0])
+    stopped = [first]
+    os.kill(first, signal.SIGSTOP)
     try:
+        found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(first)], capture_output=True, check=True)
+        for pid in map(int, found.stdout.split()):
+            os.kill(pid, signal.SIGSTOP)
+            stopped.append(pid)
         yield
     finally:
-        for pid in pids:
+        for pid in stopped:
             os.kill(pid, signal.SIGCONT)
 
 

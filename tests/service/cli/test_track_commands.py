@@ -96,13 +96,16 @@ def test_the_ridge_is_broken_only_where_another_peak_becomes_the_highest() -> No
     assert parameter[breaks + 1] == pytest.approx(exchanges)
 
 
-def test_contacts_of_other_laws_are_mapped_but_not_tracked(
+def test_contacts_without_second_derivatives_are_mapped_but_not_tracked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = (Path(solver.__file__).parent / "scene" / "shipped" / "two-dof.toml").read_text()
-    stop = '[[contacts]]\nname = "stop"\nlaw = "gap"\nbetween = ["m1", "ground"]\nk = 10.0\ngap = 1.0\n\n'
-    scene = tmp_path / "stop.toml"
-    scene.write_text(text.replace("[excitation]", f"{stop}[excitation]"))
+    plane = (
+        '[[contacts]]\nname = "plane"\nlaw = "coulomb-2d"\nbetween = ["m1", "ground"]\n'
+        'between_second = ["m2", "ground"]\nkt = 10.0\nmu = 0.3\nN0 = 50.0\nsamples = 256\n\n'
+    )
+    scene = tmp_path / "plane.toml"
+    scene.write_text(text.replace("[excitation]", f"{plane}[excitation]"))
     asked = [str(scene), *PEAKS[2:8]]
     grid = ["--steps", "2", "--frequencies", "3"]
     for arguments in (["peaks", *asked], ["map", *asked, *grid]):
@@ -110,7 +113,7 @@ def test_contacts_of_other_laws_are_mapped_but_not_tracked(
         out, err = capsys.readouterr()
         assert out == ""
         assert "`scene`" in err
-        assert "(stop)" in err
+        assert "plane (coulomb-2d)" in err
     assert main(["map", *asked, *grid, "--no-ridge", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["ridge"] is None
