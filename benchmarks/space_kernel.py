@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.harness import expect, table, timed
+from solver.contacts.kernels.circle.law import KN, KT_SECOND, coulomb_circle
 from solver.contacts.kernels.columns import COLUMNS, KT, MU
-from solver.contacts.kernels.coulomb_space import KN, KT_SECOND, coulomb_circle
 from solver.contacts.kernels.stick_slip_events import SEGMENT_COLUMNS, segment_capacity
 from solver.jit import fourier
 from solver.jit.fourier import Real

@@ -29,16 +29,16 @@ AGREE = 1e-8  # relative difference of the highest peak of two checkouts
 # Stage: where it is looked up when a sweep calls it (module and attribute; a dot leads into a class). What a
 # stage calls of another one counts there.
 STAGES = {
-    "set-up": (("solver.branches.sweep", "build"),),
-    "walk": (("solver.branches.sweep", "_covering"),),
-    "loose parts": (("solver.branches.sweep", "balanced_part"),),
-    "resonances": (("solver.extrema.extrema", "Survey._look_for_resonances"),),
-    "densify": (("solver.extrema.extrema", "Survey._densify"),),
-    "peaks": (("solver.extrema.extrema", "Survey._find_peaks"),),
-    "band": (("solver.extrema.extrema", "Survey.band"),),
-    "error": (("solver.branches.sweep", "branch_error"),),
-    "flags": (("solver.branches.sweep", "branch_flags"),),
-    "certificate": (("solver.extrema.extrema", "Survey.certificate"),),
+    "set-up": (("solver.continuation.branches.sweep", "build"),),
+    "walk": (("solver.continuation.branches.sweep", "_covering"),),
+    "loose parts": (("solver.continuation.branches.sweep", "balanced_part"),),
+    "resonances": (("solver.continuation.extrema.extrema", "Survey._look_for_resonances"),),
+    "densify": (("solver.continuation.extrema.extrema", "Survey._densify"),),
+    "peaks": (("solver.continuation.extrema.extrema", "Survey._find_peaks"),),
+    "band": (("solver.continuation.extrema.extrema", "Survey.band"),),
+    "error": (("solver.continuation.branches.sweep", "branch_error"),),
+    "flags": (("solver.continuation.branches.sweep", "branch_flags"),),
+    "certificate": (("solver.continuation.extrema.extrema", "Survey.certificate"),),
 }
 
 

@@ -10,17 +10,14 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from solver.balance.simplifications import Effects
-    from solver.branches.sweep import sweep
     from solver.contacts.segments import Shares
     from solver.continuation.branch import Band, Branch, BranchStatus, Peak
+    from solver.continuation.branches.sweep import sweep
+    from solver.continuation.extrema.error_estimate import ErrorEstimate, branch_errors
     from solver.continuation.segment import Stretch, joined
     from solver.continuation.settings import ContinuationSettings, Predictor
     from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
-    from solver.extrema.error_estimate import ErrorEstimate, branch_errors
     from solver.marching.march import march
-    from solver.peaks.minimise_peak import least_peak
-    from solver.peaks.results import Basin, LeastPeak, PeakTrack, TrackStatus
-    from solver.peaks.track_peak import track_peak
     from solver.response.floquet import Growth, Stability, branch_stability, stability
     from solver.response.power_balance import PowerBalance, power_balance
     from solver.response.solution import Solution, SolutionStatus
@@ -32,7 +29,7 @@ if TYPE_CHECKING:
     from solver.results.base import Shown, progress_bar
     from solver.results.dataset import Dataset, Variable
     from solver.results.told import Summary
-    from solver.scene.annulus import Extent, annulus, sectors_needed
+    from solver.scene.cyclic.annulus import Extent, annulus, sectors_needed
     from solver.scene.scene import Scene, load_scene, shipped_scenes
     from solver.sensitivity.gradient import Gradient, Sensitivities
     from solver.sensitivity.hessian import AmplitudeHessian, EdgeHessian, PeakHessian
@@ -40,17 +37,20 @@ if TYPE_CHECKING:
     from solver.studies.blades import BladeAmplitudes, BladePeaks, blade_amplitudes, blade_peaks, mistuned
     from solver.studies.convergence import AccuracyRow, AccuracyStudy, accuracy_study
     from solver.studies.mistuning import MistunedDisk, MistuningStatus, MistuningStudy, mistuning_study
+    from solver.studies.peaks.minimise_peak import least_peak
+    from solver.studies.peaks.results import Basin, LeastPeak, PeakTrack, TrackStatus
+    from solver.studies.peaks.track_peak import track_peak
     from solver.studies.plan import Plan, plan
     from solver.studies.response_map import MapStatus, ResponseMap, response_map
     from solver.views.io import load, save
 
 _HOME = {
     "AccuracyRow": "studies.convergence", "AccuracyStudy": "studies.convergence",
-    "accuracy_study": "studies.convergence", "ErrorEstimate": "extrema.error_estimate",
-    "branch_errors": "extrema.error_estimate", "Band": "continuation.branch",
+    "accuracy_study": "studies.convergence", "ErrorEstimate": "continuation.extrema.error_estimate",
+    "branch_errors": "continuation.extrema.error_estimate", "Band": "continuation.branch",
     "Branch": "continuation.branch", "BranchStatus": "continuation.branch", "Peak": "continuation.branch",
     "ContinuationSettings": "continuation.settings", "Predictor": "continuation.settings",
-    "sweep": "branches.sweep", "Dataset": "results.dataset", "Variable": "results.dataset",
+    "sweep": "continuation.branches.sweep", "Dataset": "results.dataset", "Variable": "results.dataset",
     "Shown": "results.base", "Summary": "results.base", "progress_bar": "results.base", "load": "views.io",
     "save": "views.io", "MissingExtraError": "errors", "ResultFileError": "errors", "Issue": "errors",
     "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
@@ -62,7 +62,8 @@ _HOME = {
     "MistunedDisk": "studies.mistuning", "MistuningStatus": "studies.mistuning",
     "MistuningStudy": "studies.mistuning", "mistuning_study": "studies.mistuning",
     "BladeAmplitudes": "studies.blades", "blade_amplitudes": "studies.blades", "mistuned": "studies.blades",
-    "Extent": "scene.annulus", "sectors_needed": "scene.annulus", "annulus": "scene.annulus",
+    "Extent": "scene.cyclic.annulus", "sectors_needed": "scene.cyclic.annulus",
+    "annulus": "scene.cyclic.annulus",
     "Gradient": "sensitivity.gradient", "Sensitivities": "sensitivity.gradient",
     "AmplitudeHessian": "sensitivity.hessian", "EdgeHessian": "sensitivity.hessian",
     "PeakHessian": "sensitivity.hessian", "PeakGradient": "sensitivity.nonsmooth",
@@ -71,9 +72,10 @@ _HOME = {
     "power_balance": "response.power_balance", "hysteresis_loop": "response.time_history",
     "motion": "response.time_history", "time_history": "response.time_history",
     "MapStatus": "studies.response_map", "ResponseMap": "studies.response_map",
-    "response_map": "studies.response_map", "LeastPeak": "peaks.results", "Basin": "peaks.results",
-    "PeakTrack": "peaks.results", "TrackStatus": "peaks.results", "least_peak": "peaks.minimise_peak",
-    "track_peak": "peaks.track_peak", "Shares": "contacts.segments", "ContactWear": "response.wear",
+    "response_map": "studies.response_map", "LeastPeak": "studies.peaks.results",
+    "Basin": "studies.peaks.results", "PeakTrack": "studies.peaks.results",
+    "TrackStatus": "studies.peaks.results", "least_peak": "studies.peaks.minimise_peak",
+    "track_peak": "studies.peaks.track_peak", "Shares": "contacts.segments", "ContactWear": "response.wear",
     "Measured": "response.wear", "WearSensitivity": "response.wear", "contact_wear": "response.wear",
     "Measure": "response.worst_wear", "WorstWear": "response.worst_wear",
     "worst_friction_work": "response.worst_wear", "worst_wear": "response.worst_wear",

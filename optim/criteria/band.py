@@ -16,7 +16,7 @@ def _rows(judged: Judged) -> list[Row]:
     """The row of the band of a response that has one."""
     import numpy as np
 
-    from solver.extrema.extrema import HALF_POWER
+    from solver.continuation.extrema.extrema import HALF_POWER
 
     branch, sensitivity = judged.branch, judged.sensitivity
     if branch.band is None:

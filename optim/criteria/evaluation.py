@@ -13,9 +13,9 @@ from optim.problem.problem import Problem
 from optim.problem.variables import parameter_values
 from optim.problem.watch import ShouldStop
 from solver.balance.simplifications import Effects, even_harmonics_reason
-from solver.branches.observation import observing
-from solver.branches.sweep import sweep
 from solver.continuation.branch import Branch
+from solver.continuation.branches.observation import observing
+from solver.continuation.branches.sweep import sweep
 from solver.scene.scene import Scene
 
 

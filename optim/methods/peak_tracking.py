@@ -11,8 +11,8 @@ from optim.problem.problem import Problem
 from optim.problem.watch import OnProgress, ShouldStop
 from optim.results.basins import Basin
 from optim.results.design import DesignStatus
-from solver.peaks.minimise_peak import least_peak
-from solver.peaks.results import LeastPeak, TrackStatus
+from solver.studies.peaks.minimise_peak import least_peak
+from solver.studies.peaks.results import LeastPeak, TrackStatus
 
 _STATUS = {
     TrackStatus.TRACKED: DesignStatus.OPTIMAL,

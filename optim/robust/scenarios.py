@@ -14,8 +14,8 @@ from optim.problem.cases import Case
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Coordinate, Scenario
 from optim.problem.variables import Real, Variable, parameter_values
-from solver.branches.observation import observing
-from solver.branches.sweep import sweep
+from solver.continuation.branches.observation import observing
+from solver.continuation.branches.sweep import sweep
 from solver.scene.scene import CyclicStructure
 
 ShouldStop = Callable[[], bool] | None

@@ -19,13 +19,13 @@ from optim.problem.numbers import number_pair
 from optim.studies.crossings import CampbellDiagram, CampbellStatus, Crossing, OrderResponse, Ranges
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
-from solver.branches.sweep import sweep
 from solver.continuation.branch import Branch
+from solver.continuation.branches.sweep import sweep
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 from solver.matrices.normal_modes import undamped_modes
 from solver.response.time_history import matrices
-from solver.scene.annulus import written_out
+from solver.scene.cyclic.annulus import written_out
 from solver.scene.scene import Scene
 
 _MOST_ORDERS = 100

@@ -22,13 +22,13 @@ from optim.problem.variables import Real
 from solver.balance.parameter import resolve
 from solver.balance.parameter_derivatives import resolved
 from solver.balance.simplifications import Effects, even_harmonics_reason
-from solver.branches.sweep import sweep
 from solver.continuation.branch import Branch, Peak
+from solver.continuation.branches.sweep import sweep
+from solver.continuation.extrema.extrema import HALF_POWER
 from solver.errors import SettingError
-from solver.extrema.extrema import HALF_POWER
 from solver.results.base import Drawn
 from solver.results.views import Views
-from solver.scene.annulus import check_in_annulus
+from solver.scene.cyclic.annulus import check_in_annulus
 from solver.scene.parameter_paths import PHASE
 from solver.scene.scene import Scene
 

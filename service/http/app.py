@@ -12,13 +12,15 @@ from starlette.concurrency import run_in_threadpool
 from service.auth.authenticator import Doorkeeper
 from service.http import openapi
 from service.http.bodies import Turns
-from service.http.connections import Connections
 from service.http.dependencies import HostCheck
 from service.http.events import Looks
-from service.http.head import Head
 from service.http.metrics import Measured, Metrics
-from service.http.middleware import Gate
-from service.http.request_log import RequestLog
+from service.http.middleware.admission import Gate
+from service.http.middleware.connections import Connections
+from service.http.middleware.head import Head
+from service.http.middleware.request_log import RequestLog
+from service.http.middleware.security_headers import Seal
+from service.http.middleware.turnstile import Turnstile
 from service.http.routes import (
     designs,
     events,
@@ -37,8 +39,6 @@ from service.http.routes import (
     sweeps,
     uploads,
 )
-from service.http.security_headers import Seal
-from service.http.turnstile import Turnstile
 from service.jobs.registry import Registry
 from service.queue.core import SOLVER_VERSION, Service
 from service.queue.health import Probe

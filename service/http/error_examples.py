@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from service.http.middleware import OPEN
+from service.http.middleware.admission import OPEN
 from service.schemas.problems import MEDIA_TYPE
 
 _BAD = [{"pointer": "/contacts/0/mu", "detail": "`mu` must be >= 0, got -0.1"}]

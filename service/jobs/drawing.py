@@ -15,7 +15,7 @@ from solver.jit.fourier import Real
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from solver.peaks.results import PeakTrack
+    from solver.studies.peaks.results import PeakTrack
 
 
 def best_sweep_figure(result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:
@@ -62,7 +62,7 @@ def map_of(result: Json) -> Figure:
 
 def track_of(result: Json) -> PeakTrack:
     """A track as far as it is drawn; its sweeps are stored apart."""
-    from solver.peaks.results import ActivePeak, CompetingPeak, LeastPeak, PeakTrack, TrackStatus
+    from solver.studies.peaks.results import ActivePeak, CompetingPeak, LeastPeak, PeakTrack, TrackStatus
 
     status, best = TrackStatus(result["status"]), result["optimum"]
     optimum = LeastPeak(

@@ -8,7 +8,7 @@ from datetime import timedelta
 from sqlalchemy.exc import DBAPIError
 
 from service.db.engine import Database, database_name, database_path, is_sqlite, shown, shrink
-from service.db.repositories.jobs import JobRepository
+from service.db.repositories.jobs.repository import JobRepository
 from service.db.repositories.retention import Pruned, RetentionRepository
 from service.db.revisions import current_revision, head_revision
 from service.errors import DatabaseError

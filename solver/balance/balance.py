@@ -16,9 +16,9 @@ from solver.jit.trig_polynomial import grid_size, grid_tables
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import reduce_model
 from solver.linear.contact_table import contact_set, contact_table, port_stiffnesses
-from solver.scene.annulus import check_in_annulus, written_out
+from solver.scene.bodies.kinematics import static_forces
+from solver.scene.cyclic.annulus import check_in_annulus, written_out
 from solver.scene.harmonics import MOST_HARMONICS, forced_harmonics, kept_harmonics
-from solver.scene.kinematics import static_forces
 from solver.scene.parameter_paths import AMPLITUDE
 from solver.scene.scene import Scene
 

@@ -12,11 +12,11 @@ from solver.contacts.kernels import columns
 from solver.contacts.kernels import system as kernel
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.scene.body_paths import is_body_path, least_value, unit_of
+from solver.scene.bodies.paths import is_body_path, least_value, unit_of
+from solver.scene.bodies.shape_parts import contact_shares, least_shape_value, shape_of, shape_unit
+from solver.scene.bodies.shapes import POINTS
 from solver.scene.parameter_paths import has_parameter
 from solver.scene.scene import Scene
-from solver.scene.shape_parts import contact_shares, least_shape_value, shape_of, shape_unit
-from solver.scene.shapes import POINTS
 
 
 class Kind(IntEnum):

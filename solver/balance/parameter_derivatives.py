@@ -17,7 +17,7 @@ from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import reduce_model, term_amplitudes
 from solver.linear.contact_table import port_stiffnesses
-from solver.scene.body_paths import FORCE
+from solver.scene.bodies.paths import FORCE
 from solver.scene.parameter_paths import PROPORTIONAL
 from solver.scene.scene import MatricesStructure, Scene
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from solver.contacts.kernels.planar import periods_to_repeat, plane_step
+from solver.contacts.kernels.coulomb.planar import periods_to_repeat, plane_step
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SLIP,
     BEGAN,

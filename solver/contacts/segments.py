@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.contacts.kernels.planar import periods_to_repeat, plane_step
+from solver.contacts.kernels.coulomb.planar import periods_to_repeat, plane_step
 from solver.contacts.kernels.state_durations import find_segments
 from solver.contacts.kernels.stick_slip_events import (
     BEGIN,

@@ -1,6 +1,6 @@
 """What a contact with a circular limit does over a period: its force and the shares of its motions.
 
-From the sticks and slips with their exact ends that `solver.contacts.kernels.circle_state` finds: the
+From the sticks and slips with their exact ends that `solver.contacts.kernels.circle.state` finds: the
 force of a stick is that at its begin and the motion since then; in a slip it lies on the circle μN, in the
 direction of the collocation polynomial.
 """
@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.contacts.kernels.circle_path import (
+from solver.contacts.kernels.circle.law import MOST_TABLES, circle_path
+from solver.contacts.kernels.circle.path import (
     BEGIN,
     COUNT,
     END,
@@ -26,10 +27,9 @@ from solver.contacts.kernels.circle_path import (
     TX,
     TY,
 )
-from solver.contacts.kernels.circle_state import FOUND_SIZE, HOW, INTERVALS, PIECES, SETTLES, new_tables
+from solver.contacts.kernels.circle.radau import between
+from solver.contacts.kernels.circle.state import FOUND_SIZE, HOW, INTERVALS, PIECES, SETTLES, new_tables
 from solver.contacts.kernels.columns import COLUMNS, KT, KT_SECOND, MU
-from solver.contacts.kernels.coulomb_space import MOST_TABLES, circle_path
-from solver.contacts.kernels.radau import between
 from solver.contacts.kernels.stick_slip_events import FAILED, SEPARATED, SLIP
 from solver.contacts.segments import Shares
 from solver.errors import SettingError

@@ -1,1 +1,1 @@
-"""Walking along a branch of periodic responses over one parameter."""
+"""Branches of periodic responses over one parameter: walked, with their extrema, by `sweep`."""

@@ -164,8 +164,8 @@ class Branch(Drawn):
         Where the amplitude exceeds the limit asked for (peak/√2 if none was); None without a peak.
     error_estimate : float
         Estimated error of the highest peak's value, by the harmonics left out and the residual [m], with
-        peaks that stand elsewhere if more are kept (`solver.extrema.branch_error`); NaN without a peak.
-        `solver.branch_errors` gives that of every point.
+        peaks that stand elsewhere if more are kept (`solver.continuation.extrema.branch_error`); NaN without
+        a peak. `solver.branch_errors` gives that of every point.
     peak_certificate : PeakCertificate
         Why no higher peak hides between two points, or why that is not known.
     flags : tuple of str

@@ -35,8 +35,8 @@ def _source_hash() -> str:
     """Return a hash of the kernels' sources and of what compiles them."""
     solver = Path(__file__).parent.parent
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in (*sorted(solver.glob("jit/*.py")), *sorted(solver.glob("*/kernels/*.py"))):
-        digest.update(f"{source.parent.parent.name}/{source.name}".encode() + source.read_bytes())
+    for source in (*sorted(solver.glob("jit/*.py")), *sorted(solver.glob("**/kernels/**/*.py"))):
+        digest.update(source.relative_to(solver).as_posix().encode() + source.read_bytes())
     return digest.hexdigest()[:16]
 
 
@@ -85,15 +85,15 @@ def _locked(*, alone: bool) -> Iterator[None]:
 class _Locator(caching._CacheLocator):
     """Tells Numba the folder, and when the machine code there is out of date."""
 
-    def __init__(self, line: int, stamp: str) -> None:
-        self._line, self._stamp = line, stamp
+    def __init__(self, place: str, stamp: str) -> None:
+        self._place, self._stamp = place, stamp
 
     @classmethod
     def from_function(cls, function: Any, file: str) -> _Locator:
         stamp = "named by its sources"
         if not function.__module__.startswith("solver."):
             stamp = hashlib.sha256(Path(file).read_bytes()).hexdigest()
-        return cls(function.__code__.co_firstlineno, stamp)
+        return cls(f"{function.__module__}-{function.__code__.co_firstlineno}", stamp)
 
     def get_cache_path(self) -> str:
         return CACHE_FOLDER
@@ -102,7 +102,8 @@ class _Locator(caching._CacheLocator):
         return self._stamp
 
     def get_disambiguator(self) -> str:
-        return str(self._line)
+        # Numba itself takes the last part of the module's name, which modules of several folders share.
+        return self._place
 
 
 class _Serialised(caching.CompileResultCacheImpl):

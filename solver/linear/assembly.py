@@ -18,10 +18,11 @@ from solver.linear.body_matrices import bodies_mass, mass_derivative, matrices_w
 from solver.linear.model import ForceTerm as ForceTerm
 from solver.linear.model import LinearModel as LinearModel
 from solver.linear.model import LinearModelDerivative as LinearModelDerivative
-from solver.scene.annulus import written_out
-from solver.scene.bodies import MOMENTS, Body
-from solver.scene.body_paths import is_body_path
-from solver.scene.kinematics import Form, dof_names, force_derivatives
+from solver.scene.bodies.body import MOMENTS, Body
+from solver.scene.bodies.kinematics import Form, dof_names, force_derivatives
+from solver.scene.bodies.paths import is_body_path
+from solver.scene.bodies.shape_parts import motion_derivatives
+from solver.scene.cyclic.annulus import written_out
 from solver.scene.parameter_paths import PROPORTIONAL, share, structure_names
 from solver.scene.scene import (
     CyclicStructure,
@@ -34,7 +35,6 @@ from solver.scene.scene import (
     Scene,
     Spring,
 )
-from solver.scene.shape_parts import motion_derivatives
 from solver.scene.validation import listing, nearest
 
 FloatArray = NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.linear.matrix_model import MatrixModel, matrix_model
-from solver.scene.bodies import Body
+from solver.scene.bodies.body import Body
 from solver.scene.parts import MatricesStructure
 
 FloatArray = NDArray[np.float64]

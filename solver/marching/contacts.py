@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Row
-from solver.scene.kinematics import Form
+from solver.scene.bodies.kinematics import Form
 
 
 def rows(contacts: tuple[AnyContact, ...]) -> tuple[Row, ...]:

@@ -10,8 +10,8 @@ from solver.errors import SettingError
 from solver.linear.first_order import equations
 from solver.marching.contacts import columns, selection
 from solver.marching.kernels import state as kernel
-from solver.scene.bodies import Body
-from solver.scene.kinematics import dof_names, pair_form
+from solver.scene.bodies.body import Body
+from solver.scene.bodies.kinematics import dof_names, pair_form
 from solver.scene.scene import LumpedStructure, MatricesStructure, Scene
 
 FloatArray = NDArray[np.float64]

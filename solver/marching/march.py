@@ -23,7 +23,7 @@ from solver.marching.equations import equations_of_motion
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
 from solver.marching.result import MarchResult, MarchStatus, describe
-from solver.scene.annulus import annulus
+from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import CyclicStructure, Excitation, Scene
 from solver.scene.validation import listing
 

@@ -20,7 +20,7 @@ from solver.response.monodromy import PERIOD, Element, Monodromy, Structure, mon
 from solver.response.solution import Solution
 from solver.results.base import Drawn
 from solver.results.views import Views
-from solver.scene.annulus import annulus
+from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import CyclicStructure, Scene
 
 GROWS = 1e-9  # a multiplier's modulus beyond 1 that is more than rounding

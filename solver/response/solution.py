@@ -58,12 +58,12 @@ class Solution(Drawn):
     flags : tuple of str
         ``mean_undetermined``, ``history_dependent``, ``all_stuck``, ``separation``, ``not_unique``,
         ``symmetric_unstable``, ``travelling_wave_assumed`` where they apply; for the last three see
-        `solver.branches.symmetry_breaking`.
+        `solver.continuation.branches.symmetry_breaking`.
     residual : float
         Relative residual of the balance.
     error_estimate : float
         Estimated error of `max_abs` by the harmonics left out and the residual [m]; of `half_peak_to_peak`
-        where the mean is not determined. See `solver.extrema.error_estimate`.
+        where the mean is not determined. See `solver.continuation.extrema.error_estimate`.
     mean_range : (float, float)
         Bounds of the mean over every history [m], forces left in contacts by assembly included; NaN where no
         bound is known. See `solver.response.history_dependence`.

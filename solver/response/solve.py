@@ -15,11 +15,11 @@ from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN
 from solver.balance.parameter import Kind
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import PointSolution, Workspace
-from solver.branches.adaptive_harmonics import solve_to
-from solver.branches.symmetry_breaking import assumed_flags, seen
 from solver.contacts.kernels.stick_slip_events import STUCK
 from solver.contacts.kernels.system import UNHELD, evaluation_by_value
-from solver.extrema.error_estimate import UNKNOWN, truncation_error
+from solver.continuation.branches.adaptive_harmonics import solve_to
+from solver.continuation.branches.symmetry_breaking import assumed_flags, seen
+from solver.continuation.extrema.error_estimate import UNKNOWN, truncation_error
 from solver.jit import fourier
 from solver.linear.condensation import loose_ports
 from solver.response.contact_response import OPENS, ContactResponse, ContactState, contact_responses

@@ -6,7 +6,8 @@ theorem). A maximum may also be a corner of the response, closed in by bracketin
 sides of it (`solver.response.wear_nonsmooth`).
 
 Two maxima may hide between two points of a branch: near the top it is made dense until cubics through its
-points predict the measure between them, as for the peaks of the amplitude (`solver.extrema.extrema`).
+points predict the measure between them, as for the peaks of the amplitude
+(`solver.continuation.extrema.extrema`).
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ from solver.balance.parameter import Kind
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import evaluation_by_value
 from solver.continuation.branch import Branch
+from solver.continuation.extrema.extrema import MOST_HALVINGS, NEAR_THE_TOP, PREDICTED
+from solver.continuation.extrema.nodes import share_scales
 from solver.errors import SettingError
-from solver.extrema.extrema import MOST_HALVINGS, NEAR_THE_TOP, PREDICTED
-from solver.extrema.nodes import share_scales
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
 from solver.response.wear import contact_index

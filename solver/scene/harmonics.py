@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from solver.jit.fourier import Flags, Integer, Real
-from solver.scene.body_paths import changes_loads
+from solver.scene.bodies.paths import changes_loads
 from solver.scene.parameter_paths import changed_quantities
 from solver.scene.scene import Scene
 

@@ -17,11 +17,11 @@ from pydantic_core import core_schema
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.registry import laws
 from solver.matrices.load_set import UNITS
-from solver.scene import bodies as scene_bodies
 from solver.scene import matrices_structure as matrices_part
 from solver.scene import parts as scene_parts
-from solver.scene import shapes as scene_shapes
-from solver.scene.body_validation import further_ends
+from solver.scene.bodies import body as scene_bodies
+from solver.scene.bodies import shapes as scene_shapes
+from solver.scene.bodies.validation import further_ends
 from solver.scene.descriptions import EXAMPLES, WORDS
 from solver.scene.scene import Scene
 

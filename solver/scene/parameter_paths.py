@@ -12,8 +12,10 @@ from solver.contacts.fields import LARGEST, Part
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Quantity
 from solver.errors import SettingError
-from solver.scene.body_paths import body_paths, body_value, changed_bodies, is_body_path
-from solver.scene.kinematics import HasBodies
+from solver.scene.bodies.kinematics import HasBodies
+from solver.scene.bodies.paths import body_paths, body_value, changed_bodies, is_body_path
+from solver.scene.bodies.shape_parts import own_parts, shape_of, shape_paths, shape_value, with_shape_value
+from solver.scene.bodies.shapes import AnyShape
 from solver.scene.parts import (
     Damper,
     Excitation,
@@ -22,8 +24,6 @@ from solver.scene.parts import (
     Spring,
     Structure,
 )
-from solver.scene.shape_parts import own_parts, shape_of, shape_paths, shape_value, with_shape_value
-from solver.scene.shapes import AnyShape
 from solver.scene.validation import listing, nearest
 
 FREQUENCY = "frequency"

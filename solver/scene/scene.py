@@ -24,14 +24,16 @@ from solver.contacts.laws.gap import GapSpring
 from solver.contacts.laws.polynomial import PolynomialSpring
 from solver.contacts.laws.registry import on_change
 from solver.errors import Issue, SceneError
-from solver.scene import kinematics
 from solver.scene import parameter_paths as scene_paths
-from solver.scene.bodies import Body, Load, Node
-from solver.scene.body_validation import body_issues
+from solver.scene.bodies import kinematics
+from solver.scene.bodies.body import Body, Load, Node
+from solver.scene.bodies.kinematics import Form
+from solver.scene.bodies.shape_parts import own_parts, with_shapes
+from solver.scene.bodies.shapes import AnyShape
+from solver.scene.bodies.validation import body_issues
 from solver.scene.contacts import ContactOfAnyLaw
-from solver.scene.cyclic_validation import cyclic_issues
+from solver.scene.cyclic.validation import cyclic_issues
 from solver.scene.io import load_raw, scene_folder, shipped_scenes
-from solver.scene.kinematics import Form
 from solver.scene.parts import (
     KINDS,
     CyclicStructure,
@@ -45,8 +47,6 @@ from solver.scene.parts import (
     Spring,
     Structure,
 )
-from solver.scene.shape_parts import own_parts, with_shapes
-from solver.scene.shapes import AnyShape
 from solver.scene.validation import cross_issues, field_issues, plain
 
 __all__ = [

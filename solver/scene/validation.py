@@ -18,7 +18,8 @@ from solver.contacts.fields import GROUND, parse_end
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.errors import Issue
 from solver.errors import pointer as json_pointer
-from solver.scene.bodies import Body, Load, Node, body_dofs
+from solver.scene.bodies.body import Body, Load, Node, body_dofs
+from solver.scene.bodies.shapes import SHAPES, WITH_BODY
 from solver.scene.contacts import LAW_TAG
 from solver.scene.parts import (
     KINDS,
@@ -32,7 +33,6 @@ from solver.scene.parts import (
     Reduction,
     Spring,
 )
-from solver.scene.shapes import SHAPES, WITH_BODY
 
 MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
 RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe", "speed")

@@ -9,10 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.branches.observation import observing
-from solver.branches.sweep import sweep
 from solver.contacts.kernels.stick_slip_events import largest
 from solver.continuation.branch import Branch, BranchStatus
+from solver.continuation.branches.observation import observing
+from solver.continuation.branches.sweep import sweep
 from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
 from solver.jit import fourier
@@ -22,7 +22,7 @@ from solver.response.solution import Solution
 from solver.response.time_history import motion
 from solver.results.base import Drawn
 from solver.results.views import Views
-from solver.scene.annulus import annulus, sectors_needed
+from solver.scene.cyclic.annulus import annulus, sectors_needed
 from solver.scene.scene import CyclicStructure, Observe, Scene
 from solver.scene.validation import listing, nearest
 

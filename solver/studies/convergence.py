@@ -15,12 +15,12 @@ from solver.balance.balance import Balance, build, check_frequency, check_harmon
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.more_harmonics import more_harmonics, pad
 from solver.balance.workspace import Workspace
-from solver.branches.sweep import sweep
 from solver.contacts.kernels.columns import SAMPLES as SAMPLES_COLUMN
 from solver.contacts.kernels.laws import law_number
 from solver.continuation.branch import Branch
+from solver.continuation.branches.sweep import sweep
+from solver.continuation.extrema.error_estimate import truncation_error
 from solver.errors import SettingError
-from solver.extrema.error_estimate import truncation_error
 from solver.jit.fourier import Real
 from solver.results.base import Drawn
 from solver.results.told import Piece

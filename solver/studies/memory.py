@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.balance.simplifications import even_harmonics_reason
 from solver.linear.contact_table import port_counts
-from solver.scene.annulus import sectors_needed
+from solver.scene.cyclic.annulus import sectors_needed
 from solver.scene.harmonics import MULTIPLES, kept_harmonics
 from solver.scene.parts import CyclicStructure, MatricesStructure
 from solver.scene.scene import Scene

@@ -21,7 +21,7 @@ from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
 from solver.results.base import Shown
 from solver.results.views import Views
-from solver.scene.annulus import sectors_needed
+from solver.scene.cyclic.annulus import sectors_needed
 from solver.scene.parts import CyclicStructure, MatricesStructure
 from solver.scene.scene import (
     AnyContact,

@@ -17,13 +17,13 @@ from solver.balance.workspace import Workspace
 from solver.continuation.parameter_scale import Scale, scale_of
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
-from solver.peaks.results import PeakTrack, TrackStatus
-from solver.peaks.track_peak import track_peak
-from solver.peaks.tracker import check_laws
 from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.scene import Scene
 from solver.studies.kernels.map_rows import GIVEN, MAX_ABS, RESIDUAL, ROW_VALUES, SOLVED, solve_row
+from solver.studies.peaks.results import PeakTrack, TrackStatus
+from solver.studies.peaks.track_peak import track_peak
+from solver.studies.peaks.tracker import check_laws
 
 MOST_POINTS = 4_000_000
 OF_THE_GRID = 0.7  # share of the progress, where the peaks are tracked too

@@ -16,12 +16,12 @@ from solver.views.parameter_units import parameter
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
     from solver.marching.result import MarchResult
-    from solver.peaks.results import LeastPeak, PeakTrack
     from solver.response.floquet import Stability
     from solver.response.solution import Solution
     from solver.studies.blades import BladeAmplitudes, BladePeaks
     from solver.studies.convergence import AccuracyStudy
     from solver.studies.mistuning import MistuningStudy
+    from solver.studies.peaks.results import LeastPeak, PeakTrack
     from solver.studies.plan import Plan
     from solver.studies.response_map import ResponseMap
 

@@ -16,13 +16,13 @@ from solver.views.io import scene_attributes
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
     from solver.marching.result import MarchResult
-    from solver.peaks.results import LeastPeak, PeakTrack
     from solver.response.floquet import Stability
     from solver.response.solution import Solution
     from solver.scene.scene import Scene
     from solver.studies.blades import BladeAmplitudes, BladePeaks
     from solver.studies.convergence import AccuracyStudy
     from solver.studies.mistuning import MistuningStudy
+    from solver.studies.peaks.results import LeastPeak, PeakTrack
     from solver.studies.plan import Plan
     from solver.studies.response_map import ResponseMap
 

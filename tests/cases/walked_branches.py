@@ -11,7 +11,7 @@ from scene_cases import oscillator
 from solver import BranchStatus, ContinuationSettings, Predictor, Scene
 from solver.balance.balance import Balance, build
 from solver.balance.workspace import Workspace
-from solver.branches.sweep import Stretch, walk
+from solver.continuation.branches.sweep import Stretch, walk
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from solver.contacts.fields import Positive, Real
 from solver.contacts.kernels import columns
-from solver.contacts.kernels.coulomb import contact_force
+from solver.contacts.kernels.coulomb.force import contact_force
 from solver.contacts.kernels.stick_slip_events import FAILED, SLIPPING, STUCK, piece_of
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Held, Quantity, Row

@@ -27,7 +27,7 @@ from solver import (
     sweep,
     track_peak,
 )
-from solver.peaks.results import TrackStatus
+from solver.studies.peaks.results import TrackStatus
 from solver.studies.response_map import MapStatus
 
 H = 3

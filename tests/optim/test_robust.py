@@ -22,7 +22,7 @@ from optim.problem.uncertainty_set import Scenario, Shape
 from optim.robust.result import RobustStatus
 from optim.robust.scenarios import Outcome, outcome
 from optim.robust.worst_case import Aspect, UnknownScenarioError, pessimise
-from solver.branches.observation import observing
+from solver.continuation.branches.observation import observing
 
 N0 = {"damper.N0": (60.0, 300.0)}
 KT_AND_MU = {"damper.kt": {"deviation": 0.2}, "damper.mu": [0.2, 0.4]}

@@ -78,7 +78,7 @@ def test_parameters_read_as_they_are_written(site: Path) -> None:
     text = " ".join(re.sub("<[^>]+>", "", page).split())
     for part in (
         "scene: what vibrates, with the values that stay fixed. ",
-        "that the harmonics are chosen for; see solver.branches.adaptive_harmonics.harmonics_for for where",
+        "are chosen for; see solver.continuation.branches.adaptive_harmonics.harmonics_for for where",
         "frequency_hz (float): Excitation frequency [Hz].",
     ):
         assert part in text

@@ -19,7 +19,7 @@ from private_kinds import PRIVATE
 from service_helpers import ServedClient, promptly, serving, until
 
 import solver
-from service.http.connections import Connections
+from service.http.middleware.connections import Connections
 
 BODY_SECONDS = 1.0
 HEADER_SECONDS = 2.0

@@ -10,8 +10,8 @@ from sqlalchemy.dialects import sqlite
 
 from service.db import revisions
 from service.db.engine import Database
-from service.db.repositories import claims, storage
-from service.db.repositories import job_statements as statements
+from service.db.repositories import storage
+from service.db.repositories.jobs import claims, statements
 
 BY_KEY = "sqlite_autoindex_job_1"
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from service.http.gc_freeze import Sparing
+from service.http.process.gc_freeze import Sparing
 
 
 @pytest.fixture(autouse=True)

@@ -12,7 +12,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from service.auth.callers import Caller
 from service.http.dependencies import CallerDependency, ServiceDependency
 from service.http.events import Looks, job_events
-from service.http.head import HEADERS_ONLY
+from service.http.middleware.head import HEADERS_ONLY
 from service.queue.core import Service
 from service.schemas.event_answers import END
 

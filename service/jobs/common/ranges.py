@@ -52,6 +52,6 @@ def range_issues(request: RangeRequest, scene: Scene) -> list[Issue]:
 
 def law_issues(where: str, scene: Scene) -> list[Issue]:
     """Refuse contacts whose peaks cannot be tracked, at the pointer `where`."""
-    from solver.peaks.tracker import check_laws
+    from solver.studies.peaks.tracker import check_laws
 
     return check(where, partial(check_laws, scene))

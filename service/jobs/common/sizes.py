@@ -103,7 +103,7 @@ def balance_issues(
     words : what is counted, for people.
     """
     # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
-    from solver.scene.annulus import sectors_needed
+    from solver.scene.cyclic.annulus import sectors_needed
 
     large = _unknown_issues(scene, harmonics, sectors_needed(scene).sectors)
     return (
@@ -123,7 +123,7 @@ def annulus_issues(scene: Scene, harmonics: int) -> list[Issue]:
 def contact_motions(scene: Scene) -> int:
     """Motions of the contacts, those of all sectors where one does not stand for them."""
     # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
-    from solver.scene.annulus import sectors_needed
+    from solver.scene.cyclic.annulus import sectors_needed
 
     return _motions(scene, sectors_needed(scene).sectors)
 
@@ -177,7 +177,7 @@ def march_issues(scene: Scene, steps_per_period: int | None, max_periods: int) -
 def dofs_solved(scene: Scene) -> int:
     """The DOFs of the structure as it is solved: of one sector, or of the whole disk."""
     # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
-    from solver.scene.annulus import sectors_needed
+    from solver.scene.cyclic.annulus import sectors_needed
 
     return len(scene.dofs) * sectors_needed(scene).sectors
 

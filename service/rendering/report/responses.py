@@ -13,8 +13,8 @@ import solver
 from optim.problem.cases import Case, read_cases
 from optim.problem.uncertainty_set import Coordinate, Disk, How
 from service.jobs.linear_limits import linear_limit
-from solver.branches.observation import observing
 from solver.continuation.branch import Branch
+from solver.continuation.branches.observation import observing
 from solver.results import units
 from solver.scene.scene import CyclicStructure, Scene
 from solver.views.plots import style

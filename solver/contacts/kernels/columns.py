@@ -27,21 +27,21 @@ CLOSED, TOUCHING, DEFORMING = 5, 6, 7
 # The kernels whose numbers are the same in every process, in their order; those of others are given when they
 # are first asked for.
 KERNELS = (
-    "solver.contacts.kernels.coulomb_ports:coulomb_ports",
-    "solver.contacts.kernels.elastic_normal:elastic_normal",
-    "solver.contacts.kernels.springs:gap_spring",
-    "solver.contacts.kernels.springs:polynomial_spring",
-    "solver.contacts.kernels.planar:coulomb_plane",
-    "solver.contacts.kernels.coulomb_ports:coulomb_sampled",
-    "solver.contacts.kernels.coulomb_space:coulomb_circle",
-    "solver.contacts.kernels.coulomb_space_box:coulomb_box",
+    "solver.contacts.kernels.coulomb.ports:coulomb_ports",
+    "solver.contacts.kernels.coulomb.elastic_normal:elastic_normal",
+    "solver.contacts.kernels.springs.force:gap_spring",
+    "solver.contacts.kernels.springs.force:polynomial_spring",
+    "solver.contacts.kernels.coulomb.planar:coulomb_plane",
+    "solver.contacts.kernels.coulomb.ports:coulomb_sampled",
+    "solver.contacts.kernels.circle.law:coulomb_circle",
+    "solver.contacts.kernels.coulomb.box:coulomb_box",
 )
 # Likewise those of second derivatives.
 SECOND_KERNELS = (
-    "solver.contacts.kernels.rubbing_second:ports_second",
-    "solver.contacts.kernels.rubbing_second:elastic_normal_second",
-    "solver.contacts.kernels.rubbing_second:box_second",
-    "solver.contacts.kernels.circle_second_law:circle_law_second",
-    "solver.contacts.kernels.springs_second:gap_second",
-    "solver.contacts.kernels.springs_second:polynomial_second",
+    "solver.contacts.kernels.coulomb.second_law:ports_second",
+    "solver.contacts.kernels.coulomb.second_law:elastic_normal_second",
+    "solver.contacts.kernels.coulomb.second_law:box_second",
+    "solver.contacts.kernels.circle.second_law:circle_law_second",
+    "solver.contacts.kernels.springs.second_law:gap_second",
+    "solver.contacts.kernels.springs.second_law:polynomial_second",
 )

@@ -49,14 +49,14 @@ class PlanarContact(SlidesInAPlane):
     def kernel(self) -> str:
         """The kernel of its limit."""
         if self.limits_apart:
-            return "solver.contacts.kernels.coulomb_ports:coulomb_ports"
-        return CIRCLE if self.samples is None else "solver.contacts.kernels.planar:coulomb_plane"
+            return "solver.contacts.kernels.coulomb.ports:coulomb_ports"
+        return CIRCLE if self.samples is None else "solver.contacts.kernels.coulomb.planar:coulomb_plane"
 
     @property
     def second_kernel(self) -> str | None:
         """The kernel of its second derivatives; a force from samples has none."""
         if self.limits_apart:
-            return "solver.contacts.kernels.rubbing_second:ports_second"
+            return "solver.contacts.kernels.coulomb.second_law:ports_second"
         return CIRCLE_SECOND if self.samples is None else None
 
     @property

@@ -127,14 +127,14 @@ class SpaceContact(SlidesInAPlane):
     def kernel(self) -> str:
         """The kernel of its limit."""
         if self.limits_apart:
-            return "solver.contacts.kernels.coulomb_space_box:coulomb_box"
+            return "solver.contacts.kernels.coulomb.box:coulomb_box"
         return CIRCLE
 
     @property
     def second_kernel(self) -> str:
         """The kernel of the second derivatives of its limit."""
         if self.limits_apart:
-            return "solver.contacts.kernels.rubbing_second:box_second"
+            return "solver.contacts.kernels.coulomb.second_law:box_second"
         return CIRCLE_SECOND
 
     def value_of(self, key: str) -> float:

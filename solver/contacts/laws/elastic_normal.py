@@ -37,8 +37,8 @@ class ElasticNormalContact(SlidesOnALine):
     FORCE: ClassVar[str] = (
         "the same with `N = N0 + N1 cos(ωt + N1_phase) + kn v`, and `max(N, 0)` on the normal pair"
     )
-    KERNEL: ClassVar[str] = "solver.contacts.kernels.elastic_normal:elastic_normal"
-    SECOND: ClassVar[str | None] = "solver.contacts.kernels.rubbing_second:elastic_normal_second"
+    KERNEL: ClassVar[str] = "solver.contacts.kernels.coulomb.elastic_normal:elastic_normal"
+    SECOND: ClassVar[str | None] = "solver.contacts.kernels.coulomb.second_law:elastic_normal_second"
     PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
         **FrictionContact.PARAMETERS,
         # It may stand apart at rest.

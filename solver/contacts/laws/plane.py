@@ -14,8 +14,8 @@ from solver.contacts.laws.parts import Follows, Row, Slider
 if TYPE_CHECKING:
     from solver.contacts.segments import Shares
 
-CIRCLE = "solver.contacts.kernels.coulomb_space:coulomb_circle"
-CIRCLE_SECOND = "solver.contacts.kernels.circle_second_law:circle_law_second"
+CIRCLE = "solver.contacts.kernels.circle.law:coulomb_circle"
+CIRCLE_SECOND = "solver.contacts.kernels.circle.second_law:circle_law_second"
 
 
 class SlidesInAPlane(FrictionContact):

@@ -20,7 +20,7 @@ from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.output import SAME_HEIGHT, extremes, observed_motion
 from solver.balance.kernels.residual import contact_values, evaluate
 from solver.contacts.kernels.columns import KT, MU
-from solver.contacts.kernels.coulomb import contact_force
+from solver.contacts.kernels.coulomb.force import contact_force
 from solver.contacts.kernels.stick_slip_events import FAILED
 from solver.contacts.kernels.system import LOAD_COEFFICIENTS, Evaluation, Receptance, System
 from solver.jit.decorators import compiled

@@ -8,13 +8,13 @@ from matplotlib.figure import Figure
 
 from solver.continuation.branch import Branch
 from solver.marching.result import MarchResult
-from solver.peaks.results import PeakTrack
 from solver.response.floquet import Stability
 from solver.response.solution import Solution
 from solver.scene.scene import Scene
 from solver.studies.blades import BladeAmplitudes, BladePeaks
 from solver.studies.convergence import AccuracyStudy
 from solver.studies.mistuning import MistuningStudy
+from solver.studies.peaks.results import PeakTrack
 from solver.views.plots.accuracy import accuracy_figure
 from solver.views.plots.curves import Response
 from solver.views.plots.disks import blades_figure, mistuning_figure

@@ -16,7 +16,7 @@ from solver.views.plots.responses import axis_name
 from solver.views.plots.style import Into
 
 if TYPE_CHECKING:
-    from solver.peaks.results import PeakTrack
+    from solver.studies.peaks.results import PeakTrack
     from solver.studies.response_map import ResponseMap
 
 _LOGARITHMIC_FROM = 5.0  # ratio of the ends from which an axis is logarithmic

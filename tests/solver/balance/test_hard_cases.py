@@ -21,8 +21,8 @@ from solver import BranchStatus, ContinuationSettings, Solution, SolutionStatus,
 from solver.balance.balance import build
 from solver.balance.kernels.output import RESIDUAL
 from solver.balance.workspace import Workspace
-from solver.branches.sweep import walk
 from solver.contacts.kernels.stick_slip_events import LIFTING
+from solver.continuation.branches.sweep import walk
 from solver.marching.result import MarchStatus
 
 LAW = 3e-4  # of the largest friction force: what sampling leaves

@@ -16,7 +16,7 @@ from solver.balance.balance import build
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels import stick_slip_events as events
-from solver.contacts.kernels.aft import sampled_force
+from solver.contacts.kernels.coulomb.aft import sampled_force
 from solver.jit import fourier
 from solver.studies.convergence import sampled
 

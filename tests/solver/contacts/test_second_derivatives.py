@@ -14,9 +14,9 @@ from force_cases import NAMES, TRANSITIONS, critical, reference_case
 import solver
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace
-from solver.contacts.kernels.coulomb_hessian import second_along
+from solver.contacts.kernels.coulomb.hessian import second_along
 from solver.contacts.kernels.system import by_reference
-from solver.extrema.kernels.amplitude_hessian import (
+from solver.continuation.extrema.kernels.amplitude_hessian import (
     balance_at,
     choose_extremum,
     curvatures_at,
@@ -25,7 +25,7 @@ from solver.extrema.kernels.amplitude_hessian import (
     slopes_at,
     solve_responses,
 )
-from solver.extrema.kernels.peak_state import (
+from solver.continuation.extrema.kernels.peak_state import (
     AMPLITUDE,
     CURVE,
     DA_DP,
@@ -146,7 +146,7 @@ class Response:
         self._tau = float(self.here[TAU])
 
     def at(self, omega: float, p: float) -> np.ndarray:
-        """The numbers of `solver.extrema.kernels.peak_state` at the solution for (omega, p)."""
+        """The numbers of `solver.continuation.extrema.kernels.peak_state` at the solution for (omega, p)."""
         system, summit, u = self._system, self._summit, self._u.copy()
         numbers = summit_numbers(summit)
         for _ in range(20):

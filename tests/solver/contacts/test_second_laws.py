@@ -32,7 +32,7 @@ class Law:
     tied: bool = False
 
 
-_RUBBING = "solver.contacts.kernels.rubbing_second:"
+_RUBBING = "solver.contacts.kernels.coulomb.second_law:"
 _SPACE = (KT, KT_SECOND, MU, KN)
 LAWS = {
     "coulomb": Law(force=columns.KERNELS[0], second=_RUBBING + "ports_second", ports=(0,), columns=(KT, MU)),
@@ -54,19 +54,19 @@ LAWS = {
         force=columns.KERNELS[7], second=_RUBBING + "box_second", ports=(0, 1), columns=(KT, KT_SECOND, MU)
     ),
     "coulomb-3d": Law(
-        force=columns.KERNELS[6], second="solver.contacts.kernels.circle_second_law:circle_law_second",
+        force=columns.KERNELS[6], second="solver.contacts.kernels.circle.second_law:circle_law_second",
         ports=(0, 1, 2), columns=_SPACE,
     ),
     "coulomb-3d, one stiffness": Law(
-        force=columns.KERNELS[6], second="solver.contacts.kernels.circle_second_law:circle_law_second",
+        force=columns.KERNELS[6], second="solver.contacts.kernels.circle.second_law:circle_law_second",
         ports=(0, 1, 2), columns=(KT, MU, KN), tied=True,
     ),
     "gap": Law(
-        force=columns.KERNELS[2], second="solver.contacts.kernels.springs_second:gap_second", ports=(0,),
+        force=columns.KERNELS[2], second="solver.contacts.kernels.springs.second_law:gap_second", ports=(0,),
         columns=(K_GAP, GAP),
     ),
     "polynomial": Law(
-        force=columns.KERNELS[3], second="solver.contacts.kernels.springs_second:polynomial_second",
+        force=columns.KERNELS[3], second="solver.contacts.kernels.springs.second_law:polynomial_second",
         ports=(0,), columns=tuple(range(A_1, A_1 + 5)),
     ),
 }  # fmt: skip

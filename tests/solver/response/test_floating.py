@@ -21,9 +21,9 @@ from solver import (
 )
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace
-from solver.branches.point_by_point import walk_by_points
-from solver.branches.sweep import walk
 from solver.contacts.kernels.system import UNHELD
+from solver.continuation.branches.point_by_point import walk_by_points
+from solver.continuation.branches.sweep import walk
 from solver.continuation.loose_parts import balanced_part
 from solver.continuation.segment import joined
 from solver.linear.rigid_body_modes import loose_motions

@@ -27,7 +27,7 @@ from solver import (
 )
 from solver.balance.balance import Balance, build
 from solver.balance.workspace import Workspace
-from solver.branches.sweep import walk
+from solver.continuation.branches.sweep import walk
 from solver.jit.fourier import to_full
 from solver.linear.assembly import linear_model
 from solver.marching.equations import equations_of_motion

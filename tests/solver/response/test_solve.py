@@ -23,7 +23,7 @@ from scene_cases import (
 from solver import Scene, SettingError, SolutionStatus, march, solve
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace
-from solver.extrema.error_estimate import truncation_error
+from solver.continuation.extrema.error_estimate import truncation_error
 from solver.marching.result import MarchStatus
 from solver.response.contact_response import ContactState
 

@@ -10,7 +10,7 @@ from scipy.linalg import eigvalsh
 
 from solver.errors import SettingError
 from solver.linear.assembly import linear_model
-from solver.scene.annulus import annulus
+from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import CyclicStructure, LumpedStructure, Scene, load_scene
 
 

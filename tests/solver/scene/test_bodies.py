@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from solver import Scene, SceneError, SettingError
 from solver.contacts.frames import frame
-from solver.scene.annulus import annulus
-from solver.scene.kinematics import forms_of, placed_forms
+from solver.scene.bodies.kinematics import forms_of, placed_forms
+from solver.scene.cyclic.annulus import annulus
 
 RANDOM = np.random.default_rng(7)
 

@@ -14,8 +14,8 @@ from sensitivity_cases import BEAM, TWO_DOF, disk, loose, two_dof
 
 import solver
 from solver.balance.simplifications import Effects
+from solver.continuation.extrema.extrema import HALF_POWER
 from solver.errors import SettingError
-from solver.extrema.extrema import HALF_POWER
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
 

@@ -32,7 +32,7 @@ from solver import (
 from solver.jit.fourier import to_complex
 from solver.linear.assembly import linear_model
 from solver.response.contact_response import ContactState
-from solver.scene.annulus import written_out
+from solver.scene.cyclic.annulus import written_out
 
 
 @pytest.mark.parametrize("order", [0, 1, 3, 4, 5, 7, 8, 11])

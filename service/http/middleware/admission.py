@@ -1,0 +1,151 @@
+"""The gate: what every request passes before a route sees it, and what every answer carries.
+
+It lets through what is listed here and refuses the rest: a new route needs a key without saying so.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack
+from urllib.parse import urlsplit
+
+from fastapi import Request
+from starlette.concurrency import run_in_threadpool
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.auth import callers
+from service.auth.authenticator import REMEMBERED_SECONDS, Doorkeeper
+from service.auth.callers import Caller
+from service.auth.keys import id_of
+from service.errors import OriginRefusedError, ServiceError, UnauthorizedError
+from service.http.middleware.turnstile import Turnstile
+from service.schemas.problems import AWAY, answered
+
+OPEN = frozenset({"/health/live", "/health/ready", "/openapi.json", "/docs", "/docs/style.css", "/"})
+"""Paths that need no key: whether the service lives, what its API is, and the page, which asks for a key."""
+_PAGE = "/page/"
+_MONITORED = frozenset({"/metrics"})
+_READING = frozenset({"GET", "HEAD", "OPTIONS"})
+_OURS = frozenset({"same-origin", "none"})
+_BEARER = "bearer "
+
+
+def scope_of(method: str, path: str) -> callers.Scope | None:
+    """The scope that a request needs; None for none."""
+    if (path in OPEN or path.startswith(_PAGE)) and method in _READING:
+        return None
+    if path in _MONITORED:
+        return callers.Scope.MONITOR
+    return callers.Scope.READ if method in _READING else callers.Scope.SUBMIT
+
+
+class Gate:
+    """Finds out who asks and refuses who may not."""
+
+    def __init__(self, app: ASGIApp, doorkeeper: Doorkeeper, turnstile: Turnstile) -> None:
+        self._app = app
+        self._doorkeeper = doorkeeper
+        self._turnstile = turnstile
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on with its caller, or answer it with a problem."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        request = Request(scope, receive)
+        with ExitStack() as held:
+            try:
+                _refuse_other_pages(request)
+                token = _token(request)
+                caller = await self._admit(request, token)
+                needed = scope_of(scope["method"], scope["path"])
+                if needed is not None:
+                    self._doorkeeper.require(caller, needed)
+                    held.enter_context(self._turnstile.passed(caller, scope))
+                self._doorkeeper.count(caller)
+            except (ServiceError, *AWAY) as error:
+                await answered(request, error)(scope, receive, send)
+                return
+            request.state.caller = caller
+            if token is None:
+                await self._app(scope, receive, send)
+            else:
+                await self._serve(request, token, receive, send)
+
+    async def _admit(self, request: Request, token: str | None) -> Caller:
+        request.state.key_id = None if token is None else id_of(token)
+        address = address_of(request.scope)
+        if self._doorkeeper.known(token):
+            return self._doorkeeper.admit(token, address)
+        return await run_in_threadpool(self._look_up, token, address)
+
+    def _look_up(self, token: str | None, address: str) -> Caller:
+        caller = self._doorkeeper.admit(token, address)
+        if token is not None:
+            self._doorkeeper.note_use(token)
+        return caller
+
+    async def _serve(self, request: Request, token: str, receive: Receive, send: Send) -> None:
+        """Pass a request with a key on; an answer that goes on ends when its key does."""
+        looked, ended = time.monotonic(), False
+
+        async def watched(message: Message) -> None:
+            nonlocal looked, ended
+            if message.get("more_body") and time.monotonic() - looked > REMEMBERED_SECONDS:
+                looked = time.monotonic()
+                try:
+                    await self._admit(request, token)
+                except ServiceError as error:
+                    ended = True
+                    await send({"type": "http.response.body", "body": b"", "more_body": False})
+                    raise ConnectionAbortedError(error.detail) from error
+            await send(message)
+
+        try:
+            await self._app(request.scope, receive, watched)
+        except Exception:
+            if not ended:
+                raise
+
+
+def address_of(scope: Scope) -> str:
+    """Where a request came from; of several proxies that are trusted, the address the first one names."""
+    client = scope.get("client")
+    return str(client[0]) if client else "unknown"
+
+
+def _token(request: Request) -> str | None:
+    """The key of a request, from `Authorization: Bearer` or `X-API-Key`.
+
+    Raises
+    ------
+    UnauthorizedError
+        For another way to say who one is.
+    """
+    given = request.headers.get("authorization")
+    if given is None:
+        return request.headers.get("x-api-key")
+    if given[: len(_BEARER)].lower() != _BEARER:
+        raise UnauthorizedError("`Authorization` must be `Bearer` and a key", presented=True)
+    return given[len(_BEARER) :].strip()
+
+
+def _refuse_other_pages(request: Request) -> None:
+    """Refuse changes that a web page elsewhere has its visitor's browser ask for.
+
+    Browsers say so: `Sec-Fetch-Site`, and older ones `Origin`. Programs send neither.
+
+    Raises
+    ------
+    OriginRefusedError
+        If the page is not one of this service.
+    """
+    if request.method in _READING:
+        return
+    site, origin = request.headers.get("sec-fetch-site"), request.headers.get("origin")
+    if site is not None:
+        ours = site in _OURS
+    else:
+        ours = origin is None or urlsplit(origin).netloc.lower() == request.headers.get("host", "").lower()
+    if not ours:
+        raise OriginRefusedError("a web page of another origin may not ask for this")

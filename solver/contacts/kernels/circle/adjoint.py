@@ -1,0 +1,189 @@
+"""One panel of a slip in the derivatives of the force: the transpose of its collocation.
+
+See `solver.contacts.kernels.circle.gradient`; real or complex as `solver.contacts.kernels.circle.panels`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.contacts.kernels.circle.panels import (
+    CURVES,
+    DLIMIT,
+    DX,
+    DY,
+    LIMIT,
+    Array,
+    Number,
+    X,
+    Y,
+    solve_columns,
+    turning,
+)
+from solver.contacts.kernels.circle.path import FROM, START, TO
+from solver.contacts.kernels.circle.radau import NODES, SLOPES, STAGES, WEIGHTS
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Integer
+from solver.jit.separate import apart
+
+# Sums over sticks (1), and over slips weighted by cos θ and sin θ, of cos qτ and sin qτ.
+STUCK_COS, STUCK_SIN, ALONG_COS, ALONG_SIN, ACROSS_COS, ACROSS_SIN = 0, 1, 2, 3, 4, 5
+
+
+@compiled
+def basis_of(tau: Number, ks: Integer, e: Array, de: Array) -> None:
+    """Fill `e` with the basis for `ks` at `tau`, real or complex, and `de` with its slope."""
+    cos1, sin1 = np.cos(tau), np.sin(tau)
+    cosine, sine = 0.0 * cos1 + 1.0, 0.0 * cos1
+    k, here = 0, 0
+    for i in range(ks.size):
+        while k < ks[i]:
+            cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
+            k += 1
+        e[here], de[here] = cosine, -k * sine
+        here += 1
+        if k > 0:
+            e[here], de[here] = sine, k * cosine
+            here += 1
+
+
+@compiled
+def moments_between(begin: Number, end: Number, cosines: Array, sines: Array) -> None:
+    """Set ∫cos qτ and ∫sin qτ over [begin, end]; see `solver.contacts.kernels.coulomb.force.add_moments`."""
+    half, middle = 0.5 * (end - begin), 0.5 * (end + begin)
+    cm1, sm1, ch1, sh1 = np.cos(middle), np.sin(middle), np.cos(half), np.sin(half)
+    cm, sm, ch, sh = cm1, sm1, ch1, sh1
+    cosines[0], sines[0] = end - begin, 0.0
+    for q in range(1, cosines.size):
+        factor = 2.0 * sh / q
+        cosines[q], sines[q] = factor * cm, factor * sm
+        cm, sm = cm * cm1 - sm * sm1, sm * cm1 + cm * sm1
+        ch, sh = ch * ch1 - sh * sh1, sh * ch1 + ch * sh1
+
+
+@compiled
+def _slip_moments(tau: Number, along: Number, across: Number, sums: Array) -> None:
+    """Add along·(cos qτ, sin qτ) and across·(…) to the sums over slips."""
+    cos1, sin1 = np.cos(tau), np.sin(tau)
+    cosine, sine = 0.0 * cos1 + 1.0, 0.0 * cos1
+    for q in range(sums.shape[1]):
+        sums[ALONG_COS, q] += along * cosine
+        sums[ALONG_SIN, q] += along * sine
+        sums[ACROSS_COS, q] += across * cosine
+        sums[ACROSS_SIN, q] += across * sine
+        cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
+
+
+@compiled
+def _curves_of_basis(packed: Array, e: Array, de: Array, at: Array) -> None:
+    """Fill `at` with L and the slopes of X, Y and L from the basis at a point."""
+    x, y, load, rise = 0.0 * packed[0, 0], 0.0 * packed[0, 0], 0.0 * packed[0, 0], 0.0 * packed[0, 0]
+    for j in range(e.size):
+        x += packed[X, j] * de[j]
+        y += packed[Y, j] * de[j]
+        load += packed[LIMIT, j] * e[j]
+        rise += packed[LIMIT, j] * de[j]
+    at[DX], at[DY], at[LIMIT], at[DLIMIT] = x, y, load, rise
+
+
+@compiled
+def _table_row(e: Array, de: Array, c: Number, s: Number, turn: Number, more: Number, row: Array) -> None:
+    """Fill −∂R/∂(X, Y, L) at a node; `turn` is gθ' and `more` (κ − 1) sin θ cos θ."""
+    size = e.size
+    for j in range(size):
+        row[j] = -s * de[j]
+    for j in range(size):
+        row[size + j] = c * de[j]
+    for j in range(size):
+        row[2 * size + j] = -turn * e[j] - more * de[j]
+
+
+@compiled
+def _weigh(kept: Array, c: Number, s: Number, weights: Array, F: Array, line: Array) -> None:
+    """Add a node's part of the force to F, and fill its derivative by θ there for every integral."""
+    n = kept.size
+    for j in range(n):
+        F[0, j] += c * kept[j]
+        F[1, j] += s * kept[j]
+    if weights.shape[0] == 0:
+        for j in range(n):
+            line[j] = -s * kept[j]
+        for j in range(n):
+            line[n + j] = c * kept[j]
+        return
+    for r in range(weights.shape[0]):
+        for j in range(n):
+            line[r] += (c * weights[r, 1, j] - s * weights[r, 0, j]) * kept[j]
+
+
+@apart
+def panel_back(
+    packed: Array, kappa: Number, all_ks: Integer, panel: Array, weights: Array, of_motion: Integer,
+    active: bool, eta: Array, sums: Array, F: Array, table: Array, adjoint: Array, G: Array,
+) -> None:  # fmt: skip
+    """Go back over a panel of a slip: η (of θ) at its begin from that at its end.
+
+    `table` (STAGES, 3·size + 1), −∂R/∂(X, Y, L, κ), and `adjoint` (STAGES, m) are scratch.
+    """
+    dtype, m, n = packed.dtype, eta.size, of_motion.size
+    size = packed.shape[1]
+    basis, at = np.empty((3, size), dtype), np.empty(CURVES, dtype)
+    e, de, kept = basis[0], basis[1], basis[2, :n]
+    matrix, first = np.empty((STAGES, STAGES), dtype), np.empty(STAGES, dtype)
+    begin, h = panel[FROM], panel[TO] - panel[FROM]
+    for i in range(STAGES):
+        tau, theta = begin + h * NODES[i], panel[START + 1 + i]
+        basis_of(tau, all_ks, e, de)
+        _curves_of_basis(packed, e, de, at)
+        _, slope, g, dg = turning(at, kappa, theta)
+        c, s = np.cos(theta), np.sin(theta)
+        rate = SLOPES[i, 0] * panel[START]
+        for j in range(STAGES):
+            rate += SLOPES[i, j + 1] * panel[START + 1 + j]
+        rate /= h
+        factor = at[LIMIT] * g / h
+        for j in range(STAGES):
+            matrix[j, i] = factor * SLOPES[i, j + 1]
+        matrix[i, i] += at[LIMIT] * dg * rate - slope
+        first[i] = factor * SLOPES[i, 0]
+        _table_row(e, de, c, s, g * rate, (kappa - 1.0) * s * c, table[i])
+        table[i, 3 * size] = -at[LIMIT] * c * c * rate - s * c * at[DLIMIT]
+        line = adjoint[i]
+        for r in range(m):
+            line[r] = 0.0 * eta[r]
+        if not active:
+            continue
+        share = h * WEIGHTS[i]
+        _slip_moments(tau, share * c, share * s, sums)
+        norm = share * at[LIMIT] / math.pi
+        for j in range(n):
+            kept[j] = norm * e[of_motion[j]]
+        if all_ks[0] == 0 and of_motion[0] == 0:
+            kept[0] *= 0.5
+        _weigh(kept, c, s, weights, F, line)
+    for r in range(m):
+        adjoint[STAGES - 1, r] += eta[r]
+    solve_columns(matrix, adjoint)
+    _gather(adjoint, table, G)
+    for r in range(m):
+        eta[r] = -first[0] * adjoint[0, r]
+    for i in range(1, STAGES):
+        for r in range(m):
+            eta[r] -= first[i] * adjoint[i, r]
+
+
+@compiled
+def _gather(adjoint: Array, table: Array, G: Array) -> None:
+    """Add adjointᵀ · table, five nodes of the panel at once."""
+    for r in range(adjoint.shape[1]):
+        for p in range(0, STAGES, 5):
+            a, b, c, d, e = (
+                adjoint[p, r], adjoint[p + 1, r], adjoint[p + 2, r], adjoint[p + 3, r], adjoint[p + 4, r],
+            )  # fmt: skip
+            for j in range(table.shape[1]):
+                G[r, j] += (
+                    a * table[p, j] + b * table[p + 1, j] + c * table[p + 2, j] + d * table[p + 3, j]
+                    + e * table[p + 4, j]
+                )  # fmt: skip

@@ -1,0 +1,335 @@
+"""Second derivatives of the force under a circular limit, contracted with weights, along a direction.
+
+The gradient of `solver.contacts.kernels.circle.gradient` is a formula of the path: of the times of its
+events, the directions at its nodes and the curves. All of it is carried here into the complex plane, the
+direction as a tiny imaginary part: events and nodes follow by Newton's method, and the imaginary part of the
+gradient is its derivative, to rounding, without differences (W. Squire, G. Trapp, SIAM Rev. 40 (1998) 110).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.contacts.kernels.circle.adjoint import moments_between
+from solver.contacts.kernels.circle.gradient import circle_gradient
+from solver.contacts.kernels.circle.law import curves_of, load_of
+from solver.contacts.kernels.circle.panels import (
+    CURVES,
+    DDLIMIT,
+    DDX,
+    DDY,
+    DLIMIT,
+    DX,
+    DY,
+    LIMIT,
+    Array,
+    Number,
+    X,
+    Y,
+    curves_at,
+    slip_rate,
+    solve_panel,
+    turning,
+)
+from solver.contacts.kernels.circle.path import (
+    BEGAN,
+    BEGIN,
+    COUNT,
+    END,
+    FIRST,
+    FROM,
+    MOTION,
+    PANEL_COLUMNS,
+    START,
+    TO,
+    TX,
+    TY,
+)
+from solver.contacts.kernels.circle.radau import SLOPES, STAGES
+from solver.contacts.kernels.circle.state import (
+    CLOSES,
+    FACTOR,
+    HOW,
+    MX,
+    MY,
+    OPENS,
+    PANELS,
+    PIECES,
+    PX,
+    PY,
+    SETTLES,
+)
+from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU
+from solver.contacts.kernels.coulomb.elastic_normal import merged, positions
+from solver.contacts.kernels.coulomb.force import products
+from solver.contacts.kernels.stick_slip_events import LIFTING, SEPARATED, SLIP, STICK, UNLOADED
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Integer, Real, coefficient_count
+from solver.jit.separate import apart
+
+TINY = 1e-30  # of the direction
+ROUNDS = 4  # of Newton's method from a real solution, each of which all but squares what is left
+
+
+@compiled
+def _zero_of_limit(waves: Array, tau: Number, at: Array) -> Number:
+    """Move a time to where L is 0."""
+    for _ in range(3):
+        curves_at(waves, tau, at)
+        tau -= at[LIMIT] / at[DLIMIT]
+    return tau
+
+
+@compiled
+def _end_of_stick(
+    waves: Array, kappa: Number, offset_x: Number, offset_y: Number, tau: Number, at: Array
+) -> Number:
+    """Move a time to where |t|² is L²."""
+    for _ in range(ROUNDS):
+        curves_at(waves, tau, at)
+        tx, ty = offset_x + at[X], offset_y + at[Y] / kappa
+        excess = tx * tx + ty * ty - at[LIMIT] * at[LIMIT]
+        rise = 2.0 * (tx * at[DX] + ty * at[DY] / kappa - at[LIMIT] * at[DLIMIT])
+        tau -= excess / rise
+    return tau
+
+
+@compiled
+def _direction(theta: float, tx: Number, ty: Number) -> Number:
+    """Return the direction of (tx, ty), whose real part is near `theta`."""
+    c, s = np.cos(theta), np.sin(theta)
+    return theta + (c * ty - s * tx) / (c * tx + s * ty)
+
+
+@apart
+def _carry_slip(
+    waves: Array, kappa: Number, row: Array, before: Real, panels: Array, given: Real, sticks: bool
+) -> None:
+    """Carry the panels of a slip, whose begin, first direction and first guess of the end are in place.
+
+    `before` is the real piece, `given` has the real panels. Where it `sticks` the end moves to q = 0.
+    """
+    nodes, matrix = np.empty((STAGES, CURVES), np.complex128), np.empty((STAGES, STAGES), np.complex128)
+    right, first = np.empty((STAGES, 2), np.complex128), int(before[FIRST])
+    count, length = int(before[COUNT]), before[END] - before[BEGIN]
+    for _ in range(ROUNDS):
+        theta = panels[first, START]
+        stretch = (row[END] - row[BEGIN]) / length
+        for p in range(first, first + count):
+            panel = panels[p]
+            panel[FROM] = row[BEGIN] + stretch * (given[p, FROM] - before[BEGIN])
+            panel[TO] = row[BEGIN] + stretch * (given[p, TO] - before[BEGIN])
+            panel[START] = theta
+            solve_panel(
+                waves, kappa, panel[FROM], panel[TO], theta, False, panel[START + 1 :], nodes, matrix, right
+            )
+            theta = panel[START + STAGES]
+        if not sticks:
+            break
+        panel, last = panels[first + count - 1], nodes[STAGES - 1]
+        slope = SLOPES[STAGES - 1, 0] * panel[START]
+        for j in range(STAGES):
+            slope += SLOPES[STAGES - 1, j + 1] * panel[START + 1 + j]
+        slope /= panel[TO] - panel[FROM]
+        c, s = np.cos(theta), np.sin(theta)
+        fall = c * last[DDX] + s * last[DDY] / kappa - last[DDLIMIT]
+        fall += (c * last[DY] / kappa - s * last[DX]) * slope
+        row[END] -= slip_rate(last, kappa, theta) / fall
+
+
+@apart
+def _carry(
+    waves: Array, kappa: Number, found: Real, pieces: Array, panels: Array, given: Real, whole: Real,
+    start: Array,
+) -> None:  # fmt: skip
+    """Carry a path into the complex plane, the force at its begin `start` (2,); it ends as that at the end.
+
+    `given` has the real panels, `whole` the real pieces.
+    """
+    at = np.empty(CURVES, np.complex128)
+    count = int(found[PIECES])
+    tx, ty = start[0], start[1]
+    for i in range(count):
+        row, before = pieces[i], whole[i]
+        follows = i > 0 and whole[i - 1, END] == before[BEGIN]
+        followed = i + 1 < count and whole[i + 1, BEGIN] == before[END]
+        row[BEGIN] = pieces[i - 1, END] if follows else before[BEGIN] + 0.0j
+        row[END] = before[END] + 0.0j
+        if not follows and found[HOW] == OPENS:
+            row[BEGIN] = _zero_of_limit(waves, row[BEGIN], at)
+            tx, ty = 0.0j, 0.0j
+        if not followed and found[HOW] == OPENS:
+            row[END] = _zero_of_limit(waves, row[END], at)
+        row[TX], row[TY] = tx, ty
+        curves_at(waves, row[BEGIN], at)
+        if before[MOTION] == STICK:
+            offset_x, offset_y = tx - at[X], ty - at[Y] / kappa
+            if followed and whole[i + 1, MOTION] == SLIP:
+                row[END] = _end_of_stick(waves, kappa, offset_x, offset_y, row[END], at)
+            curves_at(waves, row[END], at)
+            tx, ty = offset_x + at[X], offset_y + at[Y] / kappa
+            continue
+        first = int(before[FIRST])
+        if before[COUNT] == 0.0:
+            continue
+        if not follows and found[HOW] == OPENS:
+            theta = given[first, START] + 0.0j
+            for _ in range(ROUNDS):
+                F, slope, _, _ = turning(at, kappa, theta)
+                theta -= F / slope
+            panels[first, START] = theta
+        else:
+            panels[first, START] = _direction(given[first, START], tx, ty)
+        sticks = followed and whole[i + 1, MOTION] == STICK
+        _carry_slip(waves, kappa, row, before, panels, given, sticks)
+        theta = panels[first + int(before[COUNT]) - 1, START + STAGES]
+        curves_at(waves, row[END], at)
+        tx, ty = at[LIMIT] * np.cos(theta), at[LIMIT] * np.sin(theta)
+    start[0], start[1] = tx, ty
+
+
+@apart
+def _carried(
+    waves: Array, kappa: Number, found: Real, pieces: Real, panels: Real, out_pieces: Array,
+    out_panels: Array,
+) -> None:  # fmt: skip
+    """Fill the complex pieces and panels of a path; where it closes, its begin goes with its end."""
+    count, filled = int(found[PIECES]), int(found[PANELS])
+    for i in range(count):
+        for j in range(pieces.shape[1]):
+            out_pieces[i, j] = pieces[i, j]
+    for i in range(filled):
+        for j in range(panels.shape[1]):
+            out_panels[i, j] = panels[i, j]
+    at, start = np.empty(CURVES, np.complex128), np.empty(2, np.complex128)
+    if found[HOW] == SETTLES:
+        curves_at(waves, 0.0j, at)
+        start[0], start[1] = at[X], at[Y] / kappa
+        if pieces[0, BEGAN] != UNLOADED:
+            share = at[LIMIT] / np.sqrt(start[0] * start[0] + start[1] * start[1])
+            start[0], start[1] = share * start[0], share * start[1]
+    tx, ty = pieces[0, TX] + 0.0j, pieces[0, TY] + 0.0j
+    rounds = ROUNDS if found[HOW] == CLOSES else 1
+    for _ in range(rounds):
+        if found[HOW] == CLOSES:
+            start[0], start[1] = tx, ty
+        _carry(waves, kappa, found, out_pieces, out_panels, panels, pieces, start)
+        memory = found[FACTOR] * (found[PX] * found[MX] + found[PY] * found[MY])
+        along = found[FACTOR] * (found[PX] * (start[0] - tx) + found[PY] * (start[1] - ty))
+        step = along / (1.0 - memory)
+        tx, ty = start[0] + step * found[MX], start[1] + step * found[MY]
+
+
+@apart
+def circle_second(
+    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, state: int, found: Real, pieces: Real,
+    panels: Real, intervals: Real, w: Real, dU: Real, drow: Real, dload: Real, out_U: Real, out_row: Real,
+    out_load: Real,
+) -> None:  # fmt: skip
+    """Differentiate the gradient of w·F by (U, row, load) along a direction (dU, drow, dload).
+
+    Parameters
+    ----------
+    U (m, n), ks, load, load_ks, row : the contact, as for `solver.contacts.kernels.circle.law`.
+    state, found, pieces, panels, intervals : what `solver.contacts.kernels.circle.law.circle_path` left.
+    w : (m, n) weights of the force coefficients.
+    dU (m, n), drow (COLUMNS,), dload : the direction; of the columns KT, KT_SECOND, MU and KN count.
+    out_U (m, n), out_row (COLUMNS,), out_load : filled with Σ w ∂²F along the direction.
+    """
+    m, n = U.shape
+    turned, moved = np.empty((m, n), np.complex128), np.empty(row.size, np.complex128)
+    pressed = np.empty(load.size, np.complex128)
+    for a in range(m):
+        for i in range(n):
+            turned[a, i] = U[a, i] + 1j * TINY * dU[a, i]
+    for j in range(row.size):
+        moved[j] = row[j] + 1j * TINY * drow[j]
+    for j in range(load.size):
+        pressed[j] = load[j] + 1j * TINY * dload[j]
+    by_U, by_row = np.zeros((m, n), np.complex128), np.zeros(row.size, np.complex128)
+    by_load = np.zeros(load.size, np.complex128)
+    if state != SEPARATED:
+        _gradient_of(
+            turned, ks, pressed, load_ks, moved, state, found, pieces, panels, intervals, w, by_U, by_row,
+            by_load,
+        )  # fmt: skip
+    for a in range(m):
+        for i in range(n):
+            out_U[a, i] = by_U[a, i].imag / TINY
+    for j in range(row.size):
+        out_row[j] = by_row[j].imag / TINY
+    for j in range(load.size):
+        out_load[j] = by_load[j].imag / TINY
+
+
+@apart
+def _gradient_of(
+    U: Array, ks: Integer, load: Array, load_ks: Integer, row: Array, state: int, found: Real,
+    pieces: Real, panels: Real, intervals: Real, w: Real, by_U: Array, by_row: Array, by_load: Array,
+) -> None:  # fmt: skip
+    """Fill the gradient of w·F by motions, columns and load at complex numbers."""
+    m, n = U.shape
+    all_ks = merged(ks, load_ks)
+    size, of_motion, of_load = coefficient_count(all_ks), positions(ks, all_ks), positions(load_ks, all_ks)
+    N, by_N = np.empty(size, np.complex128), np.zeros(size, np.complex128)
+    load_of(U, ks, load, load_ks, row[KN], all_ks, N)
+    waves = np.empty((3, 2, all_ks[-1] + 1), np.complex128)
+    kt, second, mu = row[KT], row[KT_SECOND], row[MU]
+    curves_of(U, ks, N, all_ks, kt, mu, waves)
+    kappa = kt / second
+    carried = np.empty((int(found[PIECES]), pieces.shape[1]), np.complex128)
+    over = np.empty((int(found[PANELS]), PANEL_COLUMNS), np.complex128)
+    _carried(waves, kappa, found, pieces, panels, carried, over)
+    weights = np.empty((1, 2, n), np.complex128)
+    for a in range(2):
+        for i in range(n):
+            weights[0, a, i] = w[a, i]
+    F, G = np.empty((2, n), np.complex128), np.empty((3, 3 * size + 1), np.complex128)
+    circle_gradient(waves, kappa, ks, all_ks, of_motion, found, carried, over, weights, F, G)
+    line = G[0]
+    by_row[KT] += line[3 * size] / second
+    by_row[KT_SECOND] -= line[3 * size] * kt / (second * second)
+    for i in range(n):
+        by_u, by_w = line[of_motion[i]], line[size + of_motion[i]]
+        by_U[0, i] += kt * by_u
+        by_U[1, i] += kt * by_w
+        by_row[KT] += by_u * U[0, i] + by_w * U[1, i]
+    for j in range(size):
+        by_row[MU] += line[2 * size + j] * N[j]
+        by_N[j] = mu * line[2 * size + j]
+    if m > 2 and state == LIFTING:
+        _pressing(waves, ks, all_ks, intervals, w, N, by_N)
+    elif m > 2:
+        for i in range(n):
+            by_N[of_motion[i]] += w[2, i]
+    for j in range(load.size):
+        by_load[j] += by_N[of_load[j]]
+    if m > 2:
+        for i in range(n):
+            by_U[2, i] += row[KN] * by_N[of_motion[i]]
+            by_row[KN] += U[2, i] * by_N[of_motion[i]]
+
+
+@apart
+def _pressing(
+    waves: Array, ks: Integer, all_ks: Integer, intervals: Real, w: Real, N: Array, by_N: Array
+) -> None:
+    """Add the gradient of the weighted normal force of a contact that opens."""
+    n, size = w.shape[1], N.size
+    at = np.empty(CURVES, np.complex128)
+    here, total = (
+        np.empty((2, ks[-1] + all_ks[-1] + 1), np.complex128),
+        np.zeros((2, ks[-1] + all_ks[-1] + 1), np.complex128),
+    )
+    for i in range(intervals.shape[0]):
+        begin = _zero_of_limit(waves, intervals[i, 0] + 0.0j, at)
+        end = _zero_of_limit(waves, intervals[i, 1] + 0.0j, at)
+        moments_between(begin, end, here[0], here[1])
+        for q in range(here.shape[1]):
+            total[0, q] += here[0, q]
+            total[1, q] += here[1, q]
+    block: Array = np.zeros((n, size), np.complex128)
+    products(total[0], total[1], ks, all_ks, 1.0, block)
+    for i in range(n):
+        for j in range(size):
+            by_N[j] += w[2, i] * block[i, j]

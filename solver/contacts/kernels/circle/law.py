@@ -1,0 +1,311 @@
+"""Elastic Coulomb friction in two tangential directions, |t| ≤ μN, under a load that may move.
+
+Ports: the tangential motions u and w and, if there is a third, the normal motion v, with
+N = N0 + N1 cos(τ + φ) + kn v and the normal force max(N, 0). The arguments are those of
+`solver.contacts.kernels.laws`.
+
+Circle: `solver.contacts.kernels.circle.panels` has the law, `state` and `path` beside it find the motion
+of the force, `gradient` the coefficients and all derivatives. Box: each direction on its own, by
+`solver.contacts.kernels.coulomb.force`.
+
+Reference for a moving load: Yang, Menq, J. Sound Vib. 217 (1998) 909, doi:10.1006/jsvi.1998.1740.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.contacts.kernels.circle.gradient import circle_gradient
+from solver.contacts.kernels.circle.panels import LIMIT, Array, Number, X, Y
+from solver.contacts.kernels.circle.path import BEGAN as PIECE_BEGAN
+from solver.contacts.kernels.circle.path import BEGIN as PIECE_BEGIN
+from solver.contacts.kernels.circle.path import (
+    COUNT,
+    FIRST,
+    TABLE_FULL,
+    TX,
+    TY,
+)
+from solver.contacts.kernels.circle.path import END as PIECE_END
+from solver.contacts.kernels.circle.path import MOTION as PIECE_MOTION
+from solver.contacts.kernels.circle.state import (
+    CLOSES,
+    FOUND_SIZE,
+    HOW,
+    INTERVALS,
+    PANELS,
+    PIECES,
+    SETTLES,
+    TURN,
+    find_path,
+    new_tables,
+)
+from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU, PRESTRESSED
+from solver.contacts.kernels.coulomb.elastic_normal import merged, positions
+from solver.contacts.kernels.coulomb.force import add_moments, products
+from solver.contacts.kernels.stick_slip_events import (
+    AFTER_SEPARATION,
+    BEGAN,
+    BEGIN,
+    DIRECTION,
+    END,
+    FAILED,
+    LIFTING,
+    MOTION,
+    NO_LENGTH,
+    ONSET,
+    SEPARATED,
+    SLIP,
+    SLIPPING,
+    STICK,
+    STUCK,
+    UNLOADED,
+)
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Integer, Real, coefficient_count
+from solver.jit.lapack import fill, fill_block
+from solver.jit.separate import apart
+from solver.jit.trig_polynomial import unpack
+
+MOST_TABLES = 64  # times the usual size of the tables of a path, at most
+
+
+@compiled
+def with_second(row: Real, slope: Real) -> tuple[Real, Real]:
+    """Return copies of both in which the second stiffness is that of the first where it follows it (NaN)."""
+    given, moved = row.copy(), slope.copy()
+    if math.isnan(row[KT_SECOND]):
+        given[KT_SECOND], moved[KT_SECOND] = row[KT], slope[KT]
+    return given, moved
+
+
+@compiled
+def load_of(
+    U: Array, ks: Integer, load: Array, load_ks: Integer, kn: Number, all_ks: Integer, N: Array
+) -> None:
+    """Fill N (for `all_ks`) with the given load and, where there is a third port, kn times its motion."""
+    fill(N, 0.0)
+    of_load = positions(load_ks, all_ks)
+    for j in range(load.size):
+        N[of_load[j]] += load[j]
+    if U.shape[0] > 2:
+        of_motion = positions(ks, all_ks)
+        for i in range(U.shape[1]):
+            N[of_motion[i]] += kn * U[2, i]
+
+
+@compiled
+def curves_of(U: Array, ks: Integer, N: Array, all_ks: Integer, kt: Number, mu: Number, waves: Array) -> None:
+    """Fill `waves` with X = kt u, Y = kt w and L = μN."""
+    for x in range(3):
+        q = N if x == LIMIT else U[x]
+        unpack(q, all_ks if x == LIMIT else ks, waves[x, 0], waves[x, 1])
+        factor = mu if x == LIMIT else kt
+        for k in range(waves.shape[2]):
+            waves[x, 0, k] *= factor
+            waves[x, 1, k] *= factor
+
+
+@compiled
+def _reach(wave: Real) -> float:
+    """Return the sum of the amplitudes of a curve, its mean left out."""
+    total = 0.0
+    for k in range(1, wave.shape[1]):
+        total += math.hypot(wave[0, k], wave[1, k])
+    return total
+
+
+@compiled
+def plainly_stuck(waves: Real, kappa: float) -> bool:
+    """Return whether the amplitudes alone show that the unloaded slider never reaches the limit."""
+    x = abs(waves[X, 0, 0]) + _reach(waves[X])
+    y = (abs(waves[Y, 0, 0]) + _reach(waves[Y])) / kappa
+    return math.hypot(x, y) <= waves[LIMIT, 0, 0] - _reach(waves[LIMIT])
+
+
+@apart
+def circle_path(
+    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, cos_table: Real, sin_table: Real,
+    pieces: Real, panels: Real, found: Real, intervals: Real,
+) -> int:  # fmt: skip
+    """Find what the contact does over a period; see `solver.contacts.kernels.circle.state.find_path`."""
+    all_ks = merged(ks, load_ks)
+    N = np.empty(coefficient_count(all_ks))
+    load_of(U, ks, load, load_ks, row[KN], all_ks, N)
+    waves = np.empty((3, 2, all_ks[-1] + 1))
+    curves_of(U, ks, N, all_ks, row[KT], row[MU], waves)
+    kappa = row[KT] / row[KT_SECOND]
+    if plainly_stuck(waves, kappa):
+        found[HOW], found[PIECES], found[PANELS], found[INTERVALS] = SETTLES, 1.0, 0.0, 0.0
+        first = pieces[0]
+        first[PIECE_MOTION], first[PIECE_BEGIN], first[PIECE_END] = STICK, 0.0, TURN
+        first[PIECE_BEGAN], first[FIRST], first[COUNT] = UNLOADED, 0.0, 0.0
+        first[TX], first[TY] = 0.0, 0.0
+        for k in range(waves.shape[2]):
+            first[TX] += waves[X, 0, k]
+            first[TY] += waves[Y, 0, k] / kappa
+        return STUCK
+    return find_path(waves, kappa, cos_table, sin_table, pieces, panels, found, intervals)
+
+
+@apart
+def coulomb_circle(
+    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
+    cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
+) -> tuple[int, int]:  # fmt: skip
+    """Fill the force of two or three ports, its Jacobian and its derivative by λ; circular limit."""
+    row, slope = with_second(row, slope)
+    m = U.shape[0]
+    all_ks = merged(ks, load_ks)
+    for block in range(m * m):
+        fill_block(dF_dU[block], 0.0)
+    fill_block(F, 0.0)
+    fill_block(dF_dp, 0.0)
+    intervals, found = np.empty((all_ks[-1] + 2, 2)), np.zeros(FOUND_SIZE)
+    rubs = row[MU] > 0.0 and row[KT] > 0.0 and row[KT_SECOND] > 0.0
+    motion, given = U, row
+    if not rubs:
+        # Without friction only the normal force is left: that of a contact that does not move.
+        motion, given = U.copy(), row.copy()
+        fill_block(motion[:2], 0.0)
+        given[MU], given[KT], given[KT_SECOND] = 1.0, 1.0, 1.0
+    state, times = int(TABLE_FULL), 1
+    pieces, panels = new_tables(all_ks[-1], times)
+    while True:
+        state = circle_path(
+            motion, ks, load, load_ks, given, cos_table, sin_table, pieces, panels, found, intervals
+        )
+        if state != TABLE_FULL or times >= MOST_TABLES:
+            break
+        times *= 4
+        pieces, panels = new_tables(all_ks[-1], times)
+    if state < 0 or state == FAILED:
+        fill_block(F, np.nan)
+        return FAILED, 0
+    if not rubs and state == STUCK:
+        state = SLIPPING
+    elif rubs and state == STUCK and pieces[0, PIECE_BEGAN] == UNLOADED and int(found[PIECES]) == 1:
+        _stuck(U, row[KT], row[KT_SECOND], slope, F, dF_dU, dF_dp)
+    elif rubs and state != SEPARATED:
+        _friction(U, ks, load, load_ks, row, slope, dload, found, pieces, panels, F, dF_dU, dF_dp)
+    if m > 2:
+        press(
+            U, ks, load, load_ks, row, slope, dload, state, intervals[: int(found[INTERVALS])], F[2],
+            dF_dU[8], dF_dp[2],
+        )  # fmt: skip
+    return state, _write_segments(state, found, pieces, segments)
+
+
+@compiled
+def _stuck(U: Real, kt: float, second: float, slope: Real, F: Real, dF_dU: Real, dF_dp: Real) -> None:
+    """Fill the force of a slider that never moved."""
+    m, n = U.shape
+    for i in range(n):
+        F[0, i], F[1, i] = kt * U[0, i], second * U[1, i]
+        dF_dp[0, i], dF_dp[1, i] = slope[KT] * U[0, i], slope[KT_SECOND] * U[1, i]
+        dF_dU[0, i, i], dF_dU[m + 1, i, i] = kt, second
+
+
+@apart
+def _friction(
+    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real, found: Real,
+    pieces: Real, panels: Real, F: Real, dF_dU: Real, dF_dp: Real,
+) -> None:  # fmt: skip
+    """Fill the two friction forces from the path."""
+    m, n = U.shape
+    kt, second, mu, kn = row[KT], row[KT_SECOND], row[MU], row[KN]
+    all_ks = merged(ks, load_ks)
+    size, of_motion = coefficient_count(all_ks), positions(ks, all_ks)
+    N, dN, waves = np.empty(size), np.empty(size), np.empty((3, 2, all_ks[-1] + 1))
+    load_of(U, ks, load, load_ks, kn, all_ks, N)
+    load_of(U, ks, dload, load_ks, slope[KN], all_ks, dN)
+    curves_of(U, ks, N, all_ks, kt, mu, waves)
+    G, weights = np.empty((2 * n + 2, 3 * size + 1)), np.empty((0, 2, n))
+    circle_gradient(waves, kt / second, ks, all_ks, of_motion, found, pieces, panels, weights, F[:2], G)
+    dkappa = slope[KT] / second - slope[KT_SECOND] * kt / (second * second)
+    for a in range(2):
+        for i in range(n):
+            line = G[a * n + i]
+            total = line[3 * size] * dkappa
+            for j in range(n):
+                by_u, by_w = line[of_motion[j]], line[size + of_motion[j]]
+                dF_dU[a * m, i, j], dF_dU[a * m + 1, i, j] = kt * by_u, kt * by_w
+                if m > 2:
+                    dF_dU[a * m + 2, i, j] = mu * kn * line[2 * size + of_motion[j]]
+                total += slope[KT] * (by_u * U[0, j] + by_w * U[1, j])
+            for j in range(size):
+                total += line[2 * size + j] * (slope[MU] * N[j] + mu * dN[j])
+            dF_dp[a, i] = total
+
+
+@apart
+def press(
+    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real, state: int,
+    intervals: Real, P: Real, dP_dv: Real, dP_dp: Real,
+) -> None:  # fmt: skip
+    """Fill the normal force max(N, 0): nothing if separated, N if always closed, else from the intervals.
+
+    Of a prestressed contact it counts from the state in which N0, if positive, is in equilibrium already.
+    """
+    all_ks = merged(ks, load_ks)
+    n, size, of_motion = U.shape[1], coefficient_count(all_ks), positions(ks, all_ks)
+    N, dN, dP_dN = np.empty(size), np.empty(size), np.zeros((n, size))
+    load_of(U, ks, load, load_ks, row[KN], all_ks, N)
+    load_of(U, ks, dload, load_ks, slope[KN], all_ks, dN)
+    if state == LIFTING:
+        cosines, sines = np.zeros(ks[-1] + all_ks[-1] + 1), np.zeros(ks[-1] + all_ks[-1] + 1)
+        for i in range(intervals.shape[0]):
+            add_moments(intervals[i, 0], intervals[i, 1], 1.0, cosines, sines)
+        products(cosines, sines, ks, all_ks, 1.0, dP_dN)
+    elif state != SEPARATED:
+        for i in range(n):
+            dP_dN[i, of_motion[i]] = 1.0
+    for i in range(n):
+        for j in range(size):
+            P[i] += dP_dN[i, j] * N[j]
+            dP_dp[i] += dP_dN[i, j] * dN[j]
+        for j in range(n):
+            dP_dv[i, j] = row[KN] * dP_dN[i, of_motion[j]]
+    if row[PRESTRESSED] > 0.0 and load[0] > 0.0 and ks[0] == 0:
+        P[0] -= load[0]
+        dP_dp[0] -= dload[0]
+
+
+@compiled
+def _write_segments(state: int, found: Real, pieces: Real, segments: Real) -> int:
+    """Copy the pieces of the period to the table of segments; return the number of the smooth piece.
+
+    It counts the sticks and slips that have a length. One that the begin of the period cuts is one.
+    """
+    count, first = int(found[PIECES]), 0
+    if state == SEPARATED:
+        return 0
+    onset = pieces[count - 1, PIECE_BEGIN]
+    if found[HOW] == SETTLES:
+        first = count - 1
+        while count > 1 and onset > 0.0 and pieces[first - 1, PIECE_MOTION] == STICK:
+            first -= 1
+            onset = pieces[first, PIECE_BEGIN]
+        first = count - 1
+    piece, written = 0, 0
+    for i in range(first, count):
+        begin, end = pieces[i, PIECE_BEGIN], pieces[i, PIECE_END]
+        if written < segments.shape[0]:
+            row = segments[written]
+            row[MOTION], row[DIRECTION], row[BEGIN], row[END] = pieces[i, PIECE_MOTION], 1.0, begin, end
+            row[ONSET], row[BEGAN] = begin, pieces[i, PIECE_BEGAN]
+            if found[HOW] == SETTLES:
+                row[BEGIN], row[END], row[ONSET] = 0.0, TURN, onset % TURN
+            written += 1
+        if end - begin <= NO_LENGTH:
+            continue
+        kind = 3
+        if pieces[i, PIECE_MOTION] == STICK:
+            kind = 0 if pieces[i, PIECE_BEGAN] == UNLOADED else 1
+            kind = 2 if pieces[i, PIECE_BEGAN] == AFTER_SEPARATION else kind
+        piece += 1 << (8 * kind)
+    if found[HOW] == CLOSES and count > 1 and pieces[0, PIECE_MOTION] == pieces[count - 1, PIECE_MOTION]:
+        piece -= 1 << (8 * (3 if pieces[0, PIECE_MOTION] == SLIP else 1))
+    return piece

@@ -1,0 +1,173 @@
+"""One panel of a slip under a circular limit: the direction of the force by collocation.
+
+With X = k1 u and Y = k1 w [N], the limit L = μN, the force L (cos θ, sin θ) and κ = k1/k2 the law of slip
+
+    t1' = X' − k1 λ cos θ,   t2' = (Y' − k1 λ sin θ)/κ,   |t| = L,   λ ≥ 0
+
+(the slider moves along the force: the rule associated with the circle) has λ eliminated the one equation
+
+    R = L g θ' − F = 0,   g = κ cos²θ + sin²θ,   F = Y' cos θ − X' sin θ − (κ − 1) sin θ cos θ L',
+
+and goes on while the rate of slip q = X' cos θ + Y' sin θ/κ − L' is positive. Written with the slopes of the
+collocation polynomial, R has no pole where L becomes 0: there the force lies along the motion, F = 0.
+
+Everything here takes real numbers or complex ones, whose imaginary parts carry a derivative along a
+direction (complex step: W. Squire, G. Trapp, SIAM Rev. 40 (1998) 110).
+"""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.contacts.kernels.circle.radau import NODES, SLOPES, STAGES
+from solver.jit.decorators import compiled
+from solver.jit.separate import apart
+
+Array: TypeAlias = NDArray[Any]  # of real or of complex numbers
+Number: TypeAlias = Any  # a real or a complex one
+
+# Rows of `waves`, and columns of what is evaluated at a point: values, slopes, curvatures.
+X, Y, LIMIT = 0, 1, 2
+DX, DY, DLIMIT = 3, 4, 5
+DDX, DDY, DDLIMIT = 6, 7, 8
+CURVES = 9
+NEWTON_STEPS = 14
+SMALL_TURN = 3e-6  # rad: Newton's step after which what is left is its square
+
+
+@compiled
+def curves_at(waves: Array, tau: Number, out: Array) -> None:
+    """Fill `out` (CURVES,) with X, Y, L, their slopes and curvatures; `waves` is (3, 2, degree + 1)."""
+    cos1, sin1 = np.cos(tau), np.sin(tau)
+    cosine, sine = cos1, sin1
+    for x in range(3):
+        out[x], out[3 + x], out[6 + x] = waves[x, 0, 0], 0.0, 0.0
+    for k in range(1, waves.shape[2]):
+        for x in range(3):
+            c, s = waves[x, 0, k], waves[x, 1, k]
+            a = c * cosine + s * sine
+            b = s * cosine - c * sine
+            out[x] += a
+            out[3 + x] += k * b
+            out[6 + x] -= k * k * a
+        cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
+
+
+@compiled
+def turning(at: Array, kappa: Number, theta: Number) -> tuple[Number, Number, Number, Number]:
+    """Return F, ∂F/∂θ, g and ∂g/∂θ with the curves `at` a point."""
+    c, s = np.cos(theta), np.sin(theta)
+    more = (kappa - 1.0) * at[DLIMIT]
+    F = c * at[DY] - s * at[DX] - more * s * c
+    slope = -s * at[DY] - c * at[DX] - more * (c * c - s * s)
+    return F, slope, kappa * c * c + s * s, -2.0 * (kappa - 1.0) * s * c
+
+
+@compiled
+def slip_rate(at: Array, kappa: Number, theta: Number) -> Number:
+    """Return q; the force slips on while it is positive."""
+    return np.cos(theta) * at[DX] + np.sin(theta) * at[DY] / kappa - at[DLIMIT]
+
+
+@compiled
+def solve_columns(matrix: Array, right: Array) -> bool:
+    """Solve matrix · x = right for all columns in place (elimination with partial pivoting)."""
+    n, columns = matrix.shape[0], right.shape[1]
+    for k in range(n):
+        pivot, size = k, abs(matrix[k, k])
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > size:
+                pivot, size = i, abs(matrix[i, k])
+        if not size > 0.0:
+            return False
+        if pivot != k:
+            for j in range(k, n):
+                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+            for j in range(columns):
+                right[k, j], right[pivot, j] = right[pivot, j], right[k, j]
+        inverse = 1.0 / matrix[k, k]
+        for i in range(k + 1, n):
+            factor = matrix[i, k] * inverse
+            if factor != 0.0:
+                for j in range(k + 1, n):
+                    matrix[i, j] -= factor * matrix[k, j]
+                for j in range(columns):
+                    right[i, j] -= factor * right[k, j]
+    for k in range(n - 1, -1, -1):
+        inverse = 1.0 / matrix[k, k]
+        for j in range(columns):
+            right[k, j] *= inverse
+        for i in range(k):
+            factor = matrix[i, k]
+            for j in range(columns):
+                right[i, j] -= factor * right[k, j]
+    return True
+
+
+@compiled
+def panel_rows(
+    nodes: Array, kappa: Number, h: Number, theta0: Number, theta: Array, matrix: Array, right: Array
+) -> None:
+    """Fill ∂R/∂θ (STAGES, STAGES) and, as columns of `right`, −R and −∂R/∂θ0, from the curves at `nodes`."""
+    inverse = 1.0 / h
+    for i in range(STAGES):
+        F, slope, g, dg = turning(nodes[i], kappa, theta[i])
+        rate = SLOPES[i, 0] * theta0
+        for j in range(STAGES):
+            rate += SLOPES[i, j + 1] * theta[j]
+        factor = nodes[i, LIMIT] * g * inverse
+        for j in range(STAGES):
+            matrix[i, j] = factor * SLOPES[i, j + 1]
+        matrix[i, i] += nodes[i, LIMIT] * dg * rate * inverse - slope
+        right[i, 0] = F - factor * rate
+        right[i, 1] = -factor * SLOPES[i, 0]
+
+
+@compiled
+def _guess(nodes: Array, kappa: Number, h: Number, theta0: Number, theta: Array) -> None:
+    """Fill `theta` with one linearly implicit step from node to node, backward where L is 0."""
+    before, rate, place = theta0, 0.0 * theta0, 0.0
+    for i in range(STAGES):
+        F, slope, g, _ = turning(nodes[i], kappa, before)
+        half = 0.5 * h * (NODES[i] - place)
+        scale = nodes[i, LIMIT] * g
+        if i == 0:
+            half *= 2.0
+        moved = half * (rate * scale + F) / (scale - half * slope) if slope.real < 0.0 else half * 0.0
+        rate = (F + slope * moved) / scale if scale.real > 0.0 else 0.0 * rate
+        before, place = before + moved, NODES[i]
+        theta[i] = before
+
+
+@apart
+def solve_panel(
+    waves: Array, kappa: Number, begin: Number, end: Number, theta0: Number, fresh: bool, theta: Array,
+    nodes: Array, matrix: Array, right: Array,
+) -> bool:  # fmt: skip
+    """Solve R = 0 at the nodes of [begin, end] by Newton's method from `theta`, or a `fresh` guess.
+
+    On return `nodes` has the curves at the nodes and column 1 of `right` ∂θ/∂θ0. False if it fails.
+    """
+    h = end - begin
+    for i in range(STAGES):
+        curves_at(waves, begin + h * NODES[i], nodes[i])
+    if fresh:
+        _guess(nodes, kappa, h, theta0, theta)
+    for _ in range(NEWTON_STEPS):
+        panel_rows(nodes, kappa, h, theta0, theta, matrix, right)
+        if not solve_columns(matrix, right):
+            return False
+        most = 0.0
+        for i in range(STAGES):
+            most = max(most, abs(right[i, 0]))
+        if not most < 1e6:
+            return False
+        share = 1.0 / max(most, 1.0)
+        for i in range(STAGES):
+            theta[i] += share * right[i, 0]
+        if most < SMALL_TURN:
+            return True
+    return False

@@ -1,0 +1,339 @@
+"""The motion of a friction force under a circular limit: sticks and slips with exactly located events.
+
+In stick the force is t = t_s + (ΔX, ΔY/κ); it slips where |t| − L crosses 0 upward, a root of curves that are
+known. In slip its direction goes panel by panel (`solver.contacts.kernels.circle.panels`), as long as the
+polynomial through a panel's nodes has small last terms, until the rate of slip q crosses 0 downward.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.contacts.kernels.circle.panels import (
+    CURVES,
+    DDLIMIT,
+    DDX,
+    DDY,
+    DX,
+    DY,
+    LIMIT,
+    Number,
+    X,
+    Y,
+    curves_at,
+    slip_rate,
+    solve_panel,
+    turning,
+)
+from solver.contacts.kernels.circle.radau import NODES, SLOPES, STAGES, between, tail
+from solver.contacts.kernels.circle.stick import leave_stick
+from solver.contacts.kernels.stick_slip_events import AFTER_SLIP, NO_LENGTH, SLIP, STICK
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Real
+from solver.jit.separate import apart
+
+# Columns of the pieces of a path. A stick begins with the force (TX, TY); a slip has COUNT panels from FIRST.
+MOTION, BEGIN, END, BEGAN, FIRST, COUNT, TX, TY = 0, 1, 2, 3, 4, 5, 6, 7
+PIECE_COLUMNS = 8
+# Columns of the panels: begin, end, θ at the begin and at the nodes.
+FROM, TO, START = 0, 1, 2
+PANEL_COLUMNS = 3 + STAGES
+# The state a march begins with and ends in: motion, force, its direction, what a stick began after. Once it
+# slipped, a change δt of the force at the begin is (S_MX, S_MY)·S_FACTOR·(S_PX, S_PY)·δt at the end.
+S_MOTION, S_TX, S_TY, S_THETA, S_BEGAN, S_SLIPPED, S_FACTOR, S_PX, S_PY, S_MX, S_MY = (
+    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
+)  # fmt: skip
+STATE_SIZE = 11
+# Numbers of a march: tolerance of force and of its rate, size of the limit, longest panel, and the largest
+# last Legendre terms in a panel.
+TOL, TOL_RATE, SCALE, LONGEST, TAIL_SIZE = 0, 1, 2, 3, 4
+
+# How a march fails.
+TABLE_FULL, UNSOLVED = -1, -2
+SMALL_TAIL = 1e-6  # integrals over a panel are right to nearly the square of its last Legendre terms
+LEAST_PANEL, SHORT_PANEL = 1e-13, 1e-9  # rad
+NOWHERE = 2.0  # no place in a panel, which is 0..1
+IDLE = 4  # pieces without length in a row, after which a slip is not asked whether it sticks at once
+BLIND = 1e-7  # rad, for so long
+
+
+@compiled
+def _falls(nodes: Real, kappa: float, theta: Real, first: float, tol: float) -> int:
+    """Return the number of the node (from 1) at or before which the rate of slip q falls below 0, or 0."""
+    before = first
+    here = slip_rate(nodes[0], kappa, theta[0])
+    for i in range(STAGES):
+        if here < -tol:
+            return i + 1
+        if i + 1 == STAGES:
+            break
+        after = slip_rate(nodes[i + 1], kappa, theta[i + 1])
+        # A dip between nodes: below 0 if as deep as the parabola through three of them, and twice that.
+        if before > here < after and here < 0.25 * max(before - here, after - here):
+            return -(i + 1)
+        before, here = here, after
+    return 0
+
+
+@apart
+def _dense_rate(
+    waves: Real, kappa: float, begin: float, h: float, theta0: float, theta: Real, place: float, at: Real
+) -> float:
+    """Return q at a place in [0, 1] of a panel."""
+    curves_at(waves, begin + h * place, at)
+    return slip_rate(at, kappa, between(theta0, theta, place))
+
+
+@apart
+def _where_it_falls(
+    waves: Real, kappa: float, begin: float, h: float, theta0: float, theta: Real, node: int, tol: float,
+    at: Real,
+) -> float:  # fmt: skip
+    """Return the place in [0, 1] where q falls below 0 before `node` (about it if negative), or NOWHERE."""
+    hi = NODES[abs(node) - 1]
+    lo = NODES[abs(node) - 2] if abs(node) > 1 else 0.0
+    if node < 0:
+        # Golden section for the bottom of the dip.
+        a, b = lo, NODES[-node]
+        ratio = 0.6180339887498949
+        c, d = b - ratio * (b - a), a + ratio * (b - a)
+        fc = _dense_rate(waves, kappa, begin, h, theta0, theta, c, at)
+        fd = _dense_rate(waves, kappa, begin, h, theta0, theta, d, at)
+        for _ in range(40):
+            if min(fc, fd) < -tol:
+                break
+            if fc < fd:
+                b, d, fd = d, c, fc
+                c = b - ratio * (b - a)
+                fc = _dense_rate(waves, kappa, begin, h, theta0, theta, c, at)
+            else:
+                a, c, fc = c, d, fd
+                d = a + ratio * (b - a)
+                fd = _dense_rate(waves, kappa, begin, h, theta0, theta, d, at)
+        if min(fc, fd) >= -tol:
+            return NOWHERE
+        hi = c if fc < fd else d
+    for _ in range(50):
+        middle = 0.5 * (lo + hi)
+        if _dense_rate(waves, kappa, begin, h, theta0, theta, middle, at) < 0.0:
+            hi = middle
+        else:
+            lo = middle
+        if hi - lo < 1e-6:
+            break
+    return hi
+
+
+@apart
+def _end_of_slip(
+    waves: Real, kappa: float, begin: float, guess: float, theta0: float, theta: Real, nodes: Real,
+    matrix: Real, right: Real,
+) -> float:  # fmt: skip
+    """Move the end of a panel to where q is 0, solving it anew; return the end, or −1 if that fails."""
+    end = guess
+    for turn in range(12):
+        if not solve_panel(waves, kappa, begin, end, theta0, False, theta, nodes, matrix, right):
+            return -1.0
+        last = nodes[STAGES - 1]
+        angle = theta[STAGES - 1]
+        slope = SLOPES[STAGES - 1, 0] * theta0
+        for j in range(STAGES):
+            slope += SLOPES[STAGES - 1, j + 1] * theta[j]
+        slope /= end - begin
+        c, s = math.cos(angle), math.sin(angle)
+        fall = c * last[DDX] + s * last[DDY] / kappa - last[DDLIMIT]
+        fall += (c * last[DY] / kappa - s * last[DX]) * slope
+        step = -slip_rate(last, kappa, angle) / fall if fall < 0.0 else 0.0
+        step = min(max(step, -0.5 * (end - begin)), 0.5 * (end - begin))
+        if abs(step) < 1e-14 * (1.0 + abs(end)) or turn == 11:
+            break
+        moved = (end + step - begin) / (end - begin)
+        old = theta.copy()
+        for j in range(STAGES):
+            theta[j] = between(theta0, old, min(NODES[j] * moved, 1.0))
+        end += step
+    return end
+
+
+@compiled
+def _error_of(limit0: float, nodes: Real, theta0: float, theta: Real, scale: float, limits: Real) -> float:
+    """Return the last Legendre terms of a panel, of the direction weighted with the limit, or of the limit.
+
+    What the force is integrated with has waves of its own: its size counts as much as its direction.
+    """
+    most = 0.0
+    for i in range(STAGES):
+        limits[i] = nodes[i, LIMIT] / scale
+        most = max(most, limits[i])
+    return max(tail(theta0, theta) * min(most, 1.0), tail(limit0 / scale, limits))
+
+
+@apart
+def _stop_in(
+    waves: Real, kappa: float, begin: float, h: float, theta0: float, theta: Real, nodes: Real, first: float,
+    tol: float, at: Real,
+) -> float:  # fmt: skip
+    """Return the place in [0, 1] of a panel where the rate of slip falls below 0, or NOWHERE."""
+    node = _falls(nodes, kappa, theta, first, tol)
+    if node == 0:
+        return NOWHERE
+    return _where_it_falls(waves, kappa, begin, h, theta0, theta, node, tol, at)
+
+
+@compiled
+def _keep(panels: Real, filled: int, begin: float, end: float, theta0: float, theta: Real) -> None:
+    """Write a panel to the table."""
+    row = panels[filled]
+    row[FROM], row[TO], row[START] = begin, end, theta0
+    for i in range(STAGES):
+        row[START + 1 + i] = theta[i]
+
+
+@compiled
+def _shortened(theta0: float, theta: Real, place: float) -> None:
+    """Put the values at the nodes of [0, place] of a panel in the place of those at its nodes."""
+    old = theta.copy()
+    for i in range(STAGES):
+        theta[i] = between(theta0, old, NODES[i] * place)
+
+
+@apart
+def slip_on(
+    waves: Real, kappa: float, begin: float, end: float, theta0: float, blind: float, numbers: Real,
+    panels: Real, filled: int,
+) -> tuple[float, float, float, int, int]:  # fmt: skip
+    """Follow a slip from `begin` until it sticks, at most to `end`; append its panels.
+
+    Returns
+    -------
+    (place, direction there, its derivative by theta0, panels filled, 1 if it sticks there, 0 at the end,
+    TABLE_FULL or UNSOLVED).
+    """
+    nodes, matrix = np.empty((STAGES, CURVES)), np.empty((STAGES, STAGES))
+    right, theta, at = np.empty((STAGES, 2)), np.empty(STAGES), np.empty(CURVES)
+    tau, factor, tol, small = begin, 1.0, numbers[TOL_RATE], numbers[TAIL_SIZE]
+    curves_at(waves, begin, at)
+    first, limit0, limits = slip_rate(at, kappa, theta0), at[LIMIT], np.empty(STAGES)
+    h = _first_panel(at, kappa, theta0, numbers)
+    while tau < end:
+        rest = end - tau
+        share = rest if h > 0.95 * rest else (0.5 * rest if h > 0.5 * rest else h)
+        to = end if share == rest else tau + share
+        if not solve_panel(waves, kappa, tau, to, theta0, True, theta, nodes, matrix, right):
+            if share <= LEAST_PANEL:
+                return tau, theta0, factor, filled, UNSOLVED
+            h = 0.2 * share
+            continue
+        error = _error_of(limit0, nodes, theta0, theta, numbers[SCALE], limits)
+        change = 3.0 if error == 0.0 else min(3.0, max(0.15, 0.9 * (small / error) ** (1.0 / STAGES)))
+        if error > 3.0 * small and share > LEAST_PANEL:
+            h = change * share
+            continue
+        place = _stop_in(waves, kappa, tau, share, theta0, theta, nodes, first, tol, at)
+        stops = place < NOWHERE and tau + place * share >= begin + blind
+        if stops and place < 0.02 and first > tol and share > SHORT_PANEL:
+            h = 0.1 * share  # perhaps the solution against the motion
+            continue
+        if stops and place < 1e-5 and share <= SHORT_PANEL:
+            return tau, theta0, factor, filled, 1
+        if stops:
+            _shortened(theta0, theta, place)
+            to = _end_of_slip(waves, kappa, tau, tau + place * share, theta0, theta, nodes, matrix, right)
+            if to < 0.0:
+                h = 0.5 * share
+                continue
+        if filled >= panels.shape[0]:
+            return tau, theta0, factor, filled, TABLE_FULL
+        _keep(panels, filled, tau, to, theta0, theta)
+        filled += 1
+        tau, theta0 = to, theta[STAGES - 1]
+        factor *= right[STAGES - 1, 1]
+        first, limit0 = slip_rate(nodes[STAGES - 1], kappa, theta0), nodes[STAGES - 1, LIMIT]
+        if stops:
+            return tau, theta0, factor, filled, 1
+        h = min(change * share, numbers[LONGEST])
+    return end, theta0, factor, filled, 0
+
+
+@compiled
+def _first_panel(at: Real, kappa: float, theta0: float, numbers: Real) -> float:
+    """Return the length of a slip's first panel: three times that in which the direction decays."""
+    _, stiff, g, _ = turning(at, kappa, theta0)
+    h, scale = numbers[LONGEST], at[LIMIT] * g
+    if at[LIMIT] > 1e-12 * numbers[SCALE] and abs(stiff) * h > 3.0 * scale:
+        h = 3.0 * scale / abs(stiff)
+    return float(h)
+
+
+@compiled
+def projection(kappa: Number, theta: Number) -> tuple[Number, Number, Number]:
+    """Return (px, py, along): how L δθ follows from δt and along·(δL − n·δt) where a slip begins."""
+    c, s = np.cos(theta), np.sin(theta)
+    along = s * c * (1.0 - kappa) / (kappa * c * c + s * s)
+    return -s - along * c, c - along * s, along
+
+
+@apart
+def march_path(
+    waves: Real, kappa: float, grid: Real, begin: float, end: float, state: Real, numbers: Real,
+    pieces: Real, panels: Real, count: int, filled: int,
+) -> tuple[int, int]:  # fmt: skip
+    """Follow the force over [begin, end] from `state`, which is moved on; append pieces and panels.
+
+    Returns
+    -------
+    Numbers of pieces and panels, or (TABLE_FULL, 0) or (UNSOLVED, 0).
+    """
+    tau, idle = begin, 0
+    at = np.empty(CURVES)
+    while tau < end:
+        if count >= pieces.shape[0]:
+            return TABLE_FULL, 0
+        row = pieces[count]
+        row[MOTION], row[BEGIN], row[BEGAN] = state[S_MOTION], tau, state[S_BEGAN]
+        row[TX], row[TY], row[FIRST], row[COUNT] = state[S_TX], state[S_TY], filled, 0.0
+        if state[S_MOTION] == STICK:
+            curves_at(waves, tau, at)
+            offset_x, offset_y = state[S_TX] - at[X], state[S_TY] - at[Y] / kappa
+            tau, leaves = leave_stick(waves, kappa, grid, offset_x, offset_y, tau, end, numbers[TOL])
+            curves_at(waves, tau, at)
+            state[S_TX], state[S_TY] = offset_x + at[X], offset_y + at[Y] / kappa
+            if leaves:
+                _begin_slip(at, kappa, state)
+        else:
+            blind = BLIND if idle >= IDLE else 0.0
+            tau, theta, factor, now, how = slip_on(
+                waves, kappa, tau, end, state[S_THETA], blind, numbers, panels, filled
+            )
+            if how < 0:
+                return how, 0
+            row[COUNT] = now - filled
+            filled = now
+            curves_at(waves, tau, at)
+            state[S_THETA] = theta
+            state[S_TX], state[S_TY] = at[LIMIT] * math.cos(theta), at[LIMIT] * math.sin(theta)
+            state[S_FACTOR] *= factor * at[LIMIT]
+            state[S_MX], state[S_MY] = -math.sin(theta), math.cos(theta)
+            if how == 1:
+                state[S_MOTION], state[S_BEGAN] = STICK, AFTER_SLIP
+        row[END] = tau
+        idle = idle + 1 if tau - row[BEGIN] <= NO_LENGTH else 0
+        if idle > 40:
+            return UNSOLVED, 0
+        count += 1
+    return count, filled
+
+
+@compiled
+def _begin_slip(at: Real, kappa: float, state: Real) -> None:
+    """Turn a stick whose force has reached the limit into a slip."""
+    theta = math.atan2(state[S_TY], state[S_TX])
+    px, py, _ = projection(kappa, theta)
+    if state[S_SLIPPED] == 0.0:
+        state[S_SLIPPED], state[S_FACTOR] = 1.0, 1.0 / at[LIMIT]
+        state[S_PX], state[S_PY] = px, py
+    else:
+        state[S_FACTOR] *= (px * state[S_MX] + py * state[S_MY]) / at[LIMIT]
+    state[S_MOTION], state[S_THETA] = SLIP, theta

@@ -1,0 +1,365 @@
+"""The periodic force under a circular limit: what the contact does over a period, and how it got there.
+
+Where the contact opens, each interval of contact begins with the force 0. Where it does not, the offset of
+the slider is pushed by the moving limits alone (a sweeping process), so two histories never move apart: if
+one of them slips for ever, all become the same. It is found from a rough march over the grid, then by
+Newton's method on the force at one time; once a contact has slipped, its force is on the circle, and a change
+of it is one number. If the slipping ends, the force keeps what the periods from the unloaded state left.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.contacts.kernels.circle.panels import CURVES, DLIMIT, DX, DY, LIMIT, X, Y, curves_at, slip_rate
+from solver.contacts.kernels.circle.path import (
+    LONGEST,
+    PANEL_COLUMNS,
+    PIECE_COLUMNS,
+    S_BEGAN,
+    S_FACTOR,
+    S_MOTION,
+    S_MX,
+    S_MY,
+    S_PX,
+    S_PY,
+    S_SLIPPED,
+    S_THETA,
+    S_TX,
+    S_TY,
+    SCALE,
+    SMALL_TAIL,
+    STATE_SIZE,
+    TAIL_SIZE,
+    TOL,
+    TOL_RATE,
+    march_path,
+)
+from solver.contacts.kernels.state_durations import contact_intervals, one_wave
+from solver.contacts.kernels.stick_slip_events import (
+    AFTER_SEPARATION,
+    AFTER_SLIP,
+    FAILED,
+    LIFTING,
+    ROUNDING,
+    SEPARATED,
+    SLIP,
+    SLIPPING,
+    STICK,
+    STUCK,
+    UNLOADED,
+)
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Real
+from solver.jit.separate import apart
+from solver.jit.trig_polynomial import on_grid
+
+TURN = 2.0 * math.pi
+FORGOTTEN = (
+    24.0  # exponent of what is left of a difference, at which the exact march begins before its period
+)
+REPEATS = 3e-9  # change of the force over a period, relative to the largest limit, that counts as none
+MOST_ROUNDS = 60
+MOST_TRANSIENT = 40  # periods after which a slider that still slips is taken to do so for ever
+WAVES_PER_PANEL = 9.0  # rad that the highest harmonic turns in one panel, at most
+# How the path was found, and so how its derivatives go on: each interval from no force, one period that
+# repeats, or from the unloaded state to a last period that sticks (or sticks from the first).
+OPENS, CLOSES, SETTLES = 0, 1, 2
+# Numbers of a path found: these, how many intervals of contact it has, and, where it closes, how a change of
+# the force at the begin comes back: (MX, MY)·FACTOR·(PX, PY)·δt.
+HOW, PIECES, PANELS, INTERVALS, FACTOR, PX, PY, MX, MY = 0, 1, 2, 3, 4, 5, 6, 7, 8
+FOUND_SIZE = 9
+
+
+@apart
+def contact_grid(waves: Real, degree: int, cos_table: Real, sin_table: Real, grid: Real) -> None:
+    """Fill `grid` (6, n) with X, Y, L and their slopes at τ_j = 2πj/n."""
+    for x in range(3):
+        on_grid(waves[x, 0], waves[x, 1], degree, cos_table, sin_table, grid[x], grid[3 + x])
+
+
+@compiled
+def onset_direction(at: Real, kappa: float) -> float:
+    """Return the direction in which a force begins to slip where contact begins, from the curves there.
+
+    There t' = L' n, so n = (X'/(L' + Λ), Y'/(κL' + Λ)) with Λ > 0 from |n| = 1.
+    """
+    rise, dx, dy = at[DLIMIT], at[DX], at[DY]
+    if kappa == 1.0:
+        return math.atan2(dy, dx)
+    more = 0.0
+    for _ in range(60):
+        a, b = rise + more, kappa * rise + more
+        size = (dx / a) ** 2 + (dy / b) ** 2
+        slope = -2.0 * (dx * dx / a**3 + dy * dy / b**3)
+        # Newton's method on 1/√size − 1, which is nearly linear.
+        step = 2.0 * size * (1.0 - math.sqrt(size)) / slope
+        more = max(more + step, 0.0)
+        if abs(step) <= 1e-15 * (rise + more):
+            break
+    return math.atan2(dy / (kappa * rise + more), dx / (rise + more))
+
+
+@compiled
+def _fresh(state: Real, motion: float, tx: float, ty: float, theta: float, began: float) -> None:
+    """Begin a march: nothing depends on its begin yet, but for a slip on its direction."""
+    state[S_MOTION], state[S_TX], state[S_TY], state[S_THETA] = motion, tx, ty, theta
+    state[S_BEGAN], state[S_SLIPPED], state[S_FACTOR] = began, 0.0, 0.0
+    if motion == SLIP:
+        size = math.hypot(tx, ty)
+        state[S_SLIPPED], state[S_FACTOR] = 1.0, (1.0 / size if size > 0.0 else 0.0)
+        state[S_PX], state[S_PY] = -math.sin(theta), math.cos(theta)
+
+
+@apart
+def _march_intervals(
+    waves: Real, kappa: float, grid: Real, intervals: Real, n_intervals: int, numbers: Real, pieces: Real,
+    panels: Real, found: Real,
+) -> int:  # fmt: skip
+    """March every interval of contact from its beginning, where the force is 0."""
+    state, at = np.empty(STATE_SIZE), np.empty(CURVES)
+    count, filled = 0, 0
+    for i in range(n_intervals):
+        begin, end = intervals[i, 0], intervals[i, 1]
+        curves_at(waves, begin, at)
+        motion = SLIP if math.hypot(at[DX], at[DY] / kappa) > at[DLIMIT] else STICK
+        theta = onset_direction(at, kappa) if motion == SLIP else 0.0
+        _fresh(state, motion, 0.0, 0.0, theta, AFTER_SEPARATION)
+        count, filled = march_path(
+            waves, kappa, grid, begin, end, state, numbers, pieces, panels, count, filled
+        )
+        if count < 0:
+            return count
+    found[HOW], found[PIECES], found[PANELS] = OPENS, count, filled
+    return LIFTING
+
+
+@compiled
+def _rough_step(force: Real, dx: float, dy: float, limit: float) -> float:
+    """Move a force by one straight step (dx, dy) under a limit; return what the step forgets, 0 if it sticks.
+
+    In slip tan φ/2, φ the angle from the step, decays by exp(−|step|/limit): forgetting is the exponent.
+    """
+    tx, ty = force[0], force[1]
+    size, trial = math.hypot(tx, ty), math.hypot(tx + dx, ty + dy)
+    if trial <= limit:
+        force[0], force[1] = tx + dx, ty + dy
+        return 0.0
+    stuck = min(max((limit - size) / (trial - size), 0.0), 1.0) if trial > size else 0.0
+    tx, ty = tx + stuck * dx, ty + stuck * dy
+    size, length = math.hypot(tx, ty), math.hypot(dx, dy)
+    if size == 0.0 or length == 0.0:
+        share = limit / trial
+        force[0], force[1] = share * (force[0] + dx), share * (force[1] + dy)
+        return 0.0
+    nx, ny, wx, wy = tx / size, ty / size, dx / length, dy / length
+    c, exponent = nx * wx + ny * wy, (1.0 - stuck) * length / limit
+    q = math.exp(-exponent)
+    below = 1.0 + c + q * q * (1.0 - c)
+    along, kept = (1.0 + c - q * q * (1.0 - c) - 2.0 * q * c) / below, 2.0 * q / below
+    nx, ny = along * wx + kept * nx, along * wy + kept * ny
+    force[0], force[1] = limit * nx, limit * ny
+    return exponent * max(nx * wx + ny * wy, 0.0)
+
+
+@apart
+def _rough(grid: Real, kappa: float, force: Real, history: Real) -> tuple[int, int]:
+    """Go over the grid twice from the unloaded state; find places from where to go on exactly.
+
+    Returns
+    -------
+    (from, to) points of the grid: at `to` it slips most, and what happened before `from` is forgotten there;
+    −1 if it does not slip in the second period. `force` is that at `from`.
+    """
+    n = grid.shape[1]
+    force[0], force[1] = grid[0, 0], grid[1, 0] / kappa
+    size = math.hypot(force[0], force[1])
+    if size > grid[2, 0]:
+        force[0], force[1] = force[0] * grid[2, 0] / size, force[1] * grid[2, 0] / size
+    best, most = -1, 0.0
+    for period in range(2):
+        for j in range(n):
+            before = j - 1 if j > 0 else n - 1
+            forgets = 0.0
+            if period > 0 or j > 0:
+                dx, dy = grid[0, j] - grid[0, before], (grid[1, j] - grid[1, before]) / kappa
+                forgets = _rough_step(force, dx, dy, grid[2, j])
+            history[0, j], history[1, j], history[2, j] = forgets, force[0], force[1]
+            if period > 0 and forgets > most:
+                best, most = j, forgets
+    if best < 0:
+        return -1, -1
+    total, back = 0.0, 0
+    while total < FORGOTTEN and back < n:
+        total += history[0, (best - back + n) % n]
+        back += 1
+    begin = best - back if best >= back else best - back + n
+    force[0], force[1] = history[1, begin % n], history[2, begin % n]
+    return begin, begin + back
+
+
+@compiled
+def _start_at(at: Real, kappa: float, tx: float, ty: float, state: Real) -> None:
+    """Begin with the force (tx, ty), cut to the limit; there it slips if the rate of slip says so."""
+    size, theta = math.hypot(tx, ty), math.atan2(ty, tx)
+    if size > at[LIMIT] * (1.0 - 1e-12) and slip_rate(at, kappa, theta) > 0.0:
+        _fresh(state, SLIP, at[LIMIT] * math.cos(theta), at[LIMIT] * math.sin(theta), theta, AFTER_SLIP)
+        return
+    share = at[LIMIT] / size if size > at[LIMIT] else 1.0
+    _fresh(state, STICK, share * tx, share * ty, theta, AFTER_SLIP)
+
+
+@apart
+def _repeat(
+    waves: Real, kappa: float, grid: Real, begin: float, force: Real, numbers: Real, pieces: Real,
+    panels: Real, found: Real,
+) -> int:  # fmt: skip
+    """Find the force at `begin` that is the same a period later; STUCK means that the slipping ended."""
+    state, at = np.empty(STATE_SIZE), np.empty(CURVES)
+    tx, ty = force[0], force[1]
+    before, plain = np.inf, False
+    curves_at(waves, begin, at)
+    for _ in range(MOST_ROUNDS):
+        _start_at(at, kappa, tx, ty, state)
+        tx, ty = state[S_TX], state[S_TY]
+        count, filled = march_path(
+            waves, kappa, grid, begin, begin + TURN, state, numbers, pieces, panels, 0, 0
+        )
+        if count < 0:
+            return count
+        rx, ry = state[S_TX] - tx, state[S_TY] - ty
+        if state[S_SLIPPED] == 0.0:
+            return STUCK
+        along = state[S_FACTOR] * (state[S_PX] * rx + state[S_PY] * ry)
+        memory = state[S_FACTOR] * (state[S_PX] * state[S_MX] + state[S_PY] * state[S_MY])
+        change = math.hypot(rx, ry)
+        plain = (change > 0.5 * before and not plain) or memory >= 1.0
+        before = change
+        step = 0.0 if plain else along / (1.0 - memory)
+        if math.hypot(rx + step * state[S_MX], ry + step * state[S_MY]) <= REPEATS * numbers[SCALE]:
+            found[HOW], found[PIECES], found[PANELS] = CLOSES, count, filled
+            found[FACTOR], found[PX], found[PY] = state[S_FACTOR], state[S_PX], state[S_PY]
+            found[MX], found[MY] = state[S_MX], state[S_MY]
+            return SLIPPING
+        tx, ty = state[S_TX] + step * state[S_MX], state[S_TY] + step * state[S_MY]
+    return FAILED
+
+
+@apart
+def _settle(
+    waves: Real, kappa: float, grid: Real, numbers: Real, pieces: Real, panels: Real, found: Real,
+    force: Real,
+) -> int:  # fmt: skip
+    """March from the unloaded state until a period passes without slip; SLIPPING if none does."""
+    state, at = np.empty(STATE_SIZE), np.empty(CURVES)
+    curves_at(waves, 0.0, at)
+    tx, ty = at[X], at[Y] / kappa
+    size = math.hypot(tx, ty)
+    if size <= at[LIMIT]:
+        _fresh(state, STICK, tx, ty, 0.0, UNLOADED)
+    else:
+        _start_at(at, kappa, tx, ty, state)
+        state[S_SLIPPED] = 0.0
+    # What a transient leaves stays: it is not averaged over a period as a motion that repeats.
+    numbers[TAIL_SIZE] = 1e-2 * SMALL_TAIL
+    count, filled = 0, 0
+    for period in range(MOST_TRANSIENT):
+        before = filled
+        count, filled = march_path(
+            waves, kappa, grid, period * TURN, (period + 1) * TURN, state, numbers, pieces, panels, count,
+            filled,
+        )  # fmt: skip
+        if count < 0:
+            return count
+        if filled == before and state[S_MOTION] == STICK:
+            found[HOW], found[PIECES], found[PANELS] = SETTLES, count, filled
+            return STUCK
+    force[0], force[1] = state[S_TX], state[S_TY]
+    return SLIPPING
+
+
+@apart
+def _closed(
+    waves: Real, kappa: float, grid: Real, numbers: Real, pieces: Real, panels: Real, found: Real
+) -> int:
+    """Find the path of a contact that never opens."""
+    force, history, n = np.zeros(2), np.empty((3, grid.shape[1])), grid.shape[1]
+    begin, place = _rough(grid, kappa, force, history)
+    if place >= 0:
+        at, state = np.empty(CURVES), np.empty(STATE_SIZE)
+        tau = TURN * begin / n
+        curves_at(waves, tau, at)
+        _start_at(at, kappa, force[0], force[1], state)
+        count, _ = march_path(waves, kappa, grid, tau, TURN * place / n, state, numbers, pieces, panels, 0, 0)
+        if count < 0:
+            return count
+        force[0], force[1] = state[S_TX], state[S_TY]
+        how = _repeat(waves, kappa, grid, TURN * place / n, force, numbers, pieces, panels, found)
+        if how != STUCK:
+            return how
+    how = _settle(waves, kappa, grid, numbers, pieces, panels, found, force)
+    if how == SLIPPING:
+        how = _repeat(waves, kappa, grid, 0.0, force, numbers, pieces, panels, found)
+        if how == STUCK:
+            return FAILED
+    return how
+
+
+@apart
+def find_path(
+    waves: Real, kappa: float, cos_table: Real, sin_table: Real, pieces: Real, panels: Real, found: Real,
+    intervals: Real,
+) -> int:  # fmt: skip
+    """Find what the contact does; fill pieces, panels and `found` (FOUND_SIZE,).
+
+    Parameters
+    ----------
+    waves : (3, 2, degree + 1) X, Y and L, see `solver.contacts.kernels.circle.panels`.
+    intervals : (degree + 1, 2), filled with the intervals of contact of a contact that opens.
+
+    Returns
+    -------
+    SEPARATED, STUCK, SLIPPING, LIFTING or FAILED; −1 if a table is full, −2 if a panel could not be solved.
+    """
+    degree = waves.shape[2] - 1
+    grid = np.empty((6, 2 * (cos_table.shape[1] - 1)))
+    contact_grid(waves, degree, cos_table, sin_table, grid)
+    motion, rate, load, total = 0.0, 0.0, 0.0, 0.0
+    for j in range(grid.shape[1]):
+        total += grid[0, j] + grid[1, j] + grid[2, j]
+        motion = max(motion, max(abs(grid[0, j]), abs(grid[1, j]) / kappa))
+        rate = max(rate, max(max(abs(grid[3, j]), abs(grid[4, j]) / kappa), abs(grid[5, j])))
+        load = max(load, grid[2, j])
+    if not math.isfinite(total):
+        return FAILED
+    found[INTERVALS] = 0.0
+    if load <= 0.0:
+        return SEPARATED
+    top = 0
+    for k in range(degree + 1):
+        if waves[LIMIT, 0, k] != 0.0 or waves[LIMIT, 1, k] != 0.0:
+            top = k
+    n_intervals = -1
+    if top == 1:
+        n_intervals = one_wave(waves[LIMIT, 0, 0], waves[LIMIT, 0, 1], waves[LIMIT, 1, 1], intervals)
+    elif top > 1:
+        n_intervals = contact_intervals(waves[LIMIT, 0], waves[LIMIT, 1], top, grid[2], grid[5], intervals)
+    if n_intervals == 0:
+        return SEPARATED
+    numbers = np.empty(5)
+    numbers[TOL], numbers[TOL_RATE] = ROUNDING * (motion + load), 5.0 * ROUNDING * (rate + load)
+    numbers[TAIL_SIZE] = SMALL_TAIL
+    numbers[SCALE], numbers[LONGEST] = load, min(WAVES_PER_PANEL / max(degree, 1), 1.6)
+    if n_intervals < 0:
+        return _closed(waves, kappa, grid, numbers, pieces, panels, found)
+    found[INTERVALS] = n_intervals
+    return _march_intervals(waves, kappa, grid, intervals, n_intervals, numbers, pieces, panels, found)
+
+
+@compiled
+def new_tables(degree: int, times: int) -> tuple[Real, Real]:
+    """Return empty tables for pieces and panels, `times` as large as is nearly always enough."""
+    most = times * (48 + 6 * degree)
+    return np.empty((most, PIECE_COLUMNS)), np.empty((2 * most, PANEL_COLUMNS))

@@ -1,0 +1,141 @@
+"""When a stuck force reaches a circular limit: |t| − L crosses 0 upward, t = offset + (X, Y/κ).
+
+The curves are those of `solver.contacts.kernels.circle.panels`; a grid brackets the root, Newton's method
+inside the bracket finds it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.contacts.kernels.circle.panels import (
+    CURVES,
+    DDLIMIT,
+    DDX,
+    DDY,
+    DLIMIT,
+    DX,
+    DY,
+    LIMIT,
+    X,
+    Y,
+    curves_at,
+)
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Real
+from solver.jit.separate import apart
+
+
+@compiled
+def excess(waves: Real, kappa: float, offset_x: float, offset_y: float, tau: float, at: Real) -> float:
+    """Return |t| − L of a stick with t = offset + (X, Y/κ); fills `at` with the curves."""
+    curves_at(waves, tau, at)
+    return math.hypot(offset_x + at[X], offset_y + at[Y] / kappa) - at[LIMIT]
+
+
+@compiled
+def excess_slopes(at: Real, kappa: float, offset_x: float, offset_y: float) -> tuple[float, float]:
+    """Return slope and curvature of |t| − L from the curves `at` a point."""
+    tx, ty = offset_x + at[X], offset_y + at[Y] / kappa
+    size = math.hypot(tx, ty)
+    if size == 0.0:
+        return -at[DLIMIT], -at[DDLIMIT]
+    dx, dy = at[DX], at[DY] / kappa
+    along = (tx * dx + ty * dy) / size
+    bend = (dx * dx + dy * dy + tx * at[DDX] + ty * at[DDY] / kappa - along * along) / size
+    return along - at[DLIMIT], bend - at[DDLIMIT]
+
+
+@apart
+def _rising_root(
+    waves: Real, kappa: float, offset_x: float, offset_y: float, order: int, lo: float, hi: float, at: Real
+) -> float:
+    """Return where |t| − L (order 0), or minus its slope (order 1), crosses 0 upward inside [lo, hi]."""
+    x = 0.5 * (lo + hi)
+    for _ in range(100):
+        f = excess(waves, kappa, offset_x, offset_y, x, at)
+        slope, bend = excess_slopes(at, kappa, offset_x, offset_y)
+        if order == 1:
+            f, slope = -slope, -bend
+        if f > 0.0:
+            hi = x
+        else:
+            lo = x
+        step_to = x - f / slope if slope > 0.0 else lo - 1.0
+        if not lo <= step_to <= hi:
+            step_to = 0.5 * (lo + hi)
+        moved = abs(step_to - x)
+        x = step_to
+        if moved <= 4e-16 * (1.0 + abs(x)) or hi - lo <= 4e-16 * (1.0 + abs(x)):
+            break
+    return x
+
+
+@compiled
+def _inside(
+    waves: Real, kappa: float, offset_x: float, offset_y: float, lo: float, hi: float, tol: float, at: Real
+) -> float:
+    """Return a place soon after `lo` where |t| is below the limit, −1 if none is found before `hi`."""
+    width = (hi - lo) / 16.0
+    for part in range(1, 16):
+        if excess(waves, kappa, offset_x, offset_y, lo + part * width, at) < -tol:
+            return lo + part * width
+    for _ in range(30):
+        width *= 0.5
+        if excess(waves, kappa, offset_x, offset_y, lo + width, at) < -tol:
+            return lo + width
+    return -1.0
+
+
+@apart
+def leave_stick(
+    waves: Real, kappa: float, grid: Real, offset_x: float, offset_y: float, start: float, end: float,
+    tol: float,
+) -> tuple[float, bool]:  # fmt: skip
+    """Return when a stuck force reaches the limit, and whether it does before `end`.
+
+    `grid` (6, n) has X, Y, L and their slopes at τ_j = 2πj/n.
+    """
+    n = grid.shape[1]
+    delta = 2.0 * math.pi / n
+    at = np.empty(CURVES)
+    j = math.floor(start / delta) + 1
+    lo = start
+    low = excess(waves, kappa, offset_x, offset_y, start, at)
+    rate, _ = excess_slopes(at, kappa, offset_x, offset_y)
+    while lo < end:
+        hi = min(j * delta, end)
+        if hi == end:
+            high = excess(waves, kappa, offset_x, offset_y, end, at)
+            rate_high, _ = excess_slopes(at, kappa, offset_x, offset_y)
+        else:
+            g = j % n
+            tx, ty = offset_x + grid[0, g], offset_y + grid[1, g] / kappa
+            size = math.hypot(tx, ty)
+            high, rate_high = size - grid[2, g], -grid[5, g]
+            if size > 0.0:
+                rate_high += (tx * grid[3, g] + ty * grid[4, g] / kappa) / size
+        if high > tol or (rate > 0.0 and rate_high < 0.0) or low >= -tol:
+            begin = lo
+            if low >= -tol:
+                # The limit just left, or a touch: only after it was below can it reach it.
+                begin = _inside(waves, kappa, offset_x, offset_y, lo, hi, tol, at)
+                if begin < 0.0 and high > tol:
+                    return lo, True
+                if begin >= 0.0:
+                    excess(waves, kappa, offset_x, offset_y, begin, at)
+                    rate, _ = excess_slopes(at, kappa, offset_x, offset_y)
+            if begin >= 0.0:
+                top = hi
+                if high <= tol and rate > 0.0 and rate_high < 0.0:
+                    top = _rising_root(waves, kappa, offset_x, offset_y, 1, begin, hi, at)
+                    high = max(high, excess(waves, kappa, offset_x, offset_y, top, at))
+                if high > tol:
+                    return _rising_root(waves, kappa, offset_x, offset_y, 0, begin, top, at), True
+        lo, low, rate = hi, min(high, 0.0), rate_high
+        if hi < end and high < -tol:
+            low = high
+        j += 1
+    return end, False

@@ -1,0 +1,258 @@
+"""Second derivatives of the force of one elastic Coulomb contact, contracted with weights, in closed form.
+
+With W(τ) the weights times the basis, S = w·F is a sum of ∫ f W over the segments, and its gradient needs no
+event times (`solver.contacts.kernels.coulomb.force`). Differentiated once more, an event at τ_e where the
+gradient's integrand jumps by J contributes J W(τ_e) dτ_e, and an onset τ_s that fixes a later stick moves
+that stick:
+
+- stick → slip ξ: the excess force kt u + c − ξμN is 0 there, so dτ_e = −J/D with D its slope: −J J' W/D;
+- slip ξ → stick: q = ξ kt u' − μN' is 0 there, so dτ_s = −dq/q': ξ dq dq' M/q' with M = ∫W of the stick;
+- N = 0 at separation and contact: dτ = −dN/N', alike for the force that ends or begins there.
+
+Each is an outer product of the event's two functionals, so one direction costs a few vectors an event.
+Design derivation by ourselves from the law of `solver.contacts.kernels.stick_slip_events`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.contacts.kernels.stick_slip_events import (
+    AFTER_SLIP,
+    BEGAN,
+    BEGIN,
+    DIRECTION,
+    END,
+    LIFTING,
+    MOTION,
+    NO_LENGTH,
+    ONSET,
+    SEPARATED,
+    SLIP,
+    STUCK,
+    UNLOADED,
+)
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Integer, Real
+from solver.jit.lapack import fill
+from solver.jit.separate import apart
+
+# Derivatives by the two numbers of the law, and wᵀ ∂F/∂N dN without the sticks after separation, which is the
+# share of ∂F/∂μ that a change of the load brings, times μ.
+_KT, _MU, _LOAD = 0, 1, 2
+
+
+@compiled
+def bases_at(tau: float, ks: Integer, e: Real, de: Real) -> None:
+    """Fill `e` with the basis for the harmonics `ks` at `tau` and `de` with its slope d/dτ."""
+    cos1, sin1 = math.cos(tau), math.sin(tau)
+    cosine, sine, k, here = 1.0, 0.0, 0, 0
+    for i in range(ks.size):
+        while k < ks[i]:
+            cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
+            k += 1
+        e[here], de[here] = cosine, -k * sine
+        here += 1
+        if k > 0:
+            e[here], de[here] = sine, k * cosine
+            here += 1
+
+
+@compiled
+def curvature_at(e: Real, ks: Integer, q: Real) -> float:
+    """Return d²q/dτ² of coefficients `q` where the basis is `e`."""
+    total, here = 0.0, 0
+    for i in range(ks.size):
+        k = ks[i]
+        if k > 0:
+            total -= k * k * (q[here] * e[here] + q[here + 1] * e[here + 1])
+            here += 1
+        here += 1
+    return total
+
+
+@compiled
+def inner(a: Real, b: Real) -> float:
+    """Return a · b."""
+    total = 0.0
+    for i in range(a.size):
+        total += a[i] * b[i]
+    return total
+
+
+@compiled
+def _weight_of(begin: float, end: float, weights: Real, ks: Integer) -> float:
+    """Return ∫W over [begin, end], from half-length and middle; see
+    `solver.contacts.kernels.coulomb.force.add_moments`."""
+    half, middle = 0.5 * (end - begin), 0.5 * (end + begin)
+    total, here = 0.0, 0
+    for i in range(ks.size):
+        k = ks[i]
+        if k == 0:
+            total += weights[here] * (end - begin)
+        else:
+            factor = 2.0 * math.sin(k * half) / k
+            total += factor * (
+                weights[here] * math.cos(k * middle) + weights[here + 1] * math.sin(k * middle)
+            )
+            here += 1
+        here += 1
+    return total
+
+
+@apart
+def second_along(
+    U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, state: int, segments: Real,
+    count: int, dF_dU: Real, dF_dN: Real, w: Real, dU: Real, dN: Real, out_U: Real, out_N: Real,
+) -> tuple[float, float]:  # fmt: skip
+    """Differentiate the gradient of w·F by (U, N, kt, μ) along a direction (dU, dN).
+
+    Parameters
+    ----------
+    U, ks, N, load_ks, kt, mu : the contact, as for `solver.contacts.kernels.coulomb.force.contact_force`.
+    state, segments, count, dF_dU, dF_dN : what that returned.
+    w : (n,) weights of the force coefficients.
+    dU : (n,) direction of the motion; dN : (m,) direction of the normal load.
+    out_U : (n,) wᵀ ∂²F/∂U∂(U, N)·(dU, dN); out_N : (m,) wᵀ ∂²F/∂N∂(U, N)·(dU, dN); filled.
+
+    Returns
+    -------
+    The same of ∂F/∂kt and ∂F/∂μ (NaN where kt or μ is 0 and it takes part).
+    """
+    fill(out_U, 0.0)
+    fill(out_N, 0.0)
+    if state == SEPARATED:
+        return 0.0, 0.0
+    n, m = U.size, N.size
+    if state == STUCK and segments[0, BEGAN] == UNLOADED:
+        return inner(w, dU), 0.0
+    weights = np.empty(n)
+    for i in range(n):
+        weights[i] = w[i] / math.pi
+    if ks[0] == 0:
+        weights[0] *= 0.5
+    by_motion, by_load = 0.0, 0.0
+    for i in range(n):
+        for j in range(n):
+            by_motion += w[i] * dF_dU[i, j] * dU[j]
+        for j in range(m):
+            by_load += w[i] * dF_dN[i, j] * dN[j]
+    rates = np.zeros(3)
+    rates[_KT], rates[_LOAD] = by_motion / kt, by_load
+    at, over = np.empty((4, n)), np.empty((4, m))
+    for index in range(count):
+        row = segments[index]
+        if row[END] - row[BEGIN] <= NO_LENGTH or row[BEGAN] == UNLOADED:
+            continue
+        follows = index > 0 and segments[index - 1, END] == row[BEGIN]
+        followed = index + 1 < count and segments[index + 1, BEGIN] == row[END]
+        bases_at(row[ONSET], ks, at[0], at[1])
+        bases_at(row[ONSET], load_ks, over[0], over[1])
+        bases_at(row[END], ks, at[2], at[3])
+        bases_at(row[END], load_ks, over[2], over[3])
+        if row[MOTION] == SLIP:
+            if state == LIFTING:
+                _ends_of_slip(N, mu * row[DIRECTION], follows, followed, weights, at, over, dN, out_N)
+            continue
+        held = _weight_of(row[BEGIN], row[END], weights, ks)
+        if row[BEGAN] == AFTER_SLIP:
+            _onset_after_slip(
+                U, ks, N, load_ks, kt, mu, row[DIRECTION], held, at, over, dU, dN, out_U, out_N, rates
+            )
+        else:
+            _onset_after_separation(
+                U, ks, N, load_ks, kt, held, inner(weights, at[0]), at, over, dU, dN, out_U, out_N, rates
+            )
+        if followed and segments[index + 1, MOTION] == SLIP:
+            way = segments[index + 1, DIRECTION]
+            _end_of_stick(
+                U, N, kt, mu, row, way, inner(weights, at[2]), at, over, dU, dN, out_U, out_N, rates
+            )
+    if rates[_LOAD] != 0.0:
+        rates[_MU] += rates[_LOAD] / mu
+    return rates[_KT], rates[_MU]
+
+
+@compiled
+def _add(target: Real, factor: float, vector: Real) -> None:
+    """Add factor · vector."""
+    for i in range(target.size):
+        target[i] += factor * vector[i]
+
+
+@compiled
+def _ends_of_slip(
+    N: Real, limit: float, follows: bool, followed: bool, weights: Real, at: Real, over: Real, dN: Real,
+    out_N: Real,
+) -> None:  # fmt: skip
+    """Add what moves with N = 0 where a slip, force `limit` · N, begins at contact or ends at separation."""
+    if not follows:
+        factor = limit * inner(weights, at[0]) / inner(over[1], N)
+        _add(out_N, factor * inner(over[0], dN), over[0])
+    if not followed:
+        factor = -limit * inner(weights, at[2]) / inner(over[3], N)
+        _add(out_N, factor * inner(over[2], dN), over[2])
+
+
+@compiled
+def _onset_after_slip(
+    U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, mu: float, xi: float, held: float,
+    at: Real, over: Real, dU: Real, dN: Real, out_U: Real, out_N: Real, rates: Real,
+) -> None:  # fmt: skip
+    """Add ξ dq dq' M/q': the onset moves, where the rate of the limit, q = ξ kt u' − μN', is 0."""
+    e, de, en, den = at[0], at[1], over[0], over[1]
+    bend = xi * kt * curvature_at(e, ks, U) - mu * curvature_at(en, load_ks, N)
+    along = xi * kt * inner(de, dU) - mu * inner(den, dN)
+    factor = xi * along * held / bend
+    _add(out_U, factor * xi * kt, de)
+    _add(out_N, -factor * mu, den)
+    rates[_KT] += factor * xi * inner(de, U)
+    rates[_MU] -= factor * inner(den, N)
+
+
+@compiled
+def _onset_after_separation(
+    U: Real, ks: Integer, N: Real, load_ks: Integer, kt: float, held: float, weight: float,
+    at: Real, over: Real, dU: Real, dN: Real, out_U: Real, out_N: Real, rates: Real,
+) -> None:  # fmt: skip
+    """Add what moves with the onset where N = 0: the offset c = −kt u(τs) and the beginning of the force."""
+    e, de, en, den = at[0], at[1], over[0], over[1]
+    speed, rise = inner(de, U), inner(den, N)
+    moved = -inner(en, dN) / rise  # dτs
+    turn = inner(den, dN)
+    _add(out_U, -held * kt * moved, de)
+    rates[_KT] -= held * speed * moved
+    factor = held * kt * (inner(de, dU) + curvature_at(e, ks, U) * moved) / rise
+    factor -= held * kt * speed * (turn + curvature_at(en, load_ks, N) * moved) / (rise * rise)
+    factor -= kt * speed * weight * moved / rise
+    _add(out_N, factor, en)
+    _add(out_N, held * kt * speed * moved / rise, den)
+    rates[_LOAD] -= held * kt * speed * inner(en, dN) / rise
+
+
+@compiled
+def _end_of_stick(
+    U: Real, N: Real, kt: float, mu: float, row: Real, way: float, weight: float,
+    at: Real, over: Real, dU: Real, dN: Real, out_U: Real, out_N: Real, rates: Real,
+) -> None:  # fmt: skip
+    """Add −J J' W/D where the force of a stick reaches the limit ξ = `way`."""
+    e, de, eb, deb = at[0], at[1], at[2], at[3]
+    en, den, enb, denb = over[0], over[1], over[2], over[3]
+    slope = kt * inner(deb, U) - way * mu * inner(denb, N)
+    along = kt * (inner(eb, dU) - inner(e, dU)) - way * mu * inner(enb, dN)
+    at_onset, by_friction = 0.0, -way * inner(enb, N)
+    if row[BEGAN] == AFTER_SLIP:
+        at_onset = row[DIRECTION] * mu
+        by_friction += row[DIRECTION] * inner(en, N)
+    else:
+        at_onset = kt * inner(de, U) / inner(den, N)
+    along += at_onset * inner(en, dN)
+    factor = -along * weight / slope
+    for i in range(e.size):
+        out_U[i] += factor * kt * (eb[i] - e[i])
+    for j in range(en.size):
+        out_N[j] += factor * (at_onset * en[j] - way * mu * enb[j])
+    rates[_KT] += factor * (inner(eb, U) - inner(e, U))
+    rates[_MU] += factor * by_friction

@@ -1,0 +1,1 @@
+"""Nonlinear springs: force, first and second derivatives."""

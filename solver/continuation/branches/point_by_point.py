@@ -1,0 +1,142 @@
+"""The response over one parameter solved point by point, where it is unique and its arc cannot be followed.
+
+Contacts far stiffer than the structure bend the arc of a branch sharply within the tolerances of a solution;
+continuation then turns round on its own traces. Where the response is unique, every solution at a given value
+of the parameter is the response there, whatever it was found from, and no fold exists: a branch that turns
+back is told by that, and its rest is solved at values of the parameter, in steps that prediction by the
+tangent controls.
+
+Elastic Coulomb friction under a given load is monotone in the motion, and so are linear springs and dampers
+that dissipate; the periodic response of such a structure is unique but for tractions that stay where contacts
+stick.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+
+from solver.balance.balance import Balance
+from solver.balance.workspace import Workspace
+from solver.contacts.kernels.system import DENSE, MODES
+from solver.continuation.branch import BranchStatus
+from solver.continuation.extrema.nodes import Node, NodeSolver
+from solver.continuation.segment import Stretch
+from solver.jit.fourier import Real
+
+LARGEST, FIRST, SMALLEST = 0.0143, 1e-3, 1e-9  # steps, as shares of the range
+TURN = 1e-6  # share of the range by which a branch has to turn back to be lost: less is a step over a kink
+_OFF = 0.1  # distance from prediction to solution, relative to the motion, above which a step is halved
+# The same over the smallest step, above which nothing connects the two: a motion that grows without bound
+# towards a resonance that nothing damps comes back with its phase turned round.
+_TORN = 1.0
+_GROWTH = 1.6
+_STRETCH = 64
+
+
+def is_unique(balance: Balance) -> bool:
+    """Return whether every value of the parameter has one response: given loads, nothing that feeds it."""
+    system = balance.system
+    if not all(contact.load_is_given for contact in balance.scene.contacts):
+        return False
+    if system.form == DENSE:
+        return all(_dissipates(C) for C in system.C)
+    if system.form == MODES:
+        return bool(np.all(system.dampings >= 0.0) and np.all(system.eigenvalues.real >= -1e-9))
+    return bool(np.all(system.eigenvalues.real <= 0.0))
+
+
+def _dissipates(C: Real) -> bool:
+    values = np.linalg.eigvalsh(0.5 * (C + C.conj().T))
+    return bool(values.min(initial=0.0) >= -1e-12 * np.abs(values).max(initial=0.0))
+
+
+def rows_before_a_turn(stretch: Stretch, start: float, stop: float) -> int | None:
+    """Return how many points of a stretch come before it turns back; None if it does not."""
+    values = stretch.solutions[:, -1] * np.sign(stop - start)
+    back = np.maximum.accumulate(values) - values > TURN * abs(stop - start)
+    return int(np.argmax(back)) if back.any() else None
+
+
+def walk_by_points(
+    workspace: Workspace, before: Stretch, stop: float, span: float, begun: float
+) -> Iterator[Stretch]:
+    """Yield the rest of a branch behind the last point of `before`, solved at values of the parameter.
+
+    Parameters
+    ----------
+    before : points of the branch, at least one, the last of them before any turn.
+    stop, span : end and length of the whole range (inside unit).
+    begun : time at which the work began.
+    """
+    solver = NodeSolver(workspace)
+    onward = float(np.sign(stop - before.solutions[-1, -1])) or 1.0
+    at, step = float(before.solutions[-1, -1]), FIRST * span
+    last: Node | None = solver.at(at, [before.solutions[-1, :-1]], onward)
+    nodes: list[Node] = []
+    status: BranchStatus | None = None if last is not None else BranchStatus.STALLED
+    rejected = 0
+    while status is None and last is not None:
+        if (stop - at) * onward <= 0.0:
+            status = BranchStatus.COMPLETED
+            break
+        there = stop if (stop - at) * onward <= 1.5 * step else at + onward * step
+        guess = last.solution[:-1] + (there - at) * onward * last.tangent[:-1]
+        node = solver.at(there, [guess, last.solution[:-1]], onward)
+        size = max(_moved(workspace.balance, last.solution[:-1]), solver.least)
+        far = np.inf if node is None else _moved(workspace.balance, node.solution[:-1] - guess)
+        if node is None or (far > _OFF * size and step > SMALLEST * span):
+            rejected += 1
+            step *= 0.5
+            if step < SMALLEST * span and node is None:
+                drifts = workspace.solve(there).ratchets
+                status = BranchStatus.RATCHETS if drifts else BranchStatus.STALLED
+            continue
+        if far > _TORN * size:
+            status = BranchStatus.STALLED
+            break
+        nodes.append(node)
+        last, at = node, there
+        step = min(LARGEST * span, step * (_GROWTH if far < 0.3 * _OFF * size else 1.0))
+        if len(nodes) == _STRETCH:
+            yield _stretch(before, nodes, None, solver, rejected, begun)
+            nodes = []
+    yield _stretch(before, nodes, status, solver, rejected, begun)
+
+
+def _moved(balance: Balance, u: Real) -> float:
+    """Return the largest coefficient of motions or of their change [m], but for where loose parts stand.
+
+    Where a part that contacts alone hold stands is a gauge as long as none holds it, and jumps to what its
+    equilibrium asks for where one begins to: neither tells how far the tangent leads. Its rigid-body motions
+    are taken out of the means by Σ l (kt l)ᵀ, since Σ_c l_i kt l_j = δ_ij.
+    """
+    system = balance.system
+    if len(system.loose) and system.ks[0] == 0:
+        n = balance.n_coefficients
+        u = u.copy()
+        u[::n] -= (system.loose @ (system.shift * u[::n])) @ system.loose
+    return float(np.abs(u).max(initial=0.0))
+
+
+def _stretch(
+    before: Stretch, nodes: list[Node], status: BranchStatus | None, solver: NodeSolver, rejected: int,
+    begun: float,
+) -> Stretch:  # fmt: skip
+    """Return nodes as points behind others; without the state of a continuation, since there is none."""
+    return Stretch(
+        solutions=_rows([node.solution for node in nodes], before.solutions),
+        tangents=_rows([node.tangent for node in nodes], before.tangents),
+        states=np.array([node.states for node in nodes], np.int64).reshape(-1, before.states.shape[1]),
+        observed=_rows([node.observed for node in nodes], before.observed),
+        measures=_rows([np.array(node.measures) for node in nodes], before.measures),
+        status=status, newton_iterations=before.newton_iterations + solver.spent,
+        rejected_steps=before.rejected_steps + rejected, stepped_over=before.stepped_over,
+        seconds=time.perf_counter() - begun, walk=np.zeros(0),
+    )  # fmt: skip
+
+
+def _rows(rows: list[Real], like: Real) -> Real:
+    return np.array(rows) if rows else np.zeros((0, like.shape[1]))

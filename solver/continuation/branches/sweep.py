@@ -1,0 +1,341 @@
+"""Continuation of periodic responses in any parameter: `sweep`, and the walk it is made of.
+
+The steps themselves are compiled (`solver.continuation.kernels.pseudo_arclength`); here they are taken in
+stretches, so that the caller can watch and stop, and the result is put together.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from solver.balance.balance import Balance, build
+from solver.balance.kernels.output import MAX_ABS
+from solver.balance.simplifications import Effects
+from solver.balance.workspace import Workspace
+from solver.continuation.branch import ENDINGS, Branch, BranchStatus, Peak
+from solver.continuation.branches.adaptive_harmonics import sweep_to
+from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
+from solver.continuation.branches.symmetry_breaking import branch_flags
+from solver.continuation.endings import MANY, ratchets_ahead, stands_still, taken_up, too_stiff
+from solver.continuation.extrema.branch_error import branch_error
+from solver.continuation.extrema.extrema import Survey, band_limit
+from solver.continuation.extrema.nodes import Points
+from solver.continuation.kernels import state as walk_states
+from solver.continuation.kernels.pseudo_arclength import begin_walk, walk_on
+from solver.continuation.kernels.state import Control, walk_by_value
+from solver.continuation.loose_parts import balanced_part
+from solver.continuation.segment import Stretch, go_on_from, joined, rows_of, state_of
+from solver.continuation.settings import ContinuationSettings
+from solver.errors import SettingError
+from solver.jit.fourier import Integer, Real, to_full
+from solver.scene.scene import Scene
+
+_STRETCH = 64  # points between two looks at the caller, at most
+_SHORT_STRETCH = 4  # the first of them where a point may take long
+_LARGE = 400  # unknowns from which it may
+_STRETCH_SECONDS = 0.5
+_MOST_FOLLOWED = 500  # points of a look at a resonance beside the branch
+_LOST = (BranchStatus.STALLED, BranchStatus.TURNED_BACK, BranchStatus.TOO_MANY_POINTS)
+
+
+def sweep(
+    scene: Scene,
+    parameter: str = "frequency",
+    start: float | None = None,
+    stop: float | None = None,
+    *,
+    harmonics: int = 11,
+    accuracy: float | None = None,
+    frequency_hz: float | None = None,
+    limit: float | None = None,
+    settings: ContinuationSettings | None = None,
+    effects: Effects | None = None,
+    guess: Real | None = None,
+    resume: Stretch | None = None,
+    on_stretch: Callable[[Stretch], None] | None = None,
+    on_progress: Callable[[float, int], None] | None = None,
+    on_points: Callable[[Real, Real], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> Branch:
+    """Follow the periodic response over a range of one parameter.
+
+    Parameters
+    ----------
+    scene : what vibrates, with the values that stay fixed.
+    parameter : path of the parameter, for example ``frequency`` or ``shroud.N0``.
+    start, stop : the range in user units (Hz for a frequency, the scene's band if left out).
+    harmonics : highest harmonic kept, unless `accuracy` is given.
+    accuracy : estimated error, relative to the amplitude, that the harmonics are chosen for; see
+        `solver.continuation.branches.adaptive_harmonics.harmonics_for` for where and how it is judged.
+    frequency_hz : excitation frequency [Hz], needed unless it is the parameter.
+    limit : amplitude [m] above which the resonance band is measured; peak/√2 if left out.
+    settings : of the continuation.
+    effects : what is paid for though the scene does not call for it; see
+    `solver.balance.simplifications.Effects`.
+    guess : (n_unknowns,) slip motions [m] to start from, instead of the start-up ladder.
+    resume : the beginning of the same branch, to go on behind its last point.
+    on_stretch : called with all consecutive points as they are found; joined (`solver.joined`) they are what
+        `resume` takes.
+    on_progress : called with (share of the range reached, points so far).
+    on_points : called before it with the new points, at first with those of `resume`:
+        (k,) values in user units, (k,) amplitudes [m]; not while `accuracy` is looked for, which may begin
+        again with more harmonics.
+    should_stop : asked between stretches of points; True ends the branch with the status STOPPED.
+
+    Returns
+    -------
+    The branch; whatever happened, it holds converged points only, and its status says how it ended.
+
+    Raises
+    ------
+    SettingError
+        A bad path, range, frequency, limit, number of harmonics or accuracy; a beginning of another branch.
+    """
+    if accuracy is not None:
+        if guess is not None or resume is not None:
+            raise SettingError(
+                "accuracy", accuracy, "cannot go with a guess or a beginning, whose harmonics are fixed"
+            )
+
+        def sweep_with(count: int) -> Branch:
+            return sweep(
+                scene, parameter, start, stop, harmonics=count, frequency_hz=frequency_hz, limit=limit,
+                settings=settings, effects=effects, on_progress=on_progress, should_stop=should_stop,
+            )  # fmt: skip
+
+        return sweep_to(sweep_with, accuracy)
+    begun = time.perf_counter()
+    settings = settings or ContinuationSettings()
+    if parameter == "frequency":
+        start = scene.observe.band[0] if start is None else start
+        stop = scene.observe.band[1] if stop is None else stop
+    balance = build(
+        scene, parameter, harmonics=harmonics, frequency_hz=frequency_hz, effects=effects
+    )  # fmt: skip
+    first, last = check_range(balance, start, stop)
+    if limit is not None and not (isinstance(limit, (int, float)) and np.isfinite(limit) and limit > 0.0):
+        raise SettingError("limit", limit, "must be an amplitude > 0 m")
+    workspace = Workspace.of(balance)
+    stretches: list[Stretch] = []
+    status, count = BranchStatus.TOO_MANY_POINTS, 0
+    for stretch in _covering(workspace, first, last, settings, guess, resume):
+        stretches.append(stretch)
+        count += len(stretch.solutions)
+        if on_stretch is not None and stretch is not resume:
+            on_stretch(stretch)
+        if stretch.status is not None:
+            status = stretch.status
+            break
+        if on_points is not None:
+            on_points(*_curve(balance, stretch))
+        if on_progress is not None:
+            here = float(balance.parameter.outside(stretch.solutions[-1, -1]))
+            on_progress(min(max((here - first) / (last - first), 0.0), 1.0), count)
+        if should_stop is not None and should_stop():
+            status = BranchStatus.STOPPED
+            break
+        if count >= settings.most_points:
+            break
+    if status in _LOST and too_stiff(workspace, stretches):
+        status = BranchStatus.TOO_STIFF
+    earlier = 0.0 if resume is None else resume.seconds
+    branch = _finish(workspace, stretches, status, first, last, limit, begun - earlier)
+    if on_progress is not None and branch.completed:
+        on_progress(1.0, len(branch.values))
+    return branch
+
+
+def _covering(
+    workspace: Workspace, start: float, stop: float, settings: ContinuationSettings, guess: Real | None,
+    resume: Stretch | None,
+) -> Iterator[Stretch]:  # fmt: skip
+    """Yield the branch as `walk` does; what cannot be followed is solved by points where it is unique."""
+    begun = time.perf_counter() - (0.0 if resume is None else resume.seconds)
+    balance = workspace.balance
+    first, last = balance.parameter.inside(start), balance.parameter.inside(stop)
+    unique = is_unique(balance)
+    before, earlier = None, None
+    if resume is not None and len(resume.solutions) and not resume.walk.size:
+        before = resume
+        yield resume
+    else:
+        for found in walk(workspace, start, stop, settings, guess, resume):
+            stretch = found if found is resume else balanced_part(workspace, found)
+            turned = rows_before_a_turn(stretch, first, last) if unique else None
+            lost = unique and stretch.status in (BranchStatus.STALLED, BranchStatus.TURNED_BACK)
+            if turned is None and not lost:
+                yield stretch
+                if stretch is not found:
+                    return
+                earlier = stretch
+                continue
+            before = stretch.first(len(stretch.solutions) if turned is None else turned)
+            if len(before.solutions):
+                yield before
+            elif earlier is not None:
+                before = earlier.first(len(earlier.solutions))
+            else:
+                yield stretch
+                return
+            break
+    if before is not None and before.status is None:
+        yield from walk_by_points(workspace, before, last, abs(last - first), begun)
+
+
+def _curve(balance: Balance, stretch: Stretch) -> tuple[Real, Real]:
+    """Values in user units and amplitudes [m] of the points."""
+    return balance.parameter.all_outside(stretch.solutions[:, -1].copy()), stretch.measures[:, MAX_ABS]
+
+
+def check_range(balance: Balance, start: float | None, stop: float | None) -> tuple[float, float]:
+    """Return the range of a continuation as floats.
+
+    Raises
+    ------
+    SettingError
+        An end is missing, not a value the parameter may have, or both are the same.
+    """
+    ends = []
+    for name, value in (("start", start), ("stop", stop)):
+        if value is None:
+            raise SettingError(name, None, f"is needed for a sweep of `{balance.parameter.path}`")
+        ends.append(balance.parameter.check(name, value))
+    first, last = ends
+    if first == last:
+        raise SettingError("stop", last, f"must differ from the start {first!r}")
+    return first, last
+
+
+def walk(
+    workspace: Workspace, start: float, stop: float, settings: ContinuationSettings,
+    guess: Real | None = None, resume: Stretch | None = None,
+) -> Iterator[Stretch]:  # fmt: skip
+    """Yield the branch in stretches; the last one carries the status. The caller owns stop, save and plot.
+
+    Parameters
+    ----------
+    workspace : of the balance in the parameter that is continued in.
+    start, stop : the range in user units.
+    guess : (n_unknowns,) slip motions to start from [m].
+    resume : the branch so far, to go on behind its last point; it is the first that is yielded.
+    """
+    begun = time.perf_counter() - (0.0 if resume is None else resume.seconds)
+    balance, system = workspace.balance, workspace.system
+    control = Control(
+        start=balance.parameter.inside(start), stop=balance.parameter.inside(stop),
+        first_step=settings.first_step, largest_step=settings.largest_step,
+        smallest_step=settings.smallest_step, wanted_iterations=settings.wanted_iterations,
+        most_iterations=settings.most_iterations, predictor=int(settings.predictor),
+        largest_turn=settings.largest_turn, range_weight=settings.range_length,
+    )  # fmt: skip
+    linear, point = workspace.linear, workspace.point
+    if resume is None:
+        found = workspace.solve(control.start, guess)
+        spent = found.iterations
+        if not found.converged:
+            yield _no_start(balance, spent, begun, ratchets=found.ratchets)
+            return
+        code, state = begin_walk(system, linear, point, control, found.u)
+    else:
+        state, spent = go_on_from(workspace, control, resume)
+        code = walk_states.RUNNING if resume.status is None else walk_states.FINISHED
+        yield resume
+    last = np.zeros((0, balance.n_unknowns + 1))
+    size = _STRETCH if balance.n_unknowns <= _LARGE else _SHORT_STRETCH
+    while code == walk_states.RUNNING:
+        rows, before = rows_of(balance, size), time.perf_counter()
+        code, count = walk_on(system, linear, point, control, state, size, *rows)
+        last = np.concatenate([last, rows[0][:count]])[-MANY:]
+        if code == walk_states.RUNNING and stands_still(last, control):
+            code = walk_states.STALLED
+        status, again = ENDINGS.get(code), None
+        if status is BranchStatus.STALLED:
+            again = taken_up(workspace, control, state, last)
+        if again is not None:
+            status, code = None, walk_states.RUNNING
+        elif status is BranchStatus.STALLED and ratchets_ahead(workspace, state, control):
+            status = BranchStatus.RATCHETS
+        yield _stretch(rows, count, status, state, spent, begun)
+        state = state if again is None else again
+        elapsed = time.perf_counter() - before
+        size = min(_STRETCH, max(1, int(size * min(2.0, _STRETCH_SECONDS / max(elapsed, 1e-9)))))
+    if code == walk_states.NO_START:
+        yield _no_start(balance, spent, begun)
+
+
+def _no_start(balance: Balance, iterations: int, begun: float, *, ratchets: bool = False) -> Stretch:
+    """Return the stretch of a branch that could not begin."""
+    rows = rows_of(balance, 0)
+    return Stretch(
+        solutions=rows[0], tangents=rows[1], states=rows[2], observed=rows[3], measures=rows[4],
+        status=BranchStatus.RATCHETS if ratchets else BranchStatus.NO_START, newton_iterations=iterations,
+        rejected_steps=0, stepped_over=0,
+        seconds=time.perf_counter() - begun, walk=np.zeros(0),
+    )  # fmt: skip
+
+
+def _stretch(
+    rows: tuple[Real, Real, Integer, Real, Real], count: int, status: BranchStatus | None,
+    state: walk_states.Walk, spent: int, begun: float,
+) -> Stretch:  # fmt: skip
+    numbers = walk_by_value(state).numbers
+    return Stretch(
+        solutions=rows[0][:count], tangents=rows[1][:count], states=rows[2][:count], observed=rows[3][:count],
+        measures=rows[4][:count], status=status,
+        newton_iterations=spent + int(numbers[walk_states.ITERATIONS]),
+        rejected_steps=int(numbers[walk_states.REJECTED]),
+        stepped_over=int(numbers[walk_states.STEPPED_OVER]),
+        seconds=time.perf_counter() - begun, walk=state_of(state),
+    )  # fmt: skip
+
+
+def _finish(
+    workspace: Workspace, stretches: list[Stretch], status: BranchStatus, start: float, stop: float,
+    limit: float | None, begun: float,
+) -> Branch:  # fmt: skip
+    """Put the stretches together, polish the peaks and measure the band."""
+    balance = workspace.balance
+    whole = joined(stretches)
+    survey = _survey(workspace, whole)
+    at = band_limit(limit, survey.peaks, balance.parameter.kind)
+    band = None if at is None else survey.band(at)
+    points = survey.points
+    follow = None if status is BranchStatus.STOPPED else highest_between
+    return Branch(
+        balance=balance, status=status, start=start, stop=stop,
+        values=balance.parameter.all_outside(points.solutions[:, -1].copy()), solutions=points.solutions,
+        tangents=points.tangents,
+        observed=to_full(points.observed, balance.system.ks, balance.highest_harmonic),
+        measures=points.measures, states=points.states, peaks=survey.peaks,
+        band=band, error_estimate=branch_error(workspace, points, survey.peaks, follow),
+        newton_iterations=whole.newton_iterations + survey.spent,
+        rejected_steps=whole.rejected_steps, stepped_over=whole.stepped_over,
+        seconds=time.perf_counter() - begun,
+        flags=branch_flags(workspace, points.solutions),
+        peak_certificate=survey.certificate(completed=status is BranchStatus.COMPLETED),
+    )  # fmt: skip
+
+
+def _survey(workspace: Workspace, whole: Stretch) -> Survey:
+    """Return the survey of peaks between the points of a branch."""
+    points = Points(
+        solutions=whole.solutions, tangents=whole.tangents, measures=whole.measures, observed=whole.observed,
+        states=whole.states,
+    )  # fmt: skip
+    return Survey(workspace, points)
+
+
+def highest_between(balance: Balance, low: float, high: float, guess: Real) -> Peak | None:
+    """Return the highest peak of a balance between two λ (inside unit), from `guess`; None without one."""
+    workspace, outside = Workspace.of(balance), balance.parameter.outside
+    stretches: list[Stretch] = []
+    ends = float(outside(low)), float(outside(high))
+    for stretch in walk(workspace, *ends, ContinuationSettings(), guess):
+        stretches.append(stretch)
+        if sum(len(each.solutions) for each in stretches) >= _MOST_FOLLOWED:
+            break
+    survey = _survey(workspace, joined(stretches))
+    return survey.peaks[0] if survey.peaks else None

@@ -1,0 +1,171 @@
+"""The contacts of a branch as springs at its nodes, and the motion that follows from them between nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.balance.kernels.linearised_contacts import forces_at, linearise
+from solver.jit.fourier import Complex, Integer, Real, cosine_position
+
+if TYPE_CHECKING:
+    from solver.continuation.extrema.nodes import Node, NodeSolver
+
+_UNKNOWN = -2  # row of a node whose stiffness was not asked for
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resonance:
+    """A resonance between two nodes.
+
+    Attributes
+    ----------
+    at, half_width : float
+        ω [rad/s].
+    harmonic : int
+        Number of the harmonic in `System.ks` that meets it.
+    """
+
+    at: float
+    half_width: float
+    harmonic: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Springs:
+    """The contacts at a node: forces, their slopes by λ, and what a small change of motion changes."""
+
+    u: Complex  # (nk, nc) motions
+    du: Complex  # by λ
+    F: Complex  # forces less those of the shift
+    dF: Complex
+    stiffness: Complex  # (nk, nc, nc)
+
+
+class LocalModel:
+    """Contacts linearised at nodes of a branch over the frequency, each once, and predictions between two.
+
+    Attributes
+    ----------
+    stiffness : (rows, nk, nc, nc) array
+        Of the contacts against small changes of each harmonic [N/m]; `rows` tells whose each is.
+    """
+
+    def __init__(self, solver: NodeSolver) -> None:
+        self._solver = solver
+        balance = solver.workspace.balance
+        self._system = balance.system
+        nk, nc = balance.system.ks.size, balance.n_ports
+        self._rows = np.zeros(0, np.int64)
+        self._springs: dict[int, tuple[Node, Springs]] = {}
+        self.stiffness = np.zeros((0, nk, nc, nc), np.complex128)
+
+    def rows(self, numbers: Integer) -> Integer:
+        """Return the rows in `stiffness` of nodes by their `numbers`, -1 for a fold.
+
+        There nothing is a function of λ.
+        """
+        table, workspace = self._solver.table, self._solver.workspace
+        if numbers.max(initial=-1) >= self._rows.size:
+            unknown = np.full(len(table.partners) - self._rows.size, _UNKNOWN)
+            self._rows = np.concatenate([self._rows, unknown])
+        new = np.unique(numbers[self._rows[numbers] == _UNKNOWN])
+        self._rows[new] = -1
+        chosen = new[table.tangents[new, -1] != 0.0]
+        if chosen.size:
+            first = len(self.stiffness)
+            self._rows[chosen] = first + np.arange(chosen.size)
+            stiffness = np.empty((chosen.size, *self.stiffness.shape[1:]), np.complex128)
+            forces = np.empty(stiffness.shape[:3], np.complex128)
+            forces_at(
+                workspace.system,
+                workspace.linear,
+                workspace.point,
+                table.solutions[chosen],
+                forces,
+                stiffness,
+            )
+            self.stiffness = np.concatenate([self.stiffness, stiffness]) if first else stiffness
+        return self._rows[numbers]
+
+    def at(self, node: Node) -> Springs | None:
+        """Return the contacts at a node; None at a fold."""
+        if node.tangent[-1] == 0.0:
+            return None
+        if id(node) not in self._springs:
+            workspace, balance = self._solver.workspace, self._solver.workspace.balance
+            nk, nc = balance.system.ks.size, balance.n_ports
+            motions, stiffness = np.empty((4, nk, nc), np.complex128), np.empty((nk, nc, nc), np.complex128)
+            du = node.tangent[:-1] / node.tangent[-1]
+            linearise(
+                workspace.system, workspace.linear, workspace.point, node.solution[:-1], node.at, du, motions,
+                stiffness,
+            )  # fmt: skip
+            self._springs[id(node)] = node, Springs(motions[0], motions[1], motions[2], motions[3], stiffness)
+        return self._springs[id(node)][1]
+
+    def adds(self, left: Node, right: Node, one: Resonance) -> tuple[float, float]:
+        """Return what a resonance adds to what its neighbours suggest.
+
+        Returns
+        -------
+        To the observed motion [m], and to that of the contact it moves most, relative to that motion.
+        """
+        predicted = self.predicted(left, right, one.at)
+        a, b = self.at(left), self.at(right)
+        if predicted is None or a is None or b is None:
+            return np.inf, np.inf
+        i, t = one.harmonic, (one.at - left.at) / (right.at - left.at)
+        straight = (1.0 - t) * self._observed(left, i) + t * self._observed(right, i)
+        height = float(abs(predicted[1][i] - straight))
+        if not predicted[0].size:
+            return height, 0.0
+        moved = np.abs(predicted[0][i] - (1.0 - t) * a.u[i] - t * b.u[i])
+        whole = np.maximum(np.abs(a.u).max(axis=0), np.abs(b.u).max(axis=0))
+        return height, float(np.max(moved / np.maximum(whole, max(self._solver.least, 1e-300))))
+
+    def _observed(self, node: Node, i: int) -> complex:
+        """Return the complex amplitude of harmonic number i of the observed DOF [m]."""
+        here = int(cosine_position(self._system.ks, i))
+        return complex(node.observed[here], -node.observed[here + 1])
+
+    def predicted(self, left: Node, right: Node, at: float) -> tuple[Complex, Complex] | None:
+        """Return contact motions (nk, nc) and observed motion (nk,) predicted between two nodes."""
+        a, b = self.at(left), self.at(right)
+        if a is None or b is None or left.tangent[-1] * right.tangent[-1] <= 0.0:
+            return None
+        length = right.at - left.at
+        t = (at - left.at) / length
+        u = _cubic(t, a.u, length * a.du, b.u, length * b.du)
+        F = _cubic(t, a.F, length * a.dF, b.F, length * b.dF)
+        linear = self._solver.workspace.receptance(at)
+        A, free, B, x = linear.A[0], linear.u_linear[0], linear.B[0], linear.x_linear[0]
+        stiffness = (1.0 - t) * a.stiffness + t * b.stiffness - np.diag(self._system.shift)
+        residual = u - free + np.einsum("kcd,kd->kc", A, F)
+        matrix = np.eye(A.shape[1]) + A @ stiffness
+        try:
+            change = -np.linalg.solve(matrix, residual[..., None])[..., 0]
+        except np.linalg.LinAlgError:
+            return None
+        F = F + np.einsum("kcd,kd->kc", stiffness, change)
+        return u + change, x - np.einsum("kc,kc->k", B, F)
+
+
+def unknowns(amplitudes: Complex, ks: Integer) -> Real:
+    """Return the unknowns of complex amplitudes (nk, nc), as `solver.balance.kernels.linearised_contacts`
+    gives them."""
+    turned = amplitudes.T
+    skipped = 1 if ks[0] == 0 else 0
+    real = np.zeros((turned.shape[0], 2 * len(ks) - skipped))
+    if skipped:
+        real[:, 0] = turned[:, 0].real
+    real[:, skipped::2], real[:, skipped + 1 :: 2] = turned[:, skipped:].real, -turned[:, skipped:].imag
+    return real.reshape(-1)
+
+
+def _cubic(t: float, a: Complex, da: Complex, b: Complex, db: Complex) -> Complex:
+    """Return the cubic through values and slopes at both ends, at the share t."""
+    r = 1.0 - t
+    return (1.0 + 2.0 * t) * r * r * a + t * r * r * da + t * t * (3.0 - 2.0 * t) * b - t * t * r * db

@@ -1,0 +1,340 @@
+"""Peaks of a branch and the band above a limit, polished on the branch itself.
+
+max|x| is the larger of max x and −min x, and each of these is smooth along a branch between changes of
+contact state. First the branch is made dense: narrow resonances that stand between its points are solved for
+(`solver.continuation.extrema.resonance_search`), so are both sides of changes of what contacts do
+(`solver.continuation.extrema.state_changes`), and near the top cubics through its points have to predict the
+solutions between them. A maximum then shows between two points as a change of sign of its slope along the
+arc, a band edge as a change of sign of amplitude − limit; both are refined by solving on the arc between the
+points, so that folds need no special care. What could not be settled is said in the certificate
+(`solver.continuation.certificate`).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+
+from solver.balance.closed_loop_poles import ClosedLoop
+from solver.balance.kernels.locate import EDGE
+from solver.balance.kernels.output import HIGH, HIGH_SLOPE, LOW, LOW_SLOPE, MAX_ABS, PIECE, RESIDUAL
+from solver.balance.parameter import Kind
+from solver.balance.workspace import Workspace
+from solver.continuation.branch import Band, Edge, Peak
+from solver.continuation.certificate import PeakCertificate, certified, uncertain
+from solver.continuation.extrema.intervals import CURVES, highest_share, lowest_share, may_cross
+from solver.continuation.extrema.kernels.intervals import IS_BENT, WAVES, WORTH_POLISHING
+from solver.continuation.extrema.nodes import Node, NodeSolver, Points
+from solver.continuation.extrema.resonance_search import ResonanceSearch, Search
+from solver.continuation.extrema.state_changes import ChangeSearch
+from solver.continuation.folds import fold_between, motion_scales
+from solver.jit.fourier import Real
+
+SHARP_RESIDUAL = 2e-11  # of a peak; what is above was accepted because arcs allowed no better
+NEAR_BY = 1e-2
+HALF_POWER = 1.0 / math.sqrt(2.0)
+# A curve this far below the other one all over an interval is no max|x| there.
+HIDDEN = 0.8
+COMPETES = 0.5  # share of the highest from which a maximum is polished to the last digits
+SHARP, ENOUGH = 1e-10, 1e-5  # slope relative to that of the interval at which a maximum is found
+NEAR_THE_TOP = 0.97  # share of the highest point from which the branch has to be dense
+PREDICTED = 1e-4  # relative error of the cubics up to which it is
+SURE = 0.03  # share of that up to which the error the neighbours suggest needs no solution to tell it
+MOST_HALVINGS = 5
+# Elsewhere: each makes the error of a cubic 16 times smaller, and a kink needs no more.
+COARSE_HALVINGS = 4
+MOST_WAVES = 4  # halvings of an interval in which a cubic has a maximum and a minimum
+MOST_DIPS = 24  # of one in which the amplitude may cross the limit there and back
+
+
+class Survey:
+    """Looks for peaks and band edges on a branch; counts the Newton iterations it spends."""
+
+    def __init__(self, workspace: Workspace, points: Points) -> None:
+        self._workspace, self._points = workspace, points
+        self._solver = NodeSolver(workspace)
+        self._nodes = self._solver.nodes_of(points)
+        self._peaks: list[Peak] = []
+        self._undone: list[tuple[float, str]] = []  # λ and why
+        self._search = Search(nodes=self._nodes)
+        if self._nodes:
+            if len(self._nodes) > 1:
+                changes = ChangeSearch(self._solver)
+                self._nodes = changes.run(self._nodes)
+                self._undone += changes.left
+            self._look_for_resonances()
+            self._densify()
+            self._find_peaks()
+
+    @property
+    def spent(self) -> int:
+        """Newton iterations."""
+        return self._solver.spent
+
+    @property
+    def peaks(self) -> tuple[Peak, ...]:
+        """Every local maximum of max|x|, highest first; the ends of the branch are in it too."""
+        return tuple(sorted(self._peaks, key=lambda peak: -peak.value))
+
+    @property
+    def points(self) -> Points:
+        """The branch with everything that was solved for between its points, peaks included."""
+        return self._solver.points_of(self._nodes, self._points)
+
+    def certificate(self, *, completed: bool) -> PeakCertificate:
+        """Say why no higher peak hides between two points, or why that is not known."""
+        outside = self._workspace.balance.parameter.outside
+        if not self._nodes or not completed:
+            return uncertain("the branch does not cover the range")
+        undone = [*self._search.left, *self._undone]
+        ends = self._workspace.balance.parameter.all_outside(np.array([node.at for node in self._nodes]))
+        gap = float(np.abs(np.diff(ends)).max(initial=0.0))
+        if self._workspace.balance.parameter.kind is Kind.STRUCTURE:
+            return uncertain("resonances between points are looked for over the frequency alone", gap)
+        if undone:
+            at, why = undone[0]
+            return uncertain(f"{why} at {float(outside(at)):.6g}", gap)
+        top = max(peak.value for peak in self._peaks)
+        bound = max(self._search.unseen, top)
+        if len(self._nodes) > 1 and self._solver.look(self._nodes, top).reach.max() >= NEAR_THE_TOP * top:
+            # There cubics are known to be right to their share of it.
+            bound = max(bound, top * (1.0 + PREDICTED))
+        return certified(bound=bound, gap=gap, resonances=self._search.solved)
+
+    def _look_for_resonances(self) -> None:
+        balance = self._workspace.balance
+        if ClosedLoop.serves(balance) and len(self._nodes) > 1:
+            self._search = ResonanceSearch(self._solver).run(self._nodes)
+            self._nodes = self._search.nodes
+
+    def _densify(self) -> None:
+        """Halve intervals until cubics predict what lies between: finely near the top, coarsely elsewhere."""
+        if len(self._nodes) < 2:
+            return
+        for _ in range(COARSE_HALVINGS):
+            top = max(node.measures[MAX_ABS] for node in self._nodes)
+            bent = self._solver.look(self._nodes, top).flags & IS_BENT > 0
+            if not bent.any():
+                break
+            self._nodes, _, _ = self._solver.halved(self._nodes, bent)
+        top = max(node.measures[MAX_ABS] for node in self._nodes)
+        off = np.full(len(self._nodes) - 1, np.inf)
+        seen = self._solver.look(self._nodes, top)
+        off[(seen.error <= SURE * PREDICTED * top) & (np.diff(seen.measures[:, PIECE]) == 0.0)] = 0.0
+        for _ in range(MOST_HALVINGS):
+            near = self._solver.look(self._nodes, top).reach >= NEAR_THE_TOP * top
+            wanted = near & (off > PREDICTED * top)
+            if not wanted.any():
+                break
+            self._nodes, off, lost = self._solver.halved(self._nodes, wanted)
+            self._undone += [(at, "no solution was found between two points") for at in lost]
+
+    def _find_peaks(self) -> None:
+        """Collect the maxima of both curves where they are max|x|, and the ends the branch falls from."""
+        top = max(node.measures[MAX_ABS] for node in self._nodes)
+        dense = self._nodes
+        for _ in range(MOST_WAVES if len(dense) > 1 else 0):
+            waving = self._solver.look(dense, top).flags & WAVES > 0
+            if not waving.any():
+                break
+            dense, _, _ = self._solver.halved(dense, waving)
+        refined: list[Node] = []
+        slopes = self._solver.look(dense, top).slopes if len(dense) > 1 else np.zeros((0, 2, 2))
+        begun = 0
+        for j in np.flatnonzero(np.any((slopes[:, 0] > 0.0) & (slopes[:, 1] <= 0.0), axis=1)).tolist():
+            refined += dense[begun : j + 1]
+            begun = j + 1
+            refined += self._peaks_between(dense[j], dense[j + 1], slopes[j].tolist(), top)
+        refined += dense[begun:]
+        self._nodes = refined
+        first, last = self._nodes[0], self._nodes[-1]
+        if len(self._nodes) == 1 or _slope(first) <= 0.0:
+            self._peaks.append(self._peak(first, interior=False))
+        if len(self._nodes) > 1 and _slope(last) >= 0.0:
+            self._peaks.append(self._peak(last, interior=False))
+
+    def _peaks_between(self, left: Node, right: Node, slopes: list[list[float]], top: float) -> list[Node]:
+        """Collect the maxima of max|x| between two nodes; return the nodes that come between for them.
+
+        `slopes` are those of max x and −min x by the share, at the left and at the right.
+        """
+        inside = []
+        for c, curve in enumerate(CURVES):
+            ends = slopes[0][c], slopes[1][c]
+            if ends[0] > 0.0 >= ends[1]:
+                node = self._peak_between(left, right, curve, ends, top)
+                if node.measures[curve[0]] >= node.measures[MAX_ABS] * (1.0 - 1e-12):
+                    inside.append(node)
+        if left.tangent[-1] * right.tangent[-1] > 0.0:
+            inside.sort(key=lambda node: node.at * left.tangent[-1])
+        found = [self._sharpened(node) for node in _distinct(inside)]
+        self._peaks += [self._peak(node, interior=True) for node in found]
+        return [node for node in found if node is not left and node is not right]
+
+    def _peak_between(
+        self, left: Node, right: Node, curve: tuple[int, int, int], ends: tuple[float, float], top: float
+    ) -> Node:
+        """Return the maximum of one curve between two nodes; where polishing fails, the higher of the two."""
+        value, _, what = curve
+        higher = left if left.measures[value] > right.measures[value] else right
+        height = higher.measures[value] + 0.25 * (ends[0] - ends[1])
+        hidden = height < HIDDEN * min(left.measures[MAX_ABS], right.measures[MAX_ABS])
+        if hidden or height < WORTH_POLISHING * top:
+            return higher
+        close = SHARP if height >= COMPETES * top else ENOUGH
+        node = self._solver.refine(left, right, what, 0.0, ends, close)
+        if node is None or node.measures[value] < higher.measures[value]:
+            if node is None:
+                self._undone.append((higher.at, "a peak could not be polished"))
+            return higher
+        return node
+
+    def _sharpened(self, node: Node) -> Node:
+        """Return a node that was accepted with a residual near what may be, solved again for its λ.
+
+        With contacts far stiffer than the structure the residual left moves their forces, and with them the
+        amplitude, by far more than its own size.
+        """
+        if node.measures[RESIDUAL] <= SHARP_RESIDUAL or node.tangent[-1] == 0.0:
+            return node
+        again = self._solver.at(node.at, [node.solution[:-1]], math.copysign(1.0, node.tangent[-1]))
+        if again is None or again.measures[RESIDUAL] >= node.measures[RESIDUAL]:
+            return node
+        # Another response at the same λ, beside a fold, is not what was meant.
+        near = abs(again.measures[MAX_ABS] - node.measures[MAX_ABS]) <= NEAR_BY * node.measures[MAX_ABS]
+        return again if near else node
+
+    def _peak(self, node: Node, *, interior: bool) -> Peak:
+        at = float(self._workspace.balance.parameter.outside(node.at))
+        return Peak(
+            value=float(node.measures[MAX_ABS]), at=at, solution=node.solution[:-1].copy(), interior=interior
+        )
+
+    def band(self, limit: float) -> Band:
+        """Return where the amplitude exceeds `limit` [m], anywhere on the branch."""
+        outside = self._workspace.balance.parameter.outside
+        pieces, crossings = [], []
+        known = True
+        turned, folds = self._with_folds(limit)
+        nodes = [turned[0]]
+        top = max(node.measures[MAX_ABS] for node in turned)
+        crosses = may_cross(turned, self._solver.look(turned, top), limit) if len(turned) > 1 else ()
+        for right, wanted in zip(turned[1:], crosses, strict=True):
+            found, sure = self._dipped(nodes[-1], right, limit, MOST_DIPS) if wanted else ([], True)
+            known &= sure
+            nodes += [*found, right]
+        for left, right in pairwise(nodes):
+            gaps = left.measures[MAX_ABS] - limit, right.measures[MAX_ABS] - limit
+            if gaps[0] <= 0.0 and gaps[1] <= 0.0:
+                continue
+            begin, end = left.solution, right.solution
+            if (gaps[0] > 0.0) != (gaps[1] > 0.0):
+                edge = self._edge(left, right, limit, gaps)
+                crossings.append(edge)
+                begin, end = (begin, edge) if gaps[0] > 0.0 else (edge, end)
+            ends = float(outside(float(begin[-1]))), float(outside(float(end[-1])))
+            pieces.append((min(ends), max(ends)))
+        merged = _merge(pieces)
+        edges = []
+        for edge in crossings:
+            at = float(outside(float(edge[-1])))
+            for low, high in merged:
+                if at in (low, high):
+                    edges.append(Edge(at=at, solution=edge[:-1].copy(), opens=at == low))
+        for node, smooth in folds:
+            at = float(outside(float(node.solution[-1])))
+            for low, high in merged:
+                if at in (low, high):
+                    turned_at = node.solution[:-1].copy()
+                    edges.append(
+                        Edge(at=at, solution=turned_at, opens=at == low, fold=True, corner=not smooth)
+                    )
+        width = float(sum(high - low for low, high in merged))
+        return Band(limit=limit, width=width, intervals=tuple(merged), edges=tuple(edges), known=known)
+
+    def _with_folds(self, limit: float) -> tuple[list[Node], list[tuple[Node, bool]]]:
+        """Return the nodes with the folds above the limit among them, and these (and whether smooth)."""
+        nodes: list[Node] = [self._nodes[0]]
+        folds = []
+        for left, right in pairwise(self._nodes):
+            turns = left.tangent[-1] * right.tangent[-1] < 0.0
+            if turns and max(left.measures[MAX_ABS], right.measures[MAX_ABS]) > limit:
+                by_share = motion_scales(left, right)
+                ends = float(left.tangent[-1] * by_share[0]), float(right.tangent[-1] * by_share[1])
+                found = fold_between(partial(self._solver.between, left, right), *ends)
+                if found is not None:
+                    nodes.append(found[0])
+                    if found[0].measures[MAX_ABS] > limit:
+                        folds.append(found)
+            nodes.append(right)
+        return nodes, folds
+
+    def _dipped(self, left: Node, right: Node, limit: float, depth: int) -> tuple[list[Node], bool]:
+        """Return nodes where the amplitude crosses the limit and comes back between two, if it does.
+
+        Returns
+        -------
+        The nodes to be put between, and whether it is known that nothing else crosses.
+        """
+        gaps = left.measures[MAX_ABS] - limit, right.measures[MAX_ABS] - limit
+        if (gaps[0] > 0.0) != (gaps[1] > 0.0):
+            return [], True
+        by_share = self._solver.scales(left, right)
+        if gaps[0] > 0.0:
+            share = lowest_share(left, right, by_share, limit)
+        else:
+            share = highest_share(left, right, by_share, limit)
+        if share is None or abs(right.at - left.at) <= 1e-12 * abs(right.at):
+            return [], True
+        middle = self._solver.between(left, right, share) if depth > 0 else None
+        if middle is None:
+            return [], False
+        before, sure = self._dipped(left, middle, limit, depth - 1)
+        after, sure_too = self._dipped(middle, right, limit, depth - 1)
+        return [*before, middle, *after], sure and sure_too
+
+    def _edge(self, left: Node, right: Node, limit: float, gaps: tuple[float, float]) -> Real:
+        """Return the point where the amplitude equals the limit."""
+        node = self._solver.refine(left, right, EDGE, limit, gaps, SHARP)
+        if node is not None:
+            return node.solution
+        # Between two converged points the straight line stands in; its error is that of the branch.
+        share = gaps[0] / (gaps[0] - gaps[1])
+        straight: Real = left.solution + share * (right.solution - left.solution)
+        return straight
+
+
+def band_limit(limit: float | None, peaks: tuple[Peak, ...], kind: Kind) -> float | None:
+    """Return the limit of the band: the one asked for, else half power; None where a band has no meaning."""
+    if not peaks or kind is not Kind.FREQUENCY:
+        return None
+    return limit if limit is not None else peaks[0].value * HALF_POWER
+
+
+def _slope(node: Node) -> float:
+    """Return the slope of max|x| along the node's tangent."""
+    higher = HIGH_SLOPE if node.measures[HIGH] >= node.measures[LOW] else LOW_SLOPE
+    return node.measures[higher]
+
+
+def _distinct(nodes: list[Node]) -> list[Node]:
+    """Return the nodes without a second one at the same place (both curves agree in a symmetric motion)."""
+    if len(nodes) == 2:
+        first, second = (node.solution[-1] for node in nodes)
+        if abs(first - second) <= 1e-7 * abs(first):
+            return [max(nodes, key=lambda node: float(node.measures[MAX_ABS]))]
+    return nodes
+
+
+def _merge(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return the union of intervals (a folded branch passes a frequency more than once)."""
+    merged: list[tuple[float, float]] = []
+    for low, high in sorted(intervals):
+        if merged and low <= merged[-1][1] * (1.0 + 1e-12):
+            merged[-1] = (merged[-1][0], max(merged[-1][1], high))
+        else:
+            merged.append((low, high))
+    return merged

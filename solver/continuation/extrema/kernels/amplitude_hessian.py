@@ -1,0 +1,313 @@
+"""The amplitude of a response as a function of frequency ω and a parameter p, with exact second derivatives.
+
+The amplitude is a = ξ x(τ*), ξ = ±1, at an extremum τ* of the observed motion. With the adjoint λ of the
+balance, r_uᵀ λ = −a_u, the Lagrangian L(u, ω, p, τ) = a + λᵀ r has the total derivatives
+g = da/dω = L_ω and da/dp = L_p, and its Hessian along (du/dω, 1, dτ/dω) those of g:
+
+    dg = h·du + k dω + m dp,   h = L_uu u' + L_uω + L_uτ τ', and so on, with λ held fixed.
+
+Every term is linear in the contact forces or in λ, so with z = Aᵀλ − ξ Bᵀ e(τ*) (a weight for each force
+coefficient, differentiated with A and B) L = λ·u + ξ e·x_linear − λ·ū + z·(F − shift u), and wᵀ∂²F comes from
+`solver.contacts.kernels.coulomb.hessian` for elastic Coulomb contacts, whose events are known already, and
+from `solver.contacts.kernels.second_laws` for the others. Sums over harmonics are real parts: harmonic k of a
+vector v has v̂ = v_c − i v_s.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solver.balance.kernels.jacobian import factorise, step_back, step_back_transposed
+from solver.balance.kernels.output import extremes
+from solver.balance.kernels.residual import contact_values, least_size
+from solver.contacts.kernels.coulomb.hessian import inner
+from solver.contacts.kernels.system import System
+from solver.continuation.extrema.kernels.contact_curvatures import (
+    add_slopes_times,
+    forces_at,
+    second_forces_at,
+)
+from solver.continuation.extrema.kernels.peak_state import (
+    AMPLITUDE,
+    CURVE,
+    DA_DP,
+    DG_DP,
+    DTAU,
+    SIGN,
+    SPENT,
+    TAU,
+    G,
+    Summit,
+)
+from solver.jit.decorators import compiled
+from solver.jit.fourier import Real, coefficient_count, cosine_position
+from solver.jit.lapack import copy_block, fill, fill_block
+from solver.jit.separate import apart
+from solver.linear.kernels.receptance_derivatives import (
+    BY_BOTH,
+    BY_OMEGA,
+    BY_OMEGA_TWICE,
+    BY_P,
+    VALUE,
+    fill_jets,
+)
+
+_TURNS = 12
+
+
+@apart
+def balance_at(system: System, u: Real, omega: float, p: float, at: Summit) -> float:
+    """Evaluate the residual and its slopes at (u, ω, p); return its relative size (NaN if that failed)."""
+    at.numbers[SPENT] += 1.0
+    fill_jets(system, omega, p, at.jets)
+    for i in range(system.ks.size):
+        if not math.isfinite(at.jets.x_linear[0, i].real):
+            return np.nan
+    table, load, slope, dload = contact_values(system, p, 0.0)
+    copy_block(at.table, table)
+    copy_block(at.load, load)
+    copy_block(at.slope, slope)
+    copy_block(at.dload, dload)
+    if not forces_at(system, u, at):
+        return np.nan
+    return _assemble(system, u, least_size(system, p), at)
+
+
+@apart
+def _assemble(system: System, u: Real, least: float, at: Summit) -> float:
+    """Put r, dr/dω and dr/dp (rows of `rhs`) together."""
+    nc, n = system.shift.size, coefficient_count(system.ks)
+    jets, rhs = at.jets, at.rhs
+    scale, largest = least, 0.0
+    for i in range(system.ks.size):
+        here = cosine_position(system.ks, i)
+        has_sine = system.ks[i] > 0
+        for c in range(nc):
+            row = c * n + here
+            response, by_omega, by_p = complex(0.0), complex(0.0), complex(0.0)
+            for d in range(nc):
+                a = jets.A[VALUE, i, c, d]
+                fs = at.F[d, here + 1] if has_sine else 0.0
+                dfs = at.dF_dp[d, here + 1] if has_sine else 0.0
+                force, dforce = complex(at.F[d, here], -fs), complex(at.dF_dp[d, here], -dfs)
+                response += a * force
+                by_omega += jets.A[BY_OMEGA, i, c, d] * force
+                by_p += jets.A[BY_P, i, c, d] * force + a * dforce
+            free = jets.u_linear[VALUE, i, c]
+            scale = max(scale, abs(free))
+            rest = response - free
+            by_omega -= jets.u_linear[BY_OMEGA, i, c]
+            by_p -= jets.u_linear[BY_P, i, c]
+            rhs[0, row], rhs[1, row], rhs[2, row] = u[row] + rest.real, by_omega.real, by_p.real
+            largest = max(largest, abs(rhs[0, row]))
+            if has_sine:
+                scale = max(scale, abs(response), abs(u[row]))
+                rhs[0, row + 1] = u[row + 1] - rest.imag
+                rhs[1, row + 1], rhs[2, row + 1] = -by_omega.imag, -by_p.imag
+                largest = max(largest, abs(rhs[0, row + 1]))
+    return largest / scale if scale > 0.0 else largest
+
+
+@compiled
+def solve_step(system: System, at: Summit) -> bool:
+    """Factorise dr/du and replace r by the Newton step J⁻¹ r."""
+    if at.rhs.shape[1] == 0:
+        return True
+    if factorise(system, at.linear, at.point, at.rhs[0], 0.0, 0.0) == 0.0:
+        return False
+    step_back(system, at.point, at.rhs[0])
+    return True
+
+
+@compiled
+def solve_responses(system: System, at: Summit) -> bool:
+    """Replace r, dr/dω, dr/dp by the Newton step and the responses: J⁻¹ r, −du/dω, −du/dp."""
+    if not solve_step(system, at):
+        return False
+    if at.rhs.shape[1] > 0:
+        step_back(system, at.point, at.rhs[1])
+        step_back(system, at.point, at.rhs[2])
+    return True
+
+
+@compiled
+def observe_at(system: System, at: Summit) -> None:
+    """Fill `x` with the coefficients of the observed DOF."""
+    nc = system.shift.size
+    for i in range(system.ks.size):
+        here = cosine_position(system.ks, i)
+        has_sine = system.ks[i] > 0
+        value = at.jets.x_linear[VALUE, i]
+        for c in range(nc):
+            value -= at.jets.B[VALUE, i, c] * complex(at.F[c, here], -at.F[c, here + 1] if has_sine else 0.0)
+        at.x[here] = value.real
+        if has_sine:
+            at.x[here + 1] = -value.imag
+
+
+@compiled
+def motion_at(system: System, x: Real, tau: float) -> tuple[float, float, float]:
+    """Return value, slope and curvature over τ of a motion with coefficients `x`."""
+    value, slope, bend = 0.0, 0.0, 0.0
+    for i in range(system.ks.size):
+        k, here = system.ks[i], cosine_position(system.ks, i)
+        if k == 0:
+            value += x[here]
+        else:
+            cosine, sine = math.cos(k * tau), math.sin(k * tau)
+            a = x[here] * cosine + x[here + 1] * sine
+            value += a
+            slope += k * (x[here + 1] * cosine - x[here] * sine)
+            bend -= k * k * a
+    return value, slope, bend
+
+
+@compiled
+def find_extremum(system: System, at: Summit, tau: float) -> bool:
+    """Find the extremum of the observed motion near `tau`: a maximum of ξx, ξ = numbers[SIGN]."""
+    sign = at.numbers[SIGN]
+    x, here = at.x, tau
+    for _ in range(_TURNS):
+        _, slope, bend = motion_at(system, x, here)
+        if not sign * bend < 0.0:
+            break
+        move = -slope / bend
+        here += move
+        if abs(here - tau) > 0.5:
+            break
+        if abs(move) <= 1e-13:
+            at.numbers[TAU] = here
+            at.numbers[AMPLITUDE] = sign * motion_at(system, x, here)[0]
+            return True
+    high, at_high, low, at_low = extremes(system, x)
+    at.numbers[TAU] = at_high if sign > 0.0 else at_low
+    at.numbers[AMPLITUDE] = high if sign > 0.0 else -low
+    return math.isfinite(high)
+
+
+@compiled
+def choose_extremum(system: System, at: Summit) -> None:
+    """Set sign and place of the larger of max x and −min x."""
+    high, at_high, low, at_low = extremes(system, at.x)
+    at.numbers[SIGN], at.numbers[TAU] = (1.0, at_high) if high >= -low else (-1.0, at_low)
+
+
+@apart
+def slopes_at(system: System, at: Summit) -> bool:
+    """Compute λ, g = da/dω and da/dp after `solve_responses`, `observe_at` and `find_extremum`."""
+    nc, n = system.shift.size, coefficient_count(system.ks)
+    jets, numbers, tau = at.jets, at.numbers, at.numbers[TAU]
+    z = at.z[VALUE]
+    for i in range(system.ks.size):
+        here, k = cosine_position(system.ks, i), system.ks[i]
+        turn = numbers[SIGN] * complex(math.cos(k * tau), math.sin(k * tau))
+        for d in range(nc):
+            weight = -turn * jets.B[VALUE, i, d]
+            z[d, here] = weight.real
+            if k > 0:
+                z[d, here + 1] = weight.imag
+    # r_uᵀ λ = −a_u, and a_u = (∂F/∂U − shift)ᵀ z as long as z has no λ in it.
+    fill(at.adjoint, 0.0)
+    add_slopes_times(system, at, True, -1.0, z, at.adjoint.reshape((nc, n)))
+    if nc > 0:
+        step_back_transposed(system, at.point, at.adjoint)
+    numbers[G] = _linear_part(system, at, BY_OMEGA)
+    numbers[DA_DP] = _linear_part(system, at, BY_P)
+    _linear_part(system, at, VALUE)
+    for d in range(nc):
+        numbers[G] += inner(at.z[BY_OMEGA, d], at.F[d])
+        numbers[DA_DP] += inner(at.z[BY_P, d], at.F[d]) + inner(at.z[VALUE, d], at.dF_dp[d])
+    return math.isfinite(numbers[G])
+
+
+@apart
+def _linear_part(system: System, at: Summit, order: int) -> float:
+    """Fill z of one order, Aᵀλ − ξ Bᵀe(τ*), and return ξ e·x_linear − λ·ū of that order."""
+    nc, n = system.shift.size, coefficient_count(system.ks)
+    jets, lam, total = at.jets, at.adjoint, 0.0
+    sign, tau = at.numbers[SIGN], at.numbers[TAU]
+    for i in range(system.ks.size):
+        here, k = cosine_position(system.ks, i), system.ks[i]
+        turn = sign * complex(math.cos(k * tau), math.sin(k * tau))
+        total += (turn * jets.x_linear[order, i]).real
+        for d in range(nc):
+            weight = -turn * jets.B[order, i, d]
+            for c in range(nc):
+                at_c = c * n + here
+                pull = complex(lam[at_c], lam[at_c + 1] if k > 0 else 0.0)
+                weight += pull * jets.A[order, i, c, d]
+            pull = complex(lam[d * n + here], lam[d * n + here + 1] if k > 0 else 0.0)
+            total -= (pull * jets.u_linear[order, i, d]).real
+            at.z[order, d, here] = weight.real
+            if k > 0:
+                at.z[order, d, here + 1] = weight.imag
+    return total
+
+
+@compiled
+def _along_response(system: System, at: Summit) -> None:
+    """Fill dF/dω and dx/dω along the response, and dτ*/dω = −x'_ω/x''."""
+    nc, n = system.shift.size, coefficient_count(system.ks)
+    fill_block(at.along, 0.0)
+    add_slopes_times(system, at, False, -1.0, at.rhs[1].reshape((nc, n)), at.along)  # of −du/dω
+    for i in range(system.ks.size):
+        here = cosine_position(system.ks, i)
+        has_sine = system.ks[i] > 0
+        value = at.jets.x_linear[BY_OMEGA, i]
+        for c in range(nc):
+            fs, dfs = 0.0, 0.0
+            if has_sine:
+                fs, dfs = at.F[c, here + 1], at.along[c, here + 1]
+            value -= at.jets.B[BY_OMEGA, i, c] * complex(at.F[c, here], -fs)
+            value -= at.jets.B[VALUE, i, c] * complex(at.along[c, here], -dfs)
+        at.dx[here] = value.real
+        if has_sine:
+            at.dx[here + 1] = -value.imag
+    tau = at.numbers[TAU]
+    bend = motion_at(system, at.x, tau)[2]
+    at.numbers[DTAU] = -motion_at(system, at.dx, tau)[1] / bend if bend != 0.0 else 0.0
+
+
+@compiled
+def _turned(system: System, at: Summit, order: int, weights: Real) -> float:
+    """Fill `weights` with dz/dτ of one order, −ξ ik B e(τ), and return ξ d(e·x_linear)/dτ less its forces."""
+    nc = system.shift.size
+    sign, tau, total = at.numbers[SIGN], at.numbers[TAU], 0.0
+    for i in range(system.ks.size):
+        here, k = cosine_position(system.ks, i), system.ks[i]
+        turn = sign * complex(0.0, float(k)) * complex(math.cos(k * tau), math.sin(k * tau))
+        total += (turn * at.jets.x_linear[order, i]).real
+        for d in range(nc):
+            weight = -turn * at.jets.B[order, i, d]
+            weights[d, here] = weight.real
+            total += weight.real * at.F[d, here]
+            if k > 0:
+                weights[d, here + 1] = weight.imag
+                total += weight.imag * at.F[d, here + 1]
+    return total
+
+
+@apart
+def curvatures_at(system: System, u: Real, at: Summit) -> None:
+    """Compute h (change of g by u), k and m after `slopes_at`: d²a/dω² = h·u' + k and dg/dp = h·u_p + m."""
+    nc, n = system.shift.size, coefficient_count(system.ks)
+    numbers = at.numbers
+    _along_response(system, at)
+    k = _linear_part(system, at, BY_OMEGA_TWICE)
+    m = _linear_part(system, at, BY_BOTH)
+    turned, h = np.empty((nc, n)), at.h.reshape((nc, n))
+    k += numbers[DTAU] * _turned(system, at, BY_OMEGA, turned)
+    m += numbers[DTAU] * _turned(system, at, BY_P, turned)
+    _turned(system, at, VALUE, turned)
+    for d in range(nc):
+        for i in range(n):
+            turned[d, i] = at.z[BY_OMEGA, d, i] + numbers[DTAU] * turned[d, i]
+        k += inner(at.z[BY_OMEGA_TWICE, d], at.F[d]) + inner(at.z[BY_OMEGA, d], at.along[d])
+        m += inner(at.z[BY_BOTH, d], at.F[d]) + inner(at.z[BY_P, d], at.along[d])
+        m += inner(turned[d], at.dF_dp[d])
+    m += second_forces_at(system, u, at)
+    add_slopes_times(system, at, True, 1.0, turned, h)
+    numbers[CURVE] = k - inner(at.h, at.rhs[1])
+    numbers[DG_DP] = m - inner(at.h, at.rhs[2])

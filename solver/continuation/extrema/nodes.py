@@ -1,0 +1,355 @@
+"""Points of a branch, and further ones solved between them: what peaks and bands are found on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.balance.kernels.jacobian import factorise, step_back
+from solver.balance.kernels.locate import EDGE, HIGH_PEAK, LOW_PEAK, refine
+from solver.balance.kernels.output import (
+    HIGH,
+    HIGH_SLOPE,
+    LOW,
+    LOW_SLOPE,
+    MAX_ABS,
+    MEASURES,
+    RANGE_SLOPE,
+    RESIDUAL,
+    SLOPE,
+    measure,
+)
+from solver.contacts.kernels.system import evaluation_by_value
+from solver.continuation.extrema.kernels import intervals
+from solver.continuation.extrema.kernels.intervals import look_between, middles_between
+from solver.continuation.extrema.kernels.state_changes import locate_change
+from solver.continuation.extrema.node_table import NodeTable
+from solver.continuation.folds import OnBranch
+from solver.jit.fourier import Integer, Real
+
+if TYPE_CHECKING:
+    from solver.balance.workspace import Workspace
+
+MOST_ITERATIONS = 12
+MOST_TRIALS = 120
+MOST_SOLVES = 12  # of a change of state
+SLOPES = [SLOPE, RANGE_SLOPE, HIGH_SLOPE, LOW_SLOPE]  # measures along the tangent
+NARROW = 1e-13  # relative width at which a place is found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Points:
+    """The rows of a branch; see `solver.continuation.branch.Branch`."""
+
+    solutions: Real
+    tangents: Real
+    measures: Real
+    observed: Real
+    states: Integer
+
+
+class Node(NamedTuple):
+    """One row of `Points`; the tangent points onward along the branch, and slopes are along it.
+
+    A tuple, because hundreds are made of every branch; nodes are told apart by identity.
+    """
+
+    solution: Real
+    tangent: Real
+    measures: list[float]  # the row as a list: they are looked at one by one
+    observed: Real
+    states: Integer
+    number: int  # of its row in `NodeSolver.table`
+
+    @property
+    def at(self) -> float:
+        """λ, in the unit inside."""
+        return float(self.solution[-1])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Between:
+    """What may stand between nodes, with the shapes of `kernels.intervals.look_between`."""
+
+    measures: Real
+    at: Real
+    slopes: Real
+    reach: Real
+    error: Real
+    flags: Integer
+
+
+class NodeSolver:
+    """Solves for nodes between others; counts the Newton iterations it spends."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self.workspace = workspace
+        self.spent = 0
+        self.least = workspace.balance.system.least_size
+        balance = workspace.balance
+        self.table = NodeTable(balance.n_unknowns, balance.n_coefficients, MEASURES, balance.system.laws.size)
+        self._last: tuple[Sequence[Node], float, Between] | tuple[None, float, None] = None, 0.0, None
+
+    def nodes_of(self, points: Points) -> list[Node]:
+        """Return the rows of a branch as nodes."""
+        return self._added(points.solutions, points.tangents, points.measures, points.observed, points.states)
+
+    def points_of(self, nodes: Sequence[Node], like: Points) -> Points:
+        """Return nodes as the rows of a branch; `like` gives the shapes where there is none."""
+        if not nodes:
+            return like
+        rows, table = numbers_of(nodes), self.table
+        return Points(
+            solutions=table.solutions[rows], tangents=table.tangents[rows], measures=table.measures[rows],
+            observed=table.observed[rows], states=table.states[rows],
+        )  # fmt: skip
+
+    def _added(
+        self, solutions: Real, tangents: Real, measures: Real, observed: Real, states: Integer
+    ) -> list[Node]:
+        """Return rows as nodes, which stand in the table from then on."""
+        first = self.table.add(solutions, tangents, measures, observed, states)
+        numbers = range(first, first + len(solutions))
+        rows = zip(solutions, tangents, measures.tolist(), observed, states, numbers, strict=True)
+        return [Node._make(row) for row in rows]
+
+    def look(self, nodes: Sequence[Node], top: float) -> Between:
+        """Return what may stand between neighbouring nodes, at least two; that of the last list is kept."""
+        known = self._last[2]
+        if known is not None and nodes is self._last[0] and top == self._last[1]:
+            return known
+        count, table, rows = len(nodes) - 1, self.table, numbers_of(nodes)
+        found = Between(
+            measures=table.measures[rows], at=table.solutions[rows, -1], slopes=np.empty((count, 2, 2)),
+            reach=np.empty(count), error=np.empty(count), flags=np.empty(count, np.int64),
+        )  # fmt: skip
+        look_between(
+            table.solutions, table.tangents, table.partners, table.scales, rows, found.at, found.measures,
+            self.least, top, found.slopes, found.reach, found.error, found.flags,
+        )  # fmt: skip
+        self._last = nodes, top, found
+        return found
+
+    def scales(self, left: Node, right: Node) -> tuple[float, float]:
+        """Return `share_scales` between two nodes."""
+        return share_scales(left, right, self.least)
+
+    def between(self, left: Node, right: Node, share: float) -> Node | None:
+        """Return the node at a share of the way between two, or None if there is no solution there."""
+        return self.between_pairs([left, right], share)[0][0]
+
+    def between_pairs(self, ends: Sequence[Node], share: float = 0.5) -> tuple[list[Node | None], Real]:
+        """Return the nodes at a share of the way between pairs of nodes.
+
+        Parameters
+        ----------
+        ends : (2k) left, right, left, right, …
+
+        Returns
+        -------
+        The k nodes, None where there is no solution, and by how much the cubics of max x and −min x miss
+        them [m], infinite where the node was not found on the plane across the chord.
+        """
+        table, pairs = self.table, numbers_of(ends).reshape(-1, 2)
+        count = len(pairs)
+        found, ways = np.zeros((count, table.solutions.shape[1])), np.zeros((count, table.solutions.shape[1]))
+        x, out = np.zeros((count, table.observed.shape[1])), np.zeros((count, MEASURES))
+        states, off = np.zeros((count, table.states.shape[1]), np.int64), np.zeros(count)
+        workspace = self.workspace
+        self.spent += middles_between(
+            workspace.system, workspace.linear, workspace.point, table.solutions, table.tangents,
+            table.measures, table.partners, table.scales, pairs, share, MOST_ITERATIONS, found, ways, x, out,
+            states, off,
+        )  # fmt: skip
+        good = np.isfinite(off) & np.isfinite(out).all(axis=1)
+        nodes: list[Node | None] = list(self._added(found, ways, out, x, states))
+        for i in np.flatnonzero(~good).tolist():
+            left, right = ends[2 * i], ends[2 * i + 1]
+            nodes[i] = self._aside(left, right, left.at + share * (right.at - left.at))
+        return nodes, np.where(good, off, np.inf)
+
+    def halved(self, nodes: list[Node], wanted: NDArray[np.bool_]) -> tuple[list[Node], Real, list[float]]:
+        """Return the nodes with those in the middle of the intervals wanted.
+
+        Returns
+        -------
+        The nodes; of each new interval by how much the cubics missed its new end [m], 0 without one; and the
+        λ where intervals without a solution begin.
+        """
+        places = np.flatnonzero(wanted).tolist()
+        middles, off = self.between_pairs([nodes[k] for j in places for k in (j, j + 1)])
+        grown: list[Node] = []
+        missed: list[float] = []
+        lost: list[float] = []
+        begun = 0
+        for j, middle, by in zip(places, middles, off.tolist(), strict=True):
+            grown += nodes[begun : j + 1]
+            missed += [0.0] * (j - begun)
+            begun = j + 1
+            if middle is None:
+                missed.append(0.0)
+                lost.append(nodes[j].at)
+            else:
+                grown.append(middle)
+                missed += [by, by]
+        grown += nodes[begun:]
+        missed += [0.0] * (len(nodes) - 1 - begun)
+        return grown, np.array(missed), lost
+
+    def refine(
+        self, left: Node, right: Node, what: int, level: float, ends: tuple[float, float], close: float
+    ) -> Node | None:
+        """Return the peak or edge between two nodes, or None if there is no solution on the way.
+
+        Parameters
+        ----------
+        what, level : as in `solver.balance.kernels.locate.refine`.
+        ends : the function whose root it is at both ends, of opposite signs.
+        close : how near to the root, relative to the larger of them.
+        """
+        rows = self._rows(left)
+        by_share = self.scales(left, right)
+        workspace = self.workspace
+        value = LOW if what == LOW_PEAK else HIGH
+        values = left.measures[value], right.measures[value]
+        good, iterations = refine(
+            workspace.system, workspace.linear, workspace.point, left.solution, left.tangent * by_share[0],
+            right.solution, right.tangent * by_share[1], what, level, *ends, *values, close,
+            MOST_ITERATIONS, *rows,
+        )  # fmt: skip
+        self.spent += int(iterations)
+        return self._node(*rows) if good else self._bracketed(left, right, what, level, close)
+
+    def change(self, left: Node, right: Node, allowed: float) -> list[Node]:
+        """Return the nodes nearest to the first change of state between two, of those before and behind it.
+
+        `allowed` is the height of a maximum between both that does not matter [m].
+        """
+        by_parameter = np.array([1.0 / left.tangent[-1], 1.0 / right.tangent[-1]])
+        table, rows = self.table, [left.number, right.number]
+        found, ways = table.solutions[rows], table.tangents[rows] * by_parameter[:, None]
+        x, measures, states = table.observed[rows], table.measures[rows], table.states[rows]
+        for column in SLOPES:
+            measures[:, column] *= by_parameter
+        sides, onward = np.zeros(2, np.int64), math.copysign(1.0, left.tangent[-1])
+        workspace = self.workspace
+        self.spent += int(locate_change(
+            workspace.system, workspace.linear, workspace.point, found, ways, x, measures, states, allowed,
+            MOST_SOLVES, sides,
+        ))  # fmt: skip
+        ways *= onward
+        for column in SLOPES:
+            measures[:, column] *= onward
+        near = sides > 0
+        return self._added(found[near], ways[near], measures[near], x[near], states[near])
+
+    def _aside(self, left: Node, right: Node, p: float) -> Node | None:
+        """Return the node at λ = `p` between two, or None if the branch turns there or has no solution.
+
+        Where a contact changes its state the arc between two nodes bends so sharply that the plane across
+        the chord meets it far away, or not at all; a solution for a given λ is there all the same.
+        """
+        if left.tangent[-1] * right.tangent[-1] <= 0.0 or right.at == left.at:
+            return None
+        share = (p - left.at) / (right.at - left.at)
+        straight = (1.0 - share) * left.solution[:-1] + share * right.solution[:-1]
+        return self.at(p, [straight], math.copysign(1.0, right.at - left.at))
+
+    def _bracketed(self, left: Node, right: Node, what: int, level: float, close: float) -> Node | None:
+        """Return the peak or edge between two nodes by solving at values of λ (Illinois), else None."""
+
+        def off(node: Node) -> float:
+            if what == EDGE:
+                return node.measures[MAX_ABS] - level
+            slope = node.measures[HIGH_SLOPE if what == HIGH_PEAK else LOW_SLOPE]
+            return slope / abs(float(node.tangent[-1]))
+
+        if left.tangent[-1] * right.tangent[-1] <= 0.0:
+            return None
+        low, high, g_low, g_high, side = left, right, off(left), off(right), 0
+        scale = max(abs(g_low), abs(g_high))
+        value = {HIGH_PEAK: HIGH, LOW_PEAK: LOW}.get(what, MAX_ABS)
+        best = max((left, right), key=lambda node: node.measures[value])
+        for trial in range(MOST_TRIALS):
+            share = g_low / (g_low - g_high) if g_low != g_high and trial % 3 != 2 else 0.5
+            node = self._aside(low, high, low.at + min(max(share, 1e-3), 1.0 - 1e-3) * (high.at - low.at))
+            if node is None:
+                return None
+            g = off(node)
+            best = node if what == EDGE else max((best, node), key=lambda one: one.measures[value])
+            if abs(g) <= close * scale or abs(high.at - low.at) <= NARROW * abs(node.at):
+                return best
+            if (g > 0.0) == (g_low > 0.0):
+                low, g_low, g_high, side = node, g, g_high * (0.5 if side < 0 else 1.0), -1
+            else:
+                high, g_high, g_low, side = node, g, g_low * (0.5 if side > 0 else 1.0), 1
+        return None
+
+    def at(self, p: float, guesses: Sequence[Real], onward: float) -> Node | None:
+        """Return the node at λ = `p`, or None if no solution is found there.
+
+        Parameters
+        ----------
+        guesses : slip motions to start from, one after the other; at last from nothing.
+        onward : the sign of dλ along the branch.
+        """
+        workspace = self.workspace
+        found = None
+        for guess in guesses:
+            found = workspace.solve_from(p, guess)
+            self.spent += found.iterations
+            if found.converged:
+                break
+        if found is None or not found.converged:
+            found = workspace.solve(p)
+            self.spent += found.iterations
+        if not found.converged:
+            return None
+        system, linear, point = workspace.system, workspace.linear, workspace.point
+        slope = np.zeros(found.u.size)
+        if factorise(system, linear, point, slope, 0.0, 0.0) == 0.0:
+            return None
+        slope[:] = -evaluation_by_value(point).dr_dp
+        step_back(system, point, slope)
+        if not np.all(np.isfinite(slope)):
+            return None
+        observed, values = np.zeros(workspace.balance.n_coefficients), np.zeros(MEASURES)
+        measure(system, linear, found.u, point, onward * slope, onward, observed, values)
+        values[RESIDUAL] = found.residual
+        solution, tangent = np.append(found.u, p), onward * np.append(slope, 1.0)
+        return self._node(solution, tangent, observed, values)
+
+    def _rows(self, like: Node) -> tuple[Real, Real, Real, Real]:
+        size = like.solution.size
+        n = self.workspace.balance.n_coefficients
+        return np.zeros(size), np.zeros(size), np.zeros(n), np.zeros(MEASURES)
+
+    def _node(self, solution: Real, tangent: Real, observed: Real, values: Real) -> Node | None:
+        if not np.all(np.isfinite(values)):
+            return None
+        states = evaluation_by_value(self.workspace.point).states.copy()
+        return Node(
+            solution=solution, tangent=tangent, measures=values.tolist(), observed=observed,
+            states=states, number=self.table.add(solution, tangent, values, observed, states),
+        )  # fmt: skip
+
+
+def share_scales(left: OnBranch, right: OnBranch, least: float) -> tuple[float, float]:
+    """Return the factors that turn both tangents into derivatives by the share of the chord between them.
+
+    `least` is the size of a motion below which it is rounding [m]; see `kernels.intervals`.
+    """
+    scales: tuple[float, float] = intervals.share_scales(
+        left.solution, right.solution, left.tangent, right.tangent, least
+    )
+    return scales
+
+
+def numbers_of(nodes: Sequence[Node]) -> Integer:
+    """Return the rows of nodes in the table of their solver."""
+    return np.array([node.number for node in nodes], np.int64)

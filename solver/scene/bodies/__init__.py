@@ -1,0 +1,1 @@
+"""Rigid bodies, dampers by their shape, and the relative motions of contacts in space."""

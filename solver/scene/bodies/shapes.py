@@ -1,0 +1,372 @@
+"""Dampers by their shape: each yields a rigid body and the contacts of its faces.
+
+Directions are those of the damper: `out` (radially outward), `axial`, and across, out x axial, from the left
+platform to the right one. A face that is inclined by an angle a has the normal cos(a) out ± sin(a) across, so
+that the centrifugal load presses it on; without friction the faces of a symmetric damper carry
+N = load / (2 cos a) each. Stiffness and preload of a face are shared out evenly over its points.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+
+from pydantic import Field, model_validator
+
+from solver.contacts.fields import EndName, Friction, Name, NonNegative, Part, Positive, Signed, Vector
+from solver.contacts.frames import cross, dot, is_unit, unit
+from solver.scene.bodies.body import Body, Row
+
+MOST_POINTS = 100
+POINTS = "points"
+LAWS = ("coulomb-3d", "elastic-normal")
+Points = Annotated[int, Field(strict=True, ge=1, le=MOST_POINTS)]
+Inclination = Annotated[float, Field(strict=True, gt=-1.5, lt=1.5, allow_inf_nan=False)]
+
+
+class Spot(NamedTuple):
+    """One point of a face: its name, what it joins, and its place; numbers may be symbols."""
+
+    name: str
+    between: tuple[str, str]
+    at: tuple[Any, Any, Any]
+    axes: tuple[tuple[Any, Any, Any], ...]
+
+
+def _cosine_and_sine(angle: Any) -> tuple[Any, Any]:
+    if isinstance(angle, float):
+        return math.cos(angle), math.sin(angle)
+    import casadi  # for derivatives alone
+
+    return casadi.cos(angle), casadi.sin(angle)
+
+
+def _spread(points: int) -> list[float]:
+    """Middles of equal parts of a length 1 about 0."""
+    return [(i + 0.5) / points - 0.5 for i in range(points)]
+
+
+class _Shape(Part):
+    """What all shapes have.
+
+    Attributes
+    ----------
+    name : str
+        Name of the damper and of its body, in DOFs and parameter paths.
+    at : (3,) tuple
+        Position of the centre of mass; of a shroud, of the middle of its face [m].
+    out : (3,) tuple
+        Unit vector outward: along it the centrifugal load acts.
+    axial : (3,) tuple
+        Unit vector along the axis of rotation.
+    law : str
+        Contact law of every point.
+    kt, kn : float
+        Tangential and normal stiffness of a face [N/m], shared out over its points.
+    mu : float
+        Friction coefficient.
+    N0 : float
+        Preload of a face at rest [N], shared out over its points.
+    points : int
+        Points of a face.
+    """
+
+    SHAPE: ClassVar[str]
+    GEOMETRY: ClassVar[tuple[str, ...]]
+    """Its parameters that the places of its contacts depend on."""
+    FACE: ClassVar[tuple[str, ...]] = ("kt", "kn", "mu", "N0")
+    """Its parameters that are those of its contacts."""
+    SHARED: ClassVar[tuple[str, ...]] = ("kt", "kn", "N0")
+    """Those that are shared out over the points of a face."""
+
+    name: Name
+    at: Vector = (0.0, 0.0, 0.0)
+    out: Vector = (0.0, 1.0, 0.0)
+    axial: Vector = (0.0, 0.0, 1.0)
+    law: Literal["coulomb-3d", "elastic-normal"]
+    kt: Positive
+    kn: Positive
+    mu: Friction
+    N0: Signed = 0.0
+    points: Points = 1
+
+    @model_validator(mode="after")
+    def _directions(self) -> _Shape:
+        for key in ("out", "axial"):
+            if not is_unit(getattr(self, key)):
+                raise ValueError(f"`{key}` must be a unit vector, got {list(getattr(self, key))!r}")
+        if abs(dot(self.out, self.axial)) > 1e-2:
+            raise ValueError(f"`axial` must be perpendicular to `out`, got {list(self.axial)!r}")
+        return self
+
+    @abstractmethod
+    def spots(self, values: Mapping[str, Any]) -> Iterator[Spot]:
+        """The points of every face, with `values` for the parameters of `GEOMETRY`."""
+
+    @property
+    def geometry(self) -> dict[str, float]:
+        """The values of `GEOMETRY` as they are."""
+        return {key: float(getattr(self, key)) for key in self.GEOMETRY}
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """Its rigid bodies."""
+        return ()
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Its numbers that are parameter paths."""
+        return (*self.GEOMETRY, *self.FACE, "points")
+
+    def contacts(self) -> list[dict[str, Any]]:
+        """Its contacts, as tables of a scene."""
+        shared = {key: getattr(self, key) / self.points for key in self.SHARED}
+        return [
+            {
+                "name": spot.name, "group": f"{self.name}-faces", "law": self.law,
+                "between": list(spot.between), "at": list(spot.at), "normal": list(spot.axes[2]),
+                "tangents": [list(axis) for axis in spot.axes[:2]], "mu": self.mu, **shared, **self._settings,
+            }
+            for spot in self.spots(self.geometry)
+        ]  # fmt: skip
+
+    @property
+    def _settings(self) -> dict[str, Any]:
+        return {}
+
+    def _placed(self, across: Any, outward: Any, axial: Any) -> tuple[Any, Any, Any]:
+        """A vector of the damper's directions in those of the scene."""
+        o, a = unit(self.out), unit(self.axial)
+        x = cross(o, a)
+        return (
+            across * x[0] + outward * o[0] + axial * a[0],
+            across * x[1] + outward * o[1] + axial * a[1],
+            across * x[2] + outward * o[2] + axial * a[2],
+        )
+
+    def _spot(
+        self, name: str, between: tuple[str, str], at: tuple[Any, Any, Any], side: float, angle: Any
+    ) -> Spot:
+        """A point at a place from `at`, on a face of one side (-1 left, 1 right) inclined by an angle."""
+        c, s = _cosine_and_sine(angle)
+        offset = self._placed(*at)
+        here = (self.at[0] + offset[0], self.at[1] + offset[1], self.at[2] + offset[2])
+        axes = (
+            self._placed(c, -side * s, 0.0),
+            self._placed(0.0, 0.0, -1.0 * side),
+            self._placed(side * s, c, 0.0),
+        )
+        return Spot(name, between, here, axes)
+
+
+class _Underplatform(_Shape):
+    """A body between two platforms, pressed on them by rotation.
+
+    Attributes
+    ----------
+    between : (str, str)
+        Nodes of the left and the right platform.
+    mass : float
+        Mass [kg].
+    inertia : float, (3,) or (3, 3)
+        As of a body.
+    plane : "xy" or None
+        As of a body.
+    radius_of_rotation : float
+        Distance of the centre of mass from the axis of rotation [m].
+    """
+
+    between: tuple[EndName, EndName]
+    mass: Positive
+    inertia: Positive | tuple[Positive, Positive, Positive] | tuple[Row, Row, Row]
+    plane: Literal["xy"] | None = None
+    radius_of_rotation: NonNegative
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """Its rigid body."""
+        return (
+            Body(
+                name=self.name, mass=self.mass, inertia=self.inertia, at=self.at, plane=self.plane,
+                radius_of_rotation=self.radius_of_rotation, out=self.out,
+            ),
+        )  # fmt: skip
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Its numbers that are parameter paths."""
+        return (*super().parameters, *self.bodies[0].parameters)
+
+    def _flat(self, side: float, angle: Any, width: Any, length: Any) -> Iterator[Spot]:
+        """Points down a flat face whose middle is half the width to one side."""
+        name, c_s = ("left", "right")[side > 0], _cosine_and_sine(angle)
+        for i, share in enumerate(_spread(self.points)):
+            along = length * share
+            place = (side * 0.5 * width + along * c_s[0], -side * along * c_s[1], 0.0)
+            yield self._spot(f"{self.name}-{name}-{i}", self._ends(side), place, side, angle)
+
+    def _line(self, side: float, angle: Any, radius: Any, length: Any) -> Iterator[Spot]:
+        """Points along the line on which a cylinder touches a face."""
+        name, (c, s) = ("left", "right")[side > 0], _cosine_and_sine(angle)
+        for i, share in enumerate(_spread(self.points)):
+            place = (side * radius * s, radius * c, length * share)
+            yield self._spot(f"{self.name}-{name}-{i}", self._ends(side), place, side, angle)
+
+    def _ends(self, side: float) -> tuple[str, str]:
+        return (self.name, self.between[1] if side > 0 else self.between[0])
+
+
+class Wedge(_Underplatform):
+    """A wedge with two flat faces.
+
+    Attributes
+    ----------
+    angle : float
+        Inclination of both faces [rad].
+    width : float
+        Distance between the middles of the faces [m].
+    length : float
+        Length of a face, down which its points lie [m].
+    """
+
+    SHAPE: ClassVar[str] = "wedge"
+    GEOMETRY: ClassVar[tuple[str, ...]] = ("angle", "width", "length")
+
+    shape: Literal["wedge"]
+    angle: Inclination
+    width: Positive
+    length: NonNegative = 0.0
+
+    def spots(self, values: Mapping[str, Any]) -> Iterator[Spot]:
+        """The points of both faces."""
+        for side in (-1.0, 1.0):
+            yield from self._flat(side, values["angle"], values["width"], values["length"])
+
+
+class Cylinder(_Underplatform):
+    """A cylinder that touches both platforms along lines.
+
+    Attributes
+    ----------
+    angle : float
+        Inclination of both platforms [rad].
+    radius : float
+        Radius [m].
+    length : float
+        Length of the lines, along which the points lie [m].
+    """
+
+    SHAPE: ClassVar[str] = "cylinder"
+    GEOMETRY: ClassVar[tuple[str, ...]] = ("angle", "radius", "length")
+
+    shape: Literal["cylinder"]
+    angle: Inclination
+    radius: Positive
+    length: NonNegative = 0.0
+
+    def spots(self, values: Mapping[str, Any]) -> Iterator[Spot]:
+        """The points of both lines."""
+        for side in (-1.0, 1.0):
+            yield from self._line(side, values["angle"], values["radius"], values["length"])
+
+
+class Asymmetric(_Underplatform):
+    """A damper with a flat face on the left and a curved one on the right.
+
+    Attributes
+    ----------
+    angle, curved_angle : float
+        Inclination of the flat face and of the platform under the curved one [rad].
+    width : float
+        Twice the distance of the middle of the flat face from the centre of mass [m].
+    radius : float
+        Radius of the curved face about the centre of mass [m].
+    length : float
+        Length of both faces, along which their points lie [m].
+    """
+
+    SHAPE: ClassVar[str] = "asymmetric"
+    GEOMETRY: ClassVar[tuple[str, ...]] = ("angle", "curved_angle", "width", "radius", "length")
+
+    shape: Literal["asymmetric"]
+    angle: Inclination
+    curved_angle: Inclination
+    width: Positive
+    radius: Positive
+    length: NonNegative = 0.0
+
+    def spots(self, values: Mapping[str, Any]) -> Iterator[Spot]:
+        """The points of the flat face and of the curved one."""
+        yield from self._flat(-1.0, values["angle"], values["width"], values["length"])
+        yield from self._line(1.0, values["curved_angle"], values["radius"], values["length"])
+
+
+class SplitRing(_Underplatform):
+    """The part of a split ring that belongs to a sector, pressed on the rim from within by rotation.
+
+    Attributes
+    ----------
+    between : (str, str)
+        Node of the rim, on the left and on the right half of the face: the same, or that of the next sector.
+    width : float
+        Length of the face around the rim [m].
+    """
+
+    SHAPE: ClassVar[str] = "split-ring"
+    GEOMETRY: ClassVar[tuple[str, ...]] = ("width",)
+
+    shape: Literal["split-ring"]
+    width: Positive
+
+    def spots(self, values: Mapping[str, Any]) -> Iterator[Spot]:
+        """The points of both halves of the face."""
+        for side in (-1.0, 1.0):
+            yield from self._flat(side, 0.0, 0.5 * values["width"], 0.5 * values["width"])
+
+
+class Shroud(_Shape):
+    """The faces with which the shrouds of two blades touch, pressed on each other by their twist.
+
+    Attributes
+    ----------
+    between : (str, str)
+        Nodes of both shrouds.
+    angle : float
+        Angle of the normal of the face against the circumferential direction, about `out` [rad].
+    length : float
+        Length of the face, along which its points lie [m].
+    """
+
+    SHAPE: ClassVar[str] = "shroud"
+    GEOMETRY: ClassVar[tuple[str, ...]] = ("angle", "length")
+
+    shape: Literal["shroud"]
+    between: tuple[EndName, EndName]
+    angle: Inclination
+    length: NonNegative = 0.0
+
+    def spots(self, values: Mapping[str, Any]) -> Iterator[Spot]:
+        """The points of the face."""
+        c, s = _cosine_and_sine(values["angle"])
+        axes = (self._placed(-s, 0.0, c), self._placed(0.0, 1.0, 0.0), self._placed(c, 0.0, s))
+        for i, share in enumerate(_spread(self.points)):
+            along = values["length"] * share
+            here = tuple(self.at[k] + along * axes[0][k] for k in range(3))
+            yield Spot(f"{self.name}-{i}", self.between, (here[0], here[1], here[2]), axes)
+
+    @property
+    def _settings(self) -> dict[str, Any]:
+        return {"prestressed": True}
+
+
+AnyShape = Annotated[
+    Wedge | Cylinder | Asymmetric | SplitRing | Shroud,
+    Field(discriminator="shape"),
+]
+SHAPES: dict[str, type[_Shape]] = {
+    each.SHAPE: each for each in (Wedge, Cylinder, Asymmetric, SplitRing, Shroud)
+}
+WITH_BODY = tuple(word for word, each in SHAPES.items() if issubclass(each, _Underplatform))
+"""The shapes that are bodies."""

@@ -1,0 +1,175 @@
+"""What is wrong with bodies, nodes, loads and contacts in space, on the plain tables and lists of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain, islice
+from typing import Any
+
+from solver.contacts.fields import GROUND, parse_end
+from solver.contacts.laws.registry import DEFAULT, laws
+from solver.errors import Issue
+from solver.scene.bodies.shapes import WITH_BODY
+from solver.scene.validation import (
+    MOST_ISSUES,
+    RESERVED_PREFIXES,
+    between_keys,
+    dofs_of,
+    duplicates,
+    in_space,
+    listing,
+    nearest,
+    pointer_of,
+    quoted,
+    rows_of,
+    unknown_dof,
+)
+
+_Steps = list[int | str]
+_Dofs = dict[str, None] | None
+
+
+def further_ends(law: object) -> tuple[str, ...]:
+    """The keys of ends beside `between` that a contact of a law needs unless it is one in space."""
+    known = laws().get(DEFAULT if law is None else str(law))
+    return () if known is None else known.NEEDED_ENDS
+
+
+def body_issues(raw: dict[str, Any]) -> list[Issue]:
+    """Unknown bodies, nodes and DOFs, names taken twice, ends without a position."""
+    dofs = dofs_of(raw)
+    structure = raw.get("structure")
+    structure = structure if isinstance(structure, dict) else {}
+    found = chain(
+        _name_issues(raw, structure.get("kind") == "cyclic"),
+        _node_issues(raw, structure),
+        _load_issues(raw, dofs),
+        *(_contact_issues(steps, row, raw, structure, dofs) for steps, row in rows_of(raw, "contacts")),
+        *(
+            _end_issues([*steps, "between"], {**row, "normal": True}, structure, _places(raw), dofs)
+            for steps, row in rows_of(raw, "dampers")
+        ),
+    )
+    return list(islice(found, MOST_ISSUES))
+
+
+def _named(raw: dict[str, Any], *tables: str) -> list[tuple[_Steps, str]]:
+    rows = [row for table in tables for row in rows_of(raw, table)]
+    return [([*steps, "name"], row["name"]) for steps, row in rows if isinstance(row.get("name"), str)]
+
+
+def _places(raw: dict[str, Any]) -> list[str]:
+    """Names of everything with a position."""
+    shapes = [row.get("name") for _, row in rows_of(raw, "dampers") if row.get("shape") in WITH_BODY]
+    dampers = [name for _, name in _named(raw, "dampers") if name in shapes]
+    return [*(name for _, name in _named(raw, "bodies", "nodes")), *dampers]
+
+
+def _name_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
+    """Names of bodies, nodes and loads that are taken, reserved, or of a sector."""
+    named = _named(raw, "bodies", "nodes", "loads", "dampers")
+    yield from duplicates(named, "bodies, nodes, loads and dampers")
+    contacts = [row.get(key) for _, row in rows_of(raw, "contacts") for key in ("name", "group")]
+    for steps, name in named:
+        pointer = pointer_of(steps)
+        if name in contacts:
+            message = f"`name` = {name!r} is that of a contact or its group: parameter paths need one owner"
+            yield Issue(pointer=pointer, message=message)
+        if name in (*RESERVED_PREFIXES, GROUND):
+            yield Issue(pointer=pointer, message=f"`name` = {name!r} is reserved: give it another name")
+        if cyclic and "@" in name:
+            yield Issue(pointer=pointer, message=f"`name` = {name!r}: no '@' in a cyclic scene")
+
+
+def _node_issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
+    own = dofs_of({"structure": structure})
+    for steps, row in rows_of(raw, "nodes"):
+        dofs = row.get("dofs")
+        pairs = dofs.items() if isinstance(dofs, dict) else ()
+        for component, dof in pairs:
+            if own is not None and isinstance(dof, str) and dof not in own:
+                message = unknown_dof(str(component), dof, dof, list(own))
+                yield Issue(pointer=pointer_of([*steps, "dofs", component]), message=message)
+
+
+def _load_issues(raw: dict[str, Any], dofs: _Dofs) -> Iterator[Issue]:
+    known = _places(raw)
+    for steps, row in rows_of(raw, "loads"):
+        dof, on = row.get("dof"), row.get("on")
+        if isinstance(dof, str) and dofs is not None and dof not in dofs:
+            message = unknown_dof("dof", dof, dof, list(dofs))
+            yield Issue(pointer=pointer_of([*steps, "dof"]), message=message)
+        if isinstance(on, str) and on not in known:
+            yield Issue(pointer=pointer_of([*steps, "on"]), message=_unknown_place("on", on, known, dofs))
+
+
+def _contact_issues(
+    steps: _Steps, row: dict[str, Any], raw: dict[str, Any], structure: dict[str, Any], dofs: _Dofs
+) -> Iterator[Issue]:
+    law = row.get("law")
+    if not in_space(row):
+        for key in further_ends(law):
+            if row.get(key) is None:
+                message = f"`{key}` is missing: a contact with the law `{law}` needs it"
+                yield Issue(pointer=pointer_of([*steps, key]), message=message)
+        return
+    given = "normal" if row.get("motions") is None else "motions"
+    for key in between_keys()[1:]:
+        if row.get(key) is not None:
+            message = f"`{key}` and `{given}` exclude each other: `{given}` says how the contact moves"
+            yield Issue(pointer=pointer_of([*steps, key]), message=message)
+    known = _places(raw)
+    if given == "motions":
+        yield from _motion_issues(steps, row, structure.get("kind") == "cyclic", dofs)
+        known += list(dofs or ())
+    yield from _end_issues([*steps, "between"], row, structure, known, dofs)
+
+
+def _end_issues(
+    steps: _Steps, row: dict[str, Any], structure: dict[str, Any], known: list[str], dofs: _Dofs
+) -> Iterator[Issue]:
+    ends = row.get("between")
+    if not (isinstance(ends, list) and len(ends) == 2 and all(isinstance(end, str) for end in ends)):
+        return
+    cyclic = structure.get("kind") == "cyclic"
+    if ends[0] == ends[1]:
+        message = f"`between` must join two different ends, got {ends!r}"
+        yield Issue(pointer=pointer_of(steps), message=message)
+    elif all(parse_end(end).next for end in ends):
+        message = f"`between` must have one end in this sector, got {ends!r}"
+        yield Issue(pointer=pointer_of(steps), message=message)
+    for i, text in enumerate(ends):
+        end, pointer = parse_end(text), pointer_of([*steps, i])
+        if end.dof is not None and end.dof not in known:
+            yield Issue(pointer=pointer, message=_unknown_place("between", end.dof, known, dofs))
+        if end.next and not cyclic:
+            message = f"`between`: {text!r} needs a cyclic structure; this one has no next sector"
+            yield Issue(pointer=pointer, message=message)
+        elif end.next and row.get("normal") is not None and structure.get("axis") is None:
+            message = (
+                f"`between`: {text!r} lies in the next sector, which is turned: "
+                "give the direction of the axis as `axis` of the structure"
+            )
+            yield Issue(pointer=pointer, message=message)
+
+
+def _motion_issues(steps: _Steps, row: dict[str, Any], cyclic: bool, dofs: _Dofs) -> Iterator[Issue]:
+    motions = row.get("motions")
+    for i, motion in enumerate(motions if isinstance(motions, list) else []):
+        for text in motion if isinstance(motion, dict) else ():
+            pointer, end = pointer_of([*steps, "motions", i, str(text)]), parse_end(str(text))
+            if dofs is not None and end.dof not in dofs:
+                message = unknown_dof("motions", str(text), str(end.dof), list(dofs))
+                yield Issue(pointer=pointer, message=message)
+            elif end.next and not cyclic:
+                message = f"`motions`: {text!r} needs a cyclic structure; this one has no next sector"
+                yield Issue(pointer=pointer, message=message)
+
+
+def _unknown_place(key: str, name: str, known: list[str], dofs: _Dofs) -> str:
+    if dofs is not None and name in dofs:
+        return (
+            f"`{key}`: {quoted(name)} is a DOF and has no position: "
+            "name a body, or a node ([[nodes]] with `at` and `dofs`)"
+        )
+    return f"`{key}`: there is no body or node {quoted(name)}; known: {listing(known)}{nearest(name, known)}"

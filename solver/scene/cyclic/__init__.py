@@ -1,0 +1,1 @@
+"""Cyclic scenes: the whole annulus, and what is wrong with mistuning and wave patterns."""

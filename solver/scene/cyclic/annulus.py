@@ -1,0 +1,327 @@
+"""The whole annulus of a cyclic scene as a lumped scene: every sector with its own degrees of freedom.
+
+One sector stands for all where the disk is tuned and everything on it is one travelling wave. Otherwise the
+annulus is written out: `sectors_needed` says which it is and why, `written_out` does it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeVar
+
+from solver.errors import SettingError
+from solver.results.told import Piece
+from solver.scene.bodies.kinematics import forms_of, written_form
+from solver.scene.scene import (
+    AnyContact,
+    Body,
+    ContactOfAnyLaw,
+    CyclicStructure,
+    Damper,
+    Excitation,
+    Load,
+    LumpedStructure,
+    Mass,
+    Node,
+    Observe,
+    Scene,
+    Spring,
+    parse_end,
+)
+from solver.scene.validation import listing
+
+_JoinT = TypeVar("_JoinT", Spring, Damper)
+_NamedT = TypeVar("_NamedT", Spring, Damper, Mass)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Extent(Piece):
+    """How many sectors a scene has to be solved with, and why.
+
+    Attributes
+    ----------
+    sectors : int
+        1 where one sector (or the lumped structure itself) is enough, else all.
+    reason : str
+        In words and numbers.
+    assumed : bool
+        One sector stands for all only if the response is the travelling wave, which the laws of the contacts
+        do not make the only one.
+    """
+
+    sectors: int
+    reason: str
+    assumed: bool = False
+
+
+def sectors_needed(scene: Scene) -> Extent:
+    """Return how many sectors a scene has to be solved with.
+
+    A standing wave of an engine order i is a travelling one as well where 2 i is a multiple of the number of
+    sectors: then every sector is in phase or in antiphase with its neighbour.
+    """
+    structure, order = scene.structure, scene.engine_order
+    if not isinstance(structure, CyclicStructure):
+        given = "lumped" if isinstance(structure, LumpedStructure) else "given by its matrices"
+        return Extent(sectors=1, reason=f"the structure is {given}, it has no sectors")
+    n = structure.sectors
+    factors = structure.mistuning.factors(n) if structure.mistuning is not None else (1.0,)
+    least, most = min(factors), max(factors)
+    if least != 1.0 or most != 1.0:
+        reason = f"the disk is mistuned by factors from {least:.4g} to {most:.4g}: all {n} sectors are solved"
+        return Extent(sectors=n, reason=reason)
+    if _standing(scene) and (2 * order) % n:
+        reason = (
+            f"the excitation is a standing wave of engine order {order}, which friction does not let stand "
+            f"for every sector alike: all {n} sectors are solved"
+        )
+        return Extent(sectors=n, reason=reason)
+    if "@" in scene.observe.dof:
+        reason = f"one sector is observed by its number ({scene.observe.dof}): all {n} sectors are solved"
+        return Extent(sectors=n, reason=reason)
+    reason = (
+        f"the disk is tuned and the excitation a travelling wave of engine order {order}: "
+        f"one sector stands for all {n}"
+    )
+    loose = [c.name for c in scene.contacts if not c.keeps_together]
+    if not loose or n == 1:
+        return Extent(sectors=1, reason=reason)
+    reason += (
+        f", assumed, not proven: with the law of {listing(loose)} the sectors may also move otherwise than "
+        "in that wave, and the wave be unstable; the effect every-sector solves all of them"
+    )
+    return Extent(sectors=1, reason=reason, assumed=True)
+
+
+def written_out(scene: Scene, *, every_sector: bool = False) -> Scene:
+    """Return the annulus of a scene that one sector does not stand for, under its own name; else itself.
+
+    With `every_sector` a disk is written out whether it needs to be or not.
+    """
+    if not isinstance(scene.structure, CyclicStructure):
+        return scene
+    if sectors_needed(scene).sectors == 1 and not every_sector:
+        return scene
+    return annulus(scene).model_copy(update={"name": scene.name})
+
+
+def check_in_annulus(scene: Scene, path: str) -> None:
+    """Raise SettingError if `path` of a cyclic scene is not one value in its annulus.
+
+    A contact's load has a phase (in a standing wave, an amplitude) of its own in every sector: set it in
+    the scene, there it stands for all sectors.
+    """
+    owner, _, key = path.rpartition(".")
+    differs = ("N1", "N1_ratio") if _standing(scene) else ("N1_phase",)
+    if owner != "structure" and key in differs:
+        reason = sectors_needed(scene).reason
+        raise SettingError(
+            "path",
+            path,
+            f"differs from sector to sector and cannot be continued in: {reason}; set it instead",
+        )
+
+
+def annulus(scene: Scene) -> Scene:
+    """Write a cyclic scene out as a lumped one, sector by sector.
+
+    DOF ``tip`` of sector j is ``tip@j``, contact ``shroud`` becomes ``shroud@j`` in the group ``shroud``
+    (or in the group it had), a named spring ``k`` becomes ``k@j`` in the group ``k``, times
+    the sector's factor of the mistuning. In a travelling wave sector j has
+    harmonic * engine_order * j * 2 pi / sectors added to the phase of its forces and
+    engine_order * j * 2 pi / sectors to that of its loads; in a standing wave the amplitudes are multiplied
+    by the cosines of these angles instead. What joins a sector to itself (one sector only)
+    never moves and is left out. Observed is sector 0, or the one that the scene names.
+
+    Raises
+    ------
+    SettingError
+        The scene is not cyclic.
+    """
+    structure = scene.structure
+    if not isinstance(structure, CyclicStructure):
+        raise SettingError("scene", scene.name, "must have a cyclic structure to be written out")
+    n, sectors = structure.sectors, range(structure.sectors)
+    order, standing = scene.engine_order, _standing(scene)
+    scaled = [_mistuned(structure, factor) for factor in _factors(structure)]
+    observed = scene.observe.dof
+    return Scene(
+        name=f"{scene.name}-annulus"[:100],
+        structure=LumpedStructure(
+            kind="lumped",
+            stiffness_proportional_damping=structure.stiffness_proportional_damping,
+            masses=tuple(_mass(mass, j) for j in sectors for mass in scaled[j].masses),
+            springs=tuple(_renamed(s, j) for j in sectors for s in _joining(scaled[j].springs, j, n)),
+            dampers=tuple(_renamed(d, j) for j in sectors for d in _joining(scaled[j].dampers, j, n)),
+        ),
+        contacts=tuple(
+            _contact(c, j, _turn(order * j, n), standing=standing)
+            for j in sectors
+            for c in _placed(scene, j, n)
+        ),
+        excitation=tuple(
+            _force(e, j, _turn(e.harmonic * order * j, n), standing=standing)
+            for j in sectors
+            for e in scene.excitation
+        ),
+        observe=Observe(
+            dof=observed if "@" in observed else _in_sector(observed, 0), band=scene.observe.band
+        ),
+        bodies=tuple(_body(b, j) for j in sectors for b in scene.bodies),
+        nodes=tuple(_node(node, j) for j in sectors for node in scene.nodes),
+        loads=tuple(_load(load, j) for j in sectors for load in scene.loads),
+        speed=scene.speed,
+    )
+
+
+def _standing(scene: Scene) -> bool:
+    return any(force.pattern == "standing" for force in scene.excitation)
+
+
+def _factors(structure: CyclicStructure) -> tuple[float, ...]:
+    mistuning = structure.mistuning
+    return (1.0,) * structure.sectors if mistuning is None else mistuning.factors(structure.sectors)
+
+
+def _mistuned(structure: CyclicStructure, factor: float) -> CyclicStructure:
+    """The structure with `factor` on every part that the mistuning names."""
+    if structure.mistuning is None:
+        return structure
+    of = structure.mistuning.of
+    parts: tuple[Mass | Spring | Damper, ...] = (*structure.masses, *structure.springs, *structure.dampers)
+    dofs = set(of) - {part.name for part in parts}
+    return structure.model_copy(
+        update={
+            "masses": tuple(
+                _scaled(m, {"m": factor * m.m}, factor) if m.name in of or m.dof in dofs else m
+                for m in structure.masses
+            ),
+            "springs": tuple(
+                _scaled(s, {"k": factor * s.k}, factor) if s.name in of else s for s in structure.springs
+            ),
+            "dampers": tuple(
+                _scaled(d, {"c": factor * d.c}, factor) if d.name in of else d for d in structure.dampers
+            ),
+        }
+    )
+
+
+def _scaled(part: _NamedT, value: dict[str, float], factor: float) -> _NamedT:
+    named = {} if part.name is None or factor == 1.0 else {"factor": factor}
+    return part.model_copy(update={**value, **named})
+
+
+def _in_sector(name: str, j: int) -> str:
+    return f"{name}@{j}"
+
+
+def _end(text: str, j: int, n: int) -> str:
+    end = parse_end(text)
+    return text if end.dof is None else _in_sector(end.dof, (j + 1) % n if end.next else j)
+
+
+def _joining(parts: tuple[_JoinT, ...], j: int, n: int) -> tuple[_JoinT, ...]:
+    """The parts of sector j between their ends in the annulus."""
+    placed = [(part, (_end(part.between[0], j, n), _end(part.between[1], j, n))) for part in parts]
+    return tuple(part.model_copy(update={"between": ends}) for part, ends in placed if ends[0] != ends[1])
+
+
+def _placed(scene: Scene, j: int, n: int) -> tuple[ContactOfAnyLaw, ...]:
+    """The contacts of sector j between their ends in the annulus."""
+    placed = []
+    for contact in scene.contacts:
+        in_space = contact.normal is not None or contact.motions is not None
+        update, moving = _moving(scene, contact, j, n) if in_space else _between(contact, j, n)
+        if any(moving) and not all(moving):
+            wanted = f"must have two sectors or more: `{contact.name}` joins one to itself in one direction"
+            raise SettingError("sectors", n, wanted)
+        if any(moving):
+            placed.append(contact.model_copy(update=update))
+    return tuple(placed)
+
+
+def _between(contact: AnyContact, j: int, n: int) -> tuple[dict[str, object], list[bool]]:
+    """The ends of a contact in sector j, and whether each pair can move apart."""
+    pairs = {
+        key: (_end(pair[0], j, n), _end(pair[1], j, n))
+        for key, pair in zip(contact.end_keys, contact.pairs, strict=True)
+    }
+    return dict(pairs), [ends[0] != ends[1] for ends in pairs.values()]
+
+
+def _moving(scene: Scene, contact: AnyContact, j: int, n: int) -> tuple[dict[str, object], list[bool]]:
+    """The same of one in space, whose motions are written out: each sector has its own axes."""
+    motions = []
+    for form in forms_of(scene, contact):
+        sums: dict[str, float] = {}
+        for text, factor in written_form(form):
+            dof = _end(text, j, n)
+            sums[dof] = sums.get(dof, 0.0) + factor
+        motions.append(tuple((dof, factor) for dof, factor in sums.items() if factor != 0.0))
+    ends = tuple(_end(text, j, n) for text in contact.between)
+    update: dict[str, object] = {
+        "between": ends,
+        "motions": tuple(motions),
+        "at": None,
+        "normal": None,
+        "tangents": None,
+    }
+    return update, [bool(motion) for motion in motions]
+
+
+def _body(body: Body, j: int) -> Body:
+    return body.model_copy(update={"name": _in_sector(body.name, j), "group": body.group or body.name})
+
+
+def _node(node: Node, j: int) -> Node:
+    dofs = tuple((component, _in_sector(dof, j)) for component, dof in node.dofs)
+    return node.model_copy(update={"name": _in_sector(node.name, j), "dofs": dofs})
+
+
+def _load(load: Load, j: int) -> Load:
+    places = {key: _in_sector(place, j) for key in ("dof", "on") if (place := getattr(load, key))}
+    named = {} if load.name is None else {"name": _in_sector(load.name, j)}
+    return load.model_copy(update={**places, **named})
+
+
+def _renamed(part: _NamedT, j: int) -> _NamedT:
+    if part.name is None:
+        return part
+    return part.model_copy(update={"name": _in_sector(part.name, j), "group": part.name})
+
+
+def _mass(mass: Mass, j: int) -> Mass:
+    return _renamed(mass, j).model_copy(update={"dof": _in_sector(mass.dof, j)})
+
+
+def _contact(contact: ContactOfAnyLaw, j: int, turn: float, *, standing: bool) -> ContactOfAnyLaw:
+    update: dict[str, object] = {
+        "name": _in_sector(contact.name, j),
+        "group": contact.group or contact.name,
+    }
+    update |= contact.in_sector(turn, _cosine(turn) if standing else None)
+    return contact.model_copy(update=update)
+
+
+def _force(force: Excitation, j: int, turn: float, *, standing: bool) -> Excitation:
+    return force.model_copy(
+        update={
+            "dof": _in_sector(force.dof, j),
+            "phase": force.phase + (0.0 if standing else turn),
+            "amplitude": force.amplitude * (_cosine(turn) if standing else 1.0),
+            "engine_order": None,
+            "pattern": None,
+        }
+    )
+
+
+def _turn(steps: int, n: int) -> float:
+    """Angle of `steps` sectors [rad], whole turns left out."""
+    return 2.0 * math.pi * (steps % n) / n
+
+
+def _cosine(angle: float) -> float:
+    """The cosine, with the nodes of a standing wave at exactly 0."""
+    value = math.cos(angle)
+    return value if abs(value) > 1e-15 else 0.0

@@ -1,0 +1,245 @@
+"""Where the highest of several tracked peaks is least: between rows by cubics, then by solving.
+
+Between two places the height of every line is the cubic through its values and slopes there. The least
+maximum of the cubics is the next place, the bracket shrinks to the side the highest line falls towards, and
+the cubics become exact: it converges faster than linearly at a smooth minimum and at a crossing alike.
+
+The highest line may have several minima. Those whose cubics are nearly as low as the lowest are solved too,
+so that the cubics do not decide between them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import brentq
+
+from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, Z
+from solver.jit.fourier import Real
+
+if TYPE_CHECKING:
+    from solver.studies.peaks.tracker import Tracker
+
+NEAR_THE_TOP = 0.95  # share of the envelope from which a line may be the highest within a bracket
+SHARP = 1e-12  # of the range, where the search ends
+DOUBT = 0.01  # relative error that is allowed for where cubics tell which minimum is lower
+EVEN = 1e-9  # relative change over the range up to which a peak does not depend on the parameter
+RISE = 1e-4  # relative height of what has to lie between two minima that are told apart
+LEVEL = 1e-8  # relative change of the peak over the range that is none
+_MOST = 60
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lowest:
+    """The place of a least highest peak.
+
+    Attributes
+    ----------
+    z : float
+        Where.
+    rows : mapping of line to row
+        The lines near the top there, solved, the highest first; empty if they are not solved.
+    height : float
+        The highest line there [m].
+    bracketed : bool
+        It falls towards there from both sides, as far as there is a range.
+    """
+
+    z: float
+    rows: Mapping[int, Real]
+    height: float
+    bracketed: bool
+
+    @property
+    def solved(self) -> bool:
+        """Whether the lines are solved there, rather than read from their cubics."""
+        return bool(self.rows)
+
+
+def flat(tracker: Tracker) -> bool:
+    """Return whether the highest line is everywhere, and does not depend on the parameter."""
+    heights = tracker.envelope(tracker.places())
+    return bool(np.isfinite(heights).all() and np.ptp(heights) <= EVEN * heights.max())
+
+
+def minima(tracker: Tracker, doubt: float = DOUBT, most: int | None = None) -> list[Lowest]:
+    """Return the minima of the highest line over the range, lowest first; the low ones are solved.
+
+    Empty where no line is. Minima with no rise between them count as one; of a peak that does not depend on
+    the parameter the place of the first sweep is returned.
+
+    Parameters
+    ----------
+    doubt : relative height above the lowest up to which a minimum is solved for.
+    most : how many are solved for at most; all of those if left out.
+    """
+    if not tracker.lines:
+        return []
+    if flat(tracker):
+        rows = rows_at(tracker, tracker.looks[0].z)
+        if rows:
+            top = next(iter(rows.values()))
+            height = float(top[HEIGHT])
+            return [Lowest(z=tracker.looks[0].z, rows=rows, height=height, bracketed=True)]
+    z = tracker.places()
+    heights = tracker.envelope(z)
+    heights[~np.isfinite(heights)] = np.inf
+    before, after = np.append(np.inf, heights[:-1]), np.append(heights[1:], np.inf)
+    at = np.flatnonzero((heights < before) & (heights <= after))
+    kept: list[int] = []
+    for index in at[np.argsort(heights[at], kind="stable")]:
+        if all(_apart(heights, int(index), other) for other in kept):
+            kept.append(int(index))
+    # A line that only shows that it is high enough has no minima of a peak.
+    kept = kept[:1] + [index for index in kept[1:] if heights[index] < tracker.enough]
+    if not kept:
+        return []
+    limit, found, rest = heights[kept[0]] * (1.0 + doubt), [], []
+    for rank, index in enumerate(kept):
+        if heights[index] <= limit and (most is None or rank < most):
+            found.append(_solved(tracker, z, heights, index))
+        elif not found or heights[index] < min(one.height for one in found):
+            # What was lower by the cubics is higher: this may be the lowest.
+            found.append(_solved(tracker, z, heights, index))
+        else:
+            rest.append(Lowest(z=float(z[index]), rows={}, height=float(heights[index]), bracketed=False))
+    return sorted(found + rest, key=lambda one: one.height)
+
+
+def _apart(heights: Real, one: int, other: int) -> bool:
+    """Return whether the highest line rises between two places, above both."""
+    low, high = min(one, other), max(one, other)
+    return bool(heights[low : high + 1].max() > max(heights[one], heights[other]) * (1.0 + RISE))
+
+
+def _solved(tracker: Tracker, z: Real, heights: Real, index: int) -> Lowest:
+    """Return a minimum of the highest line near a place, solved if that succeeds."""
+    low, high = float(z[max(index - 1, 0)]), float(z[min(index + 1, z.size - 1)])
+    near = [
+        number
+        for number, line in enumerate(tracker.lines)
+        if np.any(line.heights(z[[index]]) >= NEAR_THE_TOP * heights[index])
+    ]
+    unsolved = Lowest(z=float(z[index]), rows={}, height=float(heights[index]), bracketed=False)
+    rows, bracketed = _search(tracker, near, float(z[index]), low, high)
+    if not rows:
+        return unsolved
+    top = next(iter(rows.values()))
+    if top[HEIGHT] < tracker.envelope(top[[Z]])[0] * (1.0 - RISE):
+        # A line that is higher ends there: what is low lies beyond its end.
+        rows = _solve(tracker, near, float(z[index]))
+        if not rows:
+            return unsolved
+        top, bracketed = next(iter(rows.values())), False
+    return Lowest(z=float(top[Z]), rows=rows, height=float(top[HEIGHT]), bracketed=bracketed)
+
+
+def _search(
+    tracker: Tracker, near: list[int], best: float, low: float, high: float
+) -> tuple[dict[int, Real], bool]:
+    """Close the bracket [low, high] on the least maximum of the lines `near`.
+
+    Returns
+    -------
+    The rows there, and whether the highest line falls towards it from both sides.
+    """
+    left, right = (_solve(tracker, near, place) for place in (low, high))
+    if not left or not right:
+        return _solve(tracker, near, best), False
+    left, right = _widened(tracker, near, left, right)
+    before = math.inf
+    for turn in range(_MOST):
+        z = _least(left, right) if turn % 4 < 3 else 0.5 * (_place(left) + _place(right))
+        if abs(z - before) <= SHARP * tracker.scale.span or not _place(left) < z < _place(right):
+            nearer = min((left, right), key=lambda side: abs(_place(side) - z))
+            return nearer, _falls(tracker, left, 1.0) and _falls(tracker, right, -1.0)
+        rows = _solve(tracker, near, z)
+        if not rows:
+            break
+        if next(iter(rows.values()))[DHEIGHT] > 0.0:
+            right = rows
+        else:
+            left = rows
+        before = z
+    return min((left, right), key=lambda side: next(iter(side.values()))[HEIGHT]), False
+
+
+def _falls(tracker: Tracker, rows: dict[int, Real], way: float) -> bool:
+    """Return whether the highest line falls (or is level) one way (1: upward), or the range ends."""
+    end = tracker.scale.low if way > 0.0 else tracker.scale.high
+    top = next(iter(rows.values()))
+    return bool(top[Z] == end or way * top[DHEIGHT] * tracker.scale.span <= LEVEL * top[HEIGHT])
+
+
+def _widened(
+    tracker: Tracker, near: list[int], left: dict[int, Real], right: dict[int, Real]
+) -> tuple[dict[int, Real], dict[int, Real]]:
+    """Move a bracket downhill until both ends rise outward, or the lines end."""
+    for _ in range(_MOST):
+        width = _place(right) - _place(left)
+        if next(iter(right.values()))[DHEIGHT] < 0.0:
+            beyond = min(_place(right) + 2.0 * width, max(tracker.lines[index].high for index in right))
+            rows = _solve(tracker, near, beyond) if beyond > _place(right) else {}
+            if not rows:
+                break
+            left, right = right, rows
+        elif next(iter(left.values()))[DHEIGHT] > 0.0:
+            beyond = max(_place(left) - 2.0 * width, min(tracker.lines[index].low for index in left))
+            rows = _solve(tracker, near, beyond) if beyond < _place(left) else {}
+            if not rows:
+                break
+            left, right = rows, left
+        else:
+            break
+    return left, right
+
+
+def _place(rows: Mapping[int, Real]) -> float:
+    """Return where rows are."""
+    return float(next(iter(rows.values()))[Z])
+
+
+def _solve(tracker: Tracker, near: list[int], z: float) -> dict[int, Real]:
+    """Return the solved rows at z of the lines that reach it, the highest first."""
+    rows = {index: tracker.exact(tracker.lines[index], z, fitting=False) for index in near}
+    found = [(index, row) for index, row in rows.items() if row is not None]
+    return dict(sorted(found, key=lambda item: -float(item[1][HEIGHT])))
+
+
+def rows_at(tracker: Tracker, z: float) -> dict[int, Real]:
+    """Return the solved rows at z of all lines that reach it, the highest first."""
+    return _solve(tracker, list(range(len(tracker.lines))), z)
+
+
+def _least(left: Mapping[int, Real], right: Mapping[int, Real]) -> float:
+    """Return where the highest of the cubics between two sets of rows is least."""
+    both = [(left[index], right[index]) for index in left if index in right]
+    low, high = _place(left), _place(right)
+    if not both:
+        return 0.5 * (low + high)
+    length = high - low
+    cubics = [
+        (float(a[HEIGHT]), length * float(a[DHEIGHT]), float(b[HEIGHT]), length * float(b[DHEIGHT]))
+        for a, b in both
+    ]
+    if _top_slope(0.0, cubics) >= 0.0:
+        return low
+    if _top_slope(1.0, cubics) <= 0.0:
+        return high
+    # The slope jumps where lines cross: a bracketing method finds that as well as a root.
+    return low + float(brentq(_top_slope, 0.0, 1.0, args=(cubics,), xtol=1e-16)) * length
+
+
+def _top_slope(t: float, cubics: list[tuple[float, float, float, float]]) -> float:
+    """Return the slope of the highest cubic at the share t; heights and slopes by the share at both ends."""
+    top, slope, r = -math.inf, 0.0, 1.0 - t
+    for a, da, b, db in cubics:
+        value = (1.0 + 2.0 * t) * r * r * a + t * t * (3.0 - 2.0 * t) * b + t * r * (r * da - t * db)
+        if value > top:
+            top = value
+            slope = 6.0 * t * r * (b - a) + r * (1.0 - 3.0 * t) * da + t * (3.0 * t - 2.0) * db
+    return slope

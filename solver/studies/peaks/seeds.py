@@ -1,0 +1,162 @@
+"""Where lines begin and what follows from one: it leaves the band, and the amplitude at that end counts; or a
+peak comes in at an end of the band.
+
+A *crossing* is a place where a peak meets an end of the band. Each is followed once: a peak that comes in
+where a known line went out is that line.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from solver.balance.balance import Balance
+from solver.continuation.extrema.kernels.peak_continuation import HEIGHT, OMEGA, PLACE, SLOPE, Z
+from solver.jit import fourier
+from solver.jit.fourier import Integer, Real
+from solver.studies.peaks.track import Line, LineEnd
+
+CROSSING = 3.0  # smallest steps within which two crossings are one
+_HALVINGS = 12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seed:
+    """A peak from which a line is to be followed.
+
+    Attributes
+    ----------
+    z, omega : float
+        Where; rad/s.
+    u : (n_unknowns,) array
+        Slip motions near it [m].
+    sign, place : float
+        1 for a peak of max x, −1 for one of −min x, 0 for the larger; the instant τ of it (NaN: not known).
+    fixed : bool
+        The amplitude at an end of the band.
+    within : (float, float)
+        z as far as which it is followed at most.
+    height : float
+        m, as far as it is known (NaN).
+    """
+
+    z: float
+    omega: float
+    u: Real
+    sign: float
+    place: float
+    fixed: bool
+    within: tuple[float, float] = (-math.inf, math.inf)
+    height: float = math.nan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Crossing:
+    """Where a peak meets an end of the band."""
+
+    z: float
+    edge: float
+    sign: float
+
+    def same(self, other: Crossing, near: float) -> bool:
+        """Return whether another is the same; `near`: distance in z."""
+        return self.edge == other.edge and self.sign == other.sign and abs(self.z - other.z) <= near
+
+
+class Solves(Protocol):
+    """Solves a line between two of its rows; `solver.studies.peaks.tracker.Tracker`."""
+
+    def solved(self, line: Line, z: float, *, fitting: bool = True) -> tuple[Real, Real, Real] | None:
+        """Return row, solution and tangent."""
+        ...
+
+
+def leavings(line: Line, band: tuple[float, float]) -> list[Seed]:
+    """Return what counts from where a line leaves the band: the amplitude at that end of it."""
+    found = []
+    for end, row in zip(line.ends, (0, -1), strict=True):
+        if end is LineEnd.LEFT_BAND and not line.fixed:
+            numbers = line.rows[row]
+            found.append(
+                Seed(
+                    z=float(numbers[Z]), omega=nearest(band, float(numbers[OMEGA])),
+                    u=line.solutions[row].copy(), sign=line.sign, place=float(numbers[PLACE]), fixed=True,
+                    height=float(numbers[HEIGHT]),
+                )
+            )  # fmt: skip
+    return found
+
+
+def crossings(line: Line, band: tuple[float, float]) -> list[Crossing]:
+    """Return where a line leaves the band."""
+    return [Crossing(z=seed.z, edge=seed.omega, sign=seed.sign) for seed in leavings(line, band)]
+
+
+def entries(line: Line, band: tuple[float, float], solves: Solves, closest: float) -> list[Seed]:
+    """Return the peaks that come in along an end of the band: where its amplitude begins to fall outward.
+
+    Parameters
+    ----------
+    line : the amplitude at an end of the band.
+    closest : z as near as which a crossing is found.
+    """
+    outward = 1.0 if line.rows[0, OMEGA] > 0.5 * sum(band) else -1.0
+    inside = line.rows[:, SLOPE] * outward < 0.0
+    found = []
+    for left in np.flatnonzero(np.diff(inside)):
+        inner = int(left) + 1 if inside[left + 1] else int(left)
+        places = {row: (line.rows[row], line.solutions[row]) for row in (int(left), int(left) + 1)}
+        known, other = places.pop(inner), places.popitem()[1]
+        for _ in range(_HALVINGS):
+            if abs(known[0][Z] - other[0][Z]) <= closest:
+                break
+            place = solves.solved(line, 0.5 * float(known[0][Z] + other[0][Z]), fitting=False)
+            if place is None:
+                break
+            if place[0][SLOPE] * outward < 0.0:
+                known = place[0], place[1]
+            else:
+                other = place[0], place[1]
+        row, solution = known
+        found.append(
+            Seed(
+                z=float(row[Z]), omega=float(row[OMEGA]), u=solution.copy(), sign=line.sign,
+                place=float(row[PLACE]), fixed=False, height=float(row[HEIGHT]),
+            )
+        )  # fmt: skip
+    return found
+
+
+def nearest(band: tuple[float, float], omega: float) -> float:
+    """Return the end of the band that is nearer."""
+    return min(band, key=lambda edge: abs(edge - omega))
+
+
+def passes(lines: Sequence[Line], seed: Seed, near: float, about: float) -> bool:
+    """Return whether a line of the same kind passes within relative distances of frequency and height."""
+    here = np.array([seed.z])
+    return any(
+        line.fixed == seed.fixed
+        and line.sign == seed.sign
+        and abs(line.frequencies(here)[0] - seed.omega) <= near * seed.omega
+        and abs(line.heights(here)[0] - seed.height) <= about * seed.height
+        for line in lines
+    )
+
+
+def fitted(solution: Real, ks: Integer, balance: Balance) -> Real:
+    """Return a solution with harmonics `ks` in those of `balance`."""
+    mine, n = balance.system.ks, balance.n_coefficients
+    if np.array_equal(ks, mine):
+        return solution.copy()
+    top = int(max(ks[-1], mine[-1]))
+    full = fourier.to_full(solution.reshape(-1, 2 * ks.size - int(ks[0] == 0)), ks, top)
+    columns = [0] if mine[0] == 0 else []
+    for k in mine[mine > 0]:
+        columns += [2 * int(k) - 1, 2 * int(k)]
+    found: Real = np.ascontiguousarray(full[:, columns]).reshape(-1)
+    return found if found.size == n * (balance.n_unknowns // max(n, 1)) else solution.copy()

@@ -1,0 +1,231 @@
+"""Followed peaks and sweeps as data: lines over a parameter, looks at one value of it, how close to follow.
+
+Between its rows a line is the cubic through exact values and slopes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from solver.balance.balance import build
+from solver.balance.simplifications import Effects
+from solver.balance.workspace import Workspace
+from solver.continuation.branch import Branch, Peak
+from solver.continuation.branches.sweep import sweep, walk
+from solver.continuation.extrema.candidates import Rival, crests
+from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, DOMEGA, HEIGHT, OMEGA, Z
+from solver.continuation.segment import Stretch
+from solver.continuation.settings import ContinuationSettings
+from solver.jit.fourier import Integer, Real
+from solver.scene.scene import Scene
+from solver.studies.peaks.results import TrackStatus
+from solver.studies.peaks.work_limit import Allowance, HaltedError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pace:
+    """How closely peaks are followed.
+
+    Attributes
+    ----------
+    first_step, largest_step, smallest_step : float
+        Shares of the range.
+    height_error, omega_error : float
+        Relative errors of the trapezoidal rule allowed in a step.
+    above : float
+        Where a line is higher than this times the least highest peak of a sweep so far, it only has to show
+        that it is; infinity: it is followed closely everywhere.
+    slack : float
+        Share of what it is higher by that its height may be wrong by then.
+    climb_from : float
+        Share of the range: step at which a peak that Newton's method does not find is looked for uphill.
+    """
+
+    first_step: float
+    largest_step: float
+    smallest_step: float
+    height_error: float
+    omega_error: float
+    above: float
+    slack: float
+    climb_from: float
+
+
+EVERYWHERE = Pace(
+    first_step=0.02, largest_step=0.125, smallest_step=1e-4, height_error=3e-3, omega_error=1e-3,
+    above=math.inf, slack=0.0, climb_from=math.inf,
+)  # fmt: skip
+
+
+class LineEnd(Enum):
+    """Why a line ends where it does; the value is what a user reads."""
+
+    ARRIVED = "the end of the range"
+    VANISHED = "the peak vanishes"
+    LEFT_BAND = "the peak leaves the band"
+    TOO_LONG = "too many steps"
+    NOT_FOUND = "not found again"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """One peak over the parameter, ascending in z (the parameter or its logarithm).
+
+    Attributes
+    ----------
+    rows : (P, COLUMNS) array
+        Columns named in `solver.continuation.extrema.kernels.peak_continuation`; derivatives are by z.
+    solutions, tangents : (P, n_unknowns) array
+        Slip motions [m] and their derivatives by z.
+    sign : float
+        1 for a peak of max x, −1 for one of −min x.
+    fixed : bool
+        The amplitude at an end of the band, not a stationary peak.
+    ends : (LineEnd, LineEnd)
+        Why it ends below and above.
+    """
+
+    rows: Real
+    solutions: Real
+    tangents: Real
+    sign: float
+    fixed: bool
+    ends: tuple[LineEnd, LineEnd]
+
+    @property
+    def low(self) -> float:
+        """Smallest z it covers."""
+        return float(self.rows[0, Z])
+
+    @property
+    def high(self) -> float:
+        """Largest z it covers."""
+        return float(self.rows[-1, Z])
+
+    def heights(self, z: Real) -> Real:
+        """Return the height by cubics between the rows; −inf beyond the line."""
+        return self._cubic(z, HEIGHT, DHEIGHT)
+
+    def frequencies(self, z: Real) -> Real:
+        """Return ω likewise [rad/s]."""
+        return self._cubic(z, OMEGA, DOMEGA)
+
+    def _cubic(self, z: Real, value: int, slope: int) -> Real:
+        rows = self.rows
+        if len(rows) == 1:
+            return np.where(z == rows[0, Z], rows[0, value], -np.inf)
+        right = np.clip(np.searchsorted(rows[:, Z], z), 1, len(rows) - 1)
+        a, b = rows[right - 1], rows[right]
+        length = b[:, Z] - a[:, Z]
+        t = (z - a[:, Z]) / length
+        r = 1.0 - t
+        cubic = (1.0 + 2.0 * t) * r * r * a[:, value] + t * t * (3.0 - 2.0 * t) * b[:, value]
+        cubic += t * r * length * (r * a[:, slope] - t * b[:, slope])
+        return np.where((z >= self.low) & (z <= self.high), cubic, -np.inf)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Glance:
+    """One walk over the band at one z with fewer harmonics, its peaks as near as its points are.
+
+    Attributes
+    ----------
+    z : float
+        Where.
+    crests : tuple of Rival
+        Peaks of max|x|, highest first.
+    ks : array of int
+        The harmonics kept.
+    iterations : int
+        Newton iterations spent.
+    """
+
+    z: float
+    crests: tuple[Rival, ...]
+    ks: Integer
+    iterations: int
+
+
+def glance_at(
+    z: float, scene: Scene, harmonics: int, effects: Effects | None, check: Callable[[], None]
+) -> Glance:
+    """Walk over the band of a scene; of a walk that does not reach its end the peaks met are returned.
+
+    Parameters
+    ----------
+    z : what the scene stands for.
+    check : called between stretches of the walk; it may raise to end it.
+    """
+    balance = build(scene, "frequency", harmonics=harmonics, frequency_hz=None, effects=effects)
+    low, high = scene.observe.band
+    stretches = []
+    for stretch in walk(Workspace.of(balance), low, high, ContinuationSettings()):
+        stretches.append(stretch)
+        check()
+    return Glance(
+        z=z,
+        crests=tuple(
+            crests(
+                np.concatenate([stretch.solutions for stretch in stretches]),
+                np.concatenate([stretch.measures for stretch in stretches]),
+            )
+        ),
+        ks=balance.system.ks,
+        iterations=stretches[-1].newton_iterations,
+    )
+
+
+def sweep_within(scene: Scene, harmonics: int, effects: Effects | None, allowance: Allowance) -> Branch:
+    """Sweep over the band of a scene; one that takes far longer than those before is left incomplete.
+
+    Raises
+    ------
+    HaltedError
+        The caller wants it to end.
+    """
+    spent, stopped = 0, False
+
+    def watch(stretch: Stretch) -> None:
+        nonlocal spent
+        spent = stretch.newton_iterations
+
+    def stop() -> bool:
+        nonlocal stopped
+        stopped = allowance.due()
+        return stopped or spent > allowance.longest
+
+    branch = sweep(scene, harmonics=harmonics, effects=effects, on_stretch=watch, should_stop=stop)
+    if stopped:
+        raise HaltedError(TrackStatus.STOPPED)
+    return branch
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Look:
+    """One sweep over the band at one z; surprising if it found what no line had reached.
+
+    Attributes
+    ----------
+    peaks : tuple of Peak
+        Those of the branch that count, highest first.
+    """
+
+    z: float
+    branch: Branch
+    surprising: bool
+    peaks: tuple[Peak, ...]
+
+    @property
+    def top(self) -> float:
+        """The highest peak [m]; −inf if there is none."""
+        return self.peaks[0].value if self.peaks else -math.inf
+
+    @property
+    def seen(self) -> bool:
+        """Whether the whole band was seen."""
+        return self.branch.completed and bool(self.peaks)

@@ -1,0 +1,364 @@
+"""Peaks of the frequency response as lines over a parameter: found by sweeps, followed by continuation.
+
+A tracked peak is an attained amplitude at every value of the parameter, so the highest of all lines bounds
+the highest peak from below everywhere; a sweep shows what no line has reached yet.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter, deque
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from solver.balance.simplifications import Effects
+from solver.contacts.kernels.system import System, by_reference
+from solver.contacts.laws.base import without_second
+from solver.continuation.branch import Peak
+from solver.continuation.extrema.candidates import Rival, rivals
+from solver.continuation.extrema.kernels import peak_continuation as kernel
+from solver.continuation.extrema.kernels.peak_continuation import (
+    COLUMNS,
+    HEIGHT,
+    OMEGA,
+    PLACE,
+    PROGRESS,
+    Ridge,
+    Z,
+    polish,
+    track,
+)
+from solver.continuation.extrema.kernels.peak_state import (
+    PAUSE,
+    SIGN,
+    SPENT,
+    Summit,
+    new_summit,
+    summit_numbers,
+    summit_seconds,
+)
+from solver.errors import SettingError
+from solver.jit.fourier import Integer, Real
+from solver.linear.contact_table import second_numbers
+from solver.scene.scene import Scene
+from solver.studies.peaks.seeds import (
+    CROSSING,
+    Crossing,
+    Seed,
+    crossings,
+    entries,
+    fitted,
+    leavings,
+    nearest,
+    passes,
+)
+from solver.studies.peaks.survey import SAME, Looking
+from solver.studies.peaks.track import EVERYWHERE, Glance, Line, LineEnd, Look, Pace
+from solver.studies.peaks.work_limit import Allowance
+
+Place = tuple[Real, Real, Real]  # row (COLUMNS,), solution and tangent (n_unknowns,) of a line at one z
+_MOST_ROWS = 600
+SUBDIVIDED = 6  # places between two rows at which the envelope is looked at
+ROUNDING = 1e-12
+ABOUT = 0.01  # relative height that a row that does not fit may lack
+CAREFUL = 3e-4  # share of the range: first step where lines are close
+AGAIN = 8  # times the peaks of one sweep are followed at most
+ENDING = 0.1  # of the first step: as short as steps become before a line ends
+EXACTLY = 1e-6  # relative distance within which a peak is one that was solved at the same place
+_AT_ONCE = 0.1  # s of following between two looks at the caller
+_FIRST_AT_ONCE = 64.0  # evaluations likewise, as long as nothing is known of their time
+
+
+_ENDS = {
+    kernel.ARRIVED: LineEnd.ARRIVED,
+    kernel.VANISHED: LineEnd.VANISHED,
+    kernel.LEFT_BAND: LineEnd.LEFT_BAND,
+    kernel.TOO_LONG: LineEnd.TOO_LONG,
+    kernel.NOT_FOUND: LineEnd.NOT_FOUND,
+}
+
+
+def check_laws(scene: Scene) -> None:
+    """Refuse contacts whose force has no exact second derivatives.
+
+    Raises
+    ------
+    SettingError
+        A contact with such a law.
+    """
+    others = without_second(scene.contacts)
+    if others:
+        wanted = f"has contacts whose law has no second derivatives, so its peaks are not tracked: {others}"
+        raise SettingError("scene", scene.name, f"{wanted}; use sweeps, or a map without the ridge")
+
+
+class Tracker(Looking):
+    """Sweeps and lines of one scene and parameter; the arrays of the compiled loops are its own."""
+
+    def __init__(
+        self, scene: Scene, parameter: str, start: float, stop: float, harmonics: int,
+        effects: Effects | None, pace: Pace = EVERYWHERE, allowance: Allowance | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(scene, parameter, start, stop, harmonics, effects, pace, allowance)
+        check_laws(self.balance.scene)
+        self._first_step = pace.first_step
+        self.exact_between: set[tuple[float, float, float]] = set()  # z, z and height of rows: cubics hold
+        self._system: System = by_reference(self.balance.system)
+        self._summit: Summit = new_summit(self._system)
+        summit_seconds(self._summit)[:] = second_numbers(self.balance.scene)
+        self._crossings: list[Crossing] = []
+        self._at_once = _FIRST_AT_ONCE
+        self._asked_at: Counter[float] = Counter()
+
+    @property
+    def enough(self) -> float:
+        """The height from which a line only has to show that it is higher [m]."""
+        least = min((look.top for look in self.looks if look.seen), default=math.inf)
+        return least * self._pace.above
+
+    def follow_up_to(self, above: float) -> None:
+        """Set `Pace.above` for the lines to come, and for what counts as a minimum of those there are."""
+        self._pace = replace(self._pace, above=above)
+
+    @property
+    def spent(self) -> int:
+        """Evaluations of the balance in following peaks so far."""
+        return int(summit_numbers(self._summit)[SPENT])
+
+    def follow(
+        self, look: Look, share: float, solved: Mapping[int, Real] | None = None, *, careful: bool = False
+    ) -> bool:
+        """Follow every peak of a sweep above `share` of the highest that is on no line yet.
+
+        Parameters
+        ----------
+        solved : rows of lines at the same place, which tell more exactly than their cubics what is on them.
+        careful : whether to begin with short steps: other lines are close, or lines end close by.
+
+        Returns
+        -------
+        Whether there is a new line.
+        """
+        before, ks = len(self.lines), look.branch.balance.system.ks
+        self._asked_at[look.z] += 1
+        if self._asked_at[look.z] > AGAIN:
+            return False  # what is followed from there is not what was seen there
+        self._first_step = min(self._pace.first_step, CAREFUL if careful else math.inf)
+        for peak in look.peaks:
+            if peak.value >= share * look.top and not self.known(look.z, peak, solved):
+                self._follow(look.z, peak, ks)
+        return len(self.lines) > before
+
+    def follow_rivals(self, look: Look, share: float) -> None:
+        """Follow the peaks of max x and of −min x that the other of the two hides in a sweep."""
+        for rival in rivals(look.branch):
+            if rival.value >= share * look.top:
+                self._draw(self._seed_of(look.z, rival, look.branch.balance.system.ks))
+
+    def follow_guess(self, glance: Glance, guess: Rival, within: tuple[float, float], share: float) -> bool:
+        """Solve for a peak of a glance and follow it if it is high and on no line yet.
+
+        Parameters
+        ----------
+        within : z as far as which it is followed at most.
+        share : of the highest line there that it has to reach.
+
+        Returns
+        -------
+        Whether there is a new line.
+        """
+        before, z = len(self.lines), glance.z
+        self._first_step = self._pace.first_step
+        seed = self._seed_of(z, guess, glance.ks)
+        _, rows, solutions, _, sign = self._track(seed, z)
+        if len(rows) == 0 or rows[0, HEIGHT] < share * self.envelope(np.array([z]))[0]:
+            return False
+        if not self._met(rows[0]):
+            omega, place = float(rows[0, OMEGA]), float(rows[0, PLACE])
+            self._draw(
+                Seed(z=z, omega=omega, u=solutions[0], sign=sign, place=place, fixed=False, within=within)
+            )
+        return len(self.lines) > before
+
+    def _seed_of(self, z: float, rival: Rival, ks: Integer) -> Seed:
+        """Return the seed of a peak that is known as near as the points of a walk are."""
+        u = fitted(rival.solution, ks, self.balance)
+        return Seed(z=z, omega=rival.omega, u=u, sign=rival.sign, place=math.nan, fixed=False)
+
+    def _met(self, row: Real) -> bool:
+        """Return whether a solved peak is on a line, by solving for those that are near."""
+        z = float(row[Z])
+        for line in self.lines:
+            at = line.frequencies(row[[Z]])[0], line.heights(row[[Z]])[0]
+            if abs(at[0] / row[OMEGA] - 1.0) <= ABOUT and abs(at[1] / row[HEIGHT] - 1.0) <= ABOUT:
+                exact = self.exact(line, z, fitting=False)
+                if exact is not None and abs(exact[HEIGHT] / row[HEIGHT] - 1.0) <= EXACTLY:
+                    return True
+        return False
+
+    def known(self, z: float, peak: Peak, solved: Mapping[int, Real] | None = None) -> bool:
+        """Return whether a peak at z is on a line."""
+        omega, here = 2.0 * math.pi * peak.at, np.array([z])
+        for index, line in enumerate(self.lines):
+            if solved is not None and index in solved:
+                row = solved[index]
+                near = abs(row[OMEGA] - omega) <= 10.0 * EXACTLY * omega
+                if near and abs(row[HEIGHT] - peak.value) <= EXACTLY * peak.value:
+                    return True
+                continue
+            near = abs(line.frequencies(here)[0] - omega) <= 0.2 * SAME * omega
+            if near and abs(line.heights(here)[0] - peak.value) <= SAME * peak.value:
+                return True
+        return False
+
+    def exact(self, line: Line, z: float, *, fitting: bool = True) -> Real | None:
+        """Return the row of a line at z, solved; None if it is not found there; see `solved`."""
+        same = np.flatnonzero(line.rows[:, Z] == z)
+        if same.size:
+            exact_row: Real = line.rows[same[0]]
+            return exact_row
+        if not line.low < z < line.high:
+            return None
+        place = self.solved(line, z, fitting=fitting)
+        return None if place is None else place[0]
+
+    def solved(self, line: Line, z: float, *, fitting: bool = True) -> Place | None:
+        """Return row, solution and tangent of a line between two of its rows; None if it is not found.
+
+        Parameters
+        ----------
+        fitting : whether it has to fit the rows beside it; otherwise about as high, or higher, will do,
+            because a kink may lie between: what is found is attained in any case.
+
+        Raises
+        ------
+        HaltedError
+            The caller wants it to end, or the work allowed is used up.
+        """
+        if not self.allowance.ended:
+            self.check()
+        elif self.allowance.over:
+            return None
+        left = int(np.searchsorted(line.rows[:, Z], z)) - 1
+        row, nt = np.zeros(COLUMNS), self.balance.n_unknowns
+        solution, tangent = np.zeros(nt), np.zeros(nt)
+        good = polish(
+            self._system, self._ridge(line.low, line.high, fixed=line.fixed), left, z, line.sign,
+            self._summit, line.rows, line.solutions, line.tangents, row, solution, tangent,
+        )  # fmt: skip
+        found = good
+        if not good and not fitting and row[OMEGA] > 0.0:
+            cubic = float(line.heights(np.array([z]))[0])
+            found = bool(row[HEIGHT] >= (1.0 - ABOUT) * cubic)
+        return (row, solution, tangent) if found else None
+
+    def _follow(self, z: float, peak: Peak, ks: Integer) -> None:
+        """Follow a peak from z to both ends of the range."""
+        band = self._scene.observe.band
+        at_end = min(abs(peak.at - end) for end in band) <= 1e-9 * band[1]
+        if not peak.interior and not at_end:
+            return
+        u, fixed = fitted(peak.solution, ks, self.balance), not peak.interior
+        self._draw(Seed(z=z, omega=2.0 * math.pi * peak.at, u=u, sign=0.0, place=0.0, fixed=fixed))
+
+    def _draw(self, seed: Seed) -> None:
+        """Add the line through a peak, and what follows from it at the ends of the band, each once."""
+        waiting, given = deque([seed]), True
+        while waiting:
+            seed = waiting.popleft()
+            if not given and self._followed(seed):
+                continue
+            given, line = False, self._line(seed)
+            if line is None:
+                continue
+            self.lines.append(line)
+            waiting += leavings(line, self._band)
+            self._crossings += crossings(line, self._band)
+            if line.fixed:
+                waiting += entries(line, self._band, self, self._pace.smallest_step * self.scale.span)
+
+    def _line(self, seed: Seed) -> Line | None:
+        """Return the line through a peak; None if there is nothing to follow."""
+        low, high = self._wanted(seed.z)
+        low, high = max(low, seed.within[0]), min(high, seed.within[1])
+        if low == high:
+            return None
+        up = self._track(seed, high)
+        down = self._track(seed, low)
+        if len(up[1]) == 0 or len(down[1]) == 0:
+            return None
+        return Line(
+            rows=np.concatenate([down[1][:0:-1], up[1]]), solutions=np.concatenate([down[2][:0:-1], up[2]]),
+            tangents=np.concatenate([down[3][:0:-1], up[3]]), sign=up[4], fixed=seed.fixed,
+            ends=(down[0], up[0]),
+        )  # fmt: skip
+
+    def _followed(self, seed: Seed) -> bool:
+        """Return whether what follows from a line was followed already; it is then."""
+        if seed.fixed:
+            return passes(self.lines, seed, EXACTLY, SAME)
+        one = Crossing(z=seed.z, edge=nearest(self._band, seed.omega), sign=seed.sign)
+        near = CROSSING * self._pace.smallest_step * self.scale.span
+        known = any(one.same(other, near) for other in self._crossings)
+        self._crossings.append(one)
+        return known or passes(self.lines, seed, 2.0 * SAME, SAME)
+
+    def places(self) -> Real:
+        """Return where the envelope is looked at: the ends, all rows of all lines, and between them."""
+        ends = np.array([self.scale.low, self.scale.high])
+        nodes = np.unique(np.concatenate([ends, *(line.rows[:, Z] for line in self.lines)]))
+        share = np.arange(SUBDIVIDED) / SUBDIVIDED
+        between = nodes[:-1, None] + share * np.diff(nodes)[:, None]
+        return np.append(between.reshape(-1), nodes[-1])
+
+    def _wanted(self, z: float) -> tuple[float, float]:
+        """Return how far a line from z is wanted both ways: as far as the others are not high enough."""
+        enough = self.enough
+        if math.isinf(enough) or not self.lines:
+            return self.scale.low, self.scale.high
+        at = self.places()
+        short = np.flatnonzero(self.envelope(at) < enough)
+        if short.size == 0:
+            return z, z
+        first, last = max(int(short[0]) - 1, 0), min(int(short[-1]) + 1, at.size - 1)
+        return min(float(at[first]), z), max(float(at[last]), z)
+
+    @property
+    def _band(self) -> tuple[float, float]:
+        low, high = self._scene.observe.band
+        return 2.0 * math.pi * low, 2.0 * math.pi * high
+
+    def _ridge(self, start: float, stop: float, *, fixed: bool) -> Ridge:
+        (low, high), pace, span = self._band, self._pace, self.scale.span
+        if fixed:  # the end of the band itself, and rounding of it, is inside
+            low, high = low * (1.0 - ROUNDING), high * (1.0 + ROUNDING)
+        return Ridge(
+            start=start, stop=stop, logarithmic=self.scale.logarithmic, low=low, high=high, fixed=fixed,
+            first_step=self._first_step * span, largest_step=pace.largest_step * span,
+            smallest_step=min(pace.smallest_step, ENDING * self._first_step) * span,
+            height_error=pace.height_error, omega_error=pace.omega_error, enough=self.enough,
+            slack=pace.slack, climb_from=pace.climb_from * span,
+        )  # fmt: skip
+
+    def _track(self, seed: Seed, stop: float) -> tuple[LineEnd, Real, Real, Real, float]:
+        """Follow a peak one way; return why it ended, its rows, solutions, tangents and its sign."""
+        nt, sign = self.balance.n_unknowns, seed.sign
+        rows, progress = np.zeros((_MOST_ROWS, COLUMNS)), np.zeros(PROGRESS)
+        solutions, tangents = np.zeros((_MOST_ROWS, nt)), np.zeros((_MOST_ROWS, nt))
+        ridge, numbers = self._ridge(seed.z, stop, fixed=seed.fixed), summit_numbers(self._summit)
+        code = kernel.PAUSED
+        while code == kernel.PAUSED:
+            self.check()
+            begun, before = time.perf_counter(), numbers[SPENT]
+            numbers[PAUSE] = before + self._at_once
+            code, count = track(
+                self._system, ridge, seed.u, seed.omega, seed.place, sign, self._summit, rows, solutions,
+                tangents, progress,
+            )  # fmt: skip
+            sign = float(numbers[SIGN])
+            a_second = (numbers[SPENT] - before) / max(time.perf_counter() - begun, 1e-9)
+            self._at_once = min(max(_AT_ONCE * a_second, 1.0), 4.0 * self._at_once)
+        return _ENDS[code], rows[:count].copy(), solutions[:count].copy(), tangents[:count].copy(), sign
