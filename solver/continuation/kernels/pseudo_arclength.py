@@ -160,8 +160,11 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
                 system, linear, point, control, walk, guess, p_guess, trial, weight_u, weight_p
             )
             if good and (p - control.stop) * forward > 0.0:
-                last, p_guess = True, p
-                copy_to(guess, trial)
+                # A solution far from where it was looked for need not be on this branch.
+                good = distance(trial, p, guess, p_guess, weight_u, weight_p) <= control.largest_turn * step
+                if good:
+                    last, p_guess = True, p
+                    copy_to(guess, trial)
         if last:
             # The end itself, from between here and the point found (or predicted) beyond it.
             share = (control.stop - walk.numbers[P]) / (p_guess - walk.numbers[P])
