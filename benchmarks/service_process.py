@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import socket
@@ -190,15 +191,16 @@ def _seconds(pid: int) -> float:
 
 
 def _children(pid: int) -> list[int]:
-    found = []
+    """Every process below one."""
+    above = {}
     for folder in Path("/proc").iterdir():
         if folder.name.isdigit():
-            try:
-                if int(_stat(int(folder.name))[1]) == pid:
-                    found.append(int(folder.name))
-            except (FileNotFoundError, ProcessLookupError):
-                continue
-    return found
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+                above[int(folder.name)] = int(_stat(int(folder.name))[1])
+    found = [pid]
+    for one in found:
+        found += [child for child, parent in above.items() if parent == one]
+    return found[1:]
 
 
 def _machine_seconds() -> float:

@@ -108,8 +108,10 @@ def _probe(base: str, log: Log) -> None:
 
 
 def _children(pid: int) -> list[int]:
+    """Every process below one."""
     tasks = Path(f"/proc/{pid}/task").iterdir()
-    return [int(child) for task in tasks for child in (task / "children").read_text().split()]
+    found = [int(child) for task in tasks for child in (task / "children").read_text().split()]
+    return found + [below for child in found for below in _children(child)]
 
 
 def _megabytes(pid: int) -> float:

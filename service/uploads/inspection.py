@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from service.errors import InvalidRequestError, QueueFullError, UnreadableUploadError
-from service.workers.worker import THREAD_LIMITS
+from service.workers.processes import start
 from solver.errors import Issue
 
 MEMORY_BYTES = 2 * 1024**3
@@ -72,13 +72,9 @@ def look_at(asked: Mapping[str, Any], folder: Path, seconds: float, most_bytes: 
 
 
 def _ask(task: str, folder: Path, argument: Any, seconds: float, most_bytes: int) -> Any:
-    context = mp.get_context("spawn")
-    ours, theirs = context.Pipe(duplex=False)
+    ours, theirs = mp.Pipe(duplex=False)
     with _turn(), ours:
-        process = context.Process(
-            target=_main, args=(theirs, task, str(folder), argument, seconds), name="reader", daemon=True
-        )
-        process.start()
+        process = start(_main, (theirs, task, str(folder), argument, seconds), "reader")
         theirs.close()
         try:
             if not ours.poll(seconds):
@@ -127,7 +123,6 @@ def _turn() -> Iterator[None]:
 
 def _main(connection: Connection, task: str, folder: str, argument: Any, seconds: float) -> None:
     """The life of the process."""
-    os.environ.update(THREAD_LIMITS)
     _limit(seconds)
     os.chdir(folder)
     # The other end may have lost its patience.

@@ -4,43 +4,20 @@ from __future__ import annotations
 
 import ctypes
 import multiprocessing as mp
-import os
 import signal
-import threading
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from ctypes import Array
 from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 
 from service.jobs.outputs import Pace
 from service.jobs.registry import RunOn, WarmUp
 from service.workers.process_limits import ProcessLimits
-from service.workers.worker import THREAD_LIMITS, Orders, main
-
-_environment_lock = threading.Lock()
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """The environment in which workers start: one BLAS and one Numba thread each.
-
-    It must be in place before the process starts, and this process keeps its own.
-    """
-    with _environment_lock:
-        before = {name: os.environ.get(name) for name in THREAD_LIMITS}
-        os.environ.update(THREAD_LIMITS)
-        try:
-            yield
-        finally:
-            for name, value in before.items():
-                if value is None:
-                    del os.environ[name]
-                else:
-                    os.environ[name] = value
+from service.workers.processes import start
+from service.workers.worker import Orders, main
 
 
-def death(process: SpawnProcess) -> str:
+def death(process: BaseProcess) -> str:
     """How a process ended, as a sentence."""
     process.join(5.0)
     code = process.exitcode
@@ -51,7 +28,7 @@ def death(process: SpawnProcess) -> str:
     return f"worker process {process.pid} ended with status {code}"
 
 
-def ending_signal(process: SpawnProcess) -> int | None:
+def ending_signal(process: BaseProcess) -> int | None:
     """The signal that ended a process, if one did."""
     return None if process.exitcode is None or process.exitcode >= 0 else -process.exitcode
 
@@ -65,14 +42,7 @@ class Child:
         self.orders = Orders(numbers)
         self.connection: Connection
         self.connection, theirs = context.Pipe()
-        self.process = context.Process(
-            target=main,
-            args=(theirs, numbers, runs, warm_up, pace, limits),
-            name="stickslip worker",
-            daemon=True,
-        )
-        with _one_thread_each():
-            self.process.start()
+        self.process = start(main, (theirs, numbers, runs, warm_up, pace, limits), "stickslip worker")
         theirs.close()
 
     def end(self, patience: float) -> None:

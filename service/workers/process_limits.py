@@ -50,6 +50,7 @@ class ProcessLimits:
 
         if resource.getrlimit(resource.RLIMIT_AS)[0] - _address_space() > self.memory_bytes / 2:
             return
+        gc.unfreeze()  # what was loaded before this process was forked off is not looked through otherwise
         for found in gc.get_objects():
             if isinstance(found, functools._lru_cache_wrapper) and found.__module__.startswith(_MATRICES):
                 found.cache_clear()

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import wait
-from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 from multiprocessing.reduction import ForkingPickler
 from typing import Protocol
 
@@ -217,7 +217,7 @@ class Slot(threading.Thread):
         timer.daemon = True
         timer.start()
 
-    def _kill(self, process: SpawnProcess, token: int) -> None:
+    def _kill(self, process: BaseProcess, token: int) -> None:
         """End the process by force if it still computes the task that was to stop."""
         with self._lock:
             computes = bool(self._held) and self._held[0].token == token

@@ -33,6 +33,13 @@ def child_killed(site: Site, generator: random.Random) -> None:
             os.kill(generator.choice(children), signal.SIGKILL)
 
 
+def source_killed(site: Site, generator: random.Random) -> None:
+    """Kill -9 of the process that workers are forked off."""
+    for source in site.forked_off(_one(site, generator)):
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(source, signal.SIGKILL)
+
+
 def child_paused(site: Site, generator: random.Random) -> None:
     """A worker process stands still for longer than a lease."""
     for child in site.children(_one(site, generator))[:1]:

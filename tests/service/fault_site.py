@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import httpx
+import psutil
 from launch import answers
 
 SCRIPT = Path(__file__).with_name("serve_private.py")
@@ -116,11 +117,22 @@ class Site:
             time.sleep(0.05)
 
     def children(self, program: Program) -> list[int]:
-        """The worker processes of a program that are ready to compute."""
-        tasks = Path(f"/proc/{program.process.pid}/task")
-        with contextlib.suppress(FileNotFoundError):
-            found = [pid for task in tasks.iterdir() for pid in (task / "children").read_text().split()]
-            return [int(pid) for pid in found if b"spawn_main" in _read(Path(f"/proc/{pid}/cmdline"))]
+        """The worker processes of a program: children of the process that they are forked off."""
+        with contextlib.suppress(psutil.NoSuchProcess):
+            return [
+                child.pid
+                for source in psutil.Process(program.process.pid).children()
+                for child in source.children()
+            ]
+        return []
+
+    def forked_off(self, program: Program) -> list[int]:
+        """The process that the workers of a program are forked off."""
+        with contextlib.suppress(psutil.NoSuchProcess):
+            below = psutil.Process(program.process.pid).children()
+            return [
+                child.pid for child in below if b"forkserver" in _read(Path(f"/proc/{child.pid}/cmdline"))
+            ]
         return []
 
     def alive(self) -> list[int]:

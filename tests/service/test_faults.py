@@ -29,6 +29,7 @@ from fault_kinds import (
     queue_full,
     scheduler_killed,
     server_restarted,
+    source_killed,
 )
 from fault_site import Site, clients, free_port
 from postgresql_cluster import Cluster
@@ -40,6 +41,7 @@ from service.db.models import Job, JobResult, JobState, Sweep
 
 COMMON: dict[str, Fault] = {
     "worker killed": child_killed,
+    "what workers are forked off killed": source_killed,
     "worker paused past the lease": child_paused,
     "service killed": program_killed,
     "service stopped": program_stopped,
@@ -115,7 +117,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", str(folder)], check=True)
 
 
-@pytest.mark.parametrize("number", [6, pytest.param(90, marks=pytest.mark.long)])
+@pytest.mark.parametrize("number", [7, pytest.param(90, marks=pytest.mark.long)])
 def test_one_service_on_sqlite(tmp_path: Path, number: int) -> None:
     site = Site(f"sqlite:///{tmp_path}/jobs.db", tmp_path, [free_port()])
     undergo(site, COMMON, number, seed=number)
