@@ -301,6 +301,7 @@ def test_a_part_that_is_lost_is_computed_again_alone(
     assert timeless(embedded.results(job).result) == computed(embedded, "mistuning", body)[0]
 
 
+@pytest.mark.long
 def test_the_scheduler_dies_and_comes_back(service: tuple[EmbeddedService, DaskCluster]) -> None:
     """Health says so; what ran is tried again when scheduler and workers are back."""
     embedded, dask = service

@@ -70,7 +70,7 @@ def test_a_contact_too_stiff_to_be_swept():
     """Its deformation is 1e-9 of its motion: the branch ends early, with the reason."""
     hard = HARD[TOO_STIFF]
     assert hard.band is not None
-    settings = ContinuationSettings(most_points=200)
+    settings = ContinuationSettings(most_points=60)
     for start, stop in (hard.band, hard.band[::-1]):
         assert sweep(hard.scene, start=start, stop=stop, settings=settings).status is BranchStatus.TOO_STIFF
 

@@ -13,6 +13,7 @@ import pytest
 DOCS = Path(__file__).resolve().parent.parent.parent.parent / "docs"
 SCRIPTS = sorted(script for script in (DOCS / "paper").glob("*.py") if script.stem != "look")
 PAGE = (DOCS / "paper.md").read_text(encoding="utf-8")
+SLOW = ("figure13",)
 LONGEST_SCRIPT = 40
 
 
@@ -38,7 +39,11 @@ def test_every_figure_has_a_script() -> None:
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
+@pytest.mark.parametrize(
+    "script",
+    [pytest.param(script, marks=pytest.mark.long if script.stem in SLOW else ()) for script in SCRIPTS],
+    ids=lambda script: script.stem,
+)
 def test_the_script_draws_and_says_what_the_page_quotes(
     script: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

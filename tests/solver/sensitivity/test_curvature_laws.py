@@ -42,12 +42,13 @@ def test_the_hessian_of_a_law_equals_differences_of_the_gradient(case: str, hz: 
     assert error_of_hessian(CASES[case][0], hz, CASES[case][1]) <= 1e-6
 
 
+@pytest.mark.parametrize("count", [4, pytest.param(40, marks=pytest.mark.long)])
 @pytest.mark.parametrize("law", CASES)
-def test_hessians_of_random_scenes_equal_differences(law: str) -> None:
+def test_hessians_of_random_scenes_equal_differences(law: str, count: int) -> None:
     """Loads, stiffnesses and amplitudes drawn over a decade; contacts that stick, slip and open."""
     rng, errors = np.random.default_rng(9), []
     base, paths = CASES[law]
-    for _ in range(12):
+    for _ in range(count):
         drawn = {path: base.value(path) * 10.0 ** rng.uniform(-0.5, 0.5) for path in paths}
         errors.append(error_of_hessian(base.with_values(drawn), float(rng.uniform(0.1, 0.3)), paths))
     assert max(errors) <= 1e-5, sorted(errors)[-3:]
@@ -59,7 +60,9 @@ def peak_of(there: Scene, near: float) -> tuple[solver.Branch, solver.Peak]:
     return branch, min((p for p in branch.peaks if p.interior), key=lambda p: abs(p.at - near))
 
 
-@pytest.mark.parametrize("case", ["elastic-normal", "coulomb-3d", "gap"])
+@pytest.mark.parametrize(
+    "case", ["elastic-normal", pytest.param("coulomb-3d", marks=pytest.mark.long), "gap"]
+)
 def test_gradient_and_hessian_of_a_peak_equal_differences_of_sweeps(case: str) -> None:
     there, paths = CASES[case][0], CASES[case][1][:3]
     branch, peak = peak_of(there, 0.2)
