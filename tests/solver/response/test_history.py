@@ -92,6 +92,7 @@ def check_circle(seed: int, count: int, periods: int) -> str:
     return "agrees" if not flagged else "flagged, agrees from rest" if near else "flagged"
 
 
+@pytest.mark.long
 def test_under_a_circular_limit_too() -> None:
     said = [check_circle(seed, 400, 100) for seed in (0,)]
     assert said.count("not solved") == 0
