@@ -144,6 +144,22 @@ def _correct(
 
 
 @apart
+def _to_the_end(
+    system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk, guess: Real,
+    p_beyond: float, trial: Real,
+) -> tuple[bool, int, float]:  # fmt: skip
+    """Solve at the end itself into `trial`, from between here and `guess`, found or predicted beyond it."""
+    share = (control.stop - walk.numbers[P]) / (p_beyond - walk.numbers[P])
+    for i in range(guess.size):
+        guess[i] = walk.u[i] + share * (guess[i] - walk.u[i])
+    copy_to(trial, guess)
+    receptance(system, control.stop, linear)
+    good, iterations, norm = newton(system, linear, trial, control.stop, 0.0, point)
+    walk.numbers[ITERATIONS] += iterations
+    return good, iterations, norm
+
+
+@apart
 def _step(system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk) -> int:
     """Make one step; return RUNNING, FINISHED, STALLED or LEFT_RANGE."""
     n = walk.u.size
@@ -166,16 +182,9 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
                     last, p_guess = True, p
                     copy_to(guess, trial)
         if last:
-            # The end itself, from between here and the point found (or predicted) beyond it.
-            share = (control.stop - walk.numbers[P]) / (p_guess - walk.numbers[P])
-            for i in range(n):
-                guess[i] = walk.u[i] + share * (guess[i] - walk.u[i])
+            step *= (control.stop - walk.numbers[P]) / (p_guess - walk.numbers[P])
+            good, iterations, norm = _to_the_end(system, linear, point, control, walk, guess, p_guess, trial)
             p = p_guess = control.stop
-            step *= share
-            copy_to(trial, guess)
-            receptance(system, p, linear)
-            good, iterations, norm = newton(system, linear, trial, p, 0.0, point)
-            walk.numbers[ITERATIONS] += iterations
         if good:
             off = distance(trial, p, guess, p_guess, weight_u, weight_p)
             turned = off / (step + 1e-300)
