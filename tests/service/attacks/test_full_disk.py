@@ -42,7 +42,9 @@ def fill(folder: Path) -> Path:
     return file
 
 
-def test_a_full_disk_is_told_by_readiness(tmp_path: Path, small_disk: Path) -> None:
+def test_a_full_disk_is_told_by_readiness_and_does_not_hold_up_the_end(
+    tmp_path: Path, small_disk: Path
+) -> None:
     job = {"kind": "iteration", "fresh": True}
     url = f"sqlite:///{small_disk}/jobs.db"
     with besieged(tmp_path, url=url, least_free_bytes=1_000_000) as service, service.client() as client:
@@ -55,13 +57,7 @@ def test_a_full_disk_is_told_by_readiness(tmp_path: Path, small_disk: Path) -> N
         assert client.get(f"/v1/jobs/{known}").status_code == 200
         filler.unlink()
         until(lambda: httpx.get(f"{service.base}/health/ready").status_code == 200)
-        assert client.post("/v1/jobs", json={**job, "seed": 2}).status_code == 202
-
-
-def test_a_full_disk_does_not_hold_up_the_end(tmp_path: Path, small_disk: Path) -> None:
-    url = f"sqlite:///{small_disk}/jobs.db"
-    with besieged(tmp_path, url=url, least_free_bytes=1_000_000) as service:
-        httpx.post(f"{service.base}/v1/jobs", json={"kind": "iteration", "seconds": 600.0})
+        assert client.post("/v1/jobs", json={**job, "seed": 2, "seconds": 600.0}).status_code == 202
         filler = fill(small_disk)
         assert service.terminate() < EXIT_SECONDS
         filler.unlink()
