@@ -85,5 +85,5 @@ def configure(level: str = "INFO", form: str = "text") -> None:
     logging.basicConfig(level=level, handlers=[handler])
     logging.getLogger("alembic").setLevel(logging.WARNING)
     # No line says where in the program, in which thread or process it was written: nobody need find out.
-    logging._srcfile = None  # type: ignore[attr-defined]
+    logging._srcfile = None
     logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False
