@@ -213,6 +213,8 @@ class Database:
         self.url = url
         self._seconds = seconds
         self._here = threading.local()
+        self._wrote = -math.inf
+        self._cannot_write: str | None = None
         self.name = database_name(url)
         self._lock = FileLock(database_path(url)) if is_sqlite(url) else None
         self._write = write_engine(url, connections, seconds)
@@ -291,11 +293,15 @@ class Database:
         """Why nothing can be written now, or None; raises what the database raises.
 
         Of SQLite's file whether another program has locked it, and the room on its disk; of PostgreSQL
-        whether it answers.
+        whether it answers and can write (asked once a second at most, whoever asks how often).
         """
         if not self.exclusive:
             self.version()
-            return None
+            now = time.monotonic()
+            if now - self._wrote >= _PROBE_SECONDS:
+                self._cannot_write = postgresql.trouble(self._write, _PROBE_SECONDS)
+                self._wrote = now
+            return self._cannot_write
         path = database_path(self.url)
         disk = shutil.disk_usage(path.parent)
         if disk.free < least_free_bytes:

@@ -31,6 +31,12 @@ _LEAST_CONNECT_SECONDS = 2  # libpq takes no less
 _SERVICES = 0x5354_4943_4B01
 _TABLES = 0x5354_4943_4B02
 _ROOM = 0x5354_4943_4B03
+# More rows than `work_mem` has room for: the server keeps them in a temporary file until they are counted.
+_OF_PROBE = (("work_mem", "64kB"), ("temp_tablespaces", ""))
+_SPILL = (
+    "SELECT current_setting('transaction_read_only')::bool "
+    "FROM (SELECT count(*) FROM generate_series(1, 40000)) AS spilled"
+)
 
 
 def _arguments(url: URL, connect_seconds: int = _CONNECT_SECONDS) -> dict[str, Any]:
@@ -122,8 +128,31 @@ def service_engine(url: str, connections: int, seconds: float) -> Engine:
 def own_connection(engine: Engine, seconds: float) -> Any:
     """A connection of psycopg outside of the pool, which commits by itself; `seconds` as of the pool."""
     words, options = engine.dialect.create_connect_args(engine.url)
-    arguments: dict[str, Any] = {**options, **_arguments(engine.url), "autocommit": True}
+    patience = max(_LEAST_CONNECT_SECONDS, math.ceil(seconds))
+    arguments: dict[str, Any] = {**options, **_arguments(engine.url, patience), "autocommit": True}
     return bounded_connect(seconds)(*words, **arguments)
+
+
+def trouble(engine: Engine, seconds: float) -> str | None:
+    """Why the server can write nothing now, or None.
+
+    A connection of its own, which waits so long [s] for each answer, has the server spill half a megabyte
+    to a temporary file on the disk of the database and throw it away: no table, no catalogue and no log is
+    written, and the server itself says when its disk, its tablespace or a quota is full.
+    """
+    # Loaded here: only services on PostgreSQL need the driver.
+    import psycopg
+
+    try:
+        with own_connection(engine, seconds) as connection:
+            for setting, value in (*_OF_PROBE, ("statement_timeout", f"{int(seconds * 1000)}")):
+                connection.execute("SELECT set_config(%s, %s, false)", (setting, value))
+            (read_only,) = connection.execute(_SPILL).fetchone()
+    except psycopg.errors.ConfigurationLimitExceeded:
+        return None  # `temp_file_limit` is below that: the disk was not asked
+    except psycopg.Error as error:
+        return f"PostgreSQL cannot write: {error}".strip()
+    return "PostgreSQL can only be read: it is a standby, or read-only by its settings" if read_only else None
 
 
 def reading(engine: Engine) -> Engine:

@@ -84,3 +84,6 @@ def configure(level: str = "INFO", form: str = "text") -> None:
     handler.setFormatter(FORMATTERS[form]())
     logging.basicConfig(level=level, handlers=[handler])
     logging.getLogger("alembic").setLevel(logging.WARNING)
+    # No line says where in the program, in which thread or process it was written: nobody need find out.
+    logging._srcfile = None
+    logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False

@@ -18,6 +18,7 @@ def executor_of(settings: Settings, registry: Registry) -> Executor:
     ConfigurationError
         If what it needs is not installed.
     """
+    limits = ProcessLimits(memory_bytes=settings.worker_memory_bytes or None)
     if settings.executor == "local" or settings.dask_scheduler is None:
         return LocalExecutor(
             registry.runs(),
@@ -25,7 +26,7 @@ def executor_of(settings: Settings, registry: Registry) -> Executor:
             workers=settings.workers,
             grace_seconds=settings.grace_seconds,
             pace=settings.pace,
-            limits=ProcessLimits(memory_bytes=settings.worker_memory_bytes or None),
+            limits=limits,
         )
     try:
         from distributed import Security
@@ -49,4 +50,5 @@ def executor_of(settings: Settings, registry: Registry) -> Executor:
         security=security,
         grace_seconds=settings.grace_seconds,
         pace=settings.pace,
+        limits=limits,
     )

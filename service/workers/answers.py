@@ -37,6 +37,8 @@ _RETRY_SECONDS = 2
 _GRACE_SECONDS = 0.1
 _PATIENCE_SECONDS = 30.0
 """Of who waits, the computation included: the machine may be busy, a process may hang."""
+_PATIENCE_AT_THE_START = 4
+"""So many times as long, while no process is up yet."""
 _INLINE_BYTES = 64 * 1024
 _AT_THE_TIME = ("SIGPROF", "SIGXCPU")
 _WITHOUT_MEMORY = ("SIGABRT", "SIGSEGV", "SIGBUS")
@@ -135,12 +137,22 @@ class Answers:
         asked = _Asked(attempt, owner)
         self._add(asked)
         try:
-            outcome = await asyncio.wait_for(asyncio.wrap_future(asked.outcome), _PATIENCE_SECONDS)
-        except TimeoutError as error:
-            raise QueueFullError("no process was free to compute the answer", _RETRY_SECONDS) from error
+            outcome = await self._outcome(asked)
         finally:
             self._drop(asked)
         return await self._found(outcome, owner, about)
+
+    async def _outcome(self, asked: _Asked) -> Outcome:
+        """Wait for a computation; longer while the first process starts, which the kernels may hold up."""
+        waiting = asyncio.wrap_future(asked.outcome)
+        for _ in range(_PATIENCE_AT_THE_START):
+            done, _ = await asyncio.wait([waiting], timeout=_PATIENCE_SECONDS)
+            if done:
+                return waiting.result()
+            if self.ready:
+                break
+        waiting.cancel()
+        raise QueueFullError("no process was free to compute the answer", _RETRY_SECONDS)
 
     @property
     def ready(self) -> int:

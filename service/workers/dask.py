@@ -25,6 +25,7 @@ from service.jobs.outputs import Pace
 from service.jobs.registry import JobKind, Registry
 from service.workers.base import ExecutorStatus, Failed, Lost, Outcome, Sink, Stopped
 from service.workers.cluster import Cluster, answer_of
+from service.workers.process_limits import UNLIMITED, ProcessLimits
 from service.workers.tasks import Answer, Order
 from service.workers.work import Flight, Work
 from service.workers.worker import Task, failure_of
@@ -52,6 +53,8 @@ class DaskExecutor:
         a nanny.
     pace : Pace
         How often workers tell what, and how much of a divided job is kept for later attempts.
+    limits : ProcessLimits
+        What an order may use of its worker.
     """
 
     def __init__(
@@ -62,10 +65,12 @@ class DaskExecutor:
         security: Security | None = None,
         grace_seconds: float,
         pace: Pace,
+        limits: ProcessLimits = UNLIMITED,
     ) -> None:
         self._registry = registry
         self._grace_seconds = grace_seconds
         self._pace = pace
+        self._limits = limits
         self._runs = registry.runs()
         self._version = version("stickslip")
         self._cluster = Cluster(address, security, self._heard, self._looked, self._lost)
@@ -188,6 +193,7 @@ class DaskExecutor:
             warm_up=self._registry.warm_up,
             version=self._version,
             pace=self._pace,
+            limits=self._limits,
         )
 
     def _landed(self, token: str) -> None:

@@ -10,10 +10,8 @@ from service.db.repositories import Attempt
 from service.jobs.outputs import Pace
 from service.jobs.registry import RunOn, WarmUp
 from service.workers.base import ExecutorStatus, Sink, Stopped
-from service.workers.process_limits import ProcessLimits
+from service.workers.process_limits import UNLIMITED, ProcessLimits
 from service.workers.slot import Slot
-
-UNLIMITED = ProcessLimits()
 
 _TEND_SECONDS = 0.1
 

@@ -6,7 +6,7 @@ import functools
 import gc
 import signal
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 _MATRICES = "solver.linear"
@@ -28,14 +28,21 @@ class ProcessLimits:
     memory_bytes: int | None = None
     processor_seconds: float | None = None
 
+    def for_threads(self, number: int) -> ProcessLimits:
+        """Those of a process in which so many tasks are computed at a time."""
+        return self if self.memory_bytes is None else replace(self, memory_bytes=number * self.memory_bytes)
+
     def confine(self) -> None:
-        """Limit the memory of this process, which is ready."""
-        if self.memory_bytes is None or sys.platform != "linux":
+        """Limit the memory of this process, beyond what it has now that it is ready."""
+        if sys.platform != "linux":
             return
         # Loaded here, as below: there is none on Windows.
         import resource
 
         hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+        if self.memory_bytes is None:
+            resource.setrlimit(resource.RLIMIT_AS, (hard, hard))
+            return
         limit = _address_space() + self.memory_bytes
         if hard != resource.RLIM_INFINITY:
             limit = min(limit, hard)
@@ -71,6 +78,9 @@ class ProcessLimits:
     def memory_told(self) -> str:
         """The limit of memory, for people."""
         return "there is" if self.memory_bytes is None else f"{self.memory_bytes / 1e6:.0f} MB"
+
+
+UNLIMITED = ProcessLimits()
 
 
 def _address_space() -> int:

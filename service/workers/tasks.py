@@ -22,7 +22,16 @@ from service.jobs.checkpoints import Checkpoints, Kept
 from service.jobs.outputs import JobFailure, JobOutput, Pace, Piece
 from service.jobs.parts import PartOutput, RunPart
 from service.jobs.registry import RunOn, WarmUp
-from service.workers.worker import THREAD_LIMITS, Report, Task, Throttle, checked, failure_of
+from service.workers.process_limits import ProcessLimits
+from service.workers.worker import (
+    THREAD_LIMITS,
+    Report,
+    Task,
+    Throttle,
+    checked,
+    failure_of,
+    out_of_memory,
+)
 
 TOPIC = "stickslip"
 
@@ -50,6 +59,8 @@ class Order:
         Of the service; a worker with another one might compute other numbers.
     pace : Pace
         How often the worker tells what, and when a whole job keeps what it has.
+    limits : ProcessLimits
+        What the order may use; a worker with several threads may use as much for each of them.
     """
 
     token: str
@@ -64,6 +75,7 @@ class Order:
     warm_up: WarmUp
     version: str
     pace: Pace
+    limits: ProcessLimits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,22 +159,24 @@ def _answer(order: Order) -> Answer:
     say(begun=time.time_ns(), threads=worker.state.nthreads)
     stop = _Stop(_Unwanted(worker, worker.get_current_task()))
     try:
-        return _computed(order, Throttle(send, order.pace.progress_seconds), stop)
+        return _computed(order, worker.state.nthreads, Throttle(send, order.pace.progress_seconds), stop)
     finally:
+        order.limits.forget()
         say(over=True)
 
 
-def _computed(order: Order, progress: Throttle, stop: _Stop) -> Answer:
+def _computed(order: Order, threads: int, progress: Throttle, stop: _Stop) -> Answer:
     kept = Checkpoints(order.job_id, order.saved, stop.kept.append, order.pace)
     try:
-        _warm(order.warm_up)
+        _warm(order.warm_up, order.limits.for_threads(threads))
         output: JobOutput | PartOutput
         if order.run_part is not None and order.part is not None:
             output = order.run_part(order.spec, order.part, progress, stop)
         elif order.run is not None:
             output = checked(order.run(order.spec, progress, stop, kept))
     except MemoryError as error:
-        return Answer(retry=f"the worker ran out of memory ({error})")
+        done = out_of_memory(error, order.limits)
+        return Answer(failure=done.failure, retry=done.retry)
     except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
         if not stop.obeyed:
             return Answer(failure=failure_of(_task(order), error))
@@ -177,10 +191,15 @@ def _task(order: Order) -> Task:
     return Task(0, order.job_id, order.kind, order.spec)
 
 
-def _warm(warm_up: WarmUp) -> None:
-    """Load and compile what the kinds need, once in this process and one thread at a time."""
+def _warm(warm_up: WarmUp, limits: ProcessLimits) -> None:
+    """Load and compile what the kinds need, once in this process and one thread at a time; limit its memory.
+
+    Limited anew for each order, beyond what the process has then: services with other limits may use the same
+    workers, and what it keeps from other orders must not leave Dask itself without memory.
+    """
     with _warming:
         if warm_up not in _warmed:
             os.environ.update(THREAD_LIMITS)
             warm_up()
             _warmed.add(warm_up)
+        limits.confine()

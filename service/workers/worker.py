@@ -231,13 +231,13 @@ def _compute(
             raise UnknownKindError(task.kind)
         output = checked(runs[task.kind](task.spec, progress, stop, kept))
     except MemoryError as error:
-        return _out_of_memory(error, limits)
+        return out_of_memory(error, limits)
     except Exception as error:  # noqa: BLE001 - the boundary: whatever it is, the job must hear of it
         return _stopped(kept) if stop.obeyed else Done(failure=failure_of(task, error))
     return _stopped(kept) if stop.obeyed else Done(output=output)
 
 
-def _out_of_memory(error: MemoryError, limits: ProcessLimits) -> Done:
+def out_of_memory(error: MemoryError, limits: ProcessLimits) -> Done:
     """A limit is met again by every attempt; without one, another may find more memory free."""
     if limits.memory_bytes is None:
         return Done(retry=f"the worker ran out of memory ({error})")

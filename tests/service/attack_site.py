@@ -29,6 +29,9 @@ MOST_MEMORY = 300 * 1024**2
 """Bytes above those of the idle service that an attack may take."""
 MOST_WAIT = 0.25
 """Seconds in which 99 of 100 requests of another client are answered meanwhile."""
+SLOWER = 10.0
+"""Or so many times what the slowest of some takes while nobody attacks, on a machine that is slow itself."""
+_IDLE_REQUESTS = 30
 TRIES = 4
 """Of an attack, one of which keeps the limit of time: the machine may have other work."""
 GRACE_SECONDS = 2.0
@@ -94,6 +97,7 @@ class Site:
         self._attacker = attacker
         self.other = other
         self._idle = 0
+        self._most_wait = MOST_WAIT
 
     def send(self, attack: Attack, token: str | None = None, seconds: float = 300.0) -> Answer:
         """Send one request and wait for its answer."""
@@ -116,7 +120,14 @@ class Site:
         for _ in range(2):
             self.send(Attack.of("/v1/plan", {"scene": "two-dof"}))
             self.send(Attack.of("/v1/previews", {"kind": "point", "scene": "two-dof", "frequency_hz": 1.05}))
+        self._most_wait = max(MOST_WAIT, SLOWER * max(self._ask() for _ in range(_IDLE_REQUESTS)))
         self._idle = self._memory()
+
+    def _ask(self) -> float:
+        """Time that another client's GET takes [s]."""
+        begin = time.monotonic()
+        assert self.send(Attack("/v1/jobs?limit=1"), self.other).status == 200
+        return time.monotonic() - begin
 
     def under(self, attacks: Sequence[Attack], at_once: int = 1) -> Figures:
         """Send all of them, some at once, and look at the service meanwhile."""
@@ -130,9 +141,7 @@ class Site:
 
         def ask() -> None:
             while not over.is_set() or len(waits) < 20:
-                begin = time.monotonic()
-                assert self.send(Attack("/v1/jobs?limit=1"), self.other).status == 200
-                waits.append(time.monotonic() - begin)
+                waits.append(self._ask())
                 time.sleep(_LOOK_SECONDS / 2)
 
         threads = [threading.Thread(target=one) for one in (watch, ask)]
@@ -180,7 +189,7 @@ class Site:
             told = [(answer.status, answer.body[:300]) for answer in figures.answers]
             assert all(answer.status < 500 or answer.status == 503 for answer in figures.answers), told
             assert figures.memory <= MOST_MEMORY, figures.told()
-            if figures.p99 <= MOST_WAIT:
+            if figures.p99 <= self._most_wait:
                 return figures
             assert left, figures.told()
         return figures

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import psycopg
+import pytest
 from psycopg import sql
 
 from service.db import revisions
@@ -135,6 +136,28 @@ class Cluster:
         yield self._create(name, "template0" if empty else _MIGRATED)
         with psycopg.connect(self.conninfo("postgres"), autocommit=True) as connection:
             connection.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(sql.Identifier(name)))
+
+    @contextmanager
+    def small_disk(self, size: str) -> Iterator[tuple[str, Path]]:
+        """A new database with its tables on a disk of its own, and the folder of that; root can mount one."""
+        name, folder = f"d{secrets.token_hex(6)}", self.folder / f"disk-{secrets.token_hex(4)}"
+        folder.mkdir()
+        owner = "".join(f",{key[0]}id={self._how[key]}" for key in ("user", "group") if key in self._how)
+        command = ["mount", "-t", "tmpfs", "-o", f"size={size},mode=700{owner}", "tmpfs", str(folder)]
+        if subprocess.run(command, capture_output=True, check=False).returncode != 0:
+            pytest.skip("a small disk can be mounted by root only")
+        try:
+            with psycopg.connect(self.conninfo("postgres"), autocommit=True) as connection:
+                of = {"name": sql.Identifier(name), "folder": sql.Literal(str(folder)),
+                      "template": sql.Identifier(_MIGRATED)}  # fmt: skip
+                connection.execute(sql.SQL("CREATE TABLESPACE {name} LOCATION {folder}").format(**of))
+                query = "CREATE DATABASE {name} TEMPLATE {template} TABLESPACE {name}"
+                connection.execute(sql.SQL(query).format(**of))
+                yield self.url(name), folder
+                connection.execute(sql.SQL("DROP DATABASE {name} WITH (FORCE)").format(**of))
+                connection.execute(sql.SQL("DROP TABLESPACE {name}").format(**of))
+        finally:
+            subprocess.run(["umount", "--lazy", str(folder)], check=True)
 
     def _create(self, name: str, template: str = "template0") -> str:
         with psycopg.connect(self.conninfo("postgres"), autocommit=True) as connection:

@@ -37,6 +37,7 @@ def settings_of(url: str) -> MakeSettings:
             "port": 0,
             "grace_seconds": 0.3,
             "poll_seconds": 1.0,
+            "answer_workers": 1,
         }
         return load_settings(**{**defaults, **values})
 
@@ -71,7 +72,7 @@ def serving(folder: Path, registry: Registry, **values: object) -> Iterator[Serv
     """A client of a real server on loopback."""
     defaults = {
         "database": f"sqlite:///{folder}/jobs.db", "workers": 1, "port": 0, "max_body_bytes": 20_000,
-        "page_limit": 50,
+        "page_limit": 50, "answer_workers": 1,
     }  # fmt: skip
     settings = load_settings(**{**defaults, **values})
     app = create_app(settings, registry)

@@ -151,7 +151,7 @@ def test_failures_are_those_of_a_local_worker(service: tuple[EmbeddedService, Da
     expected = {
         "bad-scene": ("scene", 1), "bad-setting": ("setting", 1), "falls-short": ("goal-not-reached", 1),
         "broken": ("internal", 1), "not-json": ("internal", 1), "unsendable": ("internal", 1),
-        "out-of-memory": ("worker-lost", 3),
+        "out-of-memory": ("memory-limit", 1),
     }  # fmt: skip
     jobs = {kind: embedded.submit(kind, {}) for kind in expected}
     ends = {kind: embedded.wait(job, timeout=PATIENCE) for kind, job in jobs.items()}
@@ -159,6 +159,26 @@ def test_failures_are_those_of_a_local_worker(service: tuple[EmbeddedService, Da
     threads = embedded.submit("threads", {})
     assert embedded.wait(threads).status is JobState.SUCCESSFUL
     assert set(embedded.results(threads).result.values()) == {"1"}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux alone")
+def test_a_worker_has_the_limit_of_memory_of_the_service(
+    service: tuple[EmbeddedService, DaskCluster], tmp_path: Path
+) -> None:
+    """A job that meets it fails with that word; its worker lives on, and other services have their own."""
+    embedded, dask = service
+    workers = embedded._service.queue._executor._cluster._client.run(os.getpid)
+    with EmbeddedService(settings_on(tmp_path, dask, worker_memory_bytes=300_000_000), BOTH) as limited:
+        until(lambda: check(limited._service).workers_ready == 2)
+        large = limited.wait(limited.submit("allocate", {"seed": 500}), timeout=PATIENCE)
+        assert large.error is not None, large
+        assert (large.error["type"], large.attempt) == ("memory-limit", 1)
+        assert "300 MB" in large.error["detail"]
+        small = limited.wait(limited.submit("allocate", {"seed": 100}), timeout=PATIENCE)
+        assert small.status is JobState.SUCCESSFUL, small
+    other = embedded.wait(embedded.submit("allocate", {"seed": 500}), timeout=PATIENCE)
+    assert other.status is JobState.SUCCESSFUL, other
+    assert embedded._service.queue._executor._cluster._client.run(os.getpid) == workers
 
 
 def test_progress_and_cancel(service: tuple[EmbeddedService, DaskCluster]) -> None:

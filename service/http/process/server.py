@@ -33,6 +33,7 @@ log = logging.getLogger("stickslip.service")
 _TICK_SECONDS = 0.2
 # Files of a service besides its connections: database, workers, pipes, uploads.
 _OTHER_FILES = 256
+_LEAST_CONNECTIONS = 16
 _FORCED = 1
 
 
@@ -65,7 +66,6 @@ def serve(settings: Settings, registry: Registry | None = None) -> None:
     listener = _bind(settings)
     try:
         service.open()
-        service.answers.begin()
         log.info("listening on http://%s:%d", settings.host, listener.getsockname()[1])
         server = _Server(_config(app, settings), service)
         spare_modules()
@@ -75,7 +75,9 @@ def serve(settings: Settings, registry: Registry | None = None) -> None:
             server.should_exit = True
             _end_by_force_after(settings.exit_seconds)
 
+        later = threading.Thread(target=_begin_answers, args=(service,), daemon=True)
         with _signals(stop), scratch_folder():
+            later.start()
             server.run(sockets=[listener])
     finally:
         service.database.close()
@@ -118,7 +120,10 @@ def work(settings: Settings, registry: Registry | None = None, *, until_empty: b
 
 def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
     connections: Connections = app.state.connections
-    connections.most = min(connections.most, _files_allowed() - _OTHER_FILES)
+    room = max(_files_allowed() - _OTHER_FILES, _LEAST_CONNECTIONS)
+    if room < connections.most:
+        log.warning("the system's limit of open files leaves room for %d connections", room)
+        connections.most = room
     return uvicorn.Config(
         app,
         http=cast(type[asyncio.Protocol], connections.protocol),
@@ -130,6 +135,17 @@ def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
         proxy_headers=bool(settings.trusted_proxies),
         forwarded_allow_ips=list(settings.trusted_proxies),
     )
+
+
+def _begin_answers(service: Service) -> None:
+    """Start the processes that compute answers when a worker is ready: nothing is to delay readiness.
+
+    Who asks for an answer before starts them at once.
+    """
+    while not service.queue.status().ready:
+        if service.stopping.wait(_TICK_SECONDS):
+            return
+    service.answers.begin()
 
 
 def _end_by_force_after(seconds: float) -> None:
@@ -157,6 +173,7 @@ def _files_allowed() -> int:
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft != hard:
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+        log.info("may open %d files, %d before", hard, soft)
     return 1 << 20 if hard == resource.RLIM_INFINITY else hard
 
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -46,27 +47,25 @@ def in_time(service: Besieged, method: str, path: str, status: int, **how: objec
     return answer
 
 
-def test_a_frozen_server_is_answered_in_time(cluster: Cluster, tmp_path: Path) -> None:
+def test_a_frozen_server_is_answered_in_time_and_does_not_hold_up_the_end(
+    cluster: Cluster, tmp_path: Path
+) -> None:
     job = {"kind": "iteration", "fresh": True}
     with (
         cluster.database() as url,
         besieged(tmp_path, url=url, database_seconds=DATABASE_SECONDS) as service,
     ):
         known = in_time(service, "POST", "/v1/jobs", 202, json=job).json()["id"]
-        with frozen(cluster):
-            in_time(service, "GET", f"/v1/jobs/{known}", 503)
-            in_time(service, "POST", "/v1/jobs", 503, json=job)
-            in_time(service, "GET", "/health/ready", 503)
-            in_time(service, "GET", "/health/live", 200)
+        with frozen(cluster), ThreadPoolExecutor() as pool:
+            asked = [
+                pool.submit(in_time, service, "GET", f"/v1/jobs/{known}", 503),
+                pool.submit(in_time, service, "POST", "/v1/jobs", 503, json=job),
+                pool.submit(in_time, service, "GET", "/health/ready", 503),
+                pool.submit(in_time, service, "GET", "/health/live", 200),
+            ]
+            for one in asked:
+                one.result()
         until(lambda: httpx.get(f"{service.base}/health/ready").status_code == 200)
-        in_time(service, "POST", "/v1/jobs", 202, json=job)
-
-
-def test_a_frozen_server_does_not_hold_up_the_end(cluster: Cluster, tmp_path: Path) -> None:
-    with (
-        cluster.database() as url,
-        besieged(tmp_path, url=url, database_seconds=DATABASE_SECONDS) as service,
-    ):
-        in_time(service, "POST", "/v1/jobs", 202, json={"kind": "iteration", "seconds": 600.0})
+        in_time(service, "POST", "/v1/jobs", 202, json={**job, "seconds": 600.0})
         with frozen(cluster):
             assert service.terminate() < EXIT_SECONDS

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sqlite3
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,7 +16,8 @@ from service_helpers import is_problem, until
 
 DATABASE_SECONDS = 1.0
 # A request waits for a connection, for the lock and for its statement, at most so long each.
-ANSWER_SECONDS = 4.0 * DATABASE_SECONDS
+# The rest is for a machine that has much else to do.
+ANSWER_SECONDS = 3.0 * DATABASE_SECONDS + 5.0
 EXIT_SECONDS = 10.0
 
 
@@ -40,7 +42,7 @@ def in_time(service: Besieged, method: str, path: str, status: int, **how: objec
     return answer
 
 
-def test_a_foreign_lock_is_answered_in_time(tmp_path: Path) -> None:
+def test_a_foreign_lock_is_answered_in_time_and_does_not_hold_up_the_end(tmp_path: Path) -> None:
     job = {"kind": "iteration", "fresh": True}
     with besieged(tmp_path, database_seconds=DATABASE_SECONDS) as service:
         known = in_time(service, "POST", "/v1/jobs?", 202, json=job).json()["id"]
@@ -50,28 +52,17 @@ def test_a_foreign_lock_is_answered_in_time(tmp_path: Path) -> None:
             in_time(service, "GET", "/v1/sweeps", 200)
             assert not in_time(service, "GET", "/health/ready", 503).json()["ready"]
             in_time(service, "GET", "/health/live", 200)
+            with ThreadPoolExecutor(32) as pool:
+                asked = [pool.submit(in_time, service, "POST", "/v1/jobs", 503, json=job) for _ in range(32)]
+                for one in asked:
+                    one.result()
         until(lambda: httpx.get(f"{service.base}/health/ready").status_code == 200)
-        in_time(service, "POST", "/v1/jobs", 202, json=job)
-
-
-def test_many_writers_behind_a_lock_are_answered_in_time(tmp_path: Path) -> None:
-    from concurrent.futures import ThreadPoolExecutor
-
-    job = {"kind": "iteration", "fresh": True}
-    with (
-        besieged(tmp_path, database_seconds=DATABASE_SECONDS) as service,
-        ThreadPoolExecutor(64) as pool,
-        locked(tmp_path / "jobs.db"),
-    ):
-        asked = [pool.submit(in_time, service, "POST", "/v1/jobs", 503, json=job) for _ in range(64)]
-        for one in asked:
-            one.result()
-
-
-@pytest.mark.parametrize("busy", [False, True])
-def test_a_lock_does_not_hold_up_the_end(tmp_path: Path, busy: bool) -> None:
-    with besieged(tmp_path, database_seconds=DATABASE_SECONDS) as service:
-        if busy:
-            in_time(service, "POST", "/v1/jobs", 202, json={"kind": "iteration", "seconds": 600.0})
+        in_time(service, "POST", "/v1/jobs", 202, json={**job, "seconds": 600.0})
         with locked(tmp_path / "jobs.db"):
             assert service.terminate() < EXIT_SECONDS
+
+
+@pytest.mark.long
+def test_a_lock_does_not_hold_up_the_end_of_an_idle_service(tmp_path: Path) -> None:
+    with besieged(tmp_path, database_seconds=DATABASE_SECONDS) as service, locked(tmp_path / "jobs.db"):
+        assert service.terminate() < EXIT_SECONDS

@@ -1,16 +1,20 @@
-"""Clients that read nothing, and connections that say nothing."""
+"""Clients that read nothing, connections that say nothing, and event streams: each many, and all at once."""
 
 from __future__ import annotations
 
 import contextlib
+import resource
+import socket
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from besieged import Besieged, besieged, no_more_memory, others_are_served
-from service_helpers import until
+from besieged import Besieged, besieged, follow, no_more_memory, others_are_served, submitted
+from service_helpers import is_problem, until
 
 EXIT_SECONDS = 10.0
 LARGE = 3_000_000
+VICTIM = "/v1/scenes/two-dof"
 
 
 def with_a_large_job(service: Besieged, owner: str) -> str:
@@ -23,36 +27,80 @@ def with_a_large_job(service: Besieged, owner: str) -> str:
     return str(answer.headers["location"])
 
 
-@pytest.mark.parametrize("number", [200, pytest.param(1000, marks=pytest.mark.long)])
-def test_silent_readers_hold_no_memory(tmp_path: Path, number: int) -> None:
+def ask_and_be_silent(service: Besieged, path: str, owner: str, number: int) -> None:
+    for _ in range(number):
+        with contextlib.suppress(OSError):
+            service.ask(path, owner, receive_buffer=4096)
+
+
+def test_all_of_them_at_once_leave_others_alone(tmp_path: Path) -> None:
+    """200 streams, 200 silent readers and 300 idle connections, of which 100 are too many."""
+    limits = {
+        "owner_requests": 0,
+        "owner_streams": 0,
+        "streams": 200,
+        "connections": 600,
+        "write_seconds": 1.0,
+    }
+    with besieged(tmp_path, "ann", "bob", header_seconds=60.0, **limits) as service:
+        path, job = with_a_large_job(service, "ann"), submitted(service, "bob")
+        service.idle = service.memory()
+        follow(service, "ann", 200)
+        silent = service.ask(path, "ann", receive_buffer=4096)
+        ask_and_be_silent(service, path, "ann", 199)
+        for _ in range(300):
+            service.connect()
+        others_are_served(service, VICTIM, "bob")
+        no_more_memory(service)
+        with service.client("bob") as client:
+            is_problem(client.get(f"/v1/jobs/{job}/events"), 503)
+        until(lambda: "took nothing of its answer" in service.log(), seconds=30.0)
+        assert received(silent) < LARGE, "a silent reader is disconnected"
+        assert service.terminate() < EXIT_SECONDS
+
+
+def received(client: socket.socket) -> int:
+    """Bytes that a connection has still to give before it ends."""
+    total = 0
+    with contextlib.suppress(ConnectionResetError):
+        while piece := client.recv(1 << 16):
+            total += len(piece)
+    return total
+
+
+@pytest.mark.long
+def test_a_thousand_silent_readers_hold_no_memory(tmp_path: Path) -> None:
     limits = {"owner_requests": 0, "connections": 4000, "write_seconds": 2.0}
     with besieged(tmp_path, "ann", "bob", **limits) as service:
         path = with_a_large_job(service, "ann")
         service.idle = service.memory()
-        for _ in range(number):
-            with contextlib.suppress(OSError):
-                service.ask(path, "ann", receive_buffer=4096)
-        others_are_served(service, "/v1/scenes/two-dof", "bob")
+        ask_and_be_silent(service, path, "ann", 1000)
+        others_are_served(service, VICTIM, "bob")
         no_more_memory(service)
         assert service.terminate() < EXIT_SECONDS
 
 
-def test_a_silent_reader_is_disconnected(tmp_path: Path) -> None:
-    with besieged(tmp_path, "ann", write_seconds=0.5) as service:
-        silent = service.ask(with_a_large_job(service, "ann"), "ann", receive_buffer=4096)
-        until(lambda: "took nothing of its answer" in service.log(), seconds=30.0)
-        received = 0
-        with contextlib.suppress(ConnectionResetError):
-            while piece := silent.recv(1 << 16):
-                received += len(piece)
-        assert received < LARGE
-
-
-@pytest.mark.parametrize("number", [300, pytest.param(3000, marks=pytest.mark.long)])
-def test_idle_connections_keep_nobody_out(tmp_path: Path, number: int) -> None:
-    with besieged(tmp_path, "ann", "bob", connections=number // 3, header_seconds=60.0) as service:
-        for _ in range(number):
+@pytest.mark.long
+def test_thousands_of_idle_connections_keep_nobody_out(tmp_path: Path) -> None:
+    """Also where a process may open few files unless it asks for more."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    assert hard > 3500, "the test itself needs as many"
+    with few_files(400), besieged(tmp_path, "ann", "bob", connections=1000, header_seconds=60.0) as service:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 3500), hard))
+        for _ in range(3000):
             service.connect()
-        others_are_served(service, "/v1/scenes/two-dof", "bob")
+        others_are_served(service, VICTIM, "bob")
         no_more_memory(service)
+        assert f"may open {hard} files, 400 before" in service.log()
         assert service.terminate() < EXIT_SECONDS
+
+
+@contextlib.contextmanager
+def few_files(number: int) -> Iterator[None]:
+    """A soft limit of open files for this process and those that it starts."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (number, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))

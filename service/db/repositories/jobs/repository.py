@@ -45,6 +45,17 @@ def _guarded(connection: Connection, statement: Executable, attempt: Attempt, va
     return connection.execute(statement, of_attempt(attempt) | values).rowcount > 0
 
 
+def _text_of(output: JobOutput) -> JsonText:
+    """The result as it is stored."""
+    return encoded(output.result) if output.encoded is None else JsonText(output.encoded)
+
+
+def _bytes_of(output: JobOutput) -> int:
+    """What a result and the arrays of its sweeps take."""
+    arrays = (array for one in output.sweeps for array in one.arrays.values())
+    return len(_text_of(output).encode()) + sum(len(array.data) for array in arrays)
+
+
 def _attempt(row: Any, owner: str) -> Attempt:
     """The attempt that begins with a row as it waited."""
     values = row._asdict()
@@ -229,9 +240,10 @@ class JobRepository:
     def succeed(self, attempt: Attempt, output: JobOutput) -> bool:
         """Commit state, result and sweeps together, unless the job was lost or its cancel asked for."""
         finished = self.now()
+        values = {"ended": finished, "more": _bytes_of(output)}
 
         def write(connection: Connection) -> bool:
-            if not _guarded(connection, statements.SUCCEED, attempt, {"ended": finished}):
+            if not _guarded(connection, statements.SUCCEED, attempt, values):
                 return False
             drop_checkpoint(connection, attempt.job_id)
             self._store(connection, attempt, output, finished)
@@ -254,6 +266,8 @@ class JobRepository:
             if changed:
                 drop_checkpoint(connection, attempt.job_id)
             if changed and output is not None:
+                more = {"job": attempt.job_id, "more": _bytes_of(output)}
+                connection.execute(statements.ADD_STORED, more)
                 self._store(connection, attempt, output, finished)
             return changed
 
@@ -366,12 +380,10 @@ class JobRepository:
     @staticmethod
     def _store(connection: Connection, attempt: Attempt, output: JobOutput, created: datetime) -> None:
         job_id, owner = attempt.job_id, attempt.owner
-        body = encoded(output.result) if output.encoded is None else JsonText(output.encoded)
+        body = _text_of(output)
         text = body.encode()
         written = {"job_id": job_id, "body": body, "sha256": hashlib.sha256(text).hexdigest()}
         connection.execute(statements.INSERT_RESULT, written)
-        more = len(text) + sum(len(array.data) for one in output.sweeps for array in one.arrays.values())
-        connection.execute(statements.ADD_STORED, {"job": job_id, "more": more})
         insert_sweeps(connection, job_id, output.sweeps, created, owner)
         if output.design is not None:
             insert_design(connection, job_id, output.design, created, owner)

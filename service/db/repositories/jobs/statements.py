@@ -71,6 +71,7 @@ REPORT = _guarded().values(
 SUCCEED = _guarded(_C.cancel_requested.is_(False)).values(
     state=JobState.SUCCESSFUL,
     finished=bindparam("ended"),
+    stored_bytes=_C.stored_bytes + bindparam("more"),
     progress=1.0,
     lease_owner=None,
     lease_until=None,
