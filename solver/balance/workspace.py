@@ -189,9 +189,10 @@ class Workspace:
         full = point.elastic > 0.0
         beyond = point.elastic * u[::n] - point.F[:, 0]
         away = bool(np.all((forces @ system.loose)[full] * beyond[full] <= 0.0))
-        # A contact that opens and closes with the parts may hold the part elsewhere.
-        touches = np.array([contact.OPENS for contact in self.balance.scene.contacts])[system.owner]
-        away &= not np.any(system.loose[:, touches])
+        # A contact that opens and closes with the parts, or is pressed by them, may hold the part elsewhere.
+        contacts = self.balance.scene.contacts
+        moves = np.array([each.OPENS or each.normal_port is not None for each in contacts])[system.owner]
+        away &= not np.any(system.loose[:, moves])
         return Drive(relative=relative, unheld=away and bool(full.any() or point.counts[UNHELD]))
 
     def _mean_forces(self, point: Evaluation) -> Real:
