@@ -58,7 +58,9 @@ def state_at(
         load[c] = load[c - 1]
     closed = np.where(moving, load, system.mu * load) > 0.0
     slips = np.array([kernel.slip(system, x, c) for c in range(rows)])
-    closed = np.where(system.law == kernel.GAP, slips > system.gap, closed) | (system.law == kernel.POLYNOMIAL)
+    closed = np.where(system.law == kernel.GAP, slips > system.gap, closed) | (
+        system.law == kernel.POLYNOMIAL
+    )
     mode = np.where(closed, kernel.STICK, kernel.SEPARATED).astype(np.int64)
     force = _forces(system, start.tractions, names, np.maximum(load, 0.0))
     return kernel.State(x, v, force, mode)

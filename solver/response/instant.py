@@ -27,7 +27,9 @@ def start_of(solution: Solution) -> Start:
     """
     scene, omega = solution.scene, 2.0 * math.pi * solution.frequency_hz
     if not isinstance(scene.structure, LumpedStructure):
-        raise SettingError("solution", scene.name, "must be of a lumped structure, a cyclic one with every sector")
+        raise SettingError(
+            "solution", scene.name, "must be of a lumped structure, a cyclic one with every sector"
+        )
     coefficients = motion(solution)
     ks = np.arange(1, solution.highest_harmonic + 1)
     displacements = coefficients[:, 0] + coefficients[:, 1::2].sum(axis=1)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-import numpy as np
-
 from solver.contacts.fields import Between, Real
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.parts import Follows, Row, Slider

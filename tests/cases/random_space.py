@@ -1,0 +1,153 @@
+"""Random scenes in space: lumped points with x, y and z, and contacts whose load is given or moves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigvalsh
+
+from solver import Scene, march, solve
+from solver.linear.assembly import linear_model
+from solver.linear.contact_table import port_stiffnesses
+from solver.response.instant import start_of
+
+K0 = (2.0 * math.pi) ** 2  # N/m: about 1 Hz with 1 kg
+
+
+def random_space(seed: int) -> tuple[Scene, float, int]:
+    """One to three points, one to three contacts; with a frequency [Hz] and a number of harmonics, 3 to 21."""
+    rng = np.random.default_rng([seed, 7])
+    points = [f"p{i}" for i in range(rng.integers(1, 4))]
+    dofs = [f"{point}{axis}" for point in points for axis in "xyz"]
+    springs: list[dict[str, Any]] = [
+        {"between": [dof, "ground"], "k": float(K0 * rng.uniform(0.3, 3.0))} for dof in dofs
+    ]
+    for here, there in zip(dofs, dofs[3:], strict=False):
+        springs.append({"between": [here, there], "k": float(K0 * rng.uniform(0.1, 2.0))})
+    for point in points:
+        across = sorted(rng.choice(3, 2, replace=False).tolist())
+        ends = [f"{point}{'xyz'[axis]}" for axis in across]
+        springs.append({"between": ends, "k": float(K0 * rng.uniform(0.0, 0.5))})
+    force = float(10.0 ** rng.uniform(-0.5, 1.5))
+    loads = [
+        {
+            "dof": dof,
+            "amplitude": float(force * rng.uniform(0.3, 1.0)),
+            "phase": float(rng.uniform(-3.0, 3.0)),
+        }
+        for dof in rng.choice(dofs, rng.integers(1, 4), replace=False).tolist()
+    ]
+    scene = Scene.from_dict(
+        {
+            "name": f"space-{seed}",
+            "structure": {
+                "kind": "lumped",
+                "masses": {dof: float(rng.uniform(0.5, 2.0)) for dof in dofs},
+                "springs": springs,
+                "stiffness_proportional_damping": float(10.0 ** rng.uniform(-2.5, -1.3) / math.pi),
+            },
+            "nodes": [
+                {
+                    "name": point,
+                    "at": [float(i), 0.0, 0.0],
+                    "dofs": {axis: f"{point}{axis}" for axis in "xyz"},
+                }
+                for i, point in enumerate(points)
+            ],
+            "contacts": [_contact(rng, f"c{i}", points, force) for i in range(rng.integers(1, 4))],
+            "excitation": loads,
+            "observe": {"dof": str(rng.choice(dofs)), "band": [0.05, 5.0]},
+        }
+    )
+    return scene, _frequency(rng, scene), int(rng.integers(3, 22))
+
+
+def _contact(rng: np.random.Generator, name: str, points: list[str], force: float) -> dict[str, Any]:
+    """From loads that hardly matter to loads that stick; half of them move, a fifth of these with a gap."""
+    first = str(rng.choice(points))
+    normal = rng.normal(size=3)
+    mu = float(rng.uniform(0.1, 0.8))
+    N0 = float(force / mu * 10.0 ** rng.uniform(-1.0, 0.7))
+    contact: dict[str, Any] = {
+        "name": name,
+        "law": "coulomb-3d",
+        "between": [first, str(rng.choice([point for point in [*points, "ground"] if point != first]))],
+        "at": [0.0, 0.0, 0.0],
+        "normal": (normal / np.linalg.norm(normal)).tolist(),
+        "limit": "circle" if rng.random() < 0.7 else "box",
+        "kt": float(K0 * 10.0 ** rng.uniform(-0.5, 1.7)),
+        "mu": mu,
+        "N0": N0,
+        "N1": 0.0 if rng.random() < 0.4 else float(N0 * rng.uniform(0.0, 1.5)),
+        "N1_phase": float(rng.uniform(-math.pi, math.pi)),
+    }
+    if rng.random() < 0.3:
+        contact["kt_second"] = float(K0 * 10.0 ** rng.uniform(-0.5, 1.7))
+    if rng.random() < 0.5:
+        contact["kn"] = float(K0 * 10.0 ** rng.uniform(-0.5, 1.5))
+        if rng.random() < 0.2:
+            contact["N0"] = -0.3 * N0
+        else:
+            contact["prestressed"] = bool(rng.random() < 0.5)
+    return contact
+
+
+def _frequency(rng: np.random.Generator, scene: Scene) -> float:
+    """Near a resonance with the contacts free or stuck, near a fraction of one, or anywhere below."""
+    model = linear_model(scene)
+    L = np.real(model.contact_here)
+    kt = port_stiffnesses(scene, model) * (rng.random() < 0.5)
+    natural = np.sqrt(eigvalsh(model.K0 + L.T @ (kt[:, None] * L), model.M)) / (2.0 * math.pi)
+    near = float(rng.choice(natural))
+    frequencies = [rng.uniform(0.15, 1.5) * natural[0], near / rng.integers(2, 8), near, near]
+    return float(frequencies[rng.integers(4)] * rng.uniform(0.9, 1.1))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """What a response in space is, beside the march.
+
+    Attributes
+    ----------
+    seed : of the scene.
+    converged, marched : whether each of the two ended well.
+    error, estimate : of half peak to peak, relative to it.
+    flags : those of the response.
+    elsewhere : the march from rest ends in another motion than the march from the response itself.
+    """
+
+    seed: int
+    converged: bool
+    marched: bool
+    error: float
+    estimate: float
+    flags: tuple[str, ...]
+    elsewhere: bool
+
+
+def judge(seed: int, max_periods: int = 3000) -> Verdict:
+    """Solve a scene and march it, from rest and, if they differ, from the response."""
+    scene, frequency_hz, harmonics = random_space(seed)
+    solution = solve(scene, frequency_hz=frequency_hz, harmonics=harmonics)
+    rest = march(scene, frequency_hz=frequency_hz, max_periods=max_periods)
+    nothing = Verdict(
+        seed=seed, converged=solution.converged, marched=rest.converged, error=math.nan, estimate=math.nan,
+        flags=solution.flags, elsewhere=False,
+    )  # fmt: skip
+    if not (solution.converged and rest.converged):
+        return nothing
+    size = rest.half_peak_to_peak
+    estimate = solution.error_estimate + rest.error_estimate * size
+    error, elsewhere = abs(solution.half_peak_to_peak - size), False
+    if error > estimate:
+        again = march(scene, frequency_hz=frequency_hz, max_periods=max_periods, start=start_of(solution))
+        elsewhere = bool(again.converged and abs(again.half_peak_to_peak - size) > estimate)
+        if elsewhere:
+            error = abs(solution.half_peak_to_peak - again.half_peak_to_peak)
+    return Verdict(
+        seed=seed, converged=True, marched=True, error=error / size, estimate=estimate / size,
+        flags=solution.flags, elsewhere=elsewhere,
+    )  # fmt: skip
