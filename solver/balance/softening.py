@@ -1,4 +1,4 @@
-"""A solution from nothing by contacts that are soft at first: their tangential stiffness is raised to its own.
+"""A solution from nothing by contacts that are soft at first: tangential stiffness is raised to its own.
 
 Stiff contacts that slip far beyond what their springs give are nearly rigid friction, where Newton's method
 from full stick wanders. With springs so soft that no contact slips the response is found at once; on the way

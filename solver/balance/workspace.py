@@ -132,10 +132,12 @@ class Workspace:
     def solve(self, p: float, guess: Real | None = None) -> PointSolution:
         """Solve at λ = `p` (inside unit): from `guess` if given, else from nothing.
 
-        From nothing, Newton starts at the fully stuck response; if that fails under constant forces, the
-        contacts are made soft and then stiffer; if that fails, the harmonics are added little by little, beginning with the first alone; if that fails too, the load is walked down rung by
-        rung from full stick, and at last the excitation is raised from nothing. Where contacts alone hold a
-        part, and none does, it is looked whether a force drives the part away.
+        From nothing, Newton starts at the fully stuck response; if that fails, the harmonics are added
+        little by little, beginning with the first alone, and the contacts are made soft and then stiffer
+        (under constant forces in the other order, and the excitation is raised from the static equilibrium);
+        if that fails too, the load is walked down rung by rung from full stick, and at last the excitation
+        is raised from nothing. Where contacts alone hold a part, and none does, it is looked whether a force
+        drives the part away.
         """
         found = self._plain(p, guess)
         if not len(self.balance.system.loose) or (found.converged and self._balanced(found.u, p)):

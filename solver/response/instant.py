@@ -23,13 +23,12 @@ def start_of(solution: Solution) -> Start:
     Raises
     ------
     SettingError
-        The solution did not converge, or its structure is not lumped (of a cyclic one: solve with every sector).
+        The solution did not converge, or its structure is not lumped (a cyclic one is, with every sector).
     """
     scene, omega = solution.scene, 2.0 * math.pi * solution.frequency_hz
     if not isinstance(scene.structure, LumpedStructure):
-        raise SettingError(
-            "solution", scene.name, "must be of a lumped structure, a cyclic one with every sector"
-        )
+        wanted = "must be of a lumped structure, or of a cyclic one with every sector"
+        raise SettingError("solution", scene.name, wanted)
     coefficients = motion(solution)
     ks = np.arange(1, solution.highest_harmonic + 1)
     displacements = coefficients[:, 0] + coefficients[:, 1::2].sum(axis=1)

@@ -184,7 +184,7 @@ class FrictionContact(AnyContact):
         return np.asarray(self.friction_at(motions, load, tau)[0])
 
     def friction_at(self, motions: Real, load: Real, tau: Real) -> Real:
-        """Return the friction force along each direction it slides in [N] at the angles `tau`, by segments."""
+        """Return the friction force along each direction [N] at the angles `tau`, by its segments."""
         from solver.contacts.force_history import force_by_segments
 
         slider = self.friction
