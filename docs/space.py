@@ -25,8 +25,8 @@ class Study(NamedTuple):
 
 
 STUDIES = {
-    "platform-wedge": Study("wedge.mass", "kg", (0.004, 0.008, 0.032), 0.002, 0.1, 5),
-    "platform-cylinder": Study("cylinder.mass", "kg", (0.004, 0.008, 0.032), 0.002, 0.1, 5),
+    "platform-wedge": Study("wedge.mass", "kg", (0.004, 0.016, 0.064), 0.002, 0.25, 5),
+    "platform-cylinder": Study("cylinder.mass", "kg", (0.004, 0.016, 0.064), 0.002, 0.25, 5),
     "shroud-3d": Study("shroud.N0", "N", (20.0, 80.0, 400.0), 15.0, 1000.0, 3),
 }
 COLOURS = (style.BLUE, style.GREEN, style.VERMILION)
@@ -34,11 +34,11 @@ STEPS = 13
 
 
 def response(name: str, value: float) -> solver.Branch:
-    """Sweep a scene with one value of what its study varies, over its whole band."""
+    """Sweep a scene with one value of what its study varies; say so where it ends early."""
     study = STUDIES[name]
     branch = solver.sweep(solver.load_scene(name).with_values({study.path: value}), harmonics=study.harmonics)
     if not branch.completed:
-        raise SystemExit(f"{name} with {study.path} = {value:g}: {branch.status.value}")
+        print(f"{name} {study.path} {value:.4g}: {branch.status.name}", flush=True)
     return branch
 
 
@@ -47,20 +47,25 @@ def draw(name: str, left: Axes, right: Axes) -> None:
     study = STUDIES[name]
     for value, colour in zip(study.shown, COLOURS, strict=True):
         branch = response(name, value)
-        left.plot(branch.values, 1e6 * branch.half_peak_to_peak, color=colour, label=f"{value:g} {study.unit}")
+        left.plot(
+            branch.values, 1e6 * branch.half_peak_to_peak, color=colour, label=f"{value:g} {study.unit}"
+        )
     left.set(xlabel="frequency in Hz", ylabel="half peak to peak in µm", yscale="log")
     left.set_title(f"{name}: {study.path}")
     left.legend(frameon=False)
     values = np.geomspace(study.low, study.high, STEPS)
-    peaks = []
-    for value in values:
+    peaks = np.full(STEPS, np.nan)  # a branch that ends early has no highest point
+    for i, value in enumerate(values):
         branch = response(name, float(value))
-        highest = int(branch.half_peak_to_peak.argmax())
-        peaks.append(float(branch.half_peak_to_peak[highest]))
-        where = f"{1e6 * peaks[-1]:.2f} µm at {branch.values[highest]:.2f} Hz"
-        print(f"{name} {study.path} {value:.4g} {study.unit}: {where}", flush=True)
-    right.plot(values, 1e6 * np.array(peaks), "o-", markersize=3.0, color=style.INK)
-    right.set(xlabel=f"{study.path} in {study.unit}", ylabel="highest in the band in µm", xscale="log", yscale="log")
+        if branch.completed:
+            highest = int(branch.half_peak_to_peak.argmax())
+            peaks[i] = 1e6 * branch.half_peak_to_peak[highest]
+            where = f"{peaks[i]:.2f} µm at {branch.values[highest]:.2f} Hz"
+            print(f"{name} {study.path} {value:.4g} {study.unit}: {where}", flush=True)
+    right.plot(values, peaks, "o-", markersize=3.0, color=style.INK)
+    right.set(
+        xlabel=f"{study.path} in {study.unit}", ylabel="highest in the band in µm", xscale="log", yscale="log"
+    )
 
 
 def main(folder: Path, names: list[str]) -> None:

@@ -12,7 +12,6 @@ from service_helpers import is_problem
 import solver
 from solver.scene.toml import toml_text
 
-
 PATHS = {"two-dof": "damper.N0", "bladed-disk": "shroud.N0", "shroud-3d": "shroud.N0"}
 
 
