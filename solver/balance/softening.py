@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.balance.kernels.newton import from_stuck, newton
 from solver.contacts.kernels.columns import KT, KT_SECOND
-from solver.contacts.kernels.system import by_reference
+from solver.contacts.kernels.system import System, by_reference
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
 
@@ -31,7 +31,7 @@ def solve_softened(workspace: Workspace, u: Real, p: float) -> tuple[bool, int, 
     system, linear, point = workspace.balance.system, workspace.linear, workspace.point
     contacts = system.contacts
 
-    def softened(share: float) -> object:
+    def softened(share: float) -> System:
         table = contacts.copy()
         table[:, [KT, KT_SECOND]] *= share
         return by_reference(system._replace(contacts=table))

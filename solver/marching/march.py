@@ -107,7 +107,7 @@ def march(
         Friction forces at the start by the names in `MarchResult.contacts` [N], what assembly may have left;
         a force beyond the limit there is cut to it. None of a contact that is not named.
     start : Start, optional
-        A motion to begin with instead of rest, such as `solver.response.instant.start_of` reads from a
+        A motion to begin with instead of rest, such as `solver.studies.instant.start_of` reads from a
         response; tractions are then a part of it.
     on_progress : callable, optional
         Called with the fraction done (0 to 1, on the scale of the logarithm of the change) and the periods.

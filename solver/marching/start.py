@@ -53,7 +53,7 @@ def state_at(
     load = system.N0 + system.N1 * np.cos(system.N1_phase)
     moving = np.isin(system.law, (kernel.ELASTIC_NORMAL, kernel.CIRCLE))
     for c in np.flatnonzero(np.isin(system.law, _FRICTION)):
-        load[c] += system.kn[c] * kernel.normal_slip(system, x, c)
+        load[c] += system.kn[c] * kernel.normal_slip(system, x, int(c))
     for c in np.flatnonzero(system.law == kernel.CIRCLE_SECOND):
         load[c] = load[c - 1]
     closed = np.where(moving, load, system.mu * load) > 0.0

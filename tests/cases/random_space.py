@@ -13,7 +13,7 @@ from scipy.linalg import eigvalsh
 from solver import Scene, march, solve
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
-from solver.response.instant import start_of
+from solver.studies.instant import start_of
 
 ROUNDING = 1e-12  # of two ways to add up a motion
 K0 = (2.0 * math.pi) ** 2  # N/m: about 1 Hz with 1 kg

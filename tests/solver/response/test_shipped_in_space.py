@@ -7,7 +7,7 @@ from cases.random_space import Outcome, judge
 
 import solver
 from solver.marching.start import Start
-from solver.response.instant import start_of
+from solver.studies.instant import start_of
 
 # Half peak to peak [m] by `solver.march` from rest: the scene, frequency [Hz], harmonics of the balance.
 MARCHED = {
