@@ -23,7 +23,7 @@ from solver.marching.equations import equations_of_motion
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
 from solver.marching.result import MarchResult, MarchStatus, describe
-from solver.marching.start import Start, state_at
+from solver.marching.start import MarchStart, state_at
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import CyclicStructure, Excitation, Scene
 
@@ -78,7 +78,7 @@ def march(
     tolerance: float = 1e-10,
     max_periods: int = 20_000,
     tractions: Mapping[str, float] | None = None,
-    start: Start | None = None,
+    start: MarchStart | None = None,
     on_progress: Callable[[float, int], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> MarchResult:
@@ -106,8 +106,8 @@ def march(
     tractions : mapping, optional
         Friction forces at the start by the names in `MarchResult.contacts` [N], what assembly may have left;
         a force beyond the limit there is cut to it. None of a contact that is not named.
-    start : Start, optional
-        A motion to begin with instead of rest, such as `solver.studies.instant.start_of` reads from a
+    start : MarchStart, optional
+        A motion to begin with instead of rest, such as `solver.start_of` reads from a
         response; tractions are then a part of it.
     on_progress : callable, optional
         Called with the fraction done (0 to 1, on the scale of the logarithm of the change) and the periods.
@@ -137,7 +137,7 @@ def march(
     names = tuple(row.name for row in rows(whole.contacts))
     if start is not None and tractions is not None:
         raise SettingError("tractions", dict(tractions), "must be those of `start` where that is given")
-    begins = state_at(system, start or Start(tractions=tractions or {}), index, names, omega)
+    begins = state_at(system, start or MarchStart(tractions=tractions or {}), index, names, omega)
     coarse = _run(plan, begins, steps // 2, done=0)
     fine = _run(plan, coarse.state, steps, done=coarse.changes.size) if coarse.settled else coarse
     periods = coarse.changes.size + (fine.changes.size if coarse.settled else 0)

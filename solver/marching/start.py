@@ -17,7 +17,7 @@ _INSIDE = 1e-13  # share of the limit that a force stays below it: from there it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Start:
+class MarchStart:
     """A motion at the angle 0; what is not named is 0.
 
     Attributes
@@ -34,7 +34,7 @@ class Start:
 
 
 def state_at(
-    system: kernel.System, start: Start, index: Mapping[str, int], names: tuple[str, ...], omega: float
+    system: kernel.System, start: MarchStart, index: Mapping[str, int], names: tuple[str, ...], omega: float
 ) -> kernel.State:
     """Return the state of a march.
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from solver.errors import SettingError
 from solver.marching.contacts import rows
-from solver.marching.start import Start
+from solver.marching.start import MarchStart
 from solver.response.solution import Solution
 from solver.response.time_history import motion
 from solver.scene.scene import LumpedStructure
 
 
-def start_of(solution: Solution) -> Start:
+def start_of(solution: Solution) -> MarchStart:
     """Return displacements, velocities and friction forces of a response at the angle 0.
 
     A march from there stays at the response if it is one, but for the harmonics left out; if other residual
@@ -40,7 +40,7 @@ def start_of(solution: Solution) -> Start:
         forces = contact.friction_at(np.array(found.motions), found.load, np.zeros(1))[:, 0]
         names = [row.name for row in rows((contact,))]
         tractions.update(zip(names, forces.tolist(), strict=True))
-    return Start(
+    return MarchStart(
         displacements=dict(zip(scene.dofs, displacements.tolist(), strict=True)),
         velocities=dict(zip(scene.dofs, velocities.tolist(), strict=True)),
         tractions=tractions,

@@ -13,7 +13,7 @@ from solver import (
 from solver.linear.assembly import linear_model
 from solver.marching.equations import equations_of_motion
 from solver.marching.kernels import taylor as kernel
-from solver.marching.start import Start, state_at
+from solver.marching.start import MarchStart, state_at
 from solver.scene.scene import CyclicStructure
 
 
@@ -24,7 +24,7 @@ class Return:
         whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
         self.system, _, index = equations_of_motion(whole, 2.0 * math.pi * frequency_hz)
         self.steps = steps
-        self.orbit = state_at(self.system, Start(), index, (), 1.0)
+        self.orbit = state_at(self.system, MarchStart(), index, (), 1.0)
         code, _ = self.march(self.orbit, 5000, 1e-13)
         assert code == kernel.SETTLED
         self.ports = linear_model(whole).contact_here

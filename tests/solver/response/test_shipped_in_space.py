@@ -6,8 +6,7 @@ import pytest
 from cases.random_space import Outcome, judge
 
 import solver
-from solver.marching.start import Start
-from solver.studies.instant import start_of
+from solver import MarchStart, start_of
 
 # Half peak to peak [m] by `solver.march` from rest: the scene, frequency [Hz], harmonics of the balance.
 MARCHED = {
@@ -42,12 +41,12 @@ def test_a_march_begins_where_the_response_is() -> None:
 @pytest.mark.parametrize(
     ("start", "words"),
     [
-        (Start(displacements={"nothing": 1.0}), "degrees of freedom"),
-        (Start(velocities={"ax": float("nan")}), "number"),
-        (Start(tractions={"nothing": 1.0}), "contacts with friction"),
+        (MarchStart(displacements={"nothing": 1.0}), "degrees of freedom"),
+        (MarchStart(velocities={"ax": float("nan")}), "number"),
+        (MarchStart(tractions={"nothing": 1.0}), "contacts with friction"),
     ],
 )
-def test_a_bad_start_is_named(start: Start, words: str) -> None:
+def test_a_bad_start_is_named(start: MarchStart, words: str) -> None:
     with pytest.raises(solver.SettingError, match=words):
         solver.march(solver.load_scene("platform-wedge"), frequency_hz=400.0, start=start)
 
