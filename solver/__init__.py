@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from solver.continuation.settings import ContinuationSettings, Predictor
     from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
     from solver.marching.march import march
+    from solver.marching.start import MarchStart
     from solver.response.floquet import Growth, Stability, branch_stability, stability
     from solver.response.power_balance import PowerBalance, power_balance
     from solver.response.solution import Solution, SolutionStatus
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from solver.sensitivity.nonsmooth import PeakGradient, PeakKind, peak_gradient
     from solver.studies.blades import BladeAmplitudes, BladePeaks, blade_amplitudes, blade_peaks, mistuned
     from solver.studies.convergence import AccuracyRow, AccuracyStudy, accuracy_study
+    from solver.studies.instant import start_of
     from solver.studies.mistuning import MistunedDisk, MistuningStatus, MistuningStudy, mistuning_study
     from solver.studies.peaks.minimise_peak import least_peak
     from solver.studies.peaks.results import Basin, LeastPeak, PeakTrack, TrackStatus
@@ -68,7 +70,8 @@ _HOME = {
     "AmplitudeHessian": "sensitivity.hessian", "EdgeHessian": "sensitivity.hessian",
     "PeakHessian": "sensitivity.hessian", "PeakGradient": "sensitivity.nonsmooth",
     "PeakKind": "sensitivity.nonsmooth", "peak_gradient": "sensitivity.nonsmooth",
-    "march": "marching.march", "PowerBalance": "response.power_balance",
+    "MarchStart": "marching.start", "start_of": "studies.instant", "march": "marching.march",
+    "PowerBalance": "response.power_balance",
     "power_balance": "response.power_balance", "hysteresis_loop": "response.time_history",
     "motion": "response.time_history", "time_history": "response.time_history",
     "MapStatus": "studies.response_map", "ResponseMap": "studies.response_map",
@@ -105,6 +108,7 @@ __all__ = [
     "Issue",
     "LeastPeak",
     "MapStatus",
+    "MarchStart",
     "Measure",
     "Measured",
     "MissingExtraError",
@@ -163,6 +167,7 @@ __all__ = [
     "shipped_scenes",
     "solve",
     "stability",
+    "start_of",
     "sweep",
     "time_history",
     "track_peak",

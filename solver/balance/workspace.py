@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -13,6 +15,7 @@ from solver.balance.kernels.locate import slope_by_parameter
 from solver.balance.kernels.newton import from_stuck, ladder, newton, stuck_start
 from solver.balance.kernels.output import MEASURES
 from solver.balance.kernels.residual import evaluate
+from solver.balance.softening import solve_softened
 from solver.contacts.kernels.system import (
     UNHELD,
     Evaluation,
@@ -36,6 +39,14 @@ FEWEST_HARMONICS = (
 BALANCED = 1e-6  # of the forces on a part that contacts alone hold: a mean force that drives it is larger
 ROUNDING = 1e-15
 _LEAST_RISE = 1e-3  # share of the excitation below which it is raised no further
+
+
+def _in_place(
+    way: Callable[..., tuple[bool, int, float]], system: System, linear: Receptance, point: Evaluation,
+    u: Real, p: float,
+) -> tuple[bool, int, float]:  # fmt: skip
+    """Take one of the compiled ways from nothing."""
+    return way(system, linear, u, p, point)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,9 +133,11 @@ class Workspace:
         """Solve at λ = `p` (inside unit): from `guess` if given, else from nothing.
 
         From nothing, Newton starts at the fully stuck response; if that fails, the harmonics are added
-        little by little, beginning with the first alone; if that fails too, the load is walked down rung by
-        rung from full stick, and at last the excitation is raised from nothing. Where contacts alone hold a
-        part, and none does, it is looked whether a force drives the part away.
+        little by little, beginning with the first alone, and the contacts are made soft and then stiffer
+        (under constant forces in the other order, and the excitation is raised from the static equilibrium);
+        if that fails too, the load is walked down rung by rung from full stick, and at last the excitation
+        is raised from nothing. Where contacts alone hold a part, and none does, it is looked whether a force
+        drives the part away.
         """
         found = self._plain(p, guess)
         if not len(self.balance.system.loose) or (found.converged and self._balanced(found.u, p)):
@@ -133,30 +146,39 @@ class Workspace:
 
     def _plain(self, p: float, guess: Real | None = None) -> PointSolution:
         """Solve the balance as it stands, as `solve`."""
-        system, linear, point = self.system, self.linear, self.point
         u, spent = np.zeros(self.balance.n_unknowns), 0
         if guess is not None:
             good, spent, norm = self._newton(guess, u, p)
             if good:
                 return PointSolution(converged=True, u=u, iterations=spent, residual=norm)
-        good, more, norm = from_stuck(system, linear, u, p, point)
-        spent += more
-        if not good and self.balance.system.constant_mean:
-            good, more, norm = self._by_level(u, p, at_rest=True)
+        good, norm = False, np.inf
+        for way in self._ways():
+            good, more, norm = way(u, p)
             spent += more
-        if not good:
-            ks, coarse = self._with_fewer_harmonics(p)
-            spent += coarse.iterations
-            if coarse.converged:
-                good, more, norm = self._newton(self._padded(coarse.u, ks), u, p)
-                spent += more
-        if not good:
-            good, more, norm = ladder(system, linear, u, p, point)
-            spent += more
-        if not good:
-            good, more, norm = self._by_level(u, p)
-            spent += more
+            if good:
+                break
         return PointSolution(converged=bool(good), u=u, iterations=int(spent), residual=float(norm))
+
+    def _ways(self) -> tuple[Callable[[Real, float], tuple[bool, int, float]], ...]:
+        """Return the ways to a solution from nothing in their order, each as `newton` with u in place.
+
+        Under constant forces the contacts are soft at first: their load is not known before the equilibrium.
+        """
+        system, linear, point = self.system, self.linear, self.point
+        stuck = partial(_in_place, from_stuck, system, linear, point)
+        rungs = partial(_in_place, ladder, system, linear, point)
+        soft, at_rest = partial(solve_softened, self), partial(self._by_level, at_rest=True)
+        if self.balance.system.constant_mean:
+            return stuck, soft, at_rest, self._from_fewer, rungs, self._by_level
+        return stuck, self._from_fewer, soft, rungs, self._by_level
+
+    def _from_fewer(self, u: Real, p: float) -> tuple[bool, int, float]:
+        """Add the harmonics little by little, the result in `u`; as `newton`."""
+        ks, coarse = self._with_fewer_harmonics(p)
+        if not coarse.converged:
+            return False, coarse.iterations, np.inf
+        good, more, norm = self._newton(self._padded(coarse.u, ks), u, p)
+        return good, coarse.iterations + more, norm
 
     def solve_from(self, p: float, guess: Real) -> PointSolution:
         """Solve at λ = `p` (inside unit) by Newton's method from `guess` alone."""
@@ -189,9 +211,10 @@ class Workspace:
         full = point.elastic > 0.0
         beyond = point.elastic * u[::n] - point.F[:, 0]
         away = bool(np.all((forces @ system.loose)[full] * beyond[full] <= 0.0))
-        # A contact that opens and closes with the parts may hold the part elsewhere.
-        touches = np.array([contact.OPENS for contact in self.balance.scene.contacts])[system.owner]
-        away &= not np.any(system.loose[:, touches])
+        # A contact that opens and closes with the parts, or is pressed by them, may hold the part elsewhere.
+        contacts = self.balance.scene.contacts
+        moves = np.array([each.OPENS or each.normal_port is not None for each in contacts])[system.owner]
+        away &= not np.any(system.loose[:, moves])
         return Drive(relative=relative, unheld=away and bool(full.any() or point.counts[UNHELD]))
 
     def _mean_forces(self, point: Evaluation) -> Real:

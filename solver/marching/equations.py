@@ -66,8 +66,8 @@ def _of_matrices(
     return A, B, W, found.index | {dof: n + i for i, dof in enumerate(own)}
 
 
-def equations_of_motion(scene: Scene, omega: float) -> tuple[kernel.System, int]:
-    """The equations of a scene in the angle tau = omega t, and the coordinate observed."""
+def equations_of_motion(scene: Scene, omega: float) -> tuple[kernel.System, int, dict[str, int]]:
+    """The equations of a scene in the angle tau = omega t, the coordinate observed, and that of each DOF."""
     A, B, W, index = _equations(scene)
     A, B, W = A / omega**2, B / omega, W / omega**2
     forces = scene.forces
@@ -88,4 +88,4 @@ def equations_of_motion(scene: Scene, omega: float) -> tuple[kernel.System, int]
         force_harmonic=np.array([force.harmonic for force in forces], dtype=np.int64),
         **columns(placed, index, A.shape[0]),
     )
-    return system, index[scene.observe.dof]
+    return system, index[scene.observe.dof], index

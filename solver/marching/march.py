@@ -23,9 +23,9 @@ from solver.marching.equations import equations_of_motion
 from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
 from solver.marching.result import MarchResult, MarchStatus, describe
+from solver.marching.start import MarchStart, state_at
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import CyclicStructure, Excitation, Scene
-from solver.scene.validation import listing
 
 FloatArray = NDArray[np.float64]
 LEAST_STEPS = 64
@@ -78,6 +78,7 @@ def march(
     tolerance: float = 1e-10,
     max_periods: int = 20_000,
     tractions: Mapping[str, float] | None = None,
+    start: MarchStart | None = None,
     on_progress: Callable[[float, int], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> MarchResult:
@@ -105,6 +106,9 @@ def march(
     tractions : mapping, optional
         Friction forces at the start by the names in `MarchResult.contacts` [N], what assembly may have left;
         a force beyond the limit there is cut to it. None of a contact that is not named.
+    start : MarchStart, optional
+        A motion to begin with instead of rest, such as `solver.start_of` reads from a
+        response; tractions are then a part of it.
     on_progress : callable, optional
         Called with the fraction done (0 to 1, on the scale of the logarithm of the change) and the periods.
     should_stop : callable, optional
@@ -113,14 +117,14 @@ def march(
     Raises
     ------
     SettingError
-        An argument is out of its range, a traction of an unknown contact or of one without friction, or the
-        scene has a contact with a circular limit.
+        An argument is out of its range, a degree of freedom or contact of the start is unknown, or has no
+        friction, or the scene has a contact with a sampled circular limit.
     """
     begin = time.perf_counter()
     _check(frequency_hz, tolerance, max_periods)
     whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
     omega = 2.0 * math.pi * frequency_hz
-    system, dof = equations_of_motion(whole, omega)
+    system, dof, index = equations_of_motion(whole, omega)
     steps = _steps(system, scene.forces, steps_per_period)
     plan = _Plan(
         system=system,
@@ -131,8 +135,10 @@ def march(
         should_stop=should_stop,
     )
     names = tuple(row.name for row in rows(whole.contacts))
-    start = _with_tractions(plan.system, _at_rest(plan.system), names, tractions or {})
-    coarse = _run(plan, start, steps // 2, done=0)
+    if start is not None and tractions is not None:
+        raise SettingError("tractions", dict(tractions), "must be those of `start` where that is given")
+    begins = state_at(system, start or MarchStart(tractions=tractions or {}), index, names, omega)
+    coarse = _run(plan, begins, steps // 2, done=0)
     fine = _run(plan, coarse.state, steps, done=coarse.changes.size) if coarse.settled else coarse
     periods = coarse.changes.size + (fine.changes.size if coarse.settled else 0)
     if on_progress is not None and fine.settled:
@@ -215,34 +221,6 @@ def _largest(matrix: csr_array, products: int) -> float:
             break
         scale = grown / grown.max() + 1e-12 * scale
     return least
-
-
-def _at_rest(system: kernel.System) -> kernel.State:
-    """No motion, no friction force; open where nothing presses at tau = 0 or friction never acts."""
-    n, n_contacts = system.A_start.size - 1, system.kt.size
-    load = system.N0 + system.N1 * np.cos(system.N1_phase)
-    moving = np.isin(system.law, (kernel.ELASTIC_NORMAL, kernel.CIRCLE))
-    closed = np.where(moving, load, system.mu * load) > 0.0
-    closed = np.where(system.law == kernel.GAP, system.gap < 0.0, closed) | (system.law == kernel.POLYNOMIAL)
-    mode = np.where(closed, kernel.STICK, kernel.SEPARATED).astype(np.int64)
-    return kernel.State(np.zeros(n), np.zeros(n), np.zeros(n_contacts), mode)
-
-
-def _with_tractions(
-    system: kernel.System, start: kernel.State, names: tuple[str, ...], tractions: Mapping[str, float]
-) -> kernel.State:
-    """Put friction forces into the contacts of a start, no more than their limits there."""
-    force = start.force.copy()
-    load = np.maximum(system.N0 + system.N1 * np.cos(system.N1_phase), 0.0)
-    for name, traction in tractions.items():
-        if name not in names:
-            raise SettingError("tractions", name, f"must be of contacts with friction: {listing(names)}")
-        at = names.index(name)
-        if system.law[at] not in (kernel.COULOMB, kernel.ELASTIC_NORMAL) or not math.isfinite(traction):
-            raise SettingError("tractions", traction, f"must be a friction force in newtons, of {name!r}")
-        limit = float(system.mu[at] * load[at])
-        force[at] = min(max(float(traction), -limit), limit)
-    return start._replace(force=force)
 
 
 def _run(plan: _Plan, start: kernel.State, steps: int, *, done: int) -> _Run:

@@ -120,15 +120,18 @@ def history_of(solution: Solution) -> History:
     )  # fmt: skip
 
 
-def has_another_solution(workspace: Workspace, u: Real, p: float) -> bool:
+def has_another_solution(workspace: Workspace, u: Real, p: float, *, from_nothing: bool) -> bool:
     """Return whether Newton's method from no motion leads elsewhere.
+
+    If `u` is what a search from nothing has found (`from_nothing`), that is not made again.
 
     Under loads that are given, without gaps and nonlinear springs, there is one solution but for residual
     forces; else there may be several, of which this looks for one more: finding none proves nothing.
     """
     if all(contact.load_is_given for contact in workspace.balance.scene.contacts):
         return False
-    other = workspace.solve(p, np.zeros_like(u))
+    guess = np.zeros_like(u)
+    other = workspace.solve_from(p, guess) if from_nothing else workspace.solve(p, guess)
     if not other.converged:
         return False
     return float(np.abs(other.u - u).max(initial=0.0)) > _ELSEWHERE * float(np.abs(u).max(initial=0.0))

@@ -106,7 +106,7 @@ def describe(
         seconds=0.0,
     )
     history, nothing_holds = history_of(solution), _nothing_holds_a_part(workspace)
-    another = has_another_solution(workspace, found.u, omega)
+    another = has_another_solution(workspace, found.u, omega, from_nothing=estimated)
     mean_open = nothing_holds or history.mean_open or another
     return replace(
         solution,

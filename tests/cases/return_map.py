@@ -11,9 +11,9 @@ from solver import (
     annulus,
 )
 from solver.linear.assembly import linear_model
-from solver.marching import march as marching
 from solver.marching.equations import equations_of_motion
 from solver.marching.kernels import taylor as kernel
+from solver.marching.start import MarchStart, state_at
 from solver.scene.scene import CyclicStructure
 
 
@@ -22,9 +22,9 @@ class Return:
 
     def __init__(self, scene: Scene, frequency_hz: float, steps: int = 1024) -> None:
         whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
-        self.system, _ = equations_of_motion(whole, 2.0 * math.pi * frequency_hz)
+        self.system, _, index = equations_of_motion(whole, 2.0 * math.pi * frequency_hz)
         self.steps = steps
-        self.orbit = marching._at_rest(self.system)
+        self.orbit = state_at(self.system, MarchStart(), index, (), 1.0)
         code, _ = self.march(self.orbit, 5000, 1e-13)
         assert code == kernel.SETTLED
         self.ports = linear_model(whole).contact_here

@@ -20,7 +20,8 @@ from solver.jit.decorators import compiled
 from solver.jit.fourier import Real, coefficient_count
 from solver.jit.separate import apart
 
-FREE = 1e-9  # singular value of S below which nothing holds the part: slopes are 0 or of the size of kt
+# Singular value of S below which nothing holds the part: slopes are of the size of kt, or rounding of events.
+FREE = 1e-6
 
 
 @apart

@@ -253,6 +253,10 @@ class AnyContact(Element, InSpace):
             "contact", self.name, f"must have a law whose force is known over time ({self.LAW} is not)"
         )
 
+    def friction_at(self, motions: Real, load: Real, tau: Real) -> Real:
+        """Return the friction force along each direction it slides in [N], (directions, n); as `force_at`."""
+        return self.force_at(motions, load, tau).reshape(1, -1)
+
     def utilisation(self, forces: Real, load: Real) -> float:
         """Return the largest share of its limit that it carries while it sticks; forces (ports, 2H + 1)."""
         del forces, load

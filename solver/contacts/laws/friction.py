@@ -180,10 +180,16 @@ class FrictionContact(AnyContact):
         return False, f"the normal load of {self.name} stays at {least:g} N or more"
 
     def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
-        """Return the force along the first motion [N] at the angles `tau`, by its segments."""
+        """Return the force along the first motion [N] at the angles `tau`."""
+        return np.asarray(self.friction_at(motions, load, tau)[0])
+
+    def friction_at(self, motions: Real, load: Real, tau: Real) -> Real:
+        """Return the friction force along each direction [N] at the angles `tau`, by its segments."""
         from solver.contacts.force_history import force_by_segments
 
-        return force_by_segments(motions[0], load, self.kt, self.mu, tau)
+        slider = self.friction
+        pairs = zip(slider.ports, slider.stiffnesses, strict=True)
+        return np.array([force_by_segments(motions[port], load, kt, self.mu, tau) for port, kt in pairs])
 
     def utilisation(self, forces: Real, load: Real) -> float:
         """Return the largest share of its limit that it carries while it sticks."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-import numpy as np
-
 from solver.contacts.fields import Between, Real
 from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.parts import Follows, Row, Slider
@@ -41,14 +39,13 @@ class SlidesInAPlane(FrictionContact):
         """Its slider."""
         return replace(super().friction, kt_second=self.tangential[1], limits_apart=self.limits_apart)
 
-    def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
-        """Return the force along the first motion [N] at the angles `tau`."""
+    def friction_at(self, motions: Real, load: Real, tau: Real) -> Real:
+        """Return both components of the friction force [N] at the angles `tau`, (2, n)."""
         if self.limits_apart:
-            return super().force_at(motions, load, tau)
+            return super().friction_at(motions, load, tau)
         from solver.contacts.space_path import force_in_space, path_in_space
 
-        both = force_in_space(path_in_space(motions, load, *self.tangential, self.mu), tau)
-        return np.asarray(both[0])
+        return force_in_space(path_in_space(motions, load, *self.tangential, self.mu), tau)
 
     def shares(self, motions: Real, load: Real) -> Shares:
         """Return the shares of the period in stick, slip and separation."""

@@ -59,7 +59,8 @@ class ErrorEstimator:
     the first order misses. The estimate is the larger change of the amplitude, at least a tenth of the change
     of the motion at its worst instant, times `SAFETY`. Harmonics still beyond are added with coefficients
     that fall like 1/k², as those of a force with kinks do, weighted by the receptance, so that a resonance
-    out there is not overlooked.
+    out there is not overlooked. Where these move the contacts more than the harmonics looked at, as they do
+    up to the resonance of a light damper on its stiff contacts, the change counts as many times.
     """
 
     def __init__(self, workspace: Workspace) -> None:
@@ -70,7 +71,7 @@ class ErrorEstimator:
         self._larger = Workspace.of(more_harmonics(balance, self._top, multiples=2 * MULTIPLES), workspace)
         beyond = linear_part(self._larger.balance, _TAIL * self._top)
         self._is_beyond = ~np.isin(beyond.ks, self._larger.balance.system.ks)
-        self._beyond_ks = beyond.ks[self._is_beyond]
+        self._all_ks, self._beyond_ks = beyond.ks, beyond.ks[self._is_beyond]
         self._is_fast = is_fast(balance.scene, self._larger.balance.system.ks)
         self._later_is_fast = is_fast(balance.scene, self._beyond_ks)
         self._beyond = by_reference(beyond)
@@ -101,7 +102,7 @@ class ErrorEstimator:
         if self._motion(larger, U, p) is None:
             return UNKNOWN
         point = evaluation_by_value(larger.point)
-        tail = self._tail(point.F, p)
+        tail, more = self._tail(point.F, p)
         # Across the branch, u and λ each count relative to their size.
         size = max(float(np.abs(u).max(initial=0.0)), 1e-150)
         weights = (1.0 / size**2, 1.0 / (p * p if p != 0.0 else 1.0)) if across else (0.0, 0.0)
@@ -119,7 +120,7 @@ class ErrorEstimator:
                 return UNKNOWN
             changes.append(self._change(x, after))
         largest = np.max(changes, axis=0)
-        max_abs, half_range = SAFETY * largest + tail + self._rounding()
+        max_abs, half_range = more * SAFETY * largest + tail + self._rounding()
         return ErrorEstimate(max_abs=float(max_abs), half_peak_to_peak=float(half_range))
 
     def _rounding(self) -> float:
@@ -163,22 +164,32 @@ class ErrorEstimator:
         tangent: Real = np.append(pad(slope, kept.balance, self._larger.balance), 1.0)
         return tangent if np.all(np.isfinite(tangent)) else None
 
-    def _tail(self, F: Real, p: float) -> float:
-        """Return the motion of the observed DOF by harmonics beyond those of the larger balance [m]."""
-        ks = self._larger.balance.system.ks
+    def _tail(self, F: Real, p: float) -> tuple[float, float]:
+        """Return what harmonics beyond those of the larger balance do.
+
+        That is the motion of the observed DOF [m], and how many times as much as the harmonics that only the
+        larger balance has they move the contacts, at least 1.
+        """
+        ks, kept = self._larger.balance.system.ks, self._workspace.balance.system.ks
         receptance(self._beyond, p, self._beyond_linear)
-        B = np.abs(receptance_by_value(self._beyond_linear).B[0, self._is_beyond])
-        weighted = np.zeros((F.shape[0], ks.size))
+        linear = receptance_by_value(self._beyond_linear)
+        B, A = np.abs(linear.B[0]), np.abs(linear.A[0])
+        sizes = np.zeros((F.shape[0], ks.size))
         moving = ks > 0
         pairs = F[:, int(ks[0] == 0) :].reshape(F.shape[0], int(moving.sum()), 2)
-        weighted[:, moving] = np.hypot(pairs[..., 0], pairs[..., 1]) * ks[moving] ** 2
-        tail = 0.0
+        sizes[:, moving] = np.hypot(pairs[..., 0], pairs[..., 1])
+        weighted, tail, far = sizes * ks**2, 0.0, np.zeros(F.shape[0])
         for fast in (False, True):  # waves of their own, each with its own rate
             own, later = self._is_fast == fast, self._later_is_fast == fast
             late = weighted[:, own][:, np.count_nonzero(own) // 2 :]
             falling = np.max(late, axis=1, initial=0.0)
-            tail += float(np.sum(B[later] @ falling / self._beyond_ks[later] ** 2))
-        return tail
+            share = 1.0 / self._beyond_ks[later] ** 2
+            tail += float(np.sum(B[self._is_beyond][later] @ falling * share))
+            far += share @ (A[self._is_beyond][later] @ falling)
+        added = np.isin(self._all_ks, ks[~np.isin(ks, kept)])
+        near = np.einsum("kcd,dk->c", A[added], sizes[:, ~np.isin(ks, kept)])
+        furthest, nearest = float(far.max(initial=0.0)), float(near.max(initial=0.0))
+        return tail, max(1.0, furthest / nearest) if nearest > 0.0 else 1.0
 
 
 def truncation_error(workspace: Workspace, u: Real, p: float) -> ErrorEstimate:

@@ -92,6 +92,7 @@ class NodeSolver:
         self.spent = 0
         self.least = workspace.balance.system.least_size
         balance = workspace.balance
+        self._one_solution = all(contact.keeps_together for contact in balance.scene.contacts)
         self.table = NodeTable(balance.n_unknowns, balance.n_coefficients, MEASURES, balance.system.laws.size)
         self._last: tuple[Sequence[Node], float, Between] | tuple[None, float, None] = None, 0.0, None
 
@@ -295,7 +296,8 @@ class NodeSolver:
 
         Parameters
         ----------
-        guesses : slip motions to start from, one after the other; at last from nothing.
+        guesses : slip motions to start from, one after the other; at last from nothing, where there is one
+            solution only: elsewhere that may be of another branch.
         onward : the sign of dλ along the branch.
         """
         workspace = self.workspace
@@ -305,7 +307,7 @@ class NodeSolver:
             self.spent += found.iterations
             if found.converged:
                 break
-        if found is None or not found.converged:
+        if found is None or (not found.converged and self._one_solution):
             found = workspace.solve(p)
             self.spent += found.iterations
         if not found.converged:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from cases.body_scenes import block_in_space, cylinder_in_space, planar_wedge, shaped_wedge
 
-from solver import Scene, SettingError
+from solver import Scene, SettingError, load_scene
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace
 from solver.sensitivity.gradient import Sensitivities
@@ -70,6 +70,12 @@ def test_gradients_by_the_shape_of_a_block_are_those_of_differences() -> None:
     _check(
         Scene.from_dict(cylinder_in_space()), ["roll.angle", "roll.radius", "roll.length", "roll.mass"], 240.0
     )
+
+
+@pytest.mark.parametrize("name", ["wedge", "cylinder"])
+def test_gradients_of_a_shipped_damper_are_those_of_differences(name: str) -> None:
+    paths = [f"{name}.{key}" for key in ("mass", "angle", "mu", "kt")]
+    _check(load_scene(f"platform-{name}"), [*paths, "speed"], 345.0, rel=1e-6)
 
 
 def test_places_of_contacts_are_not_continued_in() -> None:
