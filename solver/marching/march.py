@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Integral, Real
 
 import numpy as np
@@ -128,25 +128,24 @@ def march(
     )  # fmt: skip
     names = tuple(row.name for row in rows(whole.contacts))
     start = _with_tractions(plan.system, _at_rest(plan.system), names, tractions or {})
-    coarse, fine, periods = _twice(plan, start, steps)
+    found = _twice(plan, start, steps, names, frequency_hz)
+    return replace(found, seconds=time.perf_counter() - begin)
+
+
+def _twice(
+    plan: _Plan, start: kernel.State, steps: int, names: tuple[str, ...], frequency_hz: float
+) -> MarchResult:
+    """March with double the step, then from its end with `steps` a period if it settled."""
+    coarse = _run(plan, start, steps // 2, done=0)
+    fine = _run(plan, coarse.state, steps, done=coarse.changes.size) if coarse.settled else coarse
+    periods = coarse.changes.size + (fine.changes.size if coarse.settled else 0)
+    if plan.on_progress is not None and fine.settled:
+        plan.on_progress(1.0, periods)
     return describe(
         record=fine.record, coarse=coarse.record, order=kernel.ORDER,
         transient=_left_to_decay(coarse.changes, fine.changes), periods=periods, contacts=names,
         frequency_hz=frequency_hz, steps_per_period=fine.steps, status=fine.status, drift=fine.drift,
-        seconds=time.perf_counter() - begin,
     )  # fmt: skip
-
-
-def _twice(plan: _Plan, start: kernel.State, steps: int) -> tuple[_Run, _Run, int]:
-    """March with double the step, then from its end with `steps` a period if it settled; and all periods."""
-    coarse = _run(plan, start, steps // 2, done=0)
-    if not coarse.settled:
-        return coarse, coarse, coarse.changes.size
-    fine = _run(plan, coarse.state, steps, done=coarse.changes.size)
-    periods = coarse.changes.size + fine.changes.size
-    if plan.on_progress is not None and fine.settled:
-        plan.on_progress(1.0, periods)
-    return coarse, fine, periods
 
 
 def _check(frequency_hz: float, tolerance: float, max_periods: int) -> None:
