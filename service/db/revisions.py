@@ -105,6 +105,17 @@ def upgrade(url: str, target: str = "head") -> str:
     return now or "base"
 
 
+def off_head(url: str, does: str) -> str | None:
+    """Say that a database is at another revision than the one this version `does`; None if it is at that."""
+    revision, wanted = current_revision(url), head_revision()
+    if revision == wanted:
+        return None
+    return (
+        f"{database_name(url)} is at revision {revision}, this version {does} {wanted}: "
+        f"run `stickslip db upgrade --database {shown(url)}`"
+    )
+
+
 def prepare(url: str) -> None:
     """Make a new database's tables, or check those of an existing one.
 
