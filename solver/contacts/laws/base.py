@@ -18,10 +18,11 @@ from pydantic import model_validator
 
 from solver.contacts.fields import Between, Element, MemberName, Name, Real
 from solver.contacts.frames import NORMAL, TANGENT_1, TANGENT_2, InSpace
-from solver.contacts.laws.parts import Held, Motion, NormalLoad, Piece, Quantity, Row, Slider
+from solver.contacts.laws.parts import Held, Motion, NormalLoad, Quantity, Row, Slider
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
+    from solver.contacts.pieces.piece import Part
     from solver.contacts.segments import Shares
 
 
@@ -268,12 +269,18 @@ class AnyContact(Element, InSpace):
         del motions, load
         return None
 
-    def pieces(self, slip: Real) -> tuple[Piece, ...] | None:
-        """Return its states for the stability of a motion, of whose `slip` these are the full coefficients.
+    def perturbed(self, motions: Real, load: Real) -> tuple[Part, ...] | None:
+        """Return how it follows small perturbations of a motion: its parts with their states, for stability.
 
+        Parameters
+        ----------
+        motions : (ports, 2H + 1) full coefficients [m]; load : those of the normal load [N].
+
+        Returns
+        -------
         None where the stability is not computed.
         """
-        del slip
+        del motions, load
         return None
 
     def rows(self) -> tuple[Row, ...]:
