@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from solver.continuation.settings import ContinuationSettings, Predictor
     from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
     from solver.marching.march import march
-    from solver.response.floquet import Growth, Stability, branch_stability, stability
+    from solver.response.stability.floquet import Growth, Stability, branch_stability, stability
     from solver.response.power_balance import PowerBalance, power_balance
     from solver.response.solution import Solution, SolutionStatus
     from solver.response.solve import solve
@@ -57,8 +57,8 @@ _HOME = {
     "Effects": "balance.simplifications", "Plan": "studies.plan", "plan": "studies.plan",
     "Scene": "scene.scene", "load_scene": "scene.scene", "shipped_scenes": "scene.scene",
     "Solution": "response.solution", "SolutionStatus": "response.solution", "solve": "response.solve",
-    "Growth": "response.floquet", "Stability": "response.floquet", "branch_stability": "response.floquet",
-    "stability": "response.floquet", "BladePeaks": "studies.blades", "blade_peaks": "studies.blades",
+    "Growth": "response.stability.floquet", "Stability": "response.stability.floquet", "branch_stability": "response.stability.floquet",
+    "stability": "response.stability.floquet", "BladePeaks": "studies.blades", "blade_peaks": "studies.blades",
     "MistunedDisk": "studies.mistuning", "MistuningStatus": "studies.mistuning",
     "MistuningStudy": "studies.mistuning", "mistuning_study": "studies.mistuning",
     "BladeAmplitudes": "studies.blades", "blade_amplitudes": "studies.blades", "mistuned": "studies.blades",

@@ -58,7 +58,7 @@ def _starts(contact: AnyContact, motions: np.ndarray, forces: np.ndarray, row: i
 
 
 class MarchedMap:
-    """The map in the coordinates of `solver.response.monodromy.Monodromy.matrix`."""
+    """The map in the coordinates of `solver.response.stability.monodromy.Monodromy.matrix`."""
 
     def __init__(self, solution: Solution, steps: int = 1024) -> None:
         self.system, _ = equations_of_motion(solution.scene, 2.0 * math.pi * solution.frequency_hz)

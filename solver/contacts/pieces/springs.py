@@ -24,15 +24,17 @@ def gap_pieces(motion: Real, stiffness: float, gap: float) -> tuple[Piece, ...]:
 
 def polynomial_pieces(motion: Real, powers: tuple[float, ...]) -> tuple[Piece, ...]:
     """Return the one state of a spring with the force Σ a_j u^j: its stiffness Σ j a_j u^(j−1) at each angle."""
-    slopes = np.array([j * a for j, a in enumerate(powers, start=1)])
-    nothing = np.zeros((0, 1))
-    if not np.any(slopes[1:]):
+    slopes = [j * a for j, a in enumerate(powers, start=1)]
+    if not any(slopes[1:]):
         return (spring(0.0, TURN, np.array([[slopes[0]]])),)
     highest = (motion.size - 1) // 2
+    still = steady(np.zeros((1, 1)))
 
     def rates(tau: float) -> Rates:
-        u = float(fourier.basis(np.array([tau]), highest)[0] @ motion)
-        return steady(np.array([[float(np.polyval(slopes[::-1], u))]]))
+        u, stiffness = float(fourier.basis(np.array([tau]), highest)[0] @ motion), 0.0
+        for slope in reversed(slopes):
+            stiffness = stiffness * u + slope
+        return still._replace(tangent=np.array([[stiffness]]))
 
     edges = tuple(k * TURN / 8.0 for k in range(1, 8))
-    return (Piece(begin=0.0, end=2.0 * math.pi, rates=rates, carried=nothing, edges=edges),)
+    return (Piece(begin=0.0, end=2.0 * math.pi, rates=rates, carried=np.zeros((0, 1)), edges=edges),)

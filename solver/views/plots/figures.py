@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from solver.continuation.branch import Branch
 from solver.marching.result import MarchResult
-from solver.response.floquet import Stability
+from solver.response.stability.floquet import Stability
 from solver.response.solution import Solution
 from solver.scene.scene import Scene
 from solver.studies.blades import BladeAmplitudes, BladePeaks

@@ -31,8 +31,8 @@ from solver.jit.fourier import Real
 
 PERIOD = 2.0 * math.pi
 INVARIANT = 1e-9  # smallest singular value, relative to the largest, of what resists a rigid displacement
-AGREES = 1e-8  # relative, of the two orders of a step
-LEAST_STEP = 1e-7  # rad: where a force goes to 0 its direction turns ever faster
+AGREES = 1e-5  # relative, of the two orders of a step; what order 6 leaves is a hundredth of it
+LEAST_STEP = 1e-6  # rad: where a force goes to 0 its direction turns ever faster
 _GAUSS = math.sqrt(15.0) / 10.0
 
 
