@@ -1,0 +1,271 @@
+"""Where a branch turns back, where another branch leaves it, where it ends, and which of it is not stable.
+
+Along a branch the determinant of dr/du is that of 1 minus the monodromy matrix but for a positive factor: it
+is negative where an odd number of real perturbations of the same period grows. Its sign changes at a fold,
+where the parameter turns too, and at a simple branch point, where it does not (W. Govaerts, Numerical Methods
+for Bifurcations of Dynamical Equilibria, 2000, chapters 3 and 8, doi:10.1137/1.9780898719543). Where a motion
+goes over to twice its period, or a second frequency grows, Floquet multipliers alone tell.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import partial
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.balance.kernels.jacobian import factorise
+from solver.balance.kernels.output import MAX_ABS
+from solver.balance.workspace import Workspace
+from solver.branches.point_by_point import is_unique
+from solver.continuation.branch import Branch
+from solver.continuation.folds import fold_between, motion_scales
+from solver.extrema.nodes import Node, NodeSolver, Points
+from solver.jit.fourier import Real
+from solver.response.stability.floquet import Growth, Stability, branch_stability
+from solver.results.told import Piece
+
+_HALVINGS = 40
+_MULTIPLIERS = 14  # halvings with multipliers, which cost more
+_NEAR = 1e-9  # relative width of the interval a branch point is known to
+
+
+class Kind(Enum):
+    """What happens at a mark; the value is what a user reads."""
+
+    FOLD = "fold: the branch turns back in its parameter"
+    BRANCH_POINT = "branch point: another branch leaves this one"
+    PERIOD_DOUBLING = "period doubling: a motion of twice the period leaves this branch"
+    TORUS = "torus: a second frequency grows (Neimark-Sacker)"
+    END = "end: the branch goes no further"
+
+
+_CROSSED = {Growth.PERIOD_DOUBLING: Kind.PERIOD_DOUBLING, Growth.TORUS: Kind.TORUS}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Mark(Piece):
+    """A place on a branch.
+
+    Attributes
+    ----------
+    kind : Kind
+        What happens there.
+    at : float
+        Parameter value, in user units.
+    amplitude : float
+        max|x| of the observed DOF there [m].
+    solution : (n_unknowns + 1,) array
+        Slip motions [m] with λ (inside unit) last.
+    after : int
+        The point of the branch it comes behind.
+    corner : bool
+        Of a fold: a contact changes its state there.
+    why : str
+        Of an end: how the branch ended.
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"amplitude": "m"}
+
+    kind: Kind
+    at: float
+    amplitude: float
+    solution: Real
+    after: int
+    corner: bool = False
+    why: str = ""
+
+    def to_json(self) -> dict[str, object]:
+        """Return the mark as one JSON object."""
+        found: dict[str, object] = {
+            "kind": self.kind.name.lower(), "at": self.at, "amplitude": self.amplitude, "after": self.after,
+        }  # fmt: skip
+        if self.kind is Kind.FOLD:
+            found["corner"] = self.corner
+        return {**found, "why": self.why} if self.why else found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Bifurcations(Piece):
+    """Stability along a branch, and its marks.
+
+    Attributes
+    ----------
+    unstable : (P,) array of bool
+        Points at which a perturbation grows, as far as `known_by` sees.
+    marks : tuple of Mark
+        In their order along the branch.
+    known_by : str
+        ``uniqueness``: loads are given and everything takes out power, so that all points are stable;
+        ``determinant``: real perturbations of the same period alone are seen; ``multipliers``: all are.
+    parameter : str
+        Path of the parameter.
+    seconds : float
+        What it took.
+    """
+
+    unstable: NDArray[np.bool_]
+    marks: tuple[Mark, ...]
+    known_by: str
+    parameter: str
+    seconds: float
+
+    @property
+    def stretches(self) -> tuple[tuple[int, int], ...]:
+        """First and last point of every stretch that is not stable."""
+        changes = np.flatnonzero(np.diff(np.concatenate([[0], self.unstable.astype(int), [0]])))
+        return tuple((int(first), int(last) - 1) for first, last in changes.reshape(-1, 2))
+
+    def to_json(self) -> dict[str, object]:
+        """Return the answer as one JSON object."""
+        return {
+            "known_by": self.known_by,
+            "parameter_path": self.parameter,
+            "unstable": [list(stretch) for stretch in self.stretches],
+            "marks": [mark.to_json() for mark in self.marks],
+            "seconds": self.seconds,
+        }
+
+
+def bifurcations(branch: Branch, *, multipliers: bool = False) -> Bifurcations:
+    """Return which points of a branch are not stable, and its folds, branch points and early end.
+
+    Parameters
+    ----------
+    branch : from `sweep`.
+    multipliers : with Floquet multipliers at every point, which cost more than the branch itself: then
+        period doublings and second frequencies are seen too.
+
+    Raises
+    ------
+    SettingError
+        With `multipliers`: a law that does not say how it is perturbed.
+    """
+    begun = time.perf_counter()
+    if not len(branch.values):
+        return Bifurcations(
+            unstable=np.zeros(0, bool), marks=(), known_by="determinant", parameter=branch.parameter,
+            seconds=time.perf_counter() - begun,
+        )  # fmt: skip
+    along = _Along(branch)
+    if is_unique(branch.balance):
+        unstable, marks, known_by = np.zeros(len(branch.values), bool), (), "uniqueness"
+    elif multipliers:
+        unstable, marks, known_by = *along.by_multipliers(), "multipliers"
+    else:
+        unstable, marks, known_by = along.signs < 0.0, along.by_determinant(), "determinant"
+    return Bifurcations(
+        unstable=unstable, marks=(*marks, *along.end()), known_by=known_by, parameter=branch.parameter,
+        seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+class _Along:
+    """A branch with the sign of the determinant of dr/du at its points."""
+
+    def __init__(self, branch: Branch) -> None:
+        self.branch, self.workspace = branch, Workspace.of(branch.balance)
+        self.solver = NodeSolver(self.workspace)
+        self.nodes = self.solver.nodes_of(
+            Points(
+                solutions=branch.solutions, tangents=branch.tangents, measures=branch.measures,
+                observed=np.zeros((len(branch.values), branch.balance.n_coefficients)), states=branch.states,
+            )
+        )  # fmt: skip
+        self._signs: Real | None = None
+
+    @property
+    def signs(self) -> Real:
+        """The sign of the determinant at every point, 0 where it is singular."""
+        if self._signs is None:
+            self._signs = np.array([self.sign(node) for node in self.nodes])
+        return self._signs
+
+    def sign(self, node: Node) -> float:
+        """The sign of the determinant at a node."""
+        workspace = self.workspace
+        workspace.evaluate(np.ascontiguousarray(node.solution[:-1]), node.at)
+        nothing = np.zeros(node.solution.size)
+        return float(factorise(workspace.system, workspace.linear, workspace.point, nothing, 0.0, 0.0))
+
+    def by_determinant(self) -> tuple[Mark, ...]:
+        """Folds and branch points."""
+        marks = []
+        for i, (left, right) in enumerate(pairwise(self.nodes)):
+            if left.tangent[-1] * right.tangent[-1] < 0.0:
+                marks.append(self._fold(i, left, right))
+            elif self.signs[i] * self.signs[i + 1] < 0.0:
+                marks.append(self._branch_point(i, left, right))
+        return tuple(marks)
+
+    def by_multipliers(self) -> tuple[NDArray[np.bool_], tuple[Mark, ...]]:
+        """Points that are not stable, and marks of every kind."""
+        found = branch_stability(self.branch)
+        marks = list(self.by_determinant())
+        taken = {mark.after for mark in marks}
+        for i, (here, there) in enumerate(pairwise(found)):
+            grows = there if here.stable else here
+            kind = _CROSSED.get(grows.growth)
+            if here.stable != there.stable and kind is not None and i not in taken:
+                marks.append(self._crossing(i, kind, here))
+        unstable = np.array([not each.stable for each in found])
+        return unstable, tuple(sorted(marks, key=lambda mark: mark.after))
+
+    def end(self) -> tuple[Mark, ...]:
+        """The last point, where the branch did not reach the end of the range."""
+        branch = self.branch
+        if branch.completed or branch.start == branch.stop:
+            return ()
+        last = self.nodes[-1]
+        return (self._mark(Kind.END, last, len(self.nodes) - 1, why=branch.status.value),)
+
+    def _fold(self, i: int, left: Node, right: Node) -> Mark:
+        by_share = motion_scales(left, right)
+        ends = float(left.tangent[-1] * by_share[0]), float(right.tangent[-1] * by_share[1])
+        found = fold_between(partial(self.solver.between, left, right), *ends)
+        if found is None:
+            return self._mark(Kind.FOLD, left, i)
+        node, smooth = found
+        return self._mark(Kind.FOLD, node, i, corner=not smooth)
+
+    def _branch_point(self, i: int, left: Node, right: Node) -> Mark:
+        """The place where the determinant changes its sign, by halving."""
+        sign = self.signs[i]
+        node = self._halved(left, right, lambda one: self.sign(one) == sign, _HALVINGS)
+        return self._mark(Kind.BRANCH_POINT, node, i)
+
+    def _crossing(self, i: int, kind: Kind, here: Stability) -> Mark:
+        def like_the_left(node: Node) -> bool:
+            return self._stability(node).stable == here.stable
+
+        node = self._halved(self.nodes[i], self.nodes[i + 1], like_the_left, _MULTIPLIERS)
+        return self._mark(kind, node, i)
+
+    def _stability(self, node: Node) -> Stability:
+        values = self.branch.balance.parameter.all_outside(np.array([node.at]))
+        point = replace(self.branch, values=values, solutions=node.solution[None, :])
+        return branch_stability(point)[0]
+
+    def _halved(self, left: Node, right: Node, like_the_left: Callable[[Node], bool], most: int) -> Node:
+        """The last node that is like the left one, by halving."""
+        for _ in range(most):
+            middle = self.solver.between(left, right, 0.5)
+            if middle is None:
+                break
+            left, right = (middle, right) if like_the_left(middle) else (left, middle)
+            if abs(right.at - left.at) <= _NEAR * abs(left.at):
+                break
+        return left
+
+    def _mark(self, kind: Kind, node: Node, after: int, *, corner: bool = False, why: str = "") -> Mark:
+        outside = self.branch.balance.parameter.outside
+        return Mark(
+            kind=kind, at=float(outside(node.at)), amplitude=float(node.measures[MAX_ABS]),
+            solution=node.solution.copy(), after=after, corner=corner, why=why,
+        )  # fmt: skip
