@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from solver.response.power_balance import PowerBalance, power_balance
     from solver.response.solution import Solution, SolutionStatus
     from solver.response.solve import solve
+    from solver.response.stability.bifurcations import Bifurcations, Mark, MarkKind, bifurcations
+    from solver.response.stability.floquet import Growth, Stability, branch_stability, stability
+    from solver.response.stability.switching import Switched, switch_branches
     from solver.response.time_history import hysteresis_loop, motion, time_history
     from solver.response.wear import ContactWear, Measured, WearSensitivity, contact_wear
     from solver.response.wear_nonsmooth import worst_slopes
@@ -57,8 +60,12 @@ _HOME = {
     "Effects": "balance.simplifications", "Plan": "studies.plan", "plan": "studies.plan",
     "Scene": "scene.scene", "load_scene": "scene.scene", "shipped_scenes": "scene.scene",
     "Solution": "response.solution", "SolutionStatus": "response.solution", "solve": "response.solve",
-    "Growth": "response.stability.floquet", "Stability": "response.stability.floquet", "branch_stability": "response.stability.floquet",
-    "stability": "response.stability.floquet", "BladePeaks": "studies.blades", "blade_peaks": "studies.blades",
+    "Growth": "response.stability.floquet", "Stability": "response.stability.floquet",
+    "branch_stability": "response.stability.floquet", "stability": "response.stability.floquet",
+    "Bifurcations": "response.stability.bifurcations", "Mark": "response.stability.bifurcations",
+    "MarkKind": "response.stability.bifurcations", "bifurcations": "response.stability.bifurcations",
+    "Switched": "response.stability.switching", "switch_branches": "response.stability.switching",
+    "BladePeaks": "studies.blades", "blade_peaks": "studies.blades",
     "MistunedDisk": "studies.mistuning", "MistuningStatus": "studies.mistuning",
     "MistuningStudy": "studies.mistuning", "mistuning_study": "studies.mistuning",
     "BladeAmplitudes": "studies.blades", "blade_amplitudes": "studies.blades", "mistuned": "studies.blades",
@@ -89,6 +96,7 @@ __all__ = [
     "AmplitudeHessian",
     "Band",
     "Basin",
+    "Bifurcations",
     "BladeAmplitudes",
     "BladePeaks",
     "Branch",
@@ -105,6 +113,8 @@ __all__ = [
     "Issue",
     "LeastPeak",
     "MapStatus",
+    "Mark",
+    "MarkKind",
     "Measure",
     "Measured",
     "MissingExtraError",
@@ -133,12 +143,14 @@ __all__ = [
     "Stability",
     "Stretch",
     "Summary",
+    "Switched",
     "TrackStatus",
     "Variable",
     "WearSensitivity",
     "WorstWear",
     "accuracy_study",
     "annulus",
+    "bifurcations",
     "blade_amplitudes",
     "blade_peaks",
     "branch_errors",
@@ -164,6 +176,7 @@ __all__ = [
     "solve",
     "stability",
     "sweep",
+    "switch_branches",
     "time_history",
     "track_peak",
     "worst_friction_work",

@@ -59,3 +59,31 @@ def moving_scene(seed: int, kind: str | None = None) -> tuple[Scene, float]:
         }
     )  # fmt: skip
     return scene, frequency
+
+
+def bending_scene(seed: int) -> Scene:
+    """A rubbing part pressed by a load that opens: its response bends over to lower frequencies."""
+    rng = np.random.default_rng([10, seed])
+    law = ("elastic-normal", "circle", "box")[seed % 3]
+    dofs = ["x", "y"] if law == "elastic-normal" else ["x", "z", "y"]
+    rub: dict[str, Any] = {
+        "name": "rub", "between": ["x", "ground"], "normal_between": ["y", "ground"], "prestressed": True,
+        "kt": rng.uniform(0.5, 2.0), "mu": rng.uniform(0.1, 0.4), "kn": rng.uniform(2.0, 4.0),
+        "N0": rng.uniform(0.4, 0.9), "law": "elastic-normal",
+    }  # fmt: skip
+    if law != "elastic-normal":
+        rub |= {"law": "coulomb-3d", "limit": law, "between_second": ["z", "ground"]}
+    pull = rng.uniform(0.15, 0.3)
+    springs = [{"between": [dof, "ground"], "k": rng.uniform(0.9, 1.2), "c": 0.03} for dof in dofs]
+    return Scene.from_dict(
+        {
+            "name": f"bending-{law}-{seed}",
+            "structure": {"kind": "lumped", "masses": dict.fromkeys(dofs, 1.0), "springs": springs},
+            "contacts": [rub],
+            "excitation": [
+                {"dof": "y", "amplitude": pull},
+                {"dof": "x", "amplitude": 0.4 * pull, "phase": 0.7},
+            ],
+            "observe": {"dof": "y", "band": [0.16, 0.45]},
+        }
+    )

@@ -36,7 +36,7 @@ _MULTIPLIERS = 14  # halvings with multipliers, which cost more
 _NEAR = 1e-9  # relative width of the interval a branch point is known to
 
 
-class Kind(Enum):
+class MarkKind(Enum):
     """What happens at a mark; the value is what a user reads."""
 
     FOLD = "fold: the branch turns back in its parameter"
@@ -46,7 +46,7 @@ class Kind(Enum):
     END = "end: the branch goes no further"
 
 
-_CROSSED = {Growth.PERIOD_DOUBLING: Kind.PERIOD_DOUBLING, Growth.TORUS: Kind.TORUS}
+_CROSSED = {Growth.PERIOD_DOUBLING: MarkKind.PERIOD_DOUBLING, Growth.TORUS: MarkKind.TORUS}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -55,7 +55,7 @@ class Mark(Piece):
 
     Attributes
     ----------
-    kind : Kind
+    kind : MarkKind
         What happens there.
     at : float
         Parameter value, in user units.
@@ -73,7 +73,7 @@ class Mark(Piece):
 
     UNITS: ClassVar[Mapping[str, str]] = {"amplitude": "m"}
 
-    kind: Kind
+    kind: MarkKind
     at: float
     amplitude: float
     solution: Real
@@ -86,7 +86,7 @@ class Mark(Piece):
         found: dict[str, object] = {
             "kind": self.kind.name.lower(), "at": self.at, "amplitude": self.amplitude, "after": self.after,
         }  # fmt: skip
-        if self.kind is Kind.FOLD:
+        if self.kind is MarkKind.FOLD:
             found["corner"] = self.corner
         return {**found, "why": self.why} if self.why else found
 
@@ -223,24 +223,24 @@ class _Along:
         if branch.completed or branch.start == branch.stop:
             return ()
         last = self.nodes[-1]
-        return (self._mark(Kind.END, last, len(self.nodes) - 1, why=branch.status.value),)
+        return (self._mark(MarkKind.END, last, len(self.nodes) - 1, why=branch.status.value),)
 
     def _fold(self, i: int, left: Node, right: Node) -> Mark:
         by_share = motion_scales(left, right)
         ends = float(left.tangent[-1] * by_share[0]), float(right.tangent[-1] * by_share[1])
         found = fold_between(partial(self.solver.between, left, right), *ends)
         if found is None:
-            return self._mark(Kind.FOLD, left, i)
+            return self._mark(MarkKind.FOLD, left, i)
         node, smooth = found
-        return self._mark(Kind.FOLD, node, i, corner=not smooth)
+        return self._mark(MarkKind.FOLD, node, i, corner=not smooth)
 
     def _branch_point(self, i: int, left: Node, right: Node) -> Mark:
         """The place where the determinant changes its sign, by halving."""
         sign = self.signs[i]
         node = self._halved(left, right, lambda one: self.sign(one) == sign, _HALVINGS)
-        return self._mark(Kind.BRANCH_POINT, node, i)
+        return self._mark(MarkKind.BRANCH_POINT, node, i)
 
-    def _crossing(self, i: int, kind: Kind, here: Stability) -> Mark:
+    def _crossing(self, i: int, kind: MarkKind, here: Stability) -> Mark:
         def like_the_left(node: Node) -> bool:
             return self._stability(node).stable == here.stable
 
@@ -263,7 +263,7 @@ class _Along:
                 break
         return left
 
-    def _mark(self, kind: Kind, node: Node, after: int, *, corner: bool = False, why: str = "") -> Mark:
+    def _mark(self, kind: MarkKind, node: Node, after: int, *, corner: bool = False, why: str = "") -> Mark:
         outside = self.branch.balance.parameter.outside
         return Mark(
             kind=kind, at=float(outside(node.at)), amplitude=float(node.measures[MAX_ABS]),

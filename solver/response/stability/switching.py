@@ -20,7 +20,7 @@ from solver.branches.sweep import sweep
 from solver.continuation.branch import Branch
 from solver.continuation.settings import ContinuationSettings
 from solver.jit.fourier import Real
-from solver.response.stability.bifurcations import Kind, Mark, bifurcations
+from solver.response.stability.bifurcations import MarkKind, Mark, bifurcations
 from solver.results.told import Piece
 
 AWAY = (1e-3, 3e-3, 1e-2, 3e-2, 0.1)  # of the size of the motion: how far from the point the branch is met
@@ -61,7 +61,7 @@ def switch_branches(
     settings : of the continuation.
     """
     found = bifurcations(branch).marks if marks is None else marks
-    points = [mark for mark in found if mark.kind is Kind.BRANCH_POINT]
+    points = [mark for mark in found if mark.kind is MarkKind.BRANCH_POINT]
     return tuple(_switched(branch, mark, settings) for mark in points)
 
 
