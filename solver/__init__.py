@@ -22,9 +22,12 @@ if TYPE_CHECKING:
     from solver.response.power_balance import PowerBalance, power_balance
     from solver.response.solution import Solution, SolutionStatus
     from solver.response.solve import solve
+    from solver.response.stability.all_solutions import AllSolutions, FoundSolution, solve_all
     from solver.response.stability.bifurcations import Bifurcations, Mark, MarkKind, bifurcations
     from solver.response.stability.floquet import Growth, Stability, branch_stability, stability
+    from solver.response.stability.residual_forces import AmplitudeRange, amplitude_range
     from solver.response.stability.switching import Switched, switch_branches
+    from solver.response.stability.uniqueness import Uniqueness, uniqueness
     from solver.response.time_history import hysteresis_loop, motion, time_history
     from solver.response.wear import ContactWear, Measured, WearSensitivity, contact_wear
     from solver.response.wear_nonsmooth import worst_slopes
@@ -64,7 +67,10 @@ _HOME = {
     "branch_stability": "response.stability.floquet", "stability": "response.stability.floquet",
     "Bifurcations": "response.stability.bifurcations", "Mark": "response.stability.bifurcations",
     "MarkKind": "response.stability.bifurcations", "bifurcations": "response.stability.bifurcations",
-    "Switched": "response.stability.switching", "switch_branches": "response.stability.switching",
+    "AllSolutions": "response.stability.all_solutions", "FoundSolution": "response.stability.all_solutions",
+    "solve_all": "response.stability.all_solutions", "AmplitudeRange": "response.stability.residual_forces",
+    "amplitude_range": "response.stability.residual_forces", "Uniqueness": "response.stability.uniqueness",
+    "uniqueness": "response.stability.uniqueness", "Switched": "response.stability.switching", "switch_branches": "response.stability.switching",
     "BladePeaks": "studies.blades", "blade_peaks": "studies.blades",
     "MistunedDisk": "studies.mistuning", "MistuningStatus": "studies.mistuning",
     "MistuningStudy": "studies.mistuning", "mistuning_study": "studies.mistuning",
@@ -93,7 +99,9 @@ _HOME = {
 __all__ = [
     "AccuracyRow",
     "AccuracyStudy",
+    "AllSolutions",
     "AmplitudeHessian",
+    "AmplitudeRange",
     "Band",
     "Basin",
     "Bifurcations",
@@ -108,6 +116,7 @@ __all__ = [
     "Effects",
     "ErrorEstimate",
     "Extent",
+    "FoundSolution",
     "Gradient",
     "Growth",
     "Issue",
@@ -145,10 +154,12 @@ __all__ = [
     "Summary",
     "Switched",
     "TrackStatus",
+    "Uniqueness",
     "Variable",
     "WearSensitivity",
     "WorstWear",
     "accuracy_study",
+    "amplitude_range",
     "annulus",
     "bifurcations",
     "blade_amplitudes",
@@ -174,11 +185,13 @@ __all__ = [
     "sectors_needed",
     "shipped_scenes",
     "solve",
+    "solve_all",
     "stability",
     "sweep",
     "switch_branches",
     "time_history",
     "track_peak",
+    "uniqueness",
     "worst_friction_work",
     "worst_slopes",
     "worst_wear",

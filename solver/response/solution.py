@@ -106,7 +106,11 @@ class Solution(Drawn):
     def to_json(self, *, with_stability: bool = False) -> dict[str, object]:
         """Return the answer as one JSON object; on request with what `solver.stability` says, which costs."""
         if with_stability:
-            found = on_demand("solver.response.stability.floquet:stability")(self).to_json() if self.converged else None
+            found = (
+                on_demand("solver.response.stability.floquet:stability")(self).to_json()
+                if self.converged
+                else None
+            )
             return {**self.to_json(), "stability": found}
         return {
             "scene": self.scene.name,

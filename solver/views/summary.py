@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from solver.marching.result import MarchResult
     from solver.response.stability.floquet import Stability
     from solver.response.solution import Solution
+    from solver.response.stability.floquet import Stability
     from solver.studies.blades import BladeAmplitudes, BladePeaks
     from solver.studies.convergence import AccuracyStudy
     from solver.studies.mistuning import MistuningStudy

@@ -97,7 +97,9 @@ class MarchedMap:
         for row, count in self.memory:
             kt = self.system.kt
             if count == 2 and self.state.mode[row] != kernel.STICK:
-                turn = math.atan2(*state.force[[row + 1, row]]) - math.atan2(*self.state.force[[row + 1, row]])
+                turn = math.atan2(*state.force[[row + 1, row]]) - math.atan2(
+                    *self.state.force[[row + 1, row]]
+                )
                 held.append(math.remainder(turn, 2.0 * math.pi) * self._limits[row] / kt[row])
                 continue
             held += [self._row(c) @ state.x - state.force[c] / kt[c] for c in range(row, row + count)]

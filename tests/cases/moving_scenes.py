@@ -42,9 +42,7 @@ def moving_scene(seed: int, kind: str | None = None) -> tuple[Scene, float]:
     ends = [[dof, "ground"] for dof in dofs[:3]]
     between = [[a, b] for a, b in zip(dofs[:3], dofs[3:], strict=False)] or ends
     names = [str(rng.choice(KINDS[:-1])) for _ in range(2)] if kind == "mixed" else [kind]
-    contacts = [
-        _contact(rng, each, f"c{i}", ends if i == 0 else between) for i, each in enumerate(names)
-    ]
+    contacts = [_contact(rng, each, f"c{i}", ends if i == 0 else between) for i, each in enumerate(names)]
     forces = [
         {"dof": dof, "amplitude": rng.uniform(0.2, 1.5), "phase": rng.uniform(-3.0, 3.0)} for dof in dofs[:3]
     ]

@@ -227,6 +227,16 @@ class AnyContact(Element, InSpace):
         """Whether it never lets two motions under the same forces move apart."""
         return False
 
+    @property
+    def slopes(self) -> tuple[Real, Real] | None:
+        """It as springs, (ports,) [N/m], and how far what is left of it follows, (ports, ports) [N/m], or None.
+
+        The force but for its springs differs between two motions, in the largest value over a period, by no
+        more than this matrix times the largest differences of the motions; residual forces aside. None where
+        there is no such bound. Of a law that opens without friction it holds at every instant.
+        """
+        return None
+
     # Plan
 
     @property

@@ -58,6 +58,12 @@ class GapSpring(AnyContact):
         return f"{self.name} pushes on one side only"
 
     @property
+    def slopes(self) -> tuple[Real, Real]:
+        """Half its stiffness, and as much on both sides of it."""
+        half = 0.5 * self.k
+        return np.array([half]), np.array([[half]])
+
+    @property
     def evaluation(self) -> str:
         """How its force is found, in the words of a plan."""
         return "a spring on one side: closed form"

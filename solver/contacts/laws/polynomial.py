@@ -92,6 +92,12 @@ class PolynomialSpring(AnyContact):
         return self.several_responses is None
 
     @property
+    def slopes(self) -> tuple[Real, Real] | None:
+        """Its stiffness where that is constant."""
+        first, *others = self.coefficients
+        return None if any(others) else (np.array([first]), np.zeros((1, 1)))
+
+    @property
     def evaluation(self) -> str:
         """How its force is found, in the words of a plan."""
         return "a polynomial: exact with enough samples"

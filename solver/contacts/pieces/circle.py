@@ -23,10 +23,19 @@ from collections.abc import Callable
 import numpy as np
 
 from solver.contacts.fields import Real
-from solver.contacts.kernels.circle_path import BEGIN, COUNT, END, FIRST, FROM, MOTION, PANEL_COLUMNS, START, TO
+from solver.contacts.kernels.circle_path import (
+    BEGIN,
+    COUNT,
+    END,
+    FIRST,
+    FROM,
+    MOTION,
+    PANEL_COLUMNS,
+    START,
+    TO,
+)
 from solver.contacts.kernels.radau import between
 from solver.contacts.kernels.stick_slip_events import SLIP
-from solver.contacts.pieces.line import slopes_of
 from solver.contacts.pieces.piece import SHORTEST, TURN, Entry, Piece, Rates, spring, steady
 from solver.contacts.space_path import SpacePath
 from solver.jit import fourier
@@ -42,9 +51,9 @@ class _Motion:
         self.path = path
         highest = max((path.motions.shape[1] - 1) // 2, (path.load.size - 1) // 2)
         curves = np.zeros((4, 2 * highest + 1))
-        curves[:2, : path.motions.shape[1]] = slopes_of(path.motions)
+        curves[:2, : path.motions.shape[1]] = fourier.derivative(path.motions)
         curves[2, : path.load.size] = path.mu * path.load
-        curves[3, : path.load.size] = path.mu * slopes_of(path.load)
+        curves[3, : path.load.size] = path.mu * fourier.derivative(path.load)
         self._curves, self._highest = curves, highest
 
     def at(self, tau: float) -> tuple[Real, float, float]:

@@ -85,12 +85,6 @@ def friction_pieces(
 
 def _slope(coefficients: Real, tau: float) -> float:
     """Return the derivative by τ of full coefficients."""
-    return float(fourier.basis(np.array([tau]), (coefficients.size - 1) // 2)[0] @ slopes_of(coefficients))
-
-
-def slopes_of(coefficients: Real) -> Real:
-    """Return the full coefficients of the derivative by τ, of rows of them."""
-    orders = np.arange(1, (coefficients.shape[-1] - 1) // 2 + 1)
-    slopes = np.zeros_like(coefficients)
-    slopes[..., 1::2], slopes[..., 2::2] = orders * coefficients[..., 2::2], -orders * coefficients[..., 1::2]
-    return slopes
+    return float(
+        fourier.basis(np.array([tau]), (coefficients.size - 1) // 2)[0] @ fourier.derivative(coefficients)
+    )

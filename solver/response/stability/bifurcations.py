@@ -20,15 +20,16 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.balance.balance import Balance
 from solver.balance.kernels.jacobian import factorise
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
 from solver.branches.point_by_point import is_unique
-from solver.continuation.branch import Branch
+from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.folds import fold_between, motion_scales
 from solver.extrema.nodes import Node, NodeSolver, Points
 from solver.jit.fourier import Real
-from solver.response.stability.floquet import Growth, Stability, branch_stability
+from solver.response.stability.floquet import Growth, branch_stability
 from solver.results.told import Piece
 
 _HALVINGS = 40
@@ -153,31 +154,32 @@ def bifurcations(branch: Branch, *, multipliers: bool = False) -> Bifurcations:
             unstable=np.zeros(0, bool), marks=(), known_by="determinant", parameter=branch.parameter,
             seconds=time.perf_counter() - begun,
         )  # fmt: skip
-    along = _Along(branch)
+    along = Along(
+        branch.balance,
+        Points(
+            solutions=branch.solutions, tangents=branch.tangents, measures=branch.measures,
+            observed=np.zeros((len(branch.values), branch.balance.n_coefficients)), states=branch.states,
+        ),
+    )  # fmt: skip
     if is_unique(branch.balance):
         unstable, marks, known_by = np.zeros(len(branch.values), bool), (), "uniqueness"
     elif multipliers:
-        unstable, marks, known_by = *along.by_multipliers(), "multipliers"
+        unstable, marks, known_by = *_by_multipliers(branch, along), "multipliers"
     else:
         unstable, marks, known_by = along.signs < 0.0, along.by_determinant(), "determinant"
     return Bifurcations(
-        unstable=unstable, marks=(*marks, *along.end()), known_by=known_by, parameter=branch.parameter,
+        unstable=unstable, marks=(*marks, *_end(branch, along)), known_by=known_by, parameter=branch.parameter,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
 
-class _Along:
-    """A branch with the sign of the determinant of dr/du at its points."""
+class Along:
+    """Points along a branch with the sign of the determinant of dr/du at each of them."""
 
-    def __init__(self, branch: Branch) -> None:
-        self.branch, self.workspace = branch, Workspace.of(branch.balance)
+    def __init__(self, balance: Balance, points: Points) -> None:
+        self.balance, self.workspace = balance, Workspace.of(balance)
         self.solver = NodeSolver(self.workspace)
-        self.nodes = self.solver.nodes_of(
-            Points(
-                solutions=branch.solutions, tangents=branch.tangents, measures=branch.measures,
-                observed=np.zeros((len(branch.values), branch.balance.n_coefficients)), states=branch.states,
-            )
-        )  # fmt: skip
+        self.nodes = self.solver.nodes_of(points)
         self._signs: Real | None = None
 
     @property
@@ -201,59 +203,23 @@ class _Along:
             if left.tangent[-1] * right.tangent[-1] < 0.0:
                 marks.append(self._fold(i, left, right))
             elif self.signs[i] * self.signs[i + 1] < 0.0:
-                marks.append(self._branch_point(i, left, right))
+                sign = self.signs[i]
+                node = self.halved(i, lambda one, sign=sign: self.sign(one) == sign, _HALVINGS)
+                marks.append(self.mark(MarkKind.BRANCH_POINT, node, i))
         return tuple(marks)
-
-    def by_multipliers(self) -> tuple[NDArray[np.bool_], tuple[Mark, ...]]:
-        """Points that are not stable, and marks of every kind."""
-        found = branch_stability(self.branch)
-        marks = list(self.by_determinant())
-        taken = {mark.after for mark in marks}
-        for i, (here, there) in enumerate(pairwise(found)):
-            grows = there if here.stable else here
-            kind = _CROSSED.get(grows.growth)
-            if here.stable != there.stable and kind is not None and i not in taken:
-                marks.append(self._crossing(i, kind, here))
-        unstable = np.array([not each.stable for each in found])
-        return unstable, tuple(sorted(marks, key=lambda mark: mark.after))
-
-    def end(self) -> tuple[Mark, ...]:
-        """The last point, where the branch did not reach the end of the range."""
-        branch = self.branch
-        if branch.completed or branch.start == branch.stop:
-            return ()
-        last = self.nodes[-1]
-        return (self._mark(MarkKind.END, last, len(self.nodes) - 1, why=branch.status.value),)
 
     def _fold(self, i: int, left: Node, right: Node) -> Mark:
         by_share = motion_scales(left, right)
         ends = float(left.tangent[-1] * by_share[0]), float(right.tangent[-1] * by_share[1])
         found = fold_between(partial(self.solver.between, left, right), *ends)
         if found is None:
-            return self._mark(MarkKind.FOLD, left, i)
+            return self.mark(MarkKind.FOLD, left, i)
         node, smooth = found
-        return self._mark(MarkKind.FOLD, node, i, corner=not smooth)
+        return self.mark(MarkKind.FOLD, node, i, corner=not smooth)
 
-    def _branch_point(self, i: int, left: Node, right: Node) -> Mark:
-        """The place where the determinant changes its sign, by halving."""
-        sign = self.signs[i]
-        node = self._halved(left, right, lambda one: self.sign(one) == sign, _HALVINGS)
-        return self._mark(MarkKind.BRANCH_POINT, node, i)
-
-    def _crossing(self, i: int, kind: MarkKind, here: Stability) -> Mark:
-        def like_the_left(node: Node) -> bool:
-            return self._stability(node).stable == here.stable
-
-        node = self._halved(self.nodes[i], self.nodes[i + 1], like_the_left, _MULTIPLIERS)
-        return self._mark(kind, node, i)
-
-    def _stability(self, node: Node) -> Stability:
-        values = self.branch.balance.parameter.all_outside(np.array([node.at]))
-        point = replace(self.branch, values=values, solutions=node.solution[None, :])
-        return branch_stability(point)[0]
-
-    def _halved(self, left: Node, right: Node, like_the_left: Callable[[Node], bool], most: int) -> Node:
-        """The last node that is like the left one, by halving."""
+    def halved(self, i: int, like_the_left: Callable[[Node], bool], most: int) -> Node:
+        """The last node behind point i that is like it, by halving."""
+        left, right = self.nodes[i], self.nodes[i + 1]
         for _ in range(most):
             middle = self.solver.between(left, right, 0.5)
             if middle is None:
@@ -263,9 +229,39 @@ class _Along:
                 break
         return left
 
-    def _mark(self, kind: MarkKind, node: Node, after: int, *, corner: bool = False, why: str = "") -> Mark:
-        outside = self.branch.balance.parameter.outside
+    def mark(self, kind: MarkKind, node: Node, after: int, *, corner: bool = False, why: str = "") -> Mark:
+        """A mark at a node behind a point."""
+        outside = self.balance.parameter.outside
         return Mark(
             kind=kind, at=float(outside(node.at)), amplitude=float(node.measures[MAX_ABS]),
             solution=node.solution.copy(), after=after, corner=corner, why=why,
         )  # fmt: skip
+
+
+def _by_multipliers(branch: Branch, along: Along) -> tuple[NDArray[np.bool_], tuple[Mark, ...]]:
+    """Points that are not stable, and marks of every kind."""
+    found = branch_stability(branch)
+    marks = list(along.by_determinant())
+    taken = {mark.after for mark in marks}
+
+    def stable(node: Node) -> bool:
+        values = branch.balance.parameter.all_outside(np.array([node.at]))
+        point = replace(branch, values=values, solutions=node.solution[None, :])
+        return branch_stability(point)[0].stable
+
+    for i, (here, there) in enumerate(pairwise(found)):
+        kind = _CROSSED.get((there if here.stable else here).growth)
+        if here.stable == there.stable or kind is None or i in taken:
+            continue
+        node = along.halved(i, lambda one, like=here.stable: stable(one) == like, _MULTIPLIERS)
+        marks.append(along.mark(kind, node, i))
+    unstable = np.array([not each.stable for each in found])
+    return unstable, tuple(sorted(marks, key=lambda mark: mark.after))
+
+
+def _end(branch: Branch, along: Along) -> tuple[Mark, ...]:
+    """The last point, where the branch did not reach the end of the range."""
+    if branch.completed or branch.status is BranchStatus.ACCURACY_NOT_REACHED:
+        return ()
+    last = along.nodes[-1]
+    return (along.mark(MarkKind.END, last, len(along.nodes) - 1, why=branch.status.value),)

@@ -17,8 +17,8 @@ from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts
-from solver.response.stability.monodromy import PERIOD, Element, Monodromy, Structure, monodromy
 from solver.response.solution import Solution
+from solver.response.stability.monodromy import PERIOD, Element, Monodromy, Structure, monodromy
 from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import annulus

@@ -268,9 +268,7 @@ def _without_neutral(
     reduced = matrix[np.ix_(kept, kept)]
     loose = _displacements_nothing_resists(structure, elements)
     free = [i for i in range(len(elements)) if i in owners and not elements[i].held]
-    carried = [
-        elements[i].pieces[flow.active[i]].carried @ (elements[i].ports @ loose) for i in free
-    ]
+    carried = [elements[i].pieces[flow.active[i]].carried @ (elements[i].ports @ loose) for i in free]
     vectors = np.vstack([loose, np.zeros_like(loose), *carried])
     if loose.shape[1]:
         basis, _ = np.linalg.qr(vectors, mode="complete")

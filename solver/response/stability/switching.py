@@ -20,7 +20,7 @@ from solver.branches.sweep import sweep
 from solver.continuation.branch import Branch
 from solver.continuation.settings import ContinuationSettings
 from solver.jit.fourier import Real
-from solver.response.stability.bifurcations import MarkKind, Mark, bifurcations
+from solver.response.stability.bifurcations import Mark, MarkKind, bifurcations
 from solver.results.told import Piece
 
 AWAY = (1e-3, 3e-3, 1e-2, 3e-2, 0.1)  # of the size of the motion: how far from the point the branch is met
@@ -68,12 +68,9 @@ def switch_branches(
 class _Scaled:
     """The balance at a branch point in variables of size 1."""
 
-    def __init__(self, branch: Branch, mark: Mark) -> None:
-        self.balance: Balance = branch.balance
-        self.workspace = Workspace.of(branch.balance)
-        inside = branch.balance.parameter.inside
+    def __init__(self, balance: Balance, mark: Mark, span: float) -> None:
+        self.workspace = Workspace.of(balance)
         size = float(np.abs(mark.solution[:-1]).max())
-        span = abs(inside(branch.stop) - inside(branch.start))
         self.scale = np.append(np.full(mark.solution.size - 1, size), span)
         self.place = mark.solution
 
@@ -104,22 +101,41 @@ class _Scaled:
         return found if good and off <= _ASIDE * abs(by) * math.sqrt(found.size) else None
 
 
-def _switched(branch: Branch, mark: Mark, settings: ContinuationSettings | None) -> Switched:
-    scaled = _Scaled(branch, mark)
-    tangent = branch.tangents[mark.after] / scaled.scale
+@dataclass(frozen=True, slots=True)
+class Leaving:
+    """A branch point: both tangents (2, n + 1) as in `Switched`, and solutions with λ last beside it."""
+
+    tangents: Real
+    beside: tuple[Real, ...]
+
+
+def leaving(balance: Balance, mark: Mark, tangent: Real, span: float) -> Leaving:
+    """Return where another branch leaves at a branch point.
+
+    Parameters
+    ----------
+    tangent : (n_unknowns + 1,) of the branch itself; span : range of λ (inside unit).
+    """
+    scaled = _Scaled(balance, mark, span)
+    tangent = tangent / scaled.scale
     tangent /= np.linalg.norm(tangent)
     across = scaled.across(tangent)
-    ways, followed = [], []
+    ways, found = [], []
     for side in (1.0, -1.0):
         beside = next((z for by in AWAY if (z := scaled.beside(across, side * by)) is not None), None)
-        if beside is None:
-            continue
-        way = (beside - mark.solution) / scaled.scale
-        ways.append(way / np.linalg.norm(way))
-        followed.append(_followed(branch, beside, mark.solution, settings))
-    other = ways[0] if ways else across
-    tangents = np.array([tangent, other])
-    return Switched(mark=mark, tangents=tangents, branches=tuple(followed))
+        if beside is not None:
+            way = (beside - mark.solution) / scaled.scale
+            ways.append(way / np.linalg.norm(way))
+            found.append(beside)
+    return Leaving(np.array([tangent, ways[0] if ways else across]), tuple(found))
+
+
+def _switched(branch: Branch, mark: Mark, settings: ContinuationSettings | None) -> Switched:
+    inside = branch.balance.parameter.inside
+    span = abs(inside(branch.stop) - inside(branch.start))
+    found = leaving(branch.balance, mark, branch.tangents[mark.after], span)
+    followed = tuple(_followed(branch, beside, mark.solution, settings) for beside in found.beside)
+    return Switched(mark=mark, tangents=found.tangents, branches=followed)
 
 
 def _followed(branch: Branch, beside: Real, place: Real, settings: ContinuationSettings | None) -> Branch:

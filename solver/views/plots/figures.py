@@ -10,6 +10,7 @@ from solver.continuation.branch import Branch
 from solver.marching.result import MarchResult
 from solver.response.stability.floquet import Stability
 from solver.response.solution import Solution
+from solver.response.stability.floquet import Stability
 from solver.scene.scene import Scene
 from solver.studies.blades import BladeAmplitudes, BladePeaks
 from solver.studies.convergence import AccuracyStudy
