@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from solver.continuation.settings import ContinuationSettings, Predictor
     from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
     from solver.marching.march import march
-    from solver.response.stability.floquet import Growth, Stability, branch_stability, stability
     from solver.response.power_balance import PowerBalance, power_balance
     from solver.response.solution import Solution, SolutionStatus
     from solver.response.solve import solve
@@ -70,7 +69,8 @@ _HOME = {
     "AllSolutions": "response.stability.all_solutions", "FoundSolution": "response.stability.all_solutions",
     "solve_all": "response.stability.all_solutions", "AmplitudeRange": "response.stability.residual_forces",
     "amplitude_range": "response.stability.residual_forces", "Uniqueness": "response.stability.uniqueness",
-    "uniqueness": "response.stability.uniqueness", "Switched": "response.stability.switching", "switch_branches": "response.stability.switching",
+    "uniqueness": "response.stability.uniqueness", "Switched": "response.stability.switching",
+    "switch_branches": "response.stability.switching",
     "BladePeaks": "studies.blades", "blade_peaks": "studies.blades",
     "MistunedDisk": "studies.mistuning", "MistuningStatus": "studies.mistuning",
     "MistuningStudy": "studies.mistuning", "mistuning_study": "studies.mistuning",

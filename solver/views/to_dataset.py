@@ -16,7 +16,6 @@ from solver.views.io import scene_attributes
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
     from solver.marching.result import MarchResult
-    from solver.response.stability.floquet import Stability
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
     from solver.scene.scene import Scene

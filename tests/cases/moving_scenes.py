@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -37,8 +38,7 @@ def moving_scene(seed: int, kind: str | None = None) -> tuple[Scene, float]:
     springs: list[dict[str, Any]] = [
         {"between": [dof, "ground"], "k": rng.uniform(0.7, 2.0), "c": rng.uniform(0.02, 0.12)} for dof in dofs
     ]
-    pairs = [(a, b) for a, b in zip(dofs, dofs[1:], strict=False)]
-    springs += [{"between": [a, b], "k": rng.uniform(0.1, 0.6), "c": 0.02} for a, b in pairs]
+    springs += [{"between": [a, b], "k": rng.uniform(0.1, 0.6), "c": 0.02} for a, b in pairwise(dofs)]
     ends = [[dof, "ground"] for dof in dofs[:3]]
     between = [[a, b] for a, b in zip(dofs[:3], dofs[3:], strict=False)] or ends
     names = [str(rng.choice(KINDS[:-1])) for _ in range(2)] if kind == "mixed" else [kind]

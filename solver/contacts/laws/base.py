@@ -229,7 +229,7 @@ class AnyContact(Element, InSpace):
 
     @property
     def slopes(self) -> tuple[Real, Real] | None:
-        """It as springs, (ports,) [N/m], and how far what is left of it follows, (ports, ports) [N/m], or None.
+        """It as springs, (ports,) [N/m], and how far what is left of it follows, (ports, ports) [N/m].
 
         The force but for its springs differs between two motions, in the largest value over a period, by no
         more than this matrix times the largest differences of the motions; residual forces aside. None where

@@ -5,7 +5,7 @@ F = K⁻¹, Δ = 1/k2 − 1/k1, G = mᵀ F m
 
     L G θ' = mᵀ u' − Δ sin θ cos θ L',      a = [−nᵀ u' − Δ (cos² θ − sin² θ) L' + 2 L Δ sin θ cos θ θ']/(L G)
 
-(`solver.contacts.kernels.circle_panels` has the law). A perturbation δt = n δL + m k1 η, k1 η = L δθ, then has
+(`solver.contacts.kernels.circle.panels` has the law). A perturbation δt = n δL + m k1 η, k1 η = L δθ, has
 
     k1 η' = (L'/L + a) k1 η + [mᵀ δu' − Δ sin θ cos θ δL' − G θ' δL]/G,      δL = μ kn δv.
 
@@ -23,7 +23,7 @@ from collections.abc import Callable
 import numpy as np
 
 from solver.contacts.fields import Real
-from solver.contacts.kernels.circle_path import (
+from solver.contacts.kernels.circle.path import (
     BEGIN,
     COUNT,
     END,
@@ -34,7 +34,7 @@ from solver.contacts.kernels.circle_path import (
     START,
     TO,
 )
-from solver.contacts.kernels.radau import between
+from solver.contacts.kernels.circle.radau import between
 from solver.contacts.kernels.stick_slip_events import SLIP
 from solver.contacts.pieces.piece import SHORTEST, TURN, Entry, Piece, Rates, spring, steady
 from solver.contacts.space_path import SpacePath

@@ -74,12 +74,8 @@ def friction_pieces(
             follows = -_slope(slip, begin) * by_load / _slope(load, begin)
         always = end - begin >= TURN - SHORTEST
         entry = None if always else Entry(np.array([[1.0, follows]])[:, :m], None)
-        pieces.append(
-            Piece(
-                begin=begin, end=end, rates=steady(tangent[:m, :m], np.array([[-kt], [0.0]])[:m]), entry=entry,
-                carried=np.eye(1, m),
-            )
-        )  # fmt: skip
+        rates = steady(tangent[:m, :m], np.array([[-kt], [0.0]])[:m])
+        pieces.append(Piece(begin=begin, end=end, rates=rates, entry=entry, carried=np.eye(1, m)))
     return tuple(pieces)
 
 

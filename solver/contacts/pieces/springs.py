@@ -23,7 +23,7 @@ def gap_pieces(motion: Real, stiffness: float, gap: float) -> tuple[Piece, ...]:
 
 
 def polynomial_pieces(motion: Real, powers: tuple[float, ...]) -> tuple[Piece, ...]:
-    """Return the one state of a spring with the force Σ a_j u^j: its stiffness Σ j a_j u^(j−1) at each angle."""
+    """Return the one state of a spring with the force Σ a_j u^j, its stiffness Σ j a_j u^(j−1)."""
     slopes = [j * a for j, a in enumerate(powers, start=1)]
     if not any(slopes[1:]):
         return (spring(0.0, TURN, np.array([[slopes[0]]])),)

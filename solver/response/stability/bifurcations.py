@@ -24,10 +24,10 @@ from solver.balance.balance import Balance
 from solver.balance.kernels.jacobian import factorise
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
-from solver.branches.point_by_point import is_unique
 from solver.continuation.branch import Branch, BranchStatus
+from solver.continuation.branches.point_by_point import is_unique
+from solver.continuation.extrema.nodes import Node, NodeSolver, Points
 from solver.continuation.folds import fold_between, motion_scales
-from solver.extrema.nodes import Node, NodeSolver, Points
 from solver.jit.fourier import Real
 from solver.response.stability.floquet import Growth, branch_stability
 from solver.results.told import Piece
@@ -161,15 +161,16 @@ def bifurcations(branch: Branch, *, multipliers: bool = False) -> Bifurcations:
             observed=np.zeros((len(branch.values), branch.balance.n_coefficients)), states=branch.states,
         ),
     )  # fmt: skip
+    marks: tuple[Mark, ...] = ()
     if is_unique(branch.balance):
-        unstable, marks, known_by = np.zeros(len(branch.values), bool), (), "uniqueness"
+        unstable, known_by = np.zeros(len(branch.values), bool), "uniqueness"
     elif multipliers:
         unstable, marks, known_by = *_by_multipliers(branch, along), "multipliers"
     else:
         unstable, marks, known_by = along.signs < 0.0, along.by_determinant(), "determinant"
     return Bifurcations(
-        unstable=unstable, marks=(*marks, *_end(branch, along)), known_by=known_by, parameter=branch.parameter,
-        seconds=time.perf_counter() - begun,
+        unstable=unstable, marks=(*marks, *_end(branch, along)), known_by=known_by,
+        parameter=branch.parameter, seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
 
@@ -204,9 +205,12 @@ class Along:
                 marks.append(self._fold(i, left, right))
             elif self.signs[i] * self.signs[i + 1] < 0.0:
                 sign = self.signs[i]
-                node = self.halved(i, lambda one, sign=sign: self.sign(one) == sign, _HALVINGS)
+                node = self.halved(i, partial(self._has_sign, sign), _HALVINGS)
                 marks.append(self.mark(MarkKind.BRANCH_POINT, node, i))
         return tuple(marks)
+
+    def _has_sign(self, sign: float, node: Node) -> bool:
+        return self.sign(node) == sign
 
     def _fold(self, i: int, left: Node, right: Node) -> Mark:
         by_share = motion_scales(left, right)
@@ -244,16 +248,16 @@ def _by_multipliers(branch: Branch, along: Along) -> tuple[NDArray[np.bool_], tu
     marks = list(along.by_determinant())
     taken = {mark.after for mark in marks}
 
-    def stable(node: Node) -> bool:
+    def like(stable: bool, node: Node) -> bool:
         values = branch.balance.parameter.all_outside(np.array([node.at]))
         point = replace(branch, values=values, solutions=node.solution[None, :])
-        return branch_stability(point)[0].stable
+        return branch_stability(point)[0].stable == stable
 
     for i, (here, there) in enumerate(pairwise(found)):
         kind = _CROSSED.get((there if here.stable else here).growth)
         if here.stable == there.stable or kind is None or i in taken:
             continue
-        node = along.halved(i, lambda one, like=here.stable: stable(one) == like, _MULTIPLIERS)
+        node = along.halved(i, partial(like, here.stable), _MULTIPLIERS)
         marks.append(along.mark(kind, node, i))
     unstable = np.array([not each.stable for each in found])
     return unstable, tuple(sorted(marks, key=lambda mark: mark.after))

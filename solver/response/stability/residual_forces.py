@@ -27,8 +27,8 @@ from solver.linear.contact_table import port_counts
 from solver.response.contact_response import ContactState, contact_responses
 from solver.response.solution import Solution
 from solver.results.told import Piece
-from solver.scene.bodies import Load
-from solver.scene.kinematics import Form
+from solver.scene.bodies.body import Load
+from solver.scene.bodies.kinematics import Form
 from solver.scene.scene import CyclicStructure, Scene
 from solver.sensitivity.gradient import Sensitivities
 

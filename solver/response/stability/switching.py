@@ -2,8 +2,8 @@
 
 At a simple branch point [dr/du dr/dλ] has two null vectors: the tangent t of the branch and one across it, v.
 The other branch is met on the plane a small way along v from the point, orthogonal to v (H. B. Keller, in
-Applications of Bifurcation Theory, ed. P. H. Rabinowitz, 1977, p. 359: switching by a parallel plane), on both
-sides, and followed from there away from the point.
+Applications of Bifurcation Theory, ed. P. H. Rabinowitz, 1977, p. 359: switching by a parallel plane), on
+both sides, and followed from there away from the point.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 from solver.balance.balance import Balance
 from solver.balance.kernels.newton import arc_newton
 from solver.balance.workspace import Workspace
-from solver.branches.sweep import sweep
 from solver.continuation.branch import Branch
+from solver.continuation.branches.sweep import sweep
 from solver.continuation.settings import ContinuationSettings
 from solver.jit.fourier import Real
 from solver.response.stability.bifurcations import Mark, MarkKind, bifurcations

@@ -5,14 +5,15 @@ structure that takes out power move apart (`solver.response.history_dependence`)
 but for residual forces where contacts stick.
 
 *Contraction.* Let every contact be a spring and what is left of it: friction under a load that moves is
-kt (u − w), and where its slider is held follows its motion and its limit, in the largest difference over time,
+kt (u − w), and where its slider is held follows motion and limit, in the largest difference over time,
 
     |δw| ≤ |δu| + |δ(μN)|/kt      (unless it never moves: a residual force),
 
 because w moves only where u − μN/kt or u + μN/kt pushes it: as long as δw is larger, neither slider can move
 away from the other, so that a periodic difference is constant or never as large (the play operator of
-A. Visintin, Differential Models of Hysteresis, 1994, chapter III, here with bounds that move). A normal load max(N, 0) or a spring on one side is half its
-stiffness, and what is left follows the motion by half of it. Two periodic responses then differ by
+A. Visintin, Differential Models of Hysteresis, 1994, chapter III, here with bounds that move). A normal load
+max(N, 0) or a spring on one side is half its stiffness, and what is left follows the motion by half of it.
+Two periodic responses then differ by
 
     max|δu_i| ≤ Σ_j G_ij Λ_jk max|δu_k|,      G_ij = ∫₀ᵀ |g_ij(t)| dt,
 
@@ -40,7 +41,7 @@ from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts
 from solver.linear.model import LinearModel
 from solver.results.told import Piece
-from solver.scene.annulus import annulus
+from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import CyclicStructure, Scene
 
 PROVEN, NOT_KNOWN = "proven", "not known"
@@ -53,8 +54,8 @@ _MONOTONE = (
     "but for residual forces where contacts stick"
 )
 _CONTRACTS = (
-    "the structure with its contacts as springs answers what is left of them by less than it is ({:.3g} of 1): "
-    "two responses are one, but for residual forces where contacts stick"
+    "the structure with its contacts as springs answers what is left of them by less than it is "
+    "({:.3g} of 1): two responses are one, but for residual forces where contacts stick"
 )
 _BETWEEN = "no multiple of the frequency can meet a resonance between open and closed contacts ({:.3g} of 1)"
 _MAY_BE = "{} may let responses move apart, and no proof of a single one applies"
@@ -145,7 +146,7 @@ def _joined(scene: Scene, springs: list[tuple[Real, Real]]) -> tuple[Real, Real]
 
 
 def _poles(model: LinearModel, centre: Real) -> tuple[Complex, Complex, Complex] | None:
-    """Return poles s, and P v and w of the impulse responses Σ P v_m e^{s_m t} w_m; None without such a form."""
+    """Return poles s, and P v and w of the impulse responses Σ P v e^{st} w; None without such a form."""
     n, P = model.M.shape[0], model.contact_here
     inverse = np.linalg.inv(model.M)
     generator = np.zeros((2 * n, 2 * n))

@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 
 from solver.continuation.branch import Branch
 from solver.marching.result import MarchResult
-from solver.response.stability.floquet import Stability
 from solver.response.solution import Solution
 from solver.response.stability.floquet import Stability
 from solver.scene.scene import Scene

@@ -27,8 +27,8 @@ from solver import (
 )
 from solver.balance.balance import Balance, build
 from solver.balance.workspace import Workspace
-from solver.continuation.branches.sweep import walk
 from solver.contacts.pieces.piece import Piece, spring
+from solver.continuation.branches.sweep import walk
 from solver.jit.fourier import to_full
 from solver.linear.assembly import linear_model
 from solver.marching.equations import equations_of_motion

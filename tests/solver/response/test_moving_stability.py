@@ -1,4 +1,4 @@
-"""Stability under loads that move, in space, with gaps and springs that bend: against marched perturbations."""
+"""Stability under loads that move, in space, with gaps and springs that bend, against the march."""
 
 from __future__ import annotations
 
