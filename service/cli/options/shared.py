@@ -59,6 +59,34 @@ Accuracy = Annotated[
         help="Estimated error relative to the amplitude; chooses the harmonics, in place of --harmonics.",
     ),
 ]  # fmt: skip
+EverySolution = Annotated[
+    bool,
+    typer.Option(
+        "--all",
+        help="Look for all solutions, with their stability: random starts, deflation, branches followed.",
+    ),
+]
+Starts = Annotated[
+    int,
+    typer.Option("--starts", metavar="N", parser=whole_number, help="Random starts of --all."),
+]
+Seed = Annotated[
+    int,
+    typer.Option("--seed", metavar="N", parser=whole_number, help="Of the random starts of --all."),
+]
+Multipliers = Annotated[
+    bool,
+    typer.Option(
+        "--stability",
+        help="Floquet multipliers at every point: period doublings and second frequencies are marked too.",
+    ),
+]
+SwitchedBranches = Annotated[
+    bool,
+    typer.Option(
+        "--branches", help="Follow the branches that leave at branch points, to the ends of the range."
+    ),
+]
 Effects = Annotated[
     str,
     typer.Option(

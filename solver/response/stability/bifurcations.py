@@ -32,6 +32,7 @@ from solver.jit.fourier import Real
 from solver.response.stability.floquet import Growth, branch_stability
 from solver.results.told import Piece
 
+LARGE = 1200  # unknowns above which no result looks by itself
 _HALVINGS = 40
 _MULTIPLIERS = 14  # halvings with multipliers, which cost more
 _NEAR = 1e-9  # relative width of the interval a branch point is known to
@@ -123,6 +124,14 @@ class Bifurcations(Piece):
         changes = np.flatnonzero(np.diff(np.concatenate([[0], self.unstable.astype(int), [0]])))
         return tuple((int(first), int(last) - 1) for first, last in changes.reshape(-1, 2))
 
+    def of_a_branch(self) -> dict[str, object]:
+        """Return what the JSON object of a branch has of it."""
+        return {
+            "unstable": [list(stretch) for stretch in self.stretches],
+            "marks": [mark.to_json() for mark in self.marks],
+            "stability_known_by": self.known_by,
+        }
+
     def to_json(self) -> dict[str, object]:
         """Return the answer as one JSON object."""
         return {
@@ -154,6 +163,11 @@ def bifurcations(branch: Branch, *, multipliers: bool = False) -> Bifurcations:
             unstable=np.zeros(0, bool), marks=(), known_by="determinant", parameter=branch.parameter,
             seconds=time.perf_counter() - begun,
         )  # fmt: skip
+    if is_unique(branch.balance) and branch.completed:
+        return Bifurcations(
+            unstable=np.zeros(len(branch.values), bool), marks=(), known_by="uniqueness",
+            parameter=branch.parameter, seconds=time.perf_counter() - begun,
+        )  # fmt: skip
     along = Along(
         branch.balance,
         Points(
@@ -171,6 +185,16 @@ def bifurcations(branch: Branch, *, multipliers: bool = False) -> Bifurcations:
     return Bifurcations(
         unstable=unstable, marks=(*marks, *_end(branch, along)), known_by=known_by,
         parameter=branch.parameter, seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def of_branch(branch: Branch) -> Bifurcations:
+    """Return `bifurcations`, or nothing but the end for a branch whose matrices take long."""
+    if branch.balance.n_unknowns <= LARGE or is_unique(branch.balance):
+        return bifurcations(branch)
+    return Bifurcations(
+        unstable=np.zeros(len(branch.values), bool), marks=(), known_by="nothing: it is large",
+        parameter=branch.parameter, seconds=0.0,
     )  # fmt: skip
 
 

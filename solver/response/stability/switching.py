@@ -48,6 +48,14 @@ class Switched(Piece):
     tangents: Real
     branches: tuple[Branch, ...]
 
+    def to_json(self) -> dict[str, object]:
+        """Return it as one JSON object."""
+        return {
+            "mark": self.mark.to_json(),
+            "tangents": self.tangents.tolist(),
+            "branches": [branch.to_json() for branch in self.branches],
+        }
+
 
 def switch_branches(
     branch: Branch, *, marks: tuple[Mark, ...] | None = None, settings: ContinuationSettings | None = None
