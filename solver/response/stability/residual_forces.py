@@ -3,8 +3,9 @@
 A contact that sticks all the time keeps a constant force s beside kt u, whatever brought it there, as long as
 |kt u + s| ≤ μN at every instant. Under loads that are given s moves the mean alone, in closed form
 (`solver.response.history_dependence`). Under a load that moves, or with springs that bend, it changes the
-vibration too: its least and largest amplitude over all s are looked for by steps along the exact gradient, s
-acting as a constant load on the parts. The range is one that can be reached; a wider one is not excluded.
+vibration too: its least and largest amplitude over all s are looked for from the ends of each force alone, by
+steps along the exact gradient, s acting as a constant load on the parts. The range is one that can be reached;
+a wider one is not excluded.
 """
 
 from __future__ import annotations
@@ -158,8 +159,23 @@ class _Search:
         first = self._at(np.array(start), None)
         if first is None:
             return
+        # max|x| is the larger of two curves and may rise on both sides: the ends are looked at first.
+        for k in range(len(self._sliding)):
+            for side in (1.0, -1.0):
+                self._reach(first, side * np.eye(len(self._sliding))[k])
         for sign in (1.0, -1.0):
-            self._climb(first, sign)
+            self._climb(max(self.reached, key=lambda one: sign * one.numbers[0]), sign)
+
+    def _reach(self, here: _Reached, way: Real) -> None:
+        """Go as far along a direction as the contacts can hold the forces."""
+        step, solves = _FIRST * self._scale, 0
+        while step > _LEAST * self._scale and solves < _MOST:
+            solves += 1
+            there = self._at(here.forces + step * way, here.u)
+            if there is None:
+                step *= 0.5
+            else:
+                here = there
 
     def _climb(self, here: _Reached, sign: float) -> None:
         """Go uphill (or down, `sign` −1) while the contacts can hold the forces."""
