@@ -84,7 +84,7 @@ def all_solutions(found: Json) -> None:
     rows = []
     for each in found["solutions"]:
         stable, left = each["stability"], each["residual_forces"]
-        low, high = (None, None) if left is None else left["max_abs"]
+        ends = [] if left is None else [end for end in left["max_abs"] if end is not None]
         rows.append(
             (
                 units.length(each["half_peak_to_peak"]),
@@ -92,7 +92,7 @@ def all_solutions(found: Json) -> None:
                 "not known" if stable is None else "stable" if stable["stable"] else "not stable",
                 "" if stable is None else f"{stable['radius']:.4g}",
                 each["found_by"],
-                "" if low is None else f"max|x| {units.length(low)} to {units.length(high)}",
+                f"max|x| {' to '.join(map(units.length, ends))}" if ends else "",
             )
         )
     if found["solutions"]:

@@ -4,8 +4,8 @@ A contact that sticks all the time keeps a constant force s beside kt u, whateve
 |kt u + s| ≤ μN at every instant. Under loads that are given s moves the mean alone, in closed form
 (`solver.response.history_dependence`). Under a load that moves, or with springs that bend, it changes the
 vibration too: its least and largest amplitude over all s are looked for from the ends of each force alone, by
-steps along the exact gradient, s acting as a constant load on the parts. The range is one that can be reached;
-a wider one is not excluded.
+steps along the exact gradient, s acting as a constant load on the parts. The range is one that can be
+reached; a wider one is not excluded.
 """
 
 from __future__ import annotations
