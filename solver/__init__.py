@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from solver.continuation.branch import Band, Branch, BranchStatus, Peak
     from solver.continuation.branches.sweep import sweep
     from solver.continuation.extrema.error_estimate import ErrorEstimate, branch_errors
+    from solver.continuation.marks import Bifurcations, Mark, MarkKind
     from solver.continuation.segment import Stretch, joined
     from solver.continuation.settings import ContinuationSettings, Predictor
     from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from solver.response.solution import Solution, SolutionStatus
     from solver.response.solve import solve
     from solver.response.stability.all_solutions import AllSolutions, FoundSolution, solve_all
-    from solver.response.stability.bifurcations import Bifurcations, Mark, MarkKind, bifurcations
+    from solver.response.stability.bifurcations import bifurcations
     from solver.response.stability.floquet import Growth, Stability, branch_stability, stability
     from solver.response.stability.residual_forces import AmplitudeRange, amplitude_range
     from solver.response.stability.switching import Switched, switch_branches
@@ -64,8 +65,8 @@ _HOME = {
     "Solution": "response.solution", "SolutionStatus": "response.solution", "solve": "response.solve",
     "Growth": "response.stability.floquet", "Stability": "response.stability.floquet",
     "branch_stability": "response.stability.floquet", "stability": "response.stability.floquet",
-    "Bifurcations": "response.stability.bifurcations", "Mark": "response.stability.bifurcations",
-    "MarkKind": "response.stability.bifurcations", "bifurcations": "response.stability.bifurcations",
+    "Bifurcations": "continuation.marks", "Mark": "continuation.marks",
+    "MarkKind": "continuation.marks", "bifurcations": "response.stability.bifurcations",
     "AllSolutions": "response.stability.all_solutions", "FoundSolution": "response.stability.all_solutions",
     "solve_all": "response.stability.all_solutions", "AmplitudeRange": "response.stability.residual_forces",
     "amplitude_range": "response.stability.residual_forces", "Uniqueness": "response.stability.uniqueness",

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from solver.response.stability.bifurcations import Bifurcations
+    from solver.continuation.marks import Bifurcations
 
 
 class BranchStatus(Enum):

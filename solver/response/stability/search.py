@@ -24,10 +24,11 @@ from solver.balance.workspace import PointSolution, Workspace
 from solver.continuation.branch import BranchStatus
 from solver.continuation.branches.sweep import walk
 from solver.continuation.extrema.nodes import Points
+from solver.continuation.marks import MarkKind
 from solver.continuation.segment import Stretch, joined
 from solver.continuation.settings import ContinuationSettings
 from solver.jit.fourier import Real, from_full, to_full
-from solver.response.stability.bifurcations import Along, MarkKind
+from solver.response.stability.bifurcations import Along
 from solver.response.stability.switching import leaving
 
 SAME = 1e-5  # relative difference of two motions below which they are one

@@ -18,9 +18,10 @@ from solver.balance.kernels.newton import arc_newton
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import sweep
+from solver.continuation.marks import Mark, MarkKind
 from solver.continuation.settings import ContinuationSettings
 from solver.jit.fourier import Real
-from solver.response.stability.bifurcations import Mark, MarkKind, bifurcations
+from solver.response.stability.bifurcations import bifurcations
 from solver.results.told import Piece
 
 AWAY = (1e-3, 3e-3, 1e-2, 3e-2, 0.1)  # of the size of the motion: how far from the point the branch is met
