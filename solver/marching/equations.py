@@ -86,6 +86,7 @@ def equations_of_motion(scene: Scene, omega: float) -> tuple[kernel.System, int]
         force_amplitude=np.array([force.amplitude for force in forces]),
         force_phase=np.array([force.phase for force in forces]),
         force_harmonic=np.array([force.harmonic for force in forces], dtype=np.int64),
+        omega=omega,
         **columns(placed, index, A.shape[0]),
     )
     return system, index[scene.observe.dof]

@@ -241,6 +241,11 @@ class AnyContact(Element, InSpace):
 
     # A periodic motion
 
+    def at_frequency(self, omega: float) -> Self:
+        """The contact as it answers motions of an angular frequency [rad/s]: only rates make a difference."""
+        del omega
+        return self
+
     def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
         """Return the force along the first motion [N] at the angles `tau`, evenly spaced from 0.
 
