@@ -14,7 +14,7 @@ JOINED: dict[str, Any] = {
             {"between": ["a", "b"], "k": 0.8, "c": 0.02},
         ],
     },
-    "contacts": [{"name": "joint", "law": "iwan", "between": ["b", "ground"], "k": 0.7, "limit": 0.8}],
+    "contacts": [{"name": "joint", "law": "sliders", "between": ["b", "ground"], "k": 0.7, "limit": 0.8}],
     "excitation": {"dof": "a", "amplitude": 1.0},
     "observe": {"dof": "b", "band": [0.1, 0.3]},
 }
