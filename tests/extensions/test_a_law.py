@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contact_cases import central_difference
-from sliders import LIMIT, SLIDERS, SlidersContact, K
 from joined_scene import JOINED as SCENE
 from launch import COMMAND, served
 from law_cases import Element, evaluate, jacobian
+from sliders import LIMIT, SLIDERS, K, SlidersContact
 
 import optim
 import solver
@@ -161,7 +161,9 @@ def test_what_is_wrong_is_told() -> None:
 
 
 def test_a_scene_knows_it_while_it_is_registered() -> None:
-    with pytest.raises(solver.SceneError, match=r"`law` must be one of coulomb, .*coulomb-tanh, got 'sliders'"):
+    with pytest.raises(
+        solver.SceneError, match=r"`law` must be one of coulomb, .*coulomb-tanh, got 'sliders'"
+    ):
         scene()
     register(SlidersContact)
     try:

@@ -163,8 +163,7 @@ def close(course: Course, state: Real, tops: Real) -> int:
         missing = np.empty((ns, 1))
         for i in range(ns):
             missing[i, 0], state[i] = state[i] - before[i], before[i]
-        no_rows = np.empty((0, 0))
-        carry(course, False, state, D, nothing, no_rows, nothing)
+        carry(course, False, state, D, nothing, np.empty((0, 0)))
         solve_shifted(np.ascontiguousarray(D[:, n + 1 :]), missing)
         moved = False
         for i in range(ns):
@@ -176,35 +175,42 @@ def close(course: Course, state: Real, tops: Real) -> int:
 
 
 @apart
-def _repeating(course: Course, turns: int, state: Real, D: Real) -> float:
-    """Fill the derivatives `D` (states, n + 1) of the state that repeats, `state`, which `turns` led to.
+def _carry_there(course: Course, turns: int, D: Real) -> float:
+    """Fill the derivatives `D` (states, n + 1) of states that each follow by itself, after the way there.
+
+    Each forgets all that was before it slips, or never slips: then the way there says what it keeps.
 
     Returns
     -------
-    The largest own rate of a state times the step; NaN if something is not finite.
+    As `carry`.
     """
-    ns, n, nothing, no_rows = state.size, D.shape[1] - 1, np.empty(0), np.empty((0, 0))
-    fill_block(D, 0.0)
-    if course.alone:
-        # Each forgets all that was before it slips, or never slips: the way here says what it keeps.
-        here = np.zeros(ns)
-        fastest = carry(ramp_of(course), True, here, D, nothing, no_rows, nothing)
-        for _ in range(max(turns - 1, 1)):
-            fastest = max(fastest, carry(course, False, here, D, nothing, no_rows, nothing))
-        return fastest
-    way = np.zeros(ns)
-    check = carry(ramp_of(course), True, way, D, nothing, no_rows, nothing)
-    wider, here = np.zeros((ns, n + 1 + ns)), state.copy()
+    here, nothing, no_rows = np.zeros(D.shape[0]), np.empty(0), np.empty((0, 0))
+    fastest = carry(ramp_of(course), True, here, D, nothing, no_rows)
+    for _ in range(max(turns - 1, 1)):
+        fastest = max(fastest, carry(course, False, here, D, nothing, no_rows))
+    return fastest
+
+
+@apart
+def _carry_repeating(course: Course, state: Real, F: Real, dF: Real) -> float:
+    """Fill force and derivatives (n, n + 1) over the period that the state repeats; return as `carry`."""
+    ns, n, way = state.size, F.size, np.zeros(state.size)
+    before = np.zeros((ns, n + 1))
+    check = carry(ramp_of(course), True, way, before, np.empty(0), np.empty((0, 0)))
+    D, wide = np.zeros((ns, n + 1 + ns)), np.zeros((n, n + 1 + ns))
     for i in range(ns):
         for q in range(n + 1):
-            wider[i, q] = D[i, q]
-        wider[i, n + 1 + i] = 1.0
-    fastest = carry(course, False, here, wider, nothing, no_rows, nothing)
-    missing = wider[:, : n + 1] - D
-    solve_shifted(np.ascontiguousarray(wider[:, n + 1 :]), missing)
-    for i in range(ns):
+            D[i, q] = before[i, q]
+        D[i, n + 1 + i] = 1.0
+    fastest = carry(course, False, state, D, F, wide)
+    missing = D[:, : n + 1] - before
+    solve_shifted(np.ascontiguousarray(D[:, n + 1 :]), missing)
+    for a in range(n):
         for q in range(n + 1):
-            D[i, q] += missing[i, q]
+            total = wide[a, q]
+            for i in range(ns):
+                total += wide[a, n + 1 + i] * missing[i, q]
+            dF[a, q] = total
     return fastest + 0.0 * check
 
 
@@ -247,28 +253,27 @@ def _at_nodes(
     course = course_of(U, ks, row, slope, count, between, cos_table, sin_table)
     n, ns = U.size, int(row[HISTORY_STATES])
     fill(F, 0.0)
-    fill(dF_dp, 0.0)
-    fill_block(dF_dU, 0.0)
-    state, D, fastest = np.zeros(ns), np.zeros((ns, n + 1)), 0.0
+    state, dF, fastest, turns = np.zeros(ns), np.zeros((n, n + 1)), 0.0, 1
     if ns > 0:
         tops = np.empty(ns)
         turns = close(course, state, tops)
         if turns <= 0:
             return False, np.inf if turns == _DIVERGES else 0.0
         keep_sizes(course, tops)
-        fastest = _repeating(course, turns, state, D)
-        if not math.isfinite(fastest):
-            return False, np.inf
-        if fastest > _FASTEST:
-            return True, fastest
-    last = carry(course, False, state, D, F, dF_dU, dF_dp)
+    if ns > 0 and not course.alone:
+        fastest = _carry_repeating(course, state, F, dF)
+    else:
+        D = np.zeros((ns, n + 1))
+        if ns > 0:
+            fastest = _carry_there(course, turns, D)
+        fastest = max(fastest, carry(course, False, state, D, F, dF))
     for i in range(n):
         share = 0.5 / math.pi if ks[0] == 0 and i == 0 else 1.0 / math.pi
         F[i] *= share
-        dF_dp[i] *= share
+        dF_dp[i] = share * dF[i, n]
         for j in range(n):
-            dF_dU[i, j] *= share
-    return math.isfinite(last), fastest
+            dF_dU[i, j] = share * dF[i, j]
+    return math.isfinite(fastest), fastest if math.isfinite(fastest) else np.inf
 
 
 @apart

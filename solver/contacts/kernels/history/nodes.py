@@ -18,13 +18,14 @@ from solver.jit.separate import apart
 from solver.jit.trig_polynomial import unpack
 
 _TURN = 2.0 * math.pi
+_LONGEST = 1.4  # half periods that have the steps of one
 _SHORTEST = 1e-9  # rad; two reversals closer than that are none
 
 
 @compiled
 def most_nodes(count: int, top: int) -> int:
     """Return how many nodes there may be, with the one that ends the period."""
-    return count + 4 * (2 * top + 2) + 1
+    return 2 * count + 16 * (2 * top + 4) + 1
 
 
 @compiled
@@ -58,6 +59,23 @@ def reversals(U: Real, ks: Integer, cos_table: Real, sin_table: Real, out: Real)
     return kept
 
 
+@compiled
+def _steps_between(halves: float, count: int) -> int:
+    """Return the steps between two reversals, `halves` half periods apart: about count/2 for each of these.
+
+    They change by factors of two, at lengths of 0.7 half periods times such factors: if they followed every
+    length, an answer would jump wherever they change, and Newton's method never end on it.
+    """
+    steps = 16 * max(math.ceil(count / 32), 1)
+    while halves > _LONGEST:
+        halves *= 0.5
+        steps *= 2
+    while halves <= 0.5 * _LONGEST and steps % 4 == 0:
+        halves *= 2.0
+        steps //= 2
+    return steps
+
+
 @apart
 def nodes_between(turns: Real, found: int, count: int, tau: Real, weight: Real) -> int:
     """Fill nodes between reversals, about `count` in a period; return their number.
@@ -69,7 +87,7 @@ def nodes_between(turns: Real, found: int, count: int, tau: Real, weight: Real) 
     for i in range(found):
         begin = turns[i]
         end = turns[i + 1] if i + 1 < found else turns[0] + _TURN
-        steps = 2 * max(1, math.ceil(0.5 * count * (end - begin) / _TURN))
+        steps = _steps_between((end - begin) / math.pi, count)
         h = (end - begin) / steps
         weight[at] += h / 3.0
         for j in range(1, steps + 1):

@@ -132,14 +132,14 @@ def ramp_of(course: Course) -> Course:
 
 
 @apart
-def carry(course: Course, ramp: bool, state: Real, D: Real, F: Real, dF_dU: Real, dF_dp: Real) -> float:
+def carry(course: Course, ramp: bool, state: Real, D: Real, F: Real, dF: Real) -> float:
     """Follow the law over a period with the derivatives `D` of its state, both in place.
 
     Parameters
     ----------
     ramp : the course is the way to the first node, not a period.
     D : (states, n + 1 or more) by the coefficients, λ, and perhaps the states at the beginning.
-    F, dF_dU, dF_dp : (n,), (n, n), (n,) integrals of force times basis are added to them, unless empty.
+    F, dF : (n,), (n, columns of D) integrals of force times basis are added to them, unless empty.
 
     Returns
     -------
@@ -184,9 +184,8 @@ def carry(course: Course, ramp: bool, state: Real, D: Real, F: Real, dF_dU: Real
             for a in range(n):
                 share = w * node[a]
                 F[a] += share * f
-                dF_dp[a] += share * by[n]
-                for b in range(n):
-                    dF_dU[a, b] += share * by[b]
+                for b in range(wide):
+                    dF[a, b] += share * by[b]
     check = fastest
     for i in range(ns):
         check += state[i]

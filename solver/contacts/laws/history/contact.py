@@ -16,7 +16,7 @@ from solver.contacts.laws.history.definition import LEAST_SAMPLES, MOST_SAMPLES,
 from solver.contacts.laws.parts import Follows, Held, Row
 from solver.errors import SettingError
 
-NODES_A_HARMONIC = 32
+NODES_A_HARMONIC, BETWEEN_REVERSALS = 32, 16
 _SMALL = 1e-9  # m; the motion whose force tells the stiffness at rest
 _FORM = {"steps": 1, "reversals": 2, "alone": 4}  # bits of `solver.contacts.kernels.history.law`
 
@@ -29,7 +29,8 @@ class HistoryContact(AnyContact):
     Attributes
     ----------
     samples : int or None
-        Nodes of a period at which the law is followed; 32 for each harmonic if left out.
+        Nodes of a period at which the law is followed; 32 for each harmonic if left out, or 16 where they
+        begin anew at every reversal.
     """
 
     DEFINITION: ClassVar[HistoryLaw]
@@ -101,7 +102,11 @@ class HistoryContact(AnyContact):
     def nodes(self, highest: int) -> int:
         """Return the nodes of a period for harmonics up to `highest`: at least four of the shortest wave."""
         given = self.samples or self.DEFINITION.samples
-        return max(given, 4 * highest) if given else max(NODES_A_HARMONIC * highest, 2 * LEAST_SAMPLES)
+        return max(given, 4 * highest) if given else max(self._nodes_a_harmonic * highest, 2 * LEAST_SAMPLES)
+
+    @property
+    def _nodes_a_harmonic(self) -> int:
+        return BETWEEN_REVERSALS if self.DEFINITION.reversals else NODES_A_HARMONIC
 
     def with_numbers(self, row: Real) -> Self:
         """The contact with the numbers of a row of the contact table."""
@@ -140,7 +145,7 @@ class HistoryContact(AnyContact):
 
         law, found = self.DEFINITION, ready(self.DEFINITION)
         given = self.samples or law.samples
-        nodes = f"{given} nodes" if given else f"{NODES_A_HARMONIC} nodes a harmonic"
+        nodes = f"{given} nodes" if given else f"{self._nodes_a_harmonic} nodes a harmonic"
         between = " between its reversals" if law.reversals else ""
         slow = "" if found.compiled else "; its functions are called as Python, which is slow"
         return f"the law {law.name} followed over {nodes}{between}, {found.derivatives.value}{slow}"

@@ -99,7 +99,8 @@ def register_law(
         never set is 0. Without it derivatives are found by a complex step if the functions are found to allow
         it, else by central differences; the plan says which.
     samples : int, optional
-        Nodes of a period; 32 a harmonic if left out. A contact may set its own `samples`.
+        Nodes of a period; 32 a harmonic if left out, 16 with `reversals`. A contact may set its own
+        `samples`.
     reversals : bool
         Whether nodes begin anew where the motion reverses: right for friction, whose force has corners there
         and is smooth between. Without, the nodes are even: right for a smooth force, and for one that has
