@@ -53,7 +53,7 @@ _PLAIN = 12  # periods that are simply followed before Newton's method
 _MOST_TURNS, _MOST_NEWTON = 60, 15
 _DIVERGES = -1
 _FASTEST = 0.7  # own rate of a state times the step, up to which the steps are accurate and stable
-_MOST_DOUBLINGS = 5
+_MOST_NODES = 8192  # to which their number is doubled where the steps are too long
 _NEUTRAL = 1e-9  # |1 − Φ| below which a period leaves a state as it was
 
 
@@ -222,9 +222,9 @@ def history_law(
     """Fill the force of a law with a history, its Jacobian and its derivative by λ (as in the contract)."""
     n, count = U.shape[1], int(row[NODES])
     good, fastest = False, 0.0
-    for _ in range(_MOST_DOUBLINGS + 1):
+    while True:
         good, fastest = _at_nodes(U[0], ks, row, slope, count, cos_table, sin_table, F[0], dF_dU[0], dF_dp[0])
-        if fastest <= _FASTEST:
+        if fastest <= _FASTEST or count >= _MOST_NODES:
             break
         count *= 2
     total = 0.0

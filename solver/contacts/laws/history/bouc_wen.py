@@ -60,7 +60,7 @@ BOUC_WEN = HistoryLaw(
         "n": LawParameter(words="Sharpness of the transition", least=1.0, most=100.0, default=1.0),
     },
     force=force, rate=rate, slopes=slopes, states=1, reversals=True, odd=True,
-    formula="`α k u + (1 - α) k z`, `ż = A u̇ - β |u̇| |z|ⁿ⁻¹ z - γ u̇ |z|ⁿ`",
+    formula="`α k u + (1 - α) k z`, `ż = u̇ (A - (β sgn(u̇ z) + γ) abs(z)ⁿ)`",
     words="Smooth hysteresis of Bouc and Wen.",
 )  # fmt: skip
 LAW = law_class(BOUC_WEN)
