@@ -111,7 +111,7 @@ def test_a_law_without_a_force_that_repeats_is_no_answer(register: Register, giv
     assert not found.converged
     assert np.isnan(found.max_abs)
     branch = solver.sweep(scene("failing"), start=0.18, stop=0.2, harmonics=3)
-    assert not branch.complete
+    assert branch.status is not solver.BranchStatus.COMPLETE
 
 
 def test_what_a_function_raises_is_raised(register: Register) -> None:
@@ -130,7 +130,7 @@ def test_its_limit_is_swept_and_designed(register: Register) -> None:
         return float(solver.sweep(scene("smooth", limit=limit), harmonics=3).peak.value)
 
     assert found.peak.value == pytest.approx(peak(best), rel=1e-6)
-    assert found.peak.value <= min(peak(share * best) for share in (0.9, 1.1))
+    assert found.peak.value <= min(peak(limit) for limit in (0.1, 0.5 * best, 0.9 * best))
     along = solver.sweep(scene("smooth"), "joint.limit", frequency_hz=HZ, start=0.6, stop=0.9, harmonics=7)
     assert along.amplitude[-1] == pytest.approx(amplitude("smooth", limit=0.9), rel=1e-6)
 

@@ -59,7 +59,7 @@ def random_motion(seed: int, harmonics: int = 5) -> np.ndarray:
 @pytest.mark.parametrize("case", CASES)
 def test_the_kernel_has_the_derivatives_of_its_force(case: str) -> None:
     """But for what lies between the nodes, which do not move along."""
-    given = {**CASES[case], "samples": 4096}
+    given = {**CASES[case], "samples": 1024}
     element = element_of(given, random_motion(3))
     here = evaluate(element)
     size = np.abs(jacobian(here)).max()
@@ -69,7 +69,7 @@ def test_the_kernel_has_the_derivatives_of_its_force(case: str) -> None:
 
     for i, unit in enumerate(np.eye(element.U.size)):
         slope = central_difference(lambda x, d=unit: moved(element.row, element.U + x * d), 1e-5)
-        assert jacobian(here)[:, i] == pytest.approx(slope, abs=(2e-3 if case == "iwan" else 2e-5) * size)
+        assert jacobian(here)[:, i] == pytest.approx(slope, abs=(5e-3 if case == "iwan" else 2e-4) * size)
     law = laws()[case]
     for column in [*(quantity.column for quantity in law.PARAMETERS.values()), columns.OMEGA]:
         unit = np.eye(columns.COLUMNS)[column]

@@ -165,7 +165,7 @@ def _complex_kernels(law: HistoryLaw) -> dict[str, Any] | None:
             for place, function in law.functions.items()
             if not place.endswith("slopes")
         }
-    except (NumbaError, SettingError):
+    except (NumbaError, NotImplementedError, SettingError):  # the second: what it types and cannot lower
         return None
 
 
