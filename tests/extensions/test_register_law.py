@@ -111,7 +111,7 @@ def test_a_law_without_a_force_that_repeats_is_no_answer(register: Register, giv
     assert not found.converged
     assert np.isnan(found.max_abs)
     branch = solver.sweep(scene("failing"), start=0.18, stop=0.2, harmonics=3)
-    assert branch.status is not solver.BranchStatus.COMPLETE
+    assert branch.status is not solver.BranchStatus.COMPLETED
 
 
 def test_what_a_function_raises_is_raised(register: Register) -> None:

@@ -117,7 +117,7 @@ def test_bouc_wen_is_what_an_integrator_gives() -> None:
         v = motion(tau)[1]
         return [v - beta * abs(v) * abs(z[0]) ** (n - 1.0) * z[0] - gamma * v * abs(z[0]) ** n]
 
-    count, turns = 8192, 12
+    count, turns = 8192, 24
     tau = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)
     z0 = 0.0
     for turn in range(turns):
