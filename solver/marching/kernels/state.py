@@ -227,3 +227,21 @@ def motion_size(system: System, series: Series, c: int, normal: bool) -> float:
         x = series.x[k]
         total += abs(normal_slip(system, x, c) if normal else slip(system, x, c))
     return total
+
+
+@compiled
+def largest_change(now: Real, before: Real, scale: float) -> float:
+    """Return the largest change of a number, relative to `scale` if that is above 0."""
+    change = 0.0
+    for i in range(now.size):
+        change = max(change, abs(now[i] - before[i]))
+    return change / scale if scale > 0.0 else change
+
+
+@compiled
+def finite(state: State) -> bool:
+    """Return whether motion and velocity are finite numbers."""
+    total = 0.0
+    for i in range(state.x.size):
+        total += state.x[i] + state.v[i]
+    return math.isfinite(total)

@@ -51,6 +51,8 @@ from solver.marching.kernels.state import (
     Series,
     State,
     System,
+    finite,
+    largest_change,
     motion_size,
     new_record,
     new_series,
@@ -332,22 +334,6 @@ def _step(
 
 
 @compiled
-def _largest_change(now: Real, before: Real, scale: float) -> float:
-    change = 0.0
-    for i in range(now.size):
-        change = max(change, abs(now[i] - before[i]))
-    return change / scale if scale > 0.0 else change
-
-
-@compiled
-def _finite(state: State) -> bool:
-    total = 0.0
-    for i in range(state.x.size):
-        total += state.x[i] + state.v[i]
-    return math.isfinite(total)
-
-
-@compiled
 def run_periods(
     system: System, state: State, steps: int, tolerance: float, dof: int, record: Record, change: Real
 ) -> tuple[int, int]:
@@ -402,12 +388,10 @@ def _run_periods(
             for c in range(n_contacts):
                 top_force = max(top_force, abs(state.force[c]))
         change[period] = max(
-            _largest_change(state.x, x, top_x),
-            max(
-                _largest_change(state.v, v, max(top_x, top_v)), _largest_change(state.force, force, top_force)
-            ),
+            largest_change(state.x, x, top_x),
+            max(largest_change(state.v, v, max(top_x, top_v)), largest_change(state.force, force, top_force)),
         )
-        if not _finite(state):
+        if not finite(state):
             return NOT_FINITE, period + 1
         if change[period] < tolerance:
             return SETTLED, period + 1
