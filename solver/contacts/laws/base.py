@@ -148,6 +148,10 @@ class AnyContact(Element, InSpace):
 
     # Contact table and kernel
 
+    @classmethod
+    def prepare(cls) -> None:
+        """Compile what its kernel calls beside the kernels."""
+
     @property
     def kernel(self) -> str:
         """``module:NAME`` of the kernel for its settings."""

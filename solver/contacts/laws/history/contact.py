@@ -41,6 +41,13 @@ class HistoryContact(AnyContact):
     samples: Samples | None = None
     _omega: float = PrivateAttr(default=math.nan)
 
+    @classmethod
+    def prepare(cls) -> None:
+        """Compile the functions of the law."""
+        from solver.contacts.laws.history.functions import ready
+
+        ready(cls.DEFINITION)
+
     @property
     def numbers(self) -> Real:
         """Its parameters as its functions take them, (MOST_OWN,)."""
