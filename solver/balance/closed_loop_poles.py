@@ -111,7 +111,7 @@ class ClosedLoop:
         """
         free, stuck = self.free, self.stuck
         half_width = np.minimum(free.half_width, stuck.half_width)
-        if not np.all(self.system.jenkins == 1):
+        if not np.all(self.system.jenkins == 1) or linear_model(self._balance.scene).extra is not None:
             return np.zeros_like(free.at), np.full_like(free.at, np.inf), half_width
         return free.at, np.maximum(stuck.at, free.at), half_width
 
@@ -247,7 +247,8 @@ class ClosedLoop:
         """Return the resonances of full matrices: eigenvalues of the first-order form."""
         system = self.system
         n = system.observe.size
-        inverse = np.linalg.inv(system.M)
+        still = ~np.any(system.M, axis=(1, 2))  # the mean does not resonate
+        inverse = np.linalg.inv(np.where(still[:, None, None], np.eye(n), system.M))
         at, half_width = [], []
         for one, s in zip(moved, structures, strict=True):
             L = system.L[s]

@@ -118,7 +118,8 @@ def whole_motion(
             observe=system.observe, forces=system.forces, by={},
         )  # fmt: skip
     if matrices is not None:
-        return _of_matrices(matrices, ks[:, None, None], omega)
+        # The mean has k = 1 and matrices without C and M, as in the compiled loops.
+        return _of_matrices(matrices, np.maximum(ks, 1.0)[:, None, None], omega)
     values, which, k = system.eigenvalues[system.which], system.which, ks[:, None]
     if system.form == MODES:
         c = system.dampings[which]

@@ -15,7 +15,7 @@ from solver.jit.fourier import Real
 from solver.scene.bodies.paths import is_body_path, least_value, unit_of
 from solver.scene.bodies.shape_parts import contact_shares, least_shape_value, shape_of, shape_unit
 from solver.scene.bodies.shapes import POINTS
-from solver.scene.parameter_paths import has_parameter
+from solver.scene.parameter_paths import has_parameter, is_gas_path, is_loss
 from solver.scene.scene import Scene
 
 
@@ -123,12 +123,17 @@ def resolve(scene: Scene, path: str) -> Parameter:
             path=path, kind=Kind.STRUCTURE, active=nobody, name=path, unit=unit_of(path),
             least=least_value(path),
         )  # fmt: skip
+    if is_gas_path(scene, path):
+        return Parameter(
+            path=path, kind=Kind.STRUCTURE, active=nobody, name=path, unit="1", least=-math.inf
+        )  # fmt: skip
     owner, _, key = path.rpartition(".")
     if owner == "excitation":
         return _parameter(path, Kind.LEVEL if key == "amplitude" else Kind.FORCE_PHASE, nobody)
     if owner == "structure":
         return Parameter(
-            path=path, kind=Kind.STRUCTURE, active=nobody, name=key, unit="SI", least=0.0
+            path=path, kind=Kind.STRUCTURE, active=nobody, name=key,
+            unit="1" if is_loss(scene.structure, key) else "SI", least=0.0,
         )  # fmt: skip
     acts = [has_parameter(contact, owner, key) for contact in scene.contacts]
     members = [contact.PARAMETERS[key] for contact, mine in zip(scene.contacts, acts, strict=True) if mine]

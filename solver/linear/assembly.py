@@ -15,6 +15,17 @@ from numpy.typing import NDArray
 
 from solver.errors import SettingError
 from solver.linear.body_matrices import bodies_mass, mass_derivative, matrices_with_bodies
+from solver.linear.extra_terms import (
+    ExtraTerms,
+    Symmetric,
+    depends_on_speed,
+    extra_terms,
+    terms_by_gas,
+    terms_by_loss,
+    terms_by_speed,
+    terms_by_stiffness,
+)
+from solver.linear.modal_damping import modal_damping, modal_damping_derivative
 from solver.linear.model import ForceTerm as ForceTerm
 from solver.linear.model import LinearModel as LinearModel
 from solver.linear.model import LinearModelDerivative as LinearModelDerivative
@@ -23,7 +34,8 @@ from solver.scene.bodies.kinematics import Form, dof_names, force_derivatives
 from solver.scene.bodies.paths import is_body_path
 from solver.scene.bodies.shape_parts import motion_derivatives
 from solver.scene.cyclic.annulus import written_out
-from solver.scene.parameter_paths import PROPORTIONAL, share, structure_names
+from solver.scene.matrices_structure import Ratios
+from solver.scene.parameter_paths import PROPORTIONAL, is_gas_path, is_loss, share, structure_names
 from solver.scene.scene import (
     CyclicStructure,
     Damper,
@@ -76,13 +88,24 @@ def linear_model(scene: Scene) -> LinearModel:
     if isinstance(structure, MatricesStructure):
         found = matrices_with_bodies(structure, scene.bodies)
         nothing = _nothing(found.M.shape[0])
-        return _model(scene, _Matrices(found.M, found.C, nothing, found.K, nothing), found.shapes)
+        matrices = _Matrices(found.M, found.C, nothing, found.K, nothing)
+        return _model(scene, matrices, found.shapes, found.skew)
     topology = _topology(structure, scene.bodies)
-    matrices = _matrices(topology, _numbers(structure, scene.bodies), scene.bodies)
+    numbers = _numbers(structure, scene.bodies)
+    matrices = _matrices(topology, numbers, scene.bodies, _modal_ratios(structure))
     return _model(scene, matrices, _identity(len(topology.dofs)))
 
 
-def _model(scene: Scene, matrices: _Matrices, shapes: FloatArray) -> LinearModel:
+def _modal_ratios(structure: _Assembled) -> Ratios | None:
+    return structure.damping_ratio if isinstance(structure, LumpedStructure) else None
+
+
+def _model(
+    scene: Scene,
+    matrices: _Matrices,
+    shapes: FloatArray,
+    skew: tuple[FloatArray, FloatArray] | None = None,
+) -> LinearModel:
     """Add contacts and forces to the matrices."""
     structure = scene.structure
     dofs = scene.dofs
@@ -106,6 +129,7 @@ def _model(scene: Scene, matrices: _Matrices, shapes: FloatArray) -> LinearModel
         observe=rows(_unit(dofs, scene.observe.dof)),
         engine_order=scene.engine_order,
         sectors=structure.sectors if isinstance(structure, CyclicStructure) else 1,
+        extra=extra_terms(scene, Symmetric(K0=matrices.K0, Kp=matrices.Kp, shapes=shapes, skew=skew)),
     )
 
 
@@ -150,6 +174,10 @@ def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
         return _of_motions(scene, slopes)
     if is_body_path(scene, name):
         return _of_bodies(scene, name)
+    if is_gas_path(scene, name):
+        return _of_extra(scene, terms_by_gas(scene, name.rpartition(".")[0], _symmetric_of(scene)))
+    if is_loss(structure, name):
+        return _of_extra(scene, terms_by_loss(_symmetric_of(scene)))
     if isinstance(structure, MatricesStructure):
         return _proportional(structure, scene.bodies, name)
     parts: tuple[Mass | Spring | Damper, ...] = (*structure.masses, *structure.springs, *structure.dampers)
@@ -161,17 +189,38 @@ def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
         structure.dofs
     )  # places of the bodies' DOFs, between masses and springs
     shares = [(i if i < len(structure.masses) else i + behind, weight) for i, weight in shares]
-    members = [(_derivative(topology, numbers, i), weight) for i, weight in shares]
+    own, ratios = len(structure.dofs), _modal_ratios(structure)
+    members = [(_derivative(topology, numbers, i, own, ratios), weight) for i, weight in shares]
 
     def total(key: str) -> FloatArray:
         return _frozen(
             sum((weight * getattr(d, key) for d, weight in members), np.zeros(members[0][0].dM.shape))
         )
 
+    dK0, dKp = total("dK0"), total("dKp")
     return LinearModelDerivative(
-        dM=total("dM"), dC0=total("dC0"), dCp=total("dCp"), dK0=total("dK0"), dKp=total("dKp"),
-        affine=all(d.affine for d, _ in members),
+        dM=total("dM"), dC0=total("dC0"), dCp=total("dCp"), dK0=dK0, dKp=dKp,
+        affine=all(d.affine for d, _ in members), extra=terms_by_stiffness(scene, dK0, dKp),
     )  # fmt: skip
+
+
+def _symmetric_of(scene: Scene) -> Symmetric:
+    """The symmetric matrices that extra terms go with."""
+    structure, bodies = scene.structure, scene.bodies
+    if isinstance(structure, MatricesStructure):
+        found = matrices_with_bodies(structure, bodies)
+        return Symmetric(K0=found.K, Kp=_nothing(found.K.shape[0]), shapes=found.shapes, skew=found.skew)
+    topology = _topology(structure, bodies)
+    matrices = _matrices(topology, _numbers(structure, bodies), bodies, _modal_ratios(structure))
+    return Symmetric(K0=matrices.K0, Kp=matrices.Kp, shapes=_identity(len(topology.dofs)))
+
+
+def _of_extra(scene: Scene, extra: ExtraTerms) -> LinearModelDerivative:
+    """Derivatives of the extra terms alone."""
+    nothing = _nothing(extra.K.shape[1])
+    return LinearModelDerivative(
+        dM=nothing, dC0=nothing, dCp=nothing, dK0=nothing, dKp=nothing, affine=True, extra=extra
+    )
 
 
 def _of_motions(scene: Scene, slopes: Mapping[str, tuple[Form, ...]]) -> LinearModelDerivative:
@@ -204,10 +253,14 @@ def _of_bodies(scene: Scene, path: str) -> LinearModelDerivative:
     massive = key == "mass" or key in MOMENTS
     nothing = _nothing(n)
     first, second = force_derivatives(scene, path)
+    extra: tuple[ExtraTerms | None, ExtraTerms | None] = (None, None)
+    if not owner and depends_on_speed(scene):
+        extra = terms_by_speed(scene, _symmetric_of(scene))
     return LinearModelDerivative(
         dM=mass_derivative(n - behind, scene.bodies, owner, key) if massive else nothing,
         dC0=nothing, dCp=nothing, dK0=nothing, dKp=nothing, affine=True,
         forces=_terms(first, dofs, shapes), second_forces=_terms(second, dofs, shapes),
+        extra=extra[0], second_extra=extra[1] if extra[1] is not None and np.any(extra[1].K) else None,
     )  # fmt: skip
 
 
@@ -217,7 +270,7 @@ def _proportional(structure: MatricesStructure, bodies: tuple[Body, ...], name: 
         raise _unknown(name, PROPORTIONAL)
     found = matrices_with_bodies(structure, bodies)
     nothing = _nothing(found.M.shape[0])
-    dC = found.K if name == PROPORTIONAL[0] else found.M
+    dC = found.K if name == PROPORTIONAL[0] else found.M  # the symmetric part of K
     if bodies:  # which have no such damping
         dC = dC.copy()
         dC[-sum(len(body.dofs) for body in bodies) :] = 0.0
@@ -295,16 +348,23 @@ def _join(X0: Any, Xp: Any, ends: _Ends, value: Any, index: dict[str, int]) -> N
 
 
 @lru_cache(maxsize=256)
-def _matrices(topology: _Topology, numbers: tuple[float, ...], bodies: tuple[Body, ...]) -> _Matrices:
+def _matrices(
+    topology: _Topology, numbers: tuple[float, ...], bodies: tuple[Body, ...], ratios: Ratios | None
+) -> _Matrices:
     n = len(topology.dofs)
-    M, *others = _assembled(topology, numbers, np.zeros((n, n)))
+    own = n - sum(len(body.dofs) for body in bodies)
+    found = _Matrices(*_assembled(topology, numbers, np.zeros((n, n))))
+    if ratios is not None:
+        found.C0[:own, :own] += modal_damping(found.M[:own, :own], found.K0[:own, :own], ratios)
     if bodies:
-        M += bodies_mass(n - sum(len(body.dofs) for body in bodies), bodies)
-    return _Matrices(*map(_frozen, (M, *others)))
+        found.M[:] += bodies_mass(own, bodies)
+    return _Matrices(*map(_frozen, found))
 
 
 @lru_cache(maxsize=256)
-def _derivative(topology: _Topology, numbers: tuple[float, ...], i: int) -> LinearModelDerivative:
+def _derivative(
+    topology: _Topology, numbers: tuple[float, ...], i: int, own: int, ratios: Ratios | None
+) -> LinearModelDerivative:
     import casadi
 
     expression = _expression(topology)
@@ -312,7 +372,14 @@ def _derivative(topology: _Topology, numbers: tuple[float, ...], i: int) -> Line
     stacked = casadi.reshape(derivative(np.asarray(numbers)), *expression.stacked.shape)
     dense = np.asarray(casadi.DM(stacked).full(), dtype=np.float64)
     n = dense.shape[0]
-    d = _Matrices(*(_frozen(dense[:, i * n : (i + 1) * n].copy()) for i in range(5)))
+    d = _Matrices(*(dense[:, i * n : (i + 1) * n].copy() for i in range(5)))
+    if ratios is not None:
+        at = _matrices(topology, numbers, (), None)
+        d.C0[:own, :own] += modal_damping_derivative(
+            at.M[:own, :own], at.K0[:own, :own], ratios, d.M[:own, :own], d.K0[:own, :own]
+        )
+        affine = affine and not (np.any(d.M) or np.any(d.K0))
+    d = _Matrices(*map(_frozen, d))
     return LinearModelDerivative(dM=d.M, dC0=d.C0, dCp=d.Cp, dK0=d.K0, dKp=d.Kp, affine=affine)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from solver.contacts.kernels.system import DENSE
-from solver.jit.fourier import Complex, Integer, Real
+from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import ForceTerm, LinearModel, LinearModelDerivative, linear_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.modal import Decomposition, Held, decompose, held_alone, held_by, matrices_of
@@ -46,6 +46,7 @@ class Reduced:
     dK: Complex
     dC: Complex
     dM: Complex
+    ddK: Complex
     L: Complex
     observe: Complex
     forces: Complex
@@ -76,24 +77,30 @@ def reduce_model(
     numpy.linalg.LinAlgError
         The mass matrix is not positive definite.
     """
-    diameters, which = np.unique((ks * model.engine_order) % model.sectors, return_inverse=True)
-    theta = 2.0 * np.pi * diameters / model.sectors
+    dense_asked = whole_matrices or derivative is not None
+    apart = dense_asked or (model.extra is not None and not model.extra.is_real)
+    which, theta, moving = _structures(model, ks, apart=apart)
     forces = force_amplitudes(model, ks)
-    L = model.contact_here + model.contact_next * np.exp(1j * theta)[:, None, None]
-    held = matrices_of(model, theta)
+    L = model.ports_at(np.exp(1j * theta))
+    held = matrices_of(model, theta, moving)
     shift, loose = np.zeros(kt.size), np.zeros((0, kt.size))
     if 0 in ks:
         loose = loose_motions(held.K[which[0]], L[which[0]], kt)
         if len(loose) or not held_alone(held):
             shift, held = kt.copy(), held_by(held, L, kt)
-    found = None if whole_matrices or derivative is not None else decompose(held)
-    if found is None and not whole_matrices and derivative is None and not held_alone(held):
+    found = None if dense_asked else decompose(held)
+    if found is None and not dense_asked and not held_alone(held):
         # A free part has a double pole at 0, of which there are no two eigenvectors: held, it has not.
         shift, held = kt.copy(), held_by(held, L, kt)
         found = decompose(held)
+    if found is None and not apart:
+        which, theta, moving = _structures(model, ks, apart=True)
+        L = model.ports_at(np.exp(1j * theta))
+        held = matrices_of(model, theta, moving)
+        held = held_by(held, L, kt) if np.any(shift) else held
     if found is None:
         modes: dict[str, Any] = _no_modes(theta.size, ks.size, kt.size)
-        dense: dict[str, Any] = _dense(held, theta, L, model, forces, derivative)
+        dense: dict[str, Any] = _dense(held, theta, moving, L, model, forces, derivative)
         given = ((), ()) if derivative is None else (derivative.forces, derivative.second_forces)
         dense["dforces"] = np.array([term_amplitudes(each, model.observe.size, ks) for each in given])
     else:
@@ -101,6 +108,17 @@ def reduce_model(
         dense = {name: np.zeros((0,) * axes, np.complex128) for name, axes in _DENSE_AXES.items()}
     least = 0.0 if found is None else _least_size(found, L, forces, which)
     return Reduced(which=which.astype(np.int64), shift=shift, loose=loose, least_size=least, **modes, **dense)
+
+
+def _structures(model: LinearModel, ks: Integer, *, apart: bool) -> tuple[Integer, Real, Flags]:
+    """Return the structure of each harmonic, and the interblade phase of each; (False) the one of the mean.
+
+    There is one for each nodal diameter in play; the mean has its own where `apart`.
+    """
+    diameters = (ks * model.engine_order) % model.sectors
+    still = (ks == 0) & apart
+    found, which = np.unique(np.where(still, -1, diameters), return_inverse=True)
+    return which, 2.0 * np.pi * np.maximum(found, 0) / model.sectors, found >= 0
 
 
 def _least_size(found: Decomposition, L: Complex, forces: Complex, which: Integer) -> float:
@@ -127,7 +145,7 @@ def loose_ports(scene: Scene) -> tuple[Real, Real]:
     """
     model = linear_model(scene)
     kt = port_stiffnesses(scene, model)
-    static = matrices_of(model, np.zeros(1))
+    static = matrices_of(model, np.zeros(1), np.zeros(1, np.bool_))
     return loose_motions(static.K[0], model.contact_here + model.contact_next, kt), kt
 
 
@@ -189,7 +207,7 @@ def _no_modes(n_structures: int, n_harmonics: int, n_contacts: int) -> dict[str,
 
 
 _DENSE_AXES = {
-    "K": 3, "C": 3, "M": 3, "dK": 3, "dC": 3, "dM": 3, "L": 3, "observe": 1, "forces": 2,
+    "K": 3, "C": 3, "M": 3, "dK": 3, "dC": 3, "dM": 3, "ddK": 3, "L": 3, "observe": 1, "forces": 2,
     "dforces": 3,
 }  # fmt: skip
 
@@ -197,19 +215,25 @@ _DENSE_AXES = {
 def _dense(
     held: Held,
     theta: Real,
+    moving: Flags,
     L: Complex,
     model: LinearModel,
     forces: Complex,
     derivative: LinearModelDerivative | None,
 ) -> dict[str, Complex]:
-    """Return the matrices and their derivatives by the structural parameter (zero if there is none)."""
-    turn = np.exp(1j * theta)[:, None, None]
+    """Return the matrices and their derivatives by the structural parameter (zero if there is none).
+
+    The loops compute the mean with k = 1: its structure has no C and no M.
+    """
     dK = dC = dM = np.zeros(held.K.shape, np.complex128)
+    ddK = np.zeros((0, 0, 0), np.complex128)
     if derivative is not None:
-        dK = dK + derivative.dK0 + derivative.dKp * turn + derivative.dKp.T * turn.conj()
-        dC = dC + derivative.dC0 + derivative.dCp * turn + derivative.dCp.T * turn.conj()
-        dM = dM + derivative.dM
+        dK, dC, dM = derivative.at(np.exp(1j * theta), moving)
+        if derivative.second_extra is not None:
+            ddK = _contiguous(derivative.second_extra.at(np.exp(1j * theta), moving)[0])
+    moves = moving[:, None, None]
     return {
-        "K": _contiguous(held.K), "C": _contiguous(held.C), "M": _contiguous(held.M), "dK": dK, "dC": dC,
-        "dM": dM, "L": _contiguous(L), "observe": _contiguous(model.observe), "forces": forces,
+        "K": _contiguous(held.K), "C": _contiguous(moves * held.C), "M": _contiguous(moves * held.M),
+        "dK": _contiguous(dK), "dC": _contiguous(moves * dC), "dM": _contiguous(moves * dM), "ddK": ddK,
+        "L": _contiguous(L), "observe": _contiguous(model.observe), "forces": forces,
     }  # fmt: skip

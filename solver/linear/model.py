@@ -8,7 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.linear.extra_terms import ExtraTerms
+
 FloatArray = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +67,8 @@ class LinearModel:
         Engine order of the excitation, 0 if lumped.
     sectors : int
         Number of sectors, 1 if lumped.
+    extra : ExtraTerms or None
+        Terms that are not symmetric, not real or not of springs and dashpots; see `at`.
     """
 
     dofs: tuple[str, ...]
@@ -79,11 +84,35 @@ class LinearModel:
     observe: FloatArray
     engine_order: int
     sectors: int
+    extra: ExtraTerms | None = None
 
     @property
     def interblade_phase(self) -> float:
         """Phase of harmonic 1 from one sector to the next [rad]."""
         return 2.0 * math.pi * self.engine_order / self.sectors
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether energy is kept but for dashpots: nothing beside springs, dashpots and gyroscopic terms."""
+        return self.extra is None or self.extra.keeps_energy
+
+    def at(self, turns: Complex, moving: NDArray[np.bool_]) -> tuple[Complex, Complex]:
+        """Return K and C, (ns, n, n), at e^{j theta} (ns,), of motions or (False) of what is at rest."""
+        turn = turns[:, None, None]
+        K = self.K0 + self.Kp * turn + self.Kp.T * turn.conj()
+        C = self.C0 + self.Cp * turn + self.Cp.T * turn.conj()
+        if self.extra is not None:
+            more, further = self.extra.at(turns, moving)
+            K, C = K + more, C + further
+        return K, C
+
+    def ports_at(self, turns: Complex) -> Complex:
+        """Return the relative motions L of the contacts, (ns, n_ports, n), at e^{j theta} (ns,)."""
+        return np.asarray(self.contact_here + self.contact_next * turns[:, None, None])
+
+    def turns(self, ks: NDArray[np.int64]) -> Complex:
+        """Return e^{j theta} of harmonics."""
+        return np.asarray(np.exp(1j * ks * self.interblade_phase))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +129,8 @@ class LinearModelDerivative:
         Derivatives of the relative motions; None where they do not depend on it.
     forces, second_forces : tuple of ForceTerm
         First and second derivatives of the forces [N per unit, and per unit squared].
+    extra, second_extra : ExtraTerms or None
+        First and second derivatives of the extra terms.
     """
 
     dM: FloatArray
@@ -112,3 +143,15 @@ class LinearModelDerivative:
     contact_next: FloatArray | None = None
     forces: tuple[ForceTerm, ...] = ()
     second_forces: tuple[ForceTerm, ...] = ()
+    extra: ExtraTerms | None = None
+    second_extra: ExtraTerms | None = None
+
+    def at(self, turns: Complex, moving: NDArray[np.bool_]) -> tuple[Complex, Complex, Complex]:
+        """Return the derivatives of K, C and M, (ns, n, n), at e^{j theta} (ns,), as `LinearModel.at`."""
+        turn = turns[:, None, None]
+        dK = self.dK0 + self.dKp * turn + self.dKp.T * turn.conj()
+        dC = self.dC0 + self.dCp * turn + self.dCp.T * turn.conj()
+        if self.extra is not None:
+            more, further = self.extra.at(turns, moving)
+            dK, dC = dK + more, dC + further
+        return dK, dC, self.dM + 0.0 * turn

@@ -7,14 +7,15 @@ from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_array, diags_array
 
 from solver.errors import SettingError
-from solver.linear.first_order import equations
+from solver.linear.first_order import equations, modal_damping_root
 from solver.marching.contacts import columns, selection
 from solver.marching.kernels import state as kernel
-from solver.scene.bodies.body import Body
+from solver.scene.bodies.body import REVOLUTIONS, Body
 from solver.scene.bodies.kinematics import dof_names, pair_form
 from solver.scene.scene import LumpedStructure, MatricesStructure, Scene
 
 FloatArray = NDArray[np.float64]
+_IN_TIME = "cannot be marched in time: it is a term of the frequency domain; give dashpots or damping ratios"
 
 
 def _matrices(
@@ -30,6 +31,11 @@ def _matrices(
     dampers = selection([pair_form(damper.between) for damper in structure.dampers], index, len(index))
     K = springs.T @ diags_array(k) @ springs
     C = springs.T @ diags_array(c) @ springs + dampers.T @ diags_array(dashpots) @ dampers
+    if structure.damping_ratio is not None:
+        root, own = np.sqrt(M), M.size
+        scaled = K.toarray()[:own, :own] / np.outer(root, root)
+        modal = np.outer(root, root) * modal_damping_root(scaled, structure.damping_ratio)
+        C = csr_array(C) + csr_array(np.pad(modal, (0, len(index) - own)))
     return M, csr_array(C), csr_array(K)
 
 
@@ -56,7 +62,9 @@ def _of_matrices(
     own = [dof for body in scene.bodies for dof in body.dofs]
     ends = [term.dof for forms in scene.forms for form in forms for term in form]
     used = [*ends, *(force.dof for force in scene.forces), scene.observe.dof]
-    found = equations(structure, [dof for dof in used if dof not in own])
+    used += [dof for coupling in scene.couplings for dof in (coupling.on, coupling.of)]
+    spin = (scene.speed or 0.0) * REVOLUTIONS
+    found = equations(structure, [dof for dof in used if dof not in own], spin)
     A, B, W = (csr_array(each) for each in (found.A, found.B, found.W))
     if not own:
         return A, B, W, found.index
@@ -66,9 +74,32 @@ def _of_matrices(
     return A, B, W, found.index | {dof: n + i for i, dof in enumerate(own)}
 
 
+def _with_couplings(
+    scene: Scene, A: csr_array, B: csr_array, W: csr_array, index: dict[str, int]
+) -> tuple[csr_array, csr_array, csr_array, dict[str, int]]:
+    """The same with the couplings: each is a force on one DOF by the motion of another.
+
+    Raises
+    ------
+    SettingError
+        A term of the frequency domain: structural damping, an imaginary coefficient.
+    """
+    if scene.structure.loss_factor:
+        raise SettingError("loss_factor", scene.structure.loss_factor, _IN_TIME)
+    spin = (scene.speed or 0.0) * REVOLUTIONS
+    for entry in (entry for coupling in scene.couplings for entry in coupling.entries()):
+        if entry.k.imag != 0.0:
+            raise SettingError("k_imaginary", entry.k.imag, _IN_TIME)
+        push = csr_array(W[:, [index[entry.on]]])
+        at = csr_array(([1.0], ([0], [index[entry.of]])), shape=(1, W.shape[0]))
+        A = A + (entry.k.real + spin**2 * entry.k_omega2) * (push @ at)
+        B = B + (entry.c.real + spin * entry.g) * (push @ at)
+    return csr_array(A), csr_array(B), W, index
+
+
 def equations_of_motion(scene: Scene, omega: float) -> tuple[kernel.System, int]:
     """The equations of a scene in the angle tau = omega t, and the coordinate observed."""
-    A, B, W, index = _equations(scene)
+    A, B, W, index = _with_couplings(scene, *_equations(scene))
     A, B, W = A / omega**2, B / omega, W / omega**2
     forces = scene.forces
     placed = [(row, own) for one, own in zip(scene.contacts, scene.forms, strict=True) for row in one.rows()]

@@ -104,10 +104,8 @@ def all_coordinates(solution: Solution) -> Complex:
     _check_converged(solution)
     model = linear_model(solution.scene)
     ks = np.arange(solution.highest_harmonic + 1)
-    turns = np.exp(1j * ks * model.interblade_phase)[:, None, None]
-    K = model.K0 + model.Kp * turns + model.Kp.T / turns
-    C = model.C0 + model.Cp * turns + model.Cp.T / turns
-    L = model.contact_here + model.contact_next * turns
+    K, C = model.at(model.turns(ks), ks > 0)
+    L = model.ports_at(model.turns(ks))
     forces = [fourier.to_complex(force) for c in solution.contacts for force in c.forces]
     friction = np.array(forces, dtype=np.complex128).reshape(-1, ks.size).T
     if solution.contacts:
@@ -121,12 +119,9 @@ def all_coordinates(solution: Solution) -> Complex:
 
 def matrices(model: LinearModel, k: int) -> tuple[Complex, Complex, Complex]:
     """Return K [N/m], C [N s/m] and the contact rows L as harmonic k sees them (its interblade phase)."""
-    turn = np.exp(1j * k * model.interblade_phase)
-    return (
-        model.K0 + model.Kp * turn + model.Kp.T / turn,
-        model.C0 + model.Cp * turn + model.Cp.T / turn,
-        model.contact_here + model.contact_next * turn,
-    )
+    ks = np.array([k], dtype=np.int64)
+    (K,), (C,) = model.at(model.turns(ks), ks > 0)
+    return K, C, model.ports_at(model.turns(ks))[0]
 
 
 def _check_converged(solution: Solution) -> None:

@@ -26,6 +26,7 @@ from solver.contacts.fields import (
     Signed,
     Vector,
 )
+from solver.scene.matrices_structure import LossFactor, Ratios
 from solver.scene.matrices_structure import MatricesStructure as MatricesStructure
 from solver.scene.matrices_structure import Reduction as Reduction
 
@@ -126,9 +127,16 @@ class _MassTable:
 
 
 class _Structure(Part):
-    """Masses, springs and dashpots."""
+    """Masses, springs and dashpots.
+
+    Attributes
+    ----------
+    loss_factor : float
+        Structural damping: the stiffness is K (1 + i loss_factor) at every frequency above 0.
+    """
 
     stiffness_proportional_damping: NonNegative = 0.0
+    loss_factor: LossFactor = 0.0
     masses: Annotated[tuple[Mass, ...], _MassTable]
     springs: tuple[Spring, ...] = ()
     dampers: tuple[Damper, ...] = ()
@@ -140,9 +148,17 @@ class _Structure(Part):
 
 
 class LumpedStructure(_Structure):
-    """A structure of point masses."""
+    """A structure of point masses.
+
+    Attributes
+    ----------
+    damping_ratio : float or list
+        Damping ratio of every mode, or of each from the lowest on (the last one also of those above), added
+        to the rest; bodies have none.
+    """
 
     kind: Literal["lumped"]
+    damping_ratio: Ratios | None = None
 
 
 class Mistuning(Part):

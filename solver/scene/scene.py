@@ -25,8 +25,7 @@ from solver.contacts.laws.polynomial import PolynomialSpring
 from solver.contacts.laws.registry import on_change
 from solver.errors import Issue, SceneError
 from solver.scene import parameter_paths as scene_paths
-from solver.scene.bodies import kinematics
-from solver.scene.bodies.body import Body, Load, Node
+from solver.scene.bodies.body import Body, Load, Node, kinematics
 from solver.scene.bodies.kinematics import Form
 from solver.scene.bodies.shape_parts import own_parts, with_shapes
 from solver.scene.bodies.shapes import AnyShape
@@ -34,6 +33,7 @@ from solver.scene.bodies.validation import body_issues
 from solver.scene.contacts import ContactOfAnyLaw
 from solver.scene.cyclic.validation import cyclic_issues
 from solver.scene.io import load_raw, scene_folder, shipped_scenes
+from solver.scene.linear_terms import Aerodynamics, Coupling
 from solver.scene.parts import (
     KINDS,
     CyclicStructure,
@@ -47,6 +47,7 @@ from solver.scene.parts import (
     Spring,
     Structure,
 )
+from solver.scene.term_validation import term_issues
 from solver.scene.validation import cross_issues, field_issues, plain
 
 __all__ = [
@@ -80,7 +81,7 @@ __all__ = [
 ]
 
 
-_OPTIONAL = ("bodies", "nodes", "loads", "dampers")  # tables that are left out where they are empty
+_OPTIONAL = ("bodies", "nodes", "loads", "dampers", "couplings", "aerodynamics")  # tables that are left out where they are empty
 _FEW = 6  # contacts that are named where a scene says what it is
 
 
@@ -108,7 +109,12 @@ class Scene(Part):
     dampers : tuple of Wedge, Cylinder, Asymmetric, SplitRing and Shroud
         Dampers by their shape; their bodies and contacts are among `bodies` and `contacts`.
     speed : float or None
-        Speed of rotation [1/min] of which bodies with a `radius_of_rotation` are loaded.
+        Speed of rotation [1/min], by which bodies with a `radius_of_rotation` are loaded and on which
+        gyroscopic terms and K_omega2 depend.
+    couplings : tuple of Coupling
+        Entries of stiffness and damping that are no springs and dashpots: not symmetric, gyroscopic.
+    aerodynamics : tuple of Aerodynamics
+        Influence of the gas between blades, of a cyclic structure.
 
     Raises
     ------
@@ -129,6 +135,8 @@ class Scene(Part):
     loads: tuple[Load, ...] = ()
     dampers: tuple[AnyShape, ...] = ()
     speed: NonNegative | None = None
+    couplings: tuple[Coupling, ...] = ()
+    aerodynamics: tuple[Aerodynamics, ...] = ()
 
     def __repr__(self) -> str:
         """Say in a line what it is; `to_dict` has all of it."""
@@ -169,7 +177,7 @@ class Scene(Part):
             scene, issues = handler(data), []
         except ValidationError as error:
             scene, issues = None, field_issues(error, raw)
-        issues = [*issues, *cross_issues(raw), *cyclic_issues(raw), *body_issues(raw)]
+        issues = [*issues, *cross_issues(raw), *cyclic_issues(raw), *body_issues(raw), *term_issues(raw)]
         if scene is None or issues:
             raise SceneError(issues)
         return scene if not scene.dampers else scene.model_copy(update=with_shapes(scene))

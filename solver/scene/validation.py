@@ -21,6 +21,7 @@ from solver.errors import pointer as json_pointer
 from solver.scene.bodies.body import Body, Load, Node, body_dofs
 from solver.scene.bodies.shapes import SHAPES, WITH_BODY
 from solver.scene.contacts import LAW_TAG
+from solver.scene.linear_terms import Aerodynamics, Coupling, DiameterCoefficient, Influence
 from solver.scene.parts import (
     KINDS,
     CyclicStructure,
@@ -38,6 +39,7 @@ MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
 RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe", "speed")
 _SCENE_KEYS = (
     "name", "structure", "contacts", "excitation", "observe", "bodies", "nodes", "loads", "dampers", "speed",
+    "couplings", "aerodynamics",
 )  # fmt: skip
 _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     (): ("a scene", _SCENE_KEYS),
@@ -54,6 +56,10 @@ _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     ("bodies",): ("a body", tuple(Body.model_fields)),
     ("nodes",): ("a node", tuple(Node.model_fields)),
     ("loads",): ("a load", tuple(Load.model_fields)),
+    ("couplings",): ("a coupling", tuple(Coupling.model_fields)),
+    ("aerodynamics",): ("aerodynamics", tuple(Aerodynamics.model_fields)),
+    ("aerodynamics", "influence"): ("an influence", tuple(Influence.model_fields)),
+    ("aerodynamics", "nodal_diameters"): ("a nodal diameter", tuple(DiameterCoefficient.model_fields)),
     **{
         ("dampers", shape): (f"a damper of the shape `{shape}`", tuple(each.model_fields))
         for shape, each in SHAPES.items()

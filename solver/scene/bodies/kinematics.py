@@ -21,6 +21,7 @@ from typing import Any, NamedTuple, Protocol
 from solver.contacts.fields import NEXT, Between, Vector, parse_end
 from solver.contacts.frames import Axes, cross, unit
 from solver.scene.bodies.body import REVOLUTIONS, Body, Load, Node, Place
+from solver.scene.linear_terms import Aerodynamics
 from solver.scene.parts import CyclicStructure, Excitation, Structure
 
 
@@ -85,6 +86,10 @@ class HasBodies(Protocol):
     @property
     def loads(self) -> tuple[Load, ...]:
         """Every constant force."""
+
+    @property
+    def aerodynamics(self) -> tuple[Aerodynamics, ...]:
+        """Influence of the gas between blades."""
 
     @property
     def speed(self) -> float | None:

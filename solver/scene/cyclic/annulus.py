@@ -13,6 +13,7 @@ from typing import TypeVar
 from solver.errors import SettingError
 from solver.results.told import Piece
 from solver.scene.bodies.kinematics import forms_of, written_form
+from solver.scene.linear_terms import Coupling
 from solver.scene.scene import (
     AnyContact,
     Body,
@@ -151,6 +152,7 @@ def annulus(scene: Scene) -> Scene:
         structure=LumpedStructure(
             kind="lumped",
             stiffness_proportional_damping=structure.stiffness_proportional_damping,
+            loss_factor=structure.loss_factor,
             masses=tuple(_mass(mass, j) for j in sectors for mass in scaled[j].masses),
             springs=tuple(_renamed(s, j) for j in sectors for s in _joining(scaled[j].springs, j, n)),
             dampers=tuple(_renamed(d, j) for j in sectors for d in _joining(scaled[j].dampers, j, n)),
@@ -172,6 +174,7 @@ def annulus(scene: Scene) -> Scene:
         nodes=tuple(_node(node, j) for j in sectors for node in scene.nodes),
         loads=tuple(_load(load, j) for j in sectors for load in scene.loads),
         speed=scene.speed,
+        couplings=tuple(_coupling(c, j, n) for j in sectors for c in scene.couplings + _gas(scene, n)),
     )
 
 
@@ -283,6 +286,37 @@ def _load(load: Load, j: int) -> Load:
     places = {key: _in_sector(place, j) for key in ("dof", "on") if (place := getattr(load, key))}
     named = {} if load.name is None else {"name": _in_sector(load.name, j)}
     return load.model_copy(update={**places, **named})
+
+
+def _coupling(coupling: Coupling, j: int, n: int) -> Coupling:
+    on, of = _in_sector(coupling.on, j), _in_sector(coupling.of, (j + coupling.offset) % n)
+    return coupling.model_copy(update={"on": on, "of": of, "offset": 0})
+
+
+def _gas(scene: Scene, n: int) -> tuple[Coupling, ...]:
+    """The aerodynamic influence between blades as couplings.
+
+    Raises
+    ------
+    SettingError
+        Damping of nodal diameters n and -n differs: no real dashpots between blades do that.
+    """
+    found = []
+    for gas in scene.aerodynamics:
+        for entry in gas.entries(n):
+            if entry.c.imag != 0.0:
+                wanted = (
+                    "must be the same for a nodal diameter and for its negative where all sectors are "
+                    "solved: give what differs as `imaginary`"
+                )
+                raise SettingError("damping", gas.dof, wanted)
+            found.append(
+                Coupling(
+                    on=entry.on, of=entry.of, offset=entry.offset, k=entry.k.real, k_imaginary=entry.k.imag,
+                    c=entry.c.real,
+                )
+            )  # fmt: skip
+    return tuple(found)
 
 
 def _renamed(part: _NamedT, j: int) -> _NamedT:
