@@ -21,7 +21,7 @@ from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import sweep
-from solver.jit.fourier import Real
+from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.matrices.normal_modes import undamped_modes
 from solver.response.time_history import matrices
@@ -118,7 +118,7 @@ def natural_frequencies(scene: Scene, *, stuck: bool) -> Real:
 
     Parameters
     ----------
-    scene : its dashpots and forces do not count.
+    scene : its dashpots and forces do not count, gyroscopic terms at its speed do.
     stuck : with all contacts closed and stuck, so that each is its springs; otherwise with all open.
     """
     scene = written_out(scene)
@@ -127,8 +127,24 @@ def natural_frequencies(scene: Scene, *, stuck: bool) -> Real:
     if stuck:
         stiffness = np.array([k for contact in scene.contacts for k in contact.stiffnesses])
         K = K + L.conj().T @ (stiffness[:, None] * L)
+    if model.extra is not None:
+        return _of_poles(
+            K, model.extra.at(model.turns(np.ones(1, np.int64)), np.ones(1, np.bool_))[1][0], model.M
+        )
     modes = undamped_modes(K if np.any(K.imag) else K.real, model.M)
     return np.sort(np.sqrt(np.maximum(modes.omega2, 0.0))) / (2.0 * math.pi)
+
+
+def _of_poles(K: Complex, C: Complex, M: Real) -> Real:
+    """Return the frequencies [Hz] of M x'' + G x' + K x = 0, ascending: G and K without what damps or feeds.
+
+    Forward and backward whirl are two of them. Of conjugate poles one counts.
+    """
+    G, K = 0.5 * (C - C.conj().T), 0.5 * (K + K.conj().T)
+    n, inverse = len(M), np.linalg.inv(M)
+    state = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K, -inverse @ G]])
+    turning = np.sort(np.linalg.eigvals(state).imag)
+    return np.asarray(np.maximum(turning[n:], 0.0) / (2.0 * math.pi))
 
 
 def _response(branch: Branch, order: int, speeds: Ranges, stuck: Real, free: Real) -> OrderResponse:

@@ -235,6 +235,7 @@ def _system(
         form=reduced.form, eigenvalues=reduced.eigenvalues, dampings=reduced.dampings,
         contact_modes=reduced.contact_modes, contact_duals=reduced.contact_duals,
         observe_modes=reduced.observe_modes, modal_forces=reduced.modal_forces, K=reduced.K, C=reduced.C,
-        M=reduced.M, dK=reduced.dK, dC=reduced.dC, dM=reduced.dM, ddK=reduced.ddK, L=reduced.L, observe=reduced.observe,
+        M=reduced.M, dK=reduced.dK, dC=reduced.dC, dM=reduced.dM, ddK=reduced.ddK, L=reduced.L,
+        observe=reduced.observe,
         forces=reduced.forces, dforces=reduced.dforces, constant_mean=int(bool(static_forces(scene))),
     )  # fmt: skip

@@ -175,9 +175,9 @@ def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
     if is_body_path(scene, name):
         return _of_bodies(scene, name)
     if is_gas_path(scene, name):
-        return _of_extra(scene, terms_by_gas(scene, name.rpartition(".")[0], _symmetric_of(scene)))
+        return _of_extra(terms_by_gas(scene, name.rpartition(".")[0], _symmetric_of(scene)))
     if is_loss(structure, name):
-        return _of_extra(scene, terms_by_loss(_symmetric_of(scene)))
+        return _of_extra(terms_by_loss(_symmetric_of(scene)))
     if isinstance(structure, MatricesStructure):
         return _proportional(structure, scene.bodies, name)
     parts: tuple[Mass | Spring | Damper, ...] = (*structure.masses, *structure.springs, *structure.dampers)
@@ -215,7 +215,7 @@ def _symmetric_of(scene: Scene) -> Symmetric:
     return Symmetric(K0=matrices.K0, Kp=matrices.Kp, shapes=_identity(len(topology.dofs)))
 
 
-def _of_extra(scene: Scene, extra: ExtraTerms) -> LinearModelDerivative:
+def _of_extra(extra: ExtraTerms) -> LinearModelDerivative:
     """Derivatives of the extra terms alone."""
     nothing = _nothing(extra.K.shape[1])
     return LinearModelDerivative(

@@ -1,7 +1,7 @@
-"""What a structure has beside symmetric springs and dashpots: couplings, gyroscopic and hysteretic terms, gas.
+"""What a structure has beside springs and dashpots: couplings, gyroscopic and hysteretic terms, gas.
 
-Kept apart from the symmetric matrices of `solver.linear.model.LinearModel` as Σ_m X_m e^{jmθ} over the offsets
-m between sectors, complex where a term is one of the frequency domain. A hysteretic term (structural damping
+Kept apart from the symmetric matrices of `solver.linear.model.LinearModel` as Σ_m X_m e^{jmθ} over offsets m
+between sectors, complex where a term is one of the frequency domain. A hysteretic term (structural damping
 K (1 + iη), an imaginary coefficient) is of a motion e^{iωt} with ω > 0 and has no share in the mean.
 """
 
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from solver.matrices.values import Matrix
 from solver.scene.bodies.body import REVOLUTIONS
-from solver.scene.linear_terms import Entry
 from solver.scene.scene import CyclicStructure, MatricesStructure, Scene, Structure
+from solver.scene.terms.linear_terms import Entry
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -45,7 +45,7 @@ class ExtraTerms:
 
     @property
     def keeps_energy(self) -> bool:
-        """Whether it is gyroscopic alone: no stiffness, and damping that is antisymmetric and does no work."""
+        """Whether it is gyroscopic alone: no stiffness, and antisymmetric damping, which does no work."""
         if np.any(self.K) or np.any(self.C.imag):
             return False
         by = dict(zip(self.offsets, self.C, strict=True))
@@ -102,7 +102,8 @@ def extra_terms(scene: Scene, symmetric: Symmetric) -> ExtraTerms | None:
     """
     structure = scene.structure
     spinning = _spinning(structure)
-    if not (scene.couplings or scene.aerodynamics or structure.loss_factor or any(spinning) or symmetric.skew):
+    own = structure.loss_factor or any(spinning) or symmetric.skew
+    if not (scene.couplings or scene.aerodynamics or own):
         return None
     spin = (scene.speed or 0.0) * REVOLUTIONS
     return _terms(_entries(scene), scene.dofs, structure.loss_factor, spin, spinning, symmetric)

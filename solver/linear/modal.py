@@ -19,7 +19,12 @@ from solver.jit import eigen
 from solver.jit.fourier import Complex, Flags, Real
 from solver.linear.assembly import LinearModel
 from solver.linear.extra_terms import ExtraTerms
-from solver.matrices.normal_modes import UndampedModes, hermitian, least_stiffness, undamped_modes
+from solver.matrices.normal_modes import (
+    UndampedModes,
+    hermitian,
+    least_stiffness,
+    undamped_modes,
+)
 
 CLASSICAL = 1e-11  # largest off-diagonal modal damping, relative to the diagonal, that counts as none
 ROUNDING = 4.0  # the same in units of what the modes lack in orthogonality
@@ -98,10 +103,10 @@ def _with_extra(
     plain = _matrices(parts, theta)
     turns = np.exp(1j * np.array(theta))
     K, C = extra.at(turns, np.array(moving, np.bool_))
-    K, C = plain.K + K, plain.C + C
-    if not (np.any(K.imag) or np.any(C.imag)):
-        K, C = K.real, C.real
-    return Held(K, C, plain.M, (plain.key, extra, moving))
+    stiffness, damping = plain.K + K, plain.C + C
+    if not (np.any(stiffness.imag) or np.any(damping.imag)):
+        stiffness, damping = stiffness.real, damping.real
+    return Held(stiffness, damping, plain.M, (plain.key, extra, moving))
 
 
 @lru_cache(maxsize=32)
@@ -135,15 +140,18 @@ def held_by(held: Held, L: Complex, kt: Real) -> Held:
 @lru_cache(maxsize=32)
 def decompose(held: Held) -> Decomposition | None:
     """Return modes if the damping is classical, else poles; None if neither gives Z⁻¹ to rounding."""
-    even = [hermitian(K) for K in held.K]
+    stiffness = list(held.K)
+    even = [hermitian(K) for K in stiffness]
     undamped = [undamped_modes(K, M) for K, M in zip(even, held.M, strict=True)]
     skew = [
         None if part is K else u.psi.conj().T @ (K - part) @ u.psi
-        for u, part, K in zip(undamped, even, held.K, strict=True)
+        for u, part, K in zip(undamped, even, stiffness, strict=True)
     ]
     damping = [u.psi.conj().T @ C @ u.psi for u, C in zip(undamped, held.C, strict=True)]
     rounding = [_rounding(u, K, M) for u, K, M in zip(undamped, even, held.M, strict=True)]
-    if all(part is None for part in skew) and all(_classical(D, each) for D, each in zip(damping, rounding, strict=True)):
+    if all(part is None for part in skew) and all(
+        _classical(D, each) for D, each in zip(damping, rounding, strict=True)
+    ):
         phi = np.array([u.phi for u in undamped])
         return Decomposition(
             form=MODES,
@@ -191,8 +199,8 @@ def _poles(
     """Return poles s_m, residues (x_m, y_mᴴ) with Z⁻¹(s) = Σ x_m y_mᴴ / (s − s_m); None if not to rounding.
 
     In the modes ψ with ψᴴ K ψ = 1 the motion z = (Ω p, p') has the inverse state matrix
-    [[−D, −Ω⁻¹], [Ω⁻¹, 0]] with eigenvalues 1/s, in which the slow poles are the large and accurate ones. E is
-    what K has there beside 1, where it is not Hermitian: then D and the first Ω⁻¹ are (1 + E)⁻¹ times so much.
+    [[−D, −Ω⁻¹], [Ω⁻¹, 0]] with eigenvalues 1/s, in which the slow poles are the large and accurate ones. E
+    is what K has there beside 1, where it is not Hermitian: D and the upper Ω⁻¹ are (1 + E)⁻¹ times so much.
     """
     n = undamped.mu.size
     slow = np.diag(np.sqrt(undamped.mu))

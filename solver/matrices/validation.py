@@ -151,7 +151,8 @@ def check_matrices(
     others: Mapping[str, Matrix],
 ) -> None:
     """Raise ValueError unless matrices or modes are there, of one size that has the rows of the DOFs."""
-    given = {key: value for key, value in (("M", M), ("K", K), ("C", C)) if value is not None} | others
+    given = {key: value for key, value in (("M", M), ("K", K), ("C", C)) if value is not None}
+    given |= others
     if modes is not None and given:
         raise ValueError(f"`modes` stands in place of the matrices: remove {', '.join(given)} or `modes`")
     if modes is None and (M is None or K is None):

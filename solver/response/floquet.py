@@ -171,8 +171,8 @@ def scene_monodromy(scene: Scene, frequency_hz: float, slips: Real) -> Monodromy
     K, C = (each[0] for each in model.at(np.ones(1, np.complex128), np.ones(1, np.bool_)))
     if np.any(K.imag) or np.any(C.imag):
         wanted = (
-            "must have no structural damping and no imaginary coefficients: they are of the frequency domain, "
-            "and stability is one in time"
+            "must have no structural damping and no imaginary coefficients: they are terms of the frequency "
+            "domain, and stability is one in time"
         )
         raise SettingError("scene", scene.name, wanted)
     structure = Structure(M=model.M, C=C.real, K=K.real)

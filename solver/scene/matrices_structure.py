@@ -4,14 +4,32 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from solver.contacts.fields import NonNegative, Part
 from solver.matrices.validation import DofTable, antisymmetric, check_matrices, symmetric
-from solver.matrices.values import Matrix, Modes
+from solver.matrices.values import MOST_MODES, Matrix, Modes
 
 Ratio = Annotated[float, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=False)]
-Ratios = Ratio | Annotated[tuple[Ratio, ...], Field(min_length=1, max_length=2000)]
+
+
+def _number_or_numbers(data: object) -> object:
+    """Refuse what is no damping ratio and no list of them, in one message."""
+    rows = data if isinstance(data, list | tuple) else [data]
+    good = all(
+        isinstance(one, int | float) and not isinstance(one, bool) and 0.0 <= one <= 10.0 for one in rows
+    )
+    if not good or not 0 < len(rows) <= MOST_MODES:
+        raise ValueError(
+            f"`damping_ratio` must be a number >= 0 and <= 10, or a list of 1 to {MOST_MODES} such numbers, "
+            f"got {str(data)[:80]}"
+        )
+    return tuple(map(float, rows)) if rows is data else float(rows[0])
+
+
+Ratios = Annotated[
+    Ratio | Annotated[tuple[Ratio, ...], Field(min_length=1)], BeforeValidator(_number_or_numbers)
+]
 LossFactor = Annotated[float, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=False)]
 
 

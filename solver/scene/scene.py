@@ -33,7 +33,6 @@ from solver.scene.bodies.validation import body_issues
 from solver.scene.contacts import ContactOfAnyLaw
 from solver.scene.cyclic.validation import cyclic_issues
 from solver.scene.io import load_raw, scene_folder, shipped_scenes
-from solver.scene.linear_terms import Aerodynamics, Coupling
 from solver.scene.parts import (
     KINDS,
     CyclicStructure,
@@ -47,7 +46,8 @@ from solver.scene.parts import (
     Spring,
     Structure,
 )
-from solver.scene.term_validation import term_issues
+from solver.scene.terms.linear_terms import Aerodynamics, Coupling
+from solver.scene.terms.validation import term_issues
 from solver.scene.validation import cross_issues, field_issues, plain
 
 __all__ = [
@@ -81,7 +81,7 @@ __all__ = [
 ]
 
 
-_OPTIONAL = ("bodies", "nodes", "loads", "dampers", "couplings", "aerodynamics")  # tables that are left out where they are empty
+_OPTIONAL = ("bodies", "nodes", "loads", "dampers", "couplings", "aerodynamics")  # left out if empty
 _FEW = 6  # contacts that are named where a scene says what it is
 
 

@@ -21,7 +21,6 @@ from solver.errors import pointer as json_pointer
 from solver.scene.bodies.body import Body, Load, Node, body_dofs
 from solver.scene.bodies.shapes import SHAPES, WITH_BODY
 from solver.scene.contacts import LAW_TAG
-from solver.scene.linear_terms import Aerodynamics, Coupling, DiameterCoefficient, Influence
 from solver.scene.parts import (
     KINDS,
     CyclicStructure,
@@ -34,6 +33,7 @@ from solver.scene.parts import (
     Reduction,
     Spring,
 )
+from solver.scene.terms.linear_terms import Aerodynamics, Coupling, DiameterCoefficient, Influence
 
 MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
 RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe", "speed")

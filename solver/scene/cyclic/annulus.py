@@ -13,7 +13,6 @@ from typing import TypeVar
 from solver.errors import SettingError
 from solver.results.told import Piece
 from solver.scene.bodies.kinematics import forms_of, written_form
-from solver.scene.linear_terms import Coupling
 from solver.scene.scene import (
     AnyContact,
     Body,
@@ -30,6 +29,7 @@ from solver.scene.scene import (
     Spring,
     parse_end,
 )
+from solver.scene.terms.linear_terms import Coupling
 from solver.scene.validation import listing
 
 _JoinT = TypeVar("_JoinT", Spring, Damper)

@@ -1,7 +1,7 @@
 """Linear terms beside masses, springs and dashpots: couplings that are not symmetric, gyroscopic, of the gas.
 
-All of them are entries of K and C: the equation of the DOF `on` gains (k + i k_imaginary) x + c x' of the DOF
-`of`, here or some sectors further on. What a nodal diameter sees of entries at the offsets m is Σ X_m e^{jmθ}.
+All of them are entries of K and C: the equation of the DOF `on` gains (k + i k_imaginary) x + c x' of the
+DOF `of`, here or some sectors further on. A nodal diameter sees Σ X_m e^{jmθ} of entries at the offsets m.
 """
 
 from __future__ import annotations
