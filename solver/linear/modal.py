@@ -103,7 +103,8 @@ def _with_extra(
     plain = _matrices(parts, theta)
     turns = np.exp(1j * np.array(theta))
     K, C = extra.at(turns, np.array(moving, np.bool_))
-    stiffness, damping = plain.K + K, plain.C + C
+    stiffness: NDArray[Any] = plain.K + K
+    damping: NDArray[Any] = plain.C + C
     if not (np.any(stiffness.imag) or np.any(damping.imag)):
         stiffness, damping = stiffness.real, damping.real
     return Held(stiffness, damping, plain.M, (plain.key, extra, moving))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
@@ -13,7 +13,7 @@ from solver.matrices.values import MOST_MODES, Matrix, Modes
 Ratio = Annotated[float, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=False)]
 
 
-def _number_or_numbers(data: object) -> object:
+def _number_or_numbers(data: Any) -> object:
     """Refuse what is no damping ratio and no list of them, in one message."""
     rows = data if isinstance(data, list | tuple) else [data]
     good = all(
