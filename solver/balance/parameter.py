@@ -12,10 +12,10 @@ from solver.contacts.kernels import columns
 from solver.contacts.kernels import system as kernel
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.scene.bodies.paths import is_body_path, least_value, unit_of
+from solver.scene.bodies.paths import SPEED, is_body_path, least_value, unit_of
 from solver.scene.bodies.shape_parts import contact_shares, least_shape_value, shape_of, shape_unit
 from solver.scene.bodies.shapes import POINTS
-from solver.scene.parameter_paths import has_parameter, is_gas_path, is_loss
+from solver.scene.parameter_paths import follows_speed, has_parameter, is_gas_path, is_loss
 from solver.scene.scene import Scene
 
 
@@ -113,6 +113,12 @@ def resolve(scene: Scene, path: str) -> Parameter:
     """
     scene.check_path(path)
     nobody = np.zeros(len(scene.contacts))
+    followed = follows_speed(scene, path)
+    if followed is not None:
+        raise SettingError("path", path, f"cannot be continued in: {followed} follows the speed")
+    if path == SPEED and (scene.speed_order is not None or scene.with_speed):
+        wanted = "is swept along an engine-order line (`speed_order`) alone where loads follow it"
+        raise SettingError("path", path, wanted)
     if path == "frequency":
         return _parameter(path, Kind.FREQUENCY, nobody)
     shape = shape_of(scene, path)

@@ -10,6 +10,7 @@ import numpy as np
 from solver.balance.balance import Balance, check_level
 from solver.balance.parameter import Kind, Parameter, resolve
 from solver.balance.simplifications import even_harmonics_reason
+from solver.balance.speed_line import check_given_loads
 from solver.contacts.kernels.columns import COLUMNS, N0, N1, PHASE, RATIO
 from solver.contacts.kernels.system import LOAD_COEFFICIENTS, MODES
 from solver.errors import SettingError
@@ -31,6 +32,7 @@ def resolved(balance: Balance, paths: Sequence[str]) -> tuple[Parameter, ...]:
         An unknown path, the frequency, or one that calls for even harmonics the balance left out.
     """
     scene, found = balance.scene, []
+    check_given_loads(scene, paths)
     for path in paths:
         parameter = resolve(scene, path)
         if parameter.kind is Kind.FREQUENCY:

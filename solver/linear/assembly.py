@@ -24,11 +24,13 @@ from solver.linear.extra_terms import (
     terms_by_loss,
     terms_by_speed,
     terms_by_stiffness,
+    terms_of_line,
 )
 from solver.linear.modal_damping import modal_damping, modal_damping_derivative
 from solver.linear.model import ForceTerm as ForceTerm
 from solver.linear.model import LinearModel as LinearModel
 from solver.linear.model import LinearModelDerivative as LinearModelDerivative
+from solver.linear.moving_base import base_of, derivative_with_base, with_base
 from solver.scene.bodies.body import MOMENTS, Body
 from solver.scene.bodies.kinematics import Form, dof_names, force_derivatives
 from solver.scene.bodies.paths import is_body_path
@@ -78,12 +80,33 @@ class _Expression(NamedTuple):
 
 
 def linear_model(scene: Scene) -> LinearModel:
-    """The matrices, contacts and forces of a scene, with the values it has now.
+    """The matrices, contacts and forces of a scene, with the values it has now, and the base that moves.
 
     Where one sector does not stand for all they are those of the whole annulus. The matrices are cached:
     changing contacts or excitation costs microseconds.
     """
     scene = written_out(scene)
+    model, base = _without_base(scene), base_of(scene)
+    return model if base is None else with_base(model, scene, base)
+
+
+def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
+    """Derivatives of the matrices by the structural parameter `name` (without ``structure.``).
+
+    By the value of a group they are the sum of those by its members, times their factors. Of a body, a load
+    or the speed the name is the path, and the forces have derivatives too.
+
+    Raises
+    ------
+    SettingError
+        The structure has no parameter of that name.
+    """
+    found, base = _derivative_by(scene, name), base_of(scene)
+    return found if base is None else derivative_with_base(found, _without_base(scene), base)
+
+
+def _without_base(scene: Scene) -> LinearModel:
+    """The same with forces alone."""
     structure = scene.structure
     if isinstance(structure, MatricesStructure):
         found = matrices_with_bodies(structure, scene.bodies)
@@ -111,6 +134,7 @@ def _model(
     dofs = scene.dofs
     here, beyond = _contact_selection(dofs, tuple(form for forms in scene.forms for form in forms))
     whole = isinstance(structure, MatricesStructure)
+    symmetric = Symmetric(K0=matrices.K0, Kp=matrices.Kp, shapes=shapes, skew=skew)
 
     def rows(selected: FloatArray) -> FloatArray:
         return _frozen(selected @ shapes) if whole else selected
@@ -129,7 +153,9 @@ def _model(
         observe=rows(_unit(dofs, scene.observe.dof)),
         engine_order=scene.engine_order,
         sectors=structure.sectors if isinstance(structure, CyclicStructure) else 1,
-        extra=extra_terms(scene, Symmetric(K0=matrices.K0, Kp=matrices.Kp, shapes=shapes, skew=skew)),
+        extra=extra_terms(scene, symmetric),
+        line=None if scene.speed_order is None else terms_of_line(scene, symmetric),
+        line_order=scene.speed_order or 1.0,
     )
 
 
@@ -138,13 +164,26 @@ def _terms(
 ) -> tuple[ForceTerm, ...]:
     """Forces on DOFs in the coordinates of the matrices."""
 
-    def vector(dof: str) -> FloatArray:
-        return _unit(dofs, dof) if shapes is None else _frozen(_unit(dofs, dof) @ shapes)
+    def vector(force: Excitation) -> NDArray[Any]:
+        found = _pattern(dofs, force.forces or ()) if force.dof is None else _unit(dofs, force.dof)
+        return found if shapes is None else _frozen(found @ shapes)
 
     return tuple(
-        ForceTerm(vector=vector(e.dof), amplitude=e.amplitude, phase=e.phase, harmonic=e.harmonic)
+        ForceTerm(vector=vector(e), amplitude=e.amplitude, phase=e.phase, harmonic=e.harmonic)
         for e in forces
+        if e.base is None
     )
+
+
+@lru_cache(maxsize=64)
+def _pattern(dofs: tuple[str, ...], parts: tuple[tuple[str, float, float], ...]) -> NDArray[Any]:
+    """Factors of the DOFs, complex where they have phases."""
+    at = {dof: i for i, dof in enumerate(dofs)}
+    found = np.zeros(len(dofs), np.complex128)
+    for dof, factor, phase in parts:
+        found[at[dof]] += factor * np.exp(1j * phase)
+    seen: NDArray[Any] = found if np.any(found.imag) else found.real.copy()
+    return _frozen(seen)
 
 
 @lru_cache(maxsize=16)
@@ -157,17 +196,8 @@ def _identity(n: int) -> FloatArray:
     return _frozen(np.eye(n))
 
 
-def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
-    """Derivatives of the matrices by the structural parameter `name` (without ``structure.``).
-
-    By the value of a group they are the sum of those by its members, times their factors. Of a body, a load
-    or the speed the name is the path, and the forces have derivatives too.
-
-    Raises
-    ------
-    SettingError
-        The structure has no parameter of that name.
-    """
+def _derivative_by(scene: Scene, name: str) -> LinearModelDerivative:
+    """Derivatives of what `_without_base` gives."""
     structure = scene.structure
     slopes = motion_derivatives(scene, name)
     if slopes is not None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.contacts.kernels.system import DENSE
 from solver.jit.fourier import Complex, Flags, Integer, Real
@@ -77,7 +78,7 @@ def reduce_model(
     numpy.linalg.LinAlgError
         The mass matrix is not positive definite.
     """
-    dense_asked = whole_matrices or derivative is not None
+    dense_asked = whole_matrices or derivative is not None or model.prescribed or model.line is not None
     apart = dense_asked or (model.extra is not None and not model.extra.is_real)
     which, theta, moving = _structures(model, ks, apart=apart)
     forces = force_amplitudes(model, ks)
@@ -85,8 +86,8 @@ def reduce_model(
     held = matrices_of(model, theta, moving)
     shift, loose = np.zeros(kt.size), np.zeros((0, kt.size))
     if 0 in ks:
-        loose = loose_motions(held.K[which[0]], L[which[0]], kt)
-        if len(loose) or not held_alone(held):
+        loose = _loose(model, held.K[which[0]], L[which[0]], kt)
+        if len(loose) or not (model.prescribed or held_alone(held)):
             shift, held = kt.copy(), held_by(held, L, kt)
     found = None if dense_asked else decompose(held)
     if found is None and not dense_asked and not held_alone(held):
@@ -100,7 +101,10 @@ def reduce_model(
         held = held_by(held, L, kt) if np.any(shift) else held
     if found is None:
         modes: dict[str, Any] = _no_modes(theta.size, ks.size, kt.size)
-        dense: dict[str, Any] = _dense(held, theta, moving, L, model, forces, derivative)
+        inertia = model.inertia(np.exp(1j * theta), _first_of(ks, which))
+        dense: dict[str, Any] = _dense(held, theta, moving, L, model, forces, derivative) | {
+            "M": _contiguous(inertia * (1.0 if model.line is not None else moving[:, None, None]))
+        }
         given = ((), ()) if derivative is None else (derivative.forces, derivative.second_forces)
         dense["dforces"] = np.array([term_amplitudes(each, model.observe.size, ks) for each in given])
     else:
@@ -117,8 +121,16 @@ def _structures(model: LinearModel, ks: Integer, *, apart: bool) -> tuple[Intege
     """
     diameters = (ks * model.engine_order) % model.sectors
     still = (ks == 0) & apart
+    if model.line is not None:  # each harmonic has an inertia of its own
+        return np.arange(ks.size), 2.0 * np.pi * diameters / model.sectors, ks > 0
     found, which = np.unique(np.where(still, -1, diameters), return_inverse=True)
     return which, 2.0 * np.pi * np.maximum(found, 0) / model.sectors, found >= 0
+
+
+def _first_of(ks: Integer, which: Integer) -> Integer:
+    """Return a harmonic of each structure."""
+    _, first = np.unique(which, return_index=True)
+    return np.asarray(ks[first])
 
 
 def _least_size(found: Decomposition, L: Complex, forces: Complex, which: Integer) -> float:
@@ -146,7 +158,14 @@ def loose_ports(scene: Scene) -> tuple[Real, Real]:
     model = linear_model(scene)
     kt = port_stiffnesses(scene, model)
     static = matrices_of(model, np.zeros(1), np.zeros(1, np.bool_))
-    return loose_motions(static.K[0], model.contact_here + model.contact_next, kt), kt
+    return _loose(model, static.K[0], model.contact_here + model.contact_next, kt), kt
+
+
+def _loose(model: LinearModel, K: NDArray[Any], L: NDArray[Any], kt: Real) -> Real:
+    """Return the rigid-body motions at the ports: of all coordinates but those of a base."""
+    if not model.prescribed:
+        return loose_motions(K, L, kt)
+    return loose_motions(K[model.free][:, model.free], L[:, model.free], kt)
 
 
 def force_amplitudes(model: LinearModel, ks: Integer) -> Complex:

@@ -32,11 +32,14 @@ class ExtraTerms:
         Sectors ahead; (0,) of a structure without sectors.
     K, C : (m, n, n) array
         Complex stiffness [N/m] and damping [N s/m].
+    still : (n, n) array or None
+        Stiffness of the mean alone [N/m].
     """
 
     offsets: tuple[int, ...]
     K: Complex
     C: Complex
+    still: Real | None = None
 
     @property
     def is_real(self) -> bool:
@@ -61,6 +64,8 @@ class ExtraTerms:
         if not np.all(moving) and np.any(self.K.imag):
             still = np.einsum("sm,mij->sij", powers, self.K.real.astype(np.complex128))
             K = np.where(moving[:, None, None], K, still)
+        if self.still is not None:
+            K = K + np.where(moving, 0.0, 1.0)[:, None, None] * self.still
         return K, np.einsum("sm,mij->sij", powers, self.C)
 
 
@@ -154,6 +159,18 @@ def terms_by_gas(scene: Scene, name: str, symmetric: Symmetric) -> ExtraTerms:
         if gas.name == name and isinstance(scene.structure, CyclicStructure):
             for entry in gas.model_copy(update={"factor": 1.0}).entries(scene.structure.sectors):
                 total.add(entry, entry.k, entry.c)
+    return total.terms()
+
+
+def terms_of_line(scene: Scene, symmetric: Symmetric) -> ExtraTerms | None:
+    """Return what K gains per squared speed and C per speed [rad/s]; None where nothing depends on it."""
+    if not depends_on_speed(scene):
+        return None
+    G, K_omega2 = (0.0 if m is None else m.array for m in _spinning(scene.structure))
+    total = _Sum(symmetric.shapes, scene.dofs)
+    for entry in _entries(scene):
+        total.add(entry, entry.k_omega2, entry.g)
+    total.add_own(K_omega2, G)
     return total.terms()
 
 

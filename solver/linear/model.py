@@ -21,7 +21,7 @@ class ForceTerm:
     Attributes
     ----------
     vector : (n,) array
-        Selects the DOF.
+        Selects the DOF; complex where several have phases of their own.
     amplitude : float
         Force [N].
     phase : float
@@ -30,7 +30,7 @@ class ForceTerm:
         Multiple of the excitation frequency; 0 is a static load.
     """
 
-    vector: FloatArray
+    vector: FloatArray | Complex
     amplitude: float
     phase: float
     harmonic: int
@@ -69,6 +69,12 @@ class LinearModel:
         Number of sectors, 1 if lumped.
     extra : ExtraTerms or None
         Terms that are not symmetric, not real or not of springs and dashpots; see `at`.
+    prescribed : bool
+        The last coordinate is the motion of a base; see `solver.linear.moving_base`.
+    line : ExtraTerms or None
+        What K gains per squared speed and C per speed where the speed follows the frequency, Ω = ω / order.
+    line_order : float
+        That order.
     """
 
     dofs: tuple[str, ...]
@@ -85,6 +91,9 @@ class LinearModel:
     engine_order: int
     sectors: int
     extra: ExtraTerms | None = None
+    prescribed: bool = False
+    line: ExtraTerms | None = None
+    line_order: float = 1.0
 
     @property
     def interblade_phase(self) -> float:
@@ -92,9 +101,16 @@ class LinearModel:
         return 2.0 * math.pi * self.engine_order / self.sectors
 
     @property
+    def free(self) -> NDArray[np.bool_]:
+        """The coordinates that move freely, (n,): not the base nor what it drives, which have no inertia."""
+        moves: NDArray[np.bool_] = np.any(self.M, axis=1)
+        moves[-1] &= not self.prescribed
+        return moves
+
+    @property
     def is_symmetric(self) -> bool:
         """Whether energy is kept but for dashpots: nothing beside springs, dashpots and gyroscopic terms."""
-        return self.extra is None or self.extra.keeps_energy
+        return not self.prescribed and (self.extra is None or self.extra.keeps_energy)
 
     def at(self, turns: Complex, moving: NDArray[np.bool_]) -> tuple[Complex, Complex]:
         """Return K and C, (ns, n, n), at e^{j theta} (ns,), of motions or (False) of what is at rest."""
@@ -105,6 +121,20 @@ class LinearModel:
             more, further = self.extra.at(turns, moving)
             K, C = K + more, C + further
         return K, C
+
+    def inertia(self, turns: Complex, ks: NDArray[np.int64]) -> FloatArray | Complex:
+        """Return M of harmonics ks (ns,) at e^{j theta} (ns,), (ns, n, n), with what follows the speed.
+
+        Along a line K + (ω/e)² K₂ + ikω (C + (ω/e) G) − k²ω² M has the shape of a fixed speed, with the
+        inertia M − K₂/(ke)² − i G/(ke). The mean is written with k = 1 and has −K₂/e² alone.
+        """
+        whole = np.broadcast_to(self.M, (len(ks), *self.M.shape))
+        if self.line is None:
+            return whole
+        K2, G = self.line.at(turns, np.ones(len(ks), np.bool_))
+        moving, k = (ks > 0)[:, None, None], np.maximum(ks, 1)[:, None, None]
+        per = 1.0 / (k * self.line_order)
+        return np.asarray(np.where(moving, whole - 1j * per * G, 0.0) - per**2 * K2)
 
     def ports_at(self, turns: Complex) -> Complex:
         """Return the relative motions L of the contacts, (ns, n_ports, n), at e^{j theta} (ns,)."""

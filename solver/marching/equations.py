@@ -8,6 +8,7 @@ from scipy.sparse import block_diag, csr_array, diags_array
 
 from solver.errors import SettingError
 from solver.linear.first_order import equations, modal_damping_root
+from solver.marching.base import base_force, with_base
 from solver.marching.contacts import columns, selection
 from solver.marching.kernels import state as kernel
 from solver.scene.bodies.body import REVOLUTIONS, Body
@@ -61,7 +62,9 @@ def _of_matrices(
     """The same of a structure given by matrices, the bodies behind its coordinates."""
     own = [dof for body in scene.bodies for dof in body.dofs]
     ends = [term.dof for forms in scene.forms for form in forms for term in form]
-    used = [*ends, *(force.dof for force in scene.forces), scene.observe.dof]
+    pushed = [dof for force in scene.forces for dof, *_ in force.parts]
+    moved = [dof for force in scene.forces if force.base is not None for dof, _ in force.base.shares]
+    used = [*ends, *pushed, *moved, scene.observe.dof]
     used += [dof for coupling in scene.couplings for dof in (coupling.on, coupling.of)]
     spin = (scene.speed or 0.0) * REVOLUTIONS
     found = equations(structure, [dof for dof in used if dof not in own], spin)
@@ -100,8 +103,19 @@ def _with_couplings(
 def equations_of_motion(scene: Scene, omega: float) -> tuple[kernel.System, int]:
     """The equations of a scene in the angle tau = omega t, and the coordinate observed."""
     A, B, W, index = _with_couplings(scene, *_equations(scene))
+    observed = index[scene.observe.dof]
+    pushes = [
+        (index[dof], force.amplitude * factor, force.phase + phase, force.harmonic)
+        for force in scene.forces
+        for dof, factor, phase in force.parts
+    ]
+    bases = [force for force in scene.excitation if force.base is not None]
+    if bases:
+        A, B, W, observed = with_base(scene, bases[0], A, B, W, index, omega)
+        n = A.shape[0]
+        pushes += [(n - 2, *base_force(force, omega), force.harmonic) for force in bases]
     A, B, W = A / omega**2, B / omega, W / omega**2
-    forces = scene.forces
+    dof, amplitude, phase, harmonic = zip(*pushes, strict=True) if pushes else ((), (), (), ())
     placed = [(row, own) for one, own in zip(scene.contacts, scene.forms, strict=True) for row in one.rows()]
     system = kernel.System(
         A_start=A.indptr.astype(np.int64),
@@ -113,10 +127,10 @@ def equations_of_motion(scene: Scene, omega: float) -> tuple[kernel.System, int]
         W_start=W.indptr.astype(np.int64),
         W_column=W.indices.astype(np.int64),
         W_value=W.data,
-        force_dof=np.array([index[force.dof] for force in forces], dtype=np.int64),
-        force_amplitude=np.array([force.amplitude for force in forces]),
-        force_phase=np.array([force.phase for force in forces]),
-        force_harmonic=np.array([force.harmonic for force in forces], dtype=np.int64),
+        force_dof=np.array(dof, dtype=np.int64),
+        force_amplitude=np.array(amplitude, dtype=np.float64),
+        force_phase=np.array(phase, dtype=np.float64),
+        force_harmonic=np.array(harmonic, dtype=np.int64),
         **columns(placed, index, A.shape[0]),
     )
-    return system, index[scene.observe.dof]
+    return system, observed

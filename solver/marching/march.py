@@ -25,6 +25,7 @@ from solver.marching.kernels import taylor as stepping
 from solver.marching.result import MarchResult, MarchStatus, describe
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import CyclicStructure, Excitation, Scene
+from solver.scene.terms.speed import at_frequency
 from solver.scene.validation import listing
 
 FloatArray = NDArray[np.float64]
@@ -118,6 +119,7 @@ def march(
     """
     begin = time.perf_counter()
     _check(frequency_hz, tolerance, max_periods)
+    scene = at_frequency(scene, frequency_hz)
     whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
     omega = 2.0 * math.pi * frequency_hz
     system, dof = equations_of_motion(whole, omega)

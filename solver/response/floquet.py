@@ -22,6 +22,7 @@ from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import CyclicStructure, Scene
+from solver.scene.terms.speed import at_frequency
 
 GROWS = 1e-9  # a multiplier's modulus beyond 1 that is more than rounding
 REAL = 1e-7  # imaginary part, relative to the modulus, that counts as none
@@ -124,7 +125,7 @@ def branch_stability(branch: Branch, points: Iterable[int] | None = None) -> tup
         value = float(branch.values[i])
         slips = fourier.to_full(branch.coefficients[i], balance.system.ks, balance.highest_harmonic)
         if branch.parameter == "frequency":
-            found.append(_stability(balance.scene, value, slips))
+            found.append(_stability(at_frequency(balance.scene, value), value, slips))
         else:
             scene = balance.scene.with_values({branch.parameter: value})
             found.append(_stability(scene, balance.system.omega / PERIOD, slips))

@@ -13,7 +13,7 @@ from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Quantity
 from solver.errors import SettingError
 from solver.scene.bodies.kinematics import HasBodies
-from solver.scene.bodies.paths import body_paths, body_value, changed_bodies, is_body_path
+from solver.scene.bodies.paths import SPEED, body_paths, body_value, changed_bodies, is_body_path
 from solver.scene.bodies.shape_parts import own_parts, shape_of, shape_paths, shape_value, with_shape_value
 from solver.scene.bodies.shapes import AnyShape
 from solver.scene.parts import (
@@ -24,6 +24,7 @@ from solver.scene.parts import (
     Spring,
     Structure,
 )
+from solver.scene.terms.speed import SpeedDependence, at_speed
 from solver.scene.validation import listing, nearest
 
 FREQUENCY = "frequency"
@@ -53,6 +54,10 @@ class HasParts(HasBodies, Protocol):
     @property
     def excitation(self) -> tuple[Excitation, ...]:
         """Every force."""
+
+    @property
+    def with_speed(self) -> tuple[SpeedDependence, ...]:
+        """What follows the speed."""
 
     @property
     def dampers(self) -> tuple[AnyShape, ...]:
@@ -111,6 +116,18 @@ def changed_quantities(scene: HasParts, path: str) -> tuple[Quantity, ...]:
     return tuple(c.PARAMETERS[key] for c in scene.contacts if has_parameter(c, owner, key))
 
 
+def follows_speed(scene: HasParts, path: str) -> str | None:
+    """The parameter that follows the speed and that a path would set, itself or its group's; else None."""
+    owner, _, key = path.rpartition(".")
+    mine = {contact.name for contact in scene.contacts if owner in (contact.name, contact.group)}
+    for each in scene.with_speed:
+        other, _, wanted = each.path.rpartition(".")
+        theirs = {contact.name for contact in scene.contacts if other in (contact.name, contact.group)}
+        if path == each.path or (key == wanted and mine & theirs):
+            return each.path
+    return None
+
+
 def is_gas_path(scene: HasBodies, path: str) -> bool:
     """Whether a path is the factor of aerodynamic influence."""
     owner, _, key = path.rpartition(".")
@@ -123,7 +140,12 @@ def is_loss(structure: Structure, name: str) -> bool:
 
 
 def check_path(scene: HasParts, path: str) -> None:
-    """Raise SettingError unless `path` is ``frequency`` or a path of the scene."""
+    """Raise SettingError unless `path` is ``frequency`` or a path of the scene.
+
+    Along an engine-order line the ``speed`` is one too.
+    """
+    if path == SPEED and scene.speed_order is not None:
+        return
     if path != FREQUENCY and path not in parameter_paths(scene):
         raise _unknown(scene, path, FREQUENCY)
 
@@ -167,6 +189,11 @@ def with_values(scene: _SceneT, values: Mapping[str, float]) -> _SceneT:
 
 
 def _with_value(scene: _SceneT, path: str, new: float) -> _SceneT:
+    followed = follows_speed(scene, path)
+    if followed is not None:
+        raise SettingError(path, new, f"cannot be set: {followed} follows the speed (`with_speed`)")
+    if path == SPEED and scene.with_speed and scene.speed is not None:
+        return cast(_SceneT, at_speed(scene, changed_bodies(scene, path, new)[SPEED]))
     if path in (AMPLITUDE, PHASE):
         change = _with_amplitude if path == AMPLITUDE else _with_phase
         return scene.model_copy(update={"excitation": change(scene.excitation, new)})

@@ -33,13 +33,15 @@ from solver.scene.parts import (
     Reduction,
     Spring,
 )
+from solver.scene.terms.excitation import PLACES
 from solver.scene.terms.linear_terms import Aerodynamics, Coupling, DiameterCoefficient, Influence
+from solver.scene.terms.speed import SpeedDependence
 
 MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
 RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe", "speed")
 _SCENE_KEYS = (
     "name", "structure", "contacts", "excitation", "observe", "bodies", "nodes", "loads", "dampers", "speed",
-    "couplings", "aerodynamics",
+    "couplings", "aerodynamics", "speed_order", "with_speed",
 )  # fmt: skip
 _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     (): ("a scene", _SCENE_KEYS),
@@ -56,6 +58,7 @@ _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     ("bodies",): ("a body", tuple(Body.model_fields)),
     ("nodes",): ("a node", tuple(Node.model_fields)),
     ("loads",): ("a load", tuple(Load.model_fields)),
+    ("with_speed",): ("a dependence on the speed", tuple(SpeedDependence.model_fields)),
     ("couplings",): ("a coupling", tuple(Coupling.model_fields)),
     ("aerodynamics",): ("aerodynamics", tuple(Aerodynamics.model_fields)),
     ("aerodynamics", "influence"): ("an influence", tuple(Influence.model_fields)),
@@ -324,6 +327,13 @@ def unknown_dof(key: str, text: str, dof: str, known: Sequence[str]) -> str:
 def _dof_issues(raw: dict[str, Any], dofs: _Known | None, sectors: object) -> Iterator[Issue]:
     if dofs is None:
         return
+    for steps, row in rows_of(raw, "excitation"):
+        for key in PLACES[1:]:
+            for dof in row[key] if isinstance(row.get(key), dict) else ():
+                if dof not in dofs:
+                    yield Issue(
+                        pointer=pointer_of([*steps, key, dof]), message=unknown_dof(key, dof, dof, list(dofs))
+                    )
     for steps, row in [*rows_of(raw, "excitation"), *rows_of(raw, "observe")]:
         dof = row.get("dof")
         if isinstance(dof, str) and steps[0] == "observe" and isinstance(sectors, int):

@@ -59,7 +59,9 @@ class System(NamedTuple):
     contacts: Real  # (ne, COLUMNS) kt, mu, N0, N1, N1_ratio (NaN: not tied), N1_phase, and a law's own
     active: Real  # (ne,) share of λ in the number it changes, 0.0 where it does not act
     load_rise: Real  # (2, ne) N0 gains these times ω and ω² where λ is the frequency [N s, N s²]
-    level_rise: Real  # (2,) the level of the excitation gains these times ω and ω² where λ is the frequency
+    level: (
+        Real  # (2, 3) factor of the excitation, and of constant forces, by 1, ω, ω² where λ is the frequency
+    )
     shift: Real  # (nc,) stiffness moved into the structure [N/m]
     loose: Real  # (nr, nc) ports' part in the rigid-body motions of what contacts alone hold, see `loose`
     hold: int  # 1: where no contact holds such a part, a constant force does

@@ -31,13 +31,13 @@ def excitation(system: System, p: float, k: int) -> tuple[complex, complex]:
     A static force has no phase to turn; the level scales it all the same, unless it is a load. Where λ is the
     frequency the level may follow it.
     """
+    if system.kind == FREQUENCY:
+        row = system.level[1 if k == 0 and system.constant_mean == 1 else 0]
+        return complex(row[0] + p * (row[1] + p * row[2])), complex(row[1] + 2.0 * p * row[2])
     if k == 0 and (system.kind == FORCE_PHASE or system.constant_mean == 1):
         return complex(1.0), complex(0.0)
     if system.kind == LEVEL:
         return complex(p / system.level_reference), complex(1.0 / system.level_reference)
-    if system.kind == FREQUENCY:
-        first, second = system.level_rise[0], system.level_rise[1]
-        return complex(1.0 + p * (first + p * second)), complex(first + 2.0 * p * second)
     if system.kind == FORCE_PHASE:
         turn = p - system.phase_reference
         value = complex(math.cos(turn), math.sin(turn))

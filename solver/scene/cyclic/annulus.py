@@ -174,6 +174,8 @@ def annulus(scene: Scene) -> Scene:
         nodes=tuple(_node(node, j) for j in sectors for node in scene.nodes),
         loads=tuple(_load(load, j) for j in sectors for load in scene.loads),
         speed=scene.speed,
+        speed_order=scene.speed_order,
+        with_speed=scene.with_speed,
         couplings=tuple(_coupling(c, j, n) for j in sectors for c in scene.couplings + _gas(scene, n)),
     )
 
@@ -341,7 +343,8 @@ def _contact(contact: ContactOfAnyLaw, j: int, turn: float, *, standing: bool) -
 def _force(force: Excitation, j: int, turn: float, *, standing: bool) -> Excitation:
     return force.model_copy(
         update={
-            "dof": _in_sector(force.dof, j),
+            "dof": None if force.dof is None else _in_sector(force.dof, j),
+            "forces": force.forces and tuple((_in_sector(dof, j), *rest) for dof, *rest in force.forces),
             "phase": force.phase + (0.0 if standing else turn),
             "amplitude": force.amplitude * (_cosine(turn) if standing else 1.0),
             "engine_order": None,

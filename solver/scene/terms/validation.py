@@ -9,6 +9,7 @@ from typing import Any
 from solver.errors import Issue
 from solver.scene.validation import MOST_ISSUES, dofs_of, duplicates, pointer_of, rows_of, unknown_dof
 
+AMPLITUDE_PATH = "excitation.amplitude"
 _TURNING = ("gyroscopic", "k_omega2")
 
 
@@ -27,11 +28,13 @@ def _issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
             message = f"`offset` = {row['offset']!r} needs a cyclic structure; this one has no other sectors"
             yield Issue(pointer=pointer_of([*steps, "offset"]), message=message)
         for key in _TURNING:
-            if row.get(key) and raw.get("speed") is None:
+            if row.get(key) and not _has_speed(raw):
                 yield _needs_speed([*steps, key], key)
     for key in ("G", "K_omega2"):
-        if structure.get(key) is not None and raw.get("speed") is None:
+        if structure.get(key) is not None and not _has_speed(raw):
             yield _needs_speed(["structure", key], key)
+    yield from _base_issues(raw, cyclic)
+    yield from _speed_issues(raw)
     for steps, row in rows_of(raw, "aerodynamics"):
         yield from _places(steps, row, ("dof",), dofs)
         if not cyclic:
@@ -44,6 +47,29 @@ def _issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
     yield from duplicates([(s, name) for s, name in reversed(named) if name in mine], "paths")
 
 
+def _base_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
+    """Bases that differ, of a disk, or a relative motion without any."""
+    first: tuple[object, ...] | None = None
+    for steps, row in rows_of(raw, "excitation"):
+        given = [key for key in ("ground", "driven") if row.get(key) is not None]
+        if not given:
+            continue
+        pointer = pointer_of([*steps, given[0]])
+        if cyclic:
+            yield Issue(
+                pointer=pointer, message=f"`{given[0]}` moves a base, which a cyclic structure has not"
+            )
+        here = (given[0], row[given[0]], row.get("motion") or "acceleration")
+        if first is not None and here != first:
+            message = f"`{given[0]}` must be the same motion in every excitation that moves a base"
+            yield Issue(pointer=pointer, message=message)
+        first = first or here
+    for steps, row in rows_of(raw, "observe"):
+        if row.get("relative") and first is None:
+            message = "`relative` = true needs a base that moves (`ground` or `driven` of the excitation)"
+            yield Issue(pointer=pointer_of([*steps, "relative"]), message=message)
+
+
 def _places(
     steps: list[int | str], row: dict[str, Any], keys: tuple[str, ...], dofs: dict[str, None] | None
 ) -> Iterator[Issue]:
@@ -51,6 +77,41 @@ def _places(
         dof = row.get(key)
         if isinstance(dof, str) and dofs is not None and dof not in dofs:
             yield Issue(pointer=pointer_of([*steps, key]), message=unknown_dof(key, dof, dof, list(dofs)))
+
+
+def _has_speed(raw: dict[str, Any]) -> bool:
+    return raw.get("speed") is not None or raw.get("speed_order") is not None
+
+
+def _speed_issues(raw: dict[str, Any]) -> Iterator[Issue]:
+    """A speed given twice, and what follows it but cannot."""
+    if raw.get("speed") is not None and raw.get("speed_order") is not None:
+        message = "`speed_order` stands in place of `speed`: the speed follows the frequency; remove one"
+        yield Issue(pointer="/speed_order", message=message)
+    contacts = {row.get(key): row for _, row in rows_of(raw, "contacts") for key in ("name", "group")}
+    seen: list[object] = []
+    for steps, row in rows_of(raw, "with_speed"):
+        path, pointer = row.get("path"), pointer_of([*steps, "path"])
+        if not isinstance(path, str):
+            continue
+        owner, _, key = path.rpartition(".")
+        if path != AMPLITUDE_PATH and not (key == "N0" and owner in contacts):
+            known = ", ".join(f"{name}.N0" for name in contacts if name)
+            message = f"`path` must be `{AMPLITUDE_PATH}` or one of {known or 'no contact'}, got {path!r}"
+            yield Issue(pointer=pointer, message=message)
+        elif path in seen:
+            yield Issue(pointer=pointer, message=f"`path` = {path!r} follows the speed twice")
+        seen.append(path)
+        if not _has_speed(raw):
+            yield Issue(pointer=pointer, message=f"{path!r} needs the `speed` of the scene, or `speed_order`")
+        forces = [each for _, each in rows_of(raw, "excitation")]
+        if path == AMPLITUDE_PATH and any(not each.get("amplitude") for each in forces[:1]):
+            message = "`amplitude` of the first excitation must not be 0: the others are in proportion to it"
+            yield Issue(pointer=pointer, message=message)
+    turning = any(row.get("radius_of_rotation") for _, row in rows_of(raw, "bodies"))
+    if raw.get("speed_order") is not None and turning and any(rows_of(raw, "loads")):
+        message = "`speed_order` cannot go with [[loads]] beside bodies that the speed loads"
+        yield Issue(pointer="/speed_order", message=message)
 
 
 def _needs_speed(steps: list[int | str], key: str) -> Issue:

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance.simplifications import Effects
+from solver.balance.speed_line import check_no_line
 from solver.contacts.kernels.system import System, by_reference
 from solver.contacts.laws.base import without_second
 from solver.continuation.branch import Peak
@@ -104,6 +105,7 @@ class Tracker(Looking):
     ) -> None:  # fmt: skip
         super().__init__(scene, parameter, start, stop, harmonics, effects, pace, allowance)
         check_laws(self.balance.scene)
+        check_no_line(self.balance.scene)
         self._first_step = pace.first_step
         self.exact_between: set[tuple[float, float, float]] = set()  # z, z and height of rows: cubics hold
         self._system: System = by_reference(self.balance.system)

@@ -99,7 +99,7 @@ def test_a_sector_with_friction_is_its_annulus() -> None:
     assert one.contacts[0].state.value == "stick and slip"
     assert one.max_abs == pytest.approx(whole.max_abs, rel=1e-8)
     assert solver.power_balance(one).imbalance < 1e-9
-    with pytest.raises(SettingError, match="k_imaginary.*cannot be marched"):
+    with pytest.raises(SettingError, match=r"k_imaginary.*cannot be marched"):
         solver.march(scene, frequency_hz=38.0)
 
 

@@ -128,7 +128,7 @@ def test_structural_damping_is_a_complex_stiffness() -> None:
     scene, omega = Scene.from_dict(raw), 2.0 * math.pi * 70.0
     exact = 1.0 / abs(K_TILT * (1.0 + 0.05j) - JT * omega**2)
     assert solver.solve(scene, frequency_hz=70.0, harmonics=1).max_abs == pytest.approx(exact, rel=1e-12)
-    with pytest.raises(SettingError, match="loss_factor.*cannot be marched"):
+    with pytest.raises(SettingError, match=r"loss_factor.*cannot be marched"):
         solver.march(scene, frequency_hz=70.0)
     rubbing = Scene.from_dict(raw | {"contacts": [CONTACT]})
     with pytest.raises(SettingError, match="no structural damping"):
