@@ -122,8 +122,8 @@ def natural_frequencies(scene: Scene, *, stuck: bool) -> Real:
 
     Parameters
     ----------
-    scene : its dashpots and forces do not count, gyroscopic terms at its speed do. Along an engine-order line it is
-        where the order meets them.
+    scene : its dashpots and forces do not count, gyroscopic terms at its speed do. Along an engine-order line
+        they are where the order meets them.
     stuck : with all contacts closed and stuck, so that each is its springs; otherwise with all open.
     """
     scene = written_out(scene)

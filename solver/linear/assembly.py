@@ -150,13 +150,38 @@ def _model(
         contact_here=rows(here),
         contact_next=rows(beyond),
         forces=_terms(scene.forces, dofs, shapes if whole else None),
-        observe=rows(_unit(dofs, scene.observe.dof)),
+        observe=rows(row_of(scene, scene.observe.dof)),
         engine_order=scene.engine_order,
         sectors=structure.sectors if isinstance(structure, CyclicStructure) else 1,
         extra=extra_terms(scene, symmetric),
         line=None if scene.speed_order is None else terms_of_line(scene, symmetric),
         line_order=scene.speed_order or 1.0,
     )
+
+
+def row_of(scene: Scene, name: str) -> FloatArray:
+    """Return the row over the DOFs (n_dofs,) of a DOF or a recovered quantity of a scene.
+
+    Raises
+    ------
+    SettingError
+        There is none of that name.
+    """
+    terms = scene.seen(name)
+    if terms is None:
+        known = (*scene.dofs, *(each.name for each in scene.recovery))
+        raise SettingError("dof", name, f"must be one of {listing(known)}", nearest(str(name), known))
+    if terms == ((name, 1.0),):
+        return _unit(scene.dofs, name)
+    return _sum_of(scene.dofs, terms)
+
+
+@lru_cache(maxsize=64)
+def _sum_of(dofs: tuple[str, ...], terms: tuple[tuple[str, float], ...]) -> FloatArray:
+    found = np.zeros(len(dofs))
+    for dof, factor in terms:
+        found[dofs.index(dof)] += factor
+    return _frozen(found)
 
 
 def _terms(

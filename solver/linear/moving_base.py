@@ -2,7 +2,7 @@
 
 The coordinate y stands last and has the row y = amplitude, ikω y = amplitude or −(kω)² y = amplitude, so that
 amplitudes, derivatives and observed motion follow as for any other. Where the ground moves, x = z + R y
-with the rigid-body motion R of the structure; in z, counted from the ground, M z'' + C z' + K z = f − M R y''.
+with the rigid-body motion R of the structure; counted from the ground, M z'' + C z' + K z = f − M R y''.
 Driven DOFs have the rows x_s = r_s y, of a stiffness beside which that of the structure vanishes.
 """
 
@@ -134,7 +134,7 @@ def _seen(shapes: Real, scene: Scene, base: Base, model: LinearModel) -> Real:
     """The DOFs, absolute or relative to the base, in all coordinates."""
     moved = shapes @ _shares(model, base) if base.ground else np.zeros(len(shapes))
     if scene.observe.relative:
-        moved = np.zeros(len(shapes)) if base.ground else -np.ones(len(shapes))
+        moved = np.zeros(len(shapes)) if base.ground else -shapes.sum(axis=1)
     return _frozen(np.column_stack([shapes, moved]))
 
 

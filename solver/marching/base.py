@@ -1,14 +1,15 @@
 """A base that moves as prescribed, as two more coordinates of the time march.
 
 The first is the motion y of the base itself, that of a mass on a spring and a dashpot of its own which is
-driven so that its steady motion is the one prescribed, y'' + 2ω y' + ω² y = f(t); it dies out into it within a
-few periods. Its acceleration drives the rest. The second adds up the observed motion: it has the acceleration
+driven so that its steady motion is the one prescribed, y'' + 2ω y' + ω² y = f(t); it dies out into it within
+a few periods. Its acceleration drives the rest. The second adds up the observed motion: it has the acceleration
 of what is observed, and begins at rest with it.
 """
 
 from __future__ import annotations
 
 import cmath
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ def with_base(
     index: dict[str, int],
     omega: float,
 ) -> tuple[csr_array, csr_array, csr_array, int]:
-    """Return x'' = W f - A x - B x' with the base and the observed motion behind x, and where that is.
+    """Return x'' = W f - A x - B x' with the base and what is observed behind x, and where the latter is.
 
     Raises
     ------
@@ -45,7 +46,7 @@ def with_base(
         wanted = "are marched in a lumped structure alone; march the motion of the ground instead"
         raise SettingError("driven", driven_by.place, wanted)
     n = A.shape[0]
-    A, B, W = (_grown(each, n + 2) for each in (A, B, W))
+    A, B, W = (_grown(each, n + 1) for each in (A, B, W))
     A[n, n], B[n, n], W[n, n] = omega**2, 2.0 * omega, 1.0
     shares = np.zeros(n)
     for dof, share in base.shares:
@@ -56,13 +57,23 @@ def with_base(
                 matrix[row] -= shares[row] * matrix[n]
             else:
                 matrix[row] = shares[row] * matrix[n]
-    seen = index[scene.observe.dof]
-    of_base = float(shares[seen]) * base.ground
+    seen = [(index[dof], factor) for dof, factor in scene.seen(scene.observe.dof) or ()]
+    of_base = sum(float(shares[at]) * factor for at, factor in seen) * base.ground
     if scene.observe.relative:
-        of_base = 0.0 if base.ground else -1.0
-    for matrix in (A, B, W):
-        matrix[n + 1] = matrix[seen] + of_base * matrix[n]
-    return csr_array(A), csr_array(B), csr_array(W), n + 1
+        of_base = 0.0 if base.ground else -sum(factor for _, factor in seen)
+    return with_sum([*seen, (n, of_base)], csr_array(A), csr_array(B), csr_array(W))
+
+
+def with_sum(
+    terms: Sequence[tuple[int, float]], A: csr_array, B: csr_array, W: csr_array
+) -> tuple[csr_array, csr_array, csr_array, int]:
+    """Return the equations with a sum of coordinates as one more behind them, and where it is."""
+    n = A.shape[0]
+    grown = [_grown(each, n + 1) for each in (A, B, W)]
+    for matrix in grown:
+        matrix[n] = sum(factor * matrix[at] for at, factor in terms)
+    A, B, W = map(csr_array, grown)
+    return A, B, W, n
 
 
 def base_force(force: Excitation, omega: float) -> tuple[float, float]:

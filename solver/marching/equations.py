@@ -8,7 +8,7 @@ from scipy.sparse import block_diag, csr_array, diags_array
 
 from solver.errors import SettingError
 from solver.linear.first_order import equations, modal_damping_root
-from solver.marching.base import base_force, with_base
+from solver.marching.base import base_force, with_base, with_sum
 from solver.marching.contacts import columns, selection
 from solver.marching.kernels import state as kernel
 from solver.scene.bodies.body import REVOLUTIONS, Body
@@ -64,7 +64,7 @@ def _of_matrices(
     ends = [term.dof for forms in scene.forms for form in forms for term in form]
     pushed = [dof for force in scene.forces for dof, *_ in force.parts]
     moved = [dof for force in scene.forces if force.base is not None for dof, _ in force.base.shares]
-    used = [*ends, *pushed, *moved, scene.observe.dof]
+    used = [*ends, *pushed, *moved, *(dof for dof, _ in scene.seen(scene.observe.dof) or ())]
     used += [dof for coupling in scene.couplings for dof in (coupling.on, coupling.of)]
     spin = (scene.speed or 0.0) * REVOLUTIONS
     found = equations(structure, [dof for dof in used if dof not in own], spin)
@@ -103,13 +103,19 @@ def _with_couplings(
 def equations_of_motion(scene: Scene, omega: float) -> tuple[kernel.System, int]:
     """The equations of a scene in the angle tau = omega t, and the coordinate observed."""
     A, B, W, index = _with_couplings(scene, *_equations(scene))
-    observed = index[scene.observe.dof]
+    seen = [(index[dof], factor) for dof, factor in scene.seen(scene.observe.dof) or ()]
+    observed = seen[0][0]
     pushes = [
         (index[dof], force.amplitude * factor, force.phase + phase, force.harmonic)
         for force in scene.forces
         for dof, factor, phase in force.parts
     ]
     bases = [force for force in scene.excitation if force.base is not None]
+    if scene.observed_unit != "m":
+        wanted = "is not followed by the march, whose tolerance is one of displacements: observe DOFs"
+        raise SettingError("observe", scene.observe.dof, wanted)
+    if scene.observe.dof not in index and not bases:
+        A, B, W, observed = with_sum(seen, A, B, W)
     if bases:
         A, B, W, observed = with_base(scene, bases[0], A, B, W, index, omega)
         n = A.shape[0]

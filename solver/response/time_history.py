@@ -13,7 +13,7 @@ import numpy as np
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
-from solver.linear.assembly import LinearModel, linear_model
+from solver.linear.assembly import LinearModel, linear_model, row_of
 from solver.linear.condensation import force_amplitudes
 from solver.linear.contact_table import port_stiffnesses
 from solver.response.solution import Solution
@@ -37,16 +37,16 @@ def motion(solution: Solution) -> Real:
 def time_history(solution: Solution, dof: str, *, samples: int = 512) -> tuple[Real, Real]:
     """Return instants [s] and motion [m] of a DOF over one period, (samples,) each, evenly spaced from 0.
 
+    Of a recovered quantity of the scene it is that, in its unit.
+
     Raises
     ------
     SettingError
         The solution did not converge, an unknown DOF, or a bad number of samples.
     """
-    dofs = solution.scene.dofs
-    if dof not in dofs:
-        raise SettingError("dof", dof, f"must be one of {listing(dofs)}")
+    row = row_of(solution.scene, dof)
     tau = _angles(samples)
-    x = fourier.basis(tau, solution.highest_harmonic) @ motion(solution)[dofs.index(dof)]
+    x = fourier.basis(tau, solution.highest_harmonic) @ (row @ motion(solution))
     return tau / (2.0 * math.pi * solution.frequency_hz), x
 
 

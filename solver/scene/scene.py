@@ -49,6 +49,7 @@ from solver.scene.parts import (
 )
 from solver.scene.terms.force_files import with_force_files
 from solver.scene.terms.linear_terms import Aerodynamics, Coupling
+from solver.scene.terms.recovery import Recovered
 from solver.scene.terms.speed import SpeedDependence, at_speed
 from solver.scene.terms.validation import term_issues
 from solver.scene.validation import cross_issues, field_issues, plain
@@ -92,6 +93,7 @@ _OPTIONAL = (
     "couplings",
     "aerodynamics",
     "with_speed",
+    "recovery",
 )  # left out if empty
 _FEW = 6  # contacts that are named where a scene says what it is
 
@@ -131,6 +133,8 @@ class Scene(Part):
         Entries of stiffness and damping that are no springs and dashpots: not symmetric, gyroscopic.
     aerodynamics : tuple of Aerodynamics
         Influence of the gas between blades, of a cyclic structure.
+    recovery : tuple of Recovered
+        Stresses, strains and other sums of DOFs that may be observed.
 
     Raises
     ------
@@ -155,6 +159,7 @@ class Scene(Part):
     with_speed: tuple[SpeedDependence, ...] = ()
     couplings: tuple[Coupling, ...] = ()
     aerodynamics: tuple[Aerodynamics, ...] = ()
+    recovery: tuple[Recovered, ...] = ()
 
     def __repr__(self) -> str:
         """Say in a line what it is; `to_dict` has all of it."""
@@ -235,6 +240,17 @@ class Scene(Part):
     def forces(self) -> tuple[Excitation, ...]:
         """The excitation, and the constant forces of loads and of rotation, each on a DOF."""
         return (*self.excitation, *kinematics.static_forces(self))
+
+    def seen(self, name: str) -> tuple[tuple[str, float], ...] | None:
+        """The DOFs, each with its factor, that a DOF or a recovered quantity of that name is a sum of."""
+        if name in self.dofs:
+            return ((name, 1.0),)
+        return next((each.terms for each in self.recovery if each.name == name), None)
+
+    @property
+    def observed_unit(self) -> str:
+        """Unit of the amplitudes: m, or that of the recovered quantity that is observed."""
+        return next((each.unit for each in self.recovery if each.name == self.observe.dof), "m")
 
     @property
     def engine_order(self) -> int:

@@ -35,13 +35,14 @@ from solver.scene.parts import (
 )
 from solver.scene.terms.excitation import PLACES
 from solver.scene.terms.linear_terms import Aerodynamics, Coupling, DiameterCoefficient, Influence
+from solver.scene.terms.recovery import Recovered
 from solver.scene.terms.speed import SpeedDependence
 
 MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
 RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe", "speed")
 _SCENE_KEYS = (
     "name", "structure", "contacts", "excitation", "observe", "bodies", "nodes", "loads", "dampers", "speed",
-    "couplings", "aerodynamics", "speed_order", "with_speed",
+    "couplings", "aerodynamics", "speed_order", "with_speed", "recovery",
 )  # fmt: skip
 _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     (): ("a scene", _SCENE_KEYS),
@@ -59,6 +60,7 @@ _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     ("nodes",): ("a node", tuple(Node.model_fields)),
     ("loads",): ("a load", tuple(Load.model_fields)),
     ("with_speed",): ("a dependence on the speed", tuple(SpeedDependence.model_fields)),
+    ("recovery",): ("a recovered quantity", tuple(Recovered.model_fields)),
     ("couplings",): ("a coupling", tuple(Coupling.model_fields)),
     ("aerodynamics",): ("aerodynamics", tuple(Aerodynamics.model_fields)),
     ("aerodynamics", "influence"): ("an influence", tuple(Influence.model_fields)),
@@ -327,6 +329,7 @@ def unknown_dof(key: str, text: str, dof: str, known: Sequence[str]) -> str:
 def _dof_issues(raw: dict[str, Any], dofs: _Known | None, sectors: object) -> Iterator[Issue]:
     if dofs is None:
         return
+    recovered = {row.get("name"): None for _, row in rows_of(raw, "recovery")}
     for steps, row in rows_of(raw, "excitation"):
         for key in PLACES[1:]:
             for dof in row[key] if isinstance(row.get(key), dict) else ():
@@ -336,9 +339,11 @@ def _dof_issues(raw: dict[str, Any], dofs: _Known | None, sectors: object) -> It
                     )
     for steps, row in [*rows_of(raw, "excitation"), *rows_of(raw, "observe")]:
         dof = row.get("dof")
+        if steps[0] == "observe" and dof in recovered:
+            continue
         if isinstance(dof, str) and steps[0] == "observe" and isinstance(sectors, int):
             base, _, sector = dof.rpartition("@")
-            if base in dofs and sector.isdecimal() and int(sector[:10]) < sectors:
+            if (base in dofs or base in recovered) and sector.isdecimal() and int(sector[:10]) < sectors:
                 continue
         if isinstance(dof, str) and dof not in dofs:
             yield Issue(pointer=pointer_of([*steps, "dof"]), message=unknown_dof("dof", dof, dof, list(dofs)))

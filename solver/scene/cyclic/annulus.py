@@ -30,6 +30,7 @@ from solver.scene.scene import (
     parse_end,
 )
 from solver.scene.terms.linear_terms import Coupling
+from solver.scene.terms.recovery import Recovered
 from solver.scene.validation import listing
 
 _JoinT = TypeVar("_JoinT", Spring, Damper)
@@ -176,6 +177,7 @@ def annulus(scene: Scene) -> Scene:
         speed=scene.speed,
         speed_order=scene.speed_order,
         with_speed=scene.with_speed,
+        recovery=tuple(_recovered(r, j) for j in sectors for r in scene.recovery),
         couplings=tuple(_coupling(c, j, n) for j in sectors for c in scene.couplings + _gas(scene, n)),
     )
 
@@ -288,6 +290,11 @@ def _load(load: Load, j: int) -> Load:
     places = {key: _in_sector(place, j) for key in ("dof", "on") if (place := getattr(load, key))}
     named = {} if load.name is None else {"name": _in_sector(load.name, j)}
     return load.model_copy(update={**places, **named})
+
+
+def _recovered(recovered: Recovered, j: int) -> Recovered:
+    terms = tuple((_in_sector(dof, j), factor) for dof, factor in recovered.terms)
+    return recovered.model_copy(update={"name": _in_sector(recovered.name, j), "terms": terms})
 
 
 def _coupling(coupling: Coupling, j: int, n: int) -> Coupling:

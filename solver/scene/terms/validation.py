@@ -35,6 +35,7 @@ def _issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
             yield _needs_speed(["structure", key], key)
     yield from _base_issues(raw, cyclic)
     yield from _speed_issues(raw)
+    yield from _recovery_issues(raw, dofs)
     for steps, row in rows_of(raw, "aerodynamics"):
         yield from _places(steps, row, ("dof",), dofs)
         if not cyclic:
@@ -112,6 +113,22 @@ def _speed_issues(raw: dict[str, Any]) -> Iterator[Issue]:
     if raw.get("speed_order") is not None and turning and any(rows_of(raw, "loads")):
         message = "`speed_order` cannot go with [[loads]] beside bodies that the speed loads"
         yield Issue(pointer="/speed_order", message=message)
+
+
+def _recovery_issues(raw: dict[str, Any], dofs: dict[str, None] | None) -> Iterator[Issue]:
+    """Recovered quantities of DOFs that do not exist, or with a name that is taken."""
+    rows = list(rows_of(raw, "recovery"))
+    named = [([*steps, "name"], row["name"]) for steps, row in rows if isinstance(row.get("name"), str)]
+    yield from duplicates(named, "recovery")
+    for steps, row in rows if dofs is not None else ():
+        terms = row.get("terms")
+        for dof in terms if isinstance(terms, dict) else ():
+            if dof not in (dofs or ()):
+                message = unknown_dof("terms", dof, dof, list(dofs or ()))
+                yield Issue(pointer=pointer_of([*steps, "terms", dof]), message=message)
+        if row.get("name") in (dofs or ()):
+            message = f"`name` = {row['name']!r} is that of a DOF: give what is recovered another name"
+            yield Issue(pointer=pointer_of([*steps, "name"]), message=message)
 
 
 def _needs_speed(steps: list[int | str], key: str) -> Issue:

@@ -103,9 +103,9 @@ class Tracker(Looking):
         self, scene: Scene, parameter: str, start: float, stop: float, harmonics: int,
         effects: Effects | None, pace: Pace = EVERYWHERE, allowance: Allowance | None = None,
     ) -> None:  # fmt: skip
+        check_no_line(scene)
         super().__init__(scene, parameter, start, stop, harmonics, effects, pace, allowance)
         check_laws(self.balance.scene)
-        check_no_line(self.balance.scene)
         self._first_step = pace.first_step
         self.exact_between: set[tuple[float, float, float]] = set()  # z, z and height of rows: cubics hold
         self._system: System = by_reference(self.balance.system)

@@ -23,7 +23,8 @@ def disk(**more: Any) -> dict[str, Any]:
     """Six blades of one mass each, coupled by springs and by the gas."""
     springs = [{"between": ["tip", "ground"], "k": K}, {"between": ["tip", "tip@next"], "k": KD}]
     return {
-        "name": "disk", "structure": {"kind": "cyclic", "sectors": N, "masses": {"tip": M}, "springs": springs},
+        "name": "disk",
+        "structure": {"kind": "cyclic", "sectors": N, "masses": {"tip": M}, "springs": springs},
         "contacts": [], "excitation": {"dof": "tip", "amplitude": 1.0, "engine_order": ORDER},
         "observe": {"dof": "tip", "band": [20.0, 60.0]},
     } | more  # fmt: skip

@@ -1,4 +1,4 @@
-"""A base that moves, against forces in absolute motion, the time march and differences; forces on many DOFs."""
+"""A base that moves, against forces in absolute motion, the march, differences; forces on many DOFs."""
 
 from __future__ import annotations
 
@@ -134,10 +134,15 @@ def test_a_pattern_is_the_sum_of_its_forces(tmp_path: Path) -> None:
         ({"excitation": {"dof": "x", "motion": "velocity", "amplitude": 1.0}}, "needs `ground` or `driven`"),
         ({"excitation": {"ground": {"z": 1.0}, "amplitude": 1.0}}, "there is no DOF 'z'"),
         ({"excitation": {"ground": {"x": 1.0}, "amplitude": 1.0, "harmonic": 0}}, "must be at least 1"),
-        ({"excitation": {"dof": "x", "amplitude": 1.0}, "observe": {"dof": "x", "band": [1.0, 2.0], "relative": True}},
-         "`relative` = true needs a base"),
+        (
+            {
+                "excitation": {"dof": "x", "amplitude": 1.0},
+                "observe": {"dof": "x", "band": [1.0, 2.0], "relative": True},
+            },
+            "`relative` = true needs a base",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_is_said(change: dict[str, Any], message: str) -> None:
     with pytest.raises(SceneError, match=message):
         Scene.from_dict(rig(**change))

@@ -91,10 +91,10 @@ def test_whirl_along_the_line_is_the_closed_form() -> None:
     assert natural_frequencies(scene, stuck=False) == pytest.approx(exact, rel=1e-9)
     diagram = optim.campbell_diagram(scene, speeds_rpm=[900.0, 2100.0], orders=[3, 5], harmonics=1)
     of_five = np.sqrt(K / (JT + JP / 5.0 * np.array([1.0, -1.0]))) / (2.0 * math.pi)
-    assert diagram.orders[0].open_hz == pytest.approx(exact[:1], rel=1e-9)
-    assert diagram.orders[1].open_hz == pytest.approx(of_five, rel=1e-9)
+    assert diagram.orders[0].open_hz == pytest.approx(exact.tolist(), rel=1e-9)
+    assert diagram.orders[1].open_hz == pytest.approx(of_five.tolist(), rel=1e-9)
     peaks = sorted(crossing.frequency_hz for crossing in diagram.orders[1].crossings)
-    assert peaks == pytest.approx(of_five, rel=5e-3)
+    assert peaks == pytest.approx(of_five.tolist(), rel=5e-3)
 
 
 def test_centrifugal_loads_of_bodies_follow_the_line() -> None:
@@ -102,10 +102,15 @@ def test_centrifugal_loads_of_bodies_follow_the_line() -> None:
         "name": "wedge", "mass": 0.01, "inertia": 1e-6, "plane": "xy", "radius_of_rotation": 0.2,
         "out": [0.0, 1.0, 0.0],
     }  # fmt: skip
-    springs = [{"between": ["wedge.y", "ground"], "k": 5e3, "c": 0.5}, {"between": ["wedge.x", "ground"], "k": 1e3},
-               {"between": ["wedge.rz", "ground"], "k": 1.0}]  # fmt: skip
-    raw = rotor(bodies=[body], couplings=[], with_speed=[], contacts=[], observe={"dof": "wedge.y", "band": [40.0, 110.0]},
-                excitation={"dof": "wedge.y", "amplitude": 0.3})  # fmt: skip
+    springs = [
+        {"between": ["wedge.y", "ground"], "k": 5e3, "c": 0.5},
+        {"between": ["wedge.x", "ground"], "k": 1e3},
+        {"between": ["wedge.rz", "ground"], "k": 1.0},
+    ]
+    raw = rotor(
+        bodies=[body], couplings=[], with_speed=[], contacts=[],
+        observe={"dof": "wedge.y", "band": [40.0, 110.0]}, excitation={"dof": "wedge.y", "amplitude": 0.3},
+    )  # fmt: skip
     raw["structure"] = raw["structure"] | {"springs": raw["structure"]["springs"] + springs}
     branch = solver.sweep(Scene.from_dict(raw), harmonics=2)
     for i in (1, -1):
@@ -115,7 +120,7 @@ def test_centrifugal_loads_of_bodies_follow_the_line() -> None:
 
 def test_a_design_along_the_line_is_better() -> None:
     scene = Scene.from_dict(rotor())
-    found = optim.design(scene, variables={"rub.kt": (100.0, 3000.0)}, harmonics=3, starts=1)
+    found = optim.design(scene, variables={"rub.kt": (100.0, 3000.0)}, harmonics=3)
     given = solver.sweep(scene, harmonics=3).peak
     at = scene.with_values(found.optimum)
     again = solver.sweep(at, harmonics=3).peak
