@@ -1,20 +1,16 @@
-"""The linear structure of a scene as matrices, and their derivatives: one CasADi expression carries both.
-
-The expression of a scene's structure is symbolic in every mass, stiffness and dashpot, so a named parameter
-has its derivative from the same lines that give the value.
-"""
+"""The linear structure of a scene as matrices with its contacts and forces, and their derivatives."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.errors import SettingError
-from solver.linear.body_matrices import bodies_mass, mass_derivative, matrices_with_bodies
+from solver.linear.body_matrices import mass_derivative, matrices_with_bodies
 from solver.linear.extra_terms import (
     ExtraTerms,
     Symmetric,
@@ -26,13 +22,19 @@ from solver.linear.extra_terms import (
     terms_by_stiffness,
     terms_of_line,
 )
-from solver.linear.modal_damping import modal_damping, modal_damping_derivative
+from solver.linear.lumped_matrices import (
+    Matrices,
+    derivative_by_number,
+    matrices_of_numbers,
+    numbers_of,
+    topology_of,
+)
 from solver.linear.model import ForceTerm as ForceTerm
 from solver.linear.model import LinearModel as LinearModel
 from solver.linear.model import LinearModelDerivative as LinearModelDerivative
 from solver.linear.moving_base import base_of, derivative_with_base, with_base
 from solver.scene.bodies.body import MOMENTS, Body
-from solver.scene.bodies.kinematics import Form, dof_names, force_derivatives
+from solver.scene.bodies.kinematics import Form, force_derivatives
 from solver.scene.bodies.paths import is_body_path
 from solver.scene.bodies.shape_parts import motion_derivatives
 from solver.scene.cyclic.annulus import written_out
@@ -41,7 +43,6 @@ from solver.scene.parameter_paths import PROPORTIONAL, is_gas_path, is_loss, sha
 from solver.scene.scene import (
     CyclicStructure,
     Damper,
-    End,
     Excitation,
     LumpedStructure,
     Mass,
@@ -52,31 +53,6 @@ from solver.scene.scene import (
 from solver.scene.validation import listing, nearest
 
 FloatArray = NDArray[np.float64]
-_Ends = tuple[End, End]
-_Assembled = LumpedStructure | CyclicStructure
-
-
-class _Topology(NamedTuple):
-    """What joins what: everything of a structure but its numbers."""
-
-    dofs: tuple[str, ...]
-    springs: tuple[_Ends, ...]
-    dampers: tuple[_Ends, ...]
-
-
-class _Matrices(NamedTuple):
-    M: FloatArray
-    C0: FloatArray
-    Cp: FloatArray
-    K0: FloatArray
-    Kp: FloatArray
-
-
-class _Expression(NamedTuple):
-    """The matrices side by side, M | C0 | Cp | K0 | Kp, as an expression in all parameters."""
-
-    parameters: Any
-    stacked: Any
 
 
 def linear_model(scene: Scene) -> LinearModel:
@@ -111,21 +87,21 @@ def _without_base(scene: Scene) -> LinearModel:
     if isinstance(structure, MatricesStructure):
         found = matrices_with_bodies(structure, scene.bodies)
         nothing = _nothing(found.M.shape[0])
-        matrices = _Matrices(found.M, found.C, nothing, found.K, nothing)
+        matrices = Matrices(found.M, found.C, nothing, found.K, nothing)
         return _model(scene, matrices, found.shapes, found.skew)
-    topology = _topology(structure, scene.bodies)
-    numbers = _numbers(structure, scene.bodies)
-    matrices = _matrices(topology, numbers, scene.bodies, _modal_ratios(structure))
+    topology = topology_of(structure, scene.bodies)
+    numbers = numbers_of(structure, scene.bodies)
+    matrices = matrices_of_numbers(topology, numbers, scene.bodies, _modal_ratios(structure))
     return _model(scene, matrices, _identity(len(topology.dofs)))
 
 
-def _modal_ratios(structure: _Assembled) -> Ratios | None:
+def _modal_ratios(structure: LumpedStructure | CyclicStructure) -> Ratios | None:
     return structure.damping_ratio if isinstance(structure, LumpedStructure) else None
 
 
 def _model(
     scene: Scene,
-    matrices: _Matrices,
+    matrices: Matrices,
     shapes: FloatArray,
     skew: tuple[FloatArray, FloatArray] | None = None,
 ) -> LinearModel:
@@ -239,13 +215,13 @@ def _derivative_by(scene: Scene, name: str) -> LinearModelDerivative:
     shares = [(i, weight) for i, part in enumerate(parts) if name and (weight := share(part, name))]
     if not shares:
         raise _unknown(name, structure_names(structure))
-    topology, numbers = _topology(structure, scene.bodies), _numbers(structure, scene.bodies)
+    topology, numbers = topology_of(structure, scene.bodies), numbers_of(structure, scene.bodies)
     behind = len(topology.dofs) - len(
         structure.dofs
     )  # places of the bodies' DOFs, between masses and springs
     shares = [(i if i < len(structure.masses) else i + behind, weight) for i, weight in shares]
     own, ratios = len(structure.dofs), _modal_ratios(structure)
-    members = [(_derivative(topology, numbers, i, own, ratios), weight) for i, weight in shares]
+    members = [(derivative_by_number(topology, numbers, i, own, ratios), weight) for i, weight in shares]
 
     def total(key: str) -> FloatArray:
         return _frozen(
@@ -265,8 +241,8 @@ def _symmetric_of(scene: Scene) -> Symmetric:
     if isinstance(structure, MatricesStructure):
         found = matrices_with_bodies(structure, bodies)
         return Symmetric(K0=found.K, Kp=_nothing(found.K.shape[0]), shapes=found.shapes, skew=found.skew)
-    topology = _topology(structure, bodies)
-    matrices = _matrices(topology, _numbers(structure, bodies), bodies, _modal_ratios(structure))
+    topology = topology_of(structure, bodies)
+    matrices = matrices_of_numbers(topology, numbers_of(structure, bodies), bodies, _modal_ratios(structure))
     return Symmetric(K0=matrices.K0, Kp=matrices.Kp, shapes=_identity(len(topology.dofs)))
 
 
@@ -335,118 +311,6 @@ def _proportional(structure: MatricesStructure, bodies: tuple[Body, ...], name: 
 
 def _unknown(name: str, known: Sequence[str]) -> SettingError:
     return SettingError("name", name, f"must be one of {listing(known)}", nearest(str(name), known))
-
-
-def _topology(structure: _Assembled, bodies: tuple[Body, ...]) -> _Topology:
-    springs = tuple(spring.ends for spring in structure.springs)
-    dampers = tuple(damper.ends for damper in structure.dampers)
-    return _Topology(dof_names(structure, bodies), springs, dampers)
-
-
-def _numbers(structure: _Assembled, bodies: tuple[Body, ...]) -> tuple[float, ...]:
-    """All numbers: masses, stiffnesses, dashpots, dashpots of springs, proportional damping.
-
-    The mass of a body is no point mass and stands apart: 0 here.
-    """
-    return (
-        *(mass.m for mass in structure.masses),
-        *(0.0 for body in bodies for _ in body.dofs),
-        *(spring.k for spring in structure.springs),
-        *(damper.c for damper in structure.dampers),
-        *(spring.c for spring in structure.springs),
-        structure.stiffness_proportional_damping,
-    )
-
-
-@lru_cache(maxsize=64)
-def _expression(topology: _Topology) -> _Expression:
-    """The matrices in symbols, in the order of `_numbers`, for their derivatives."""
-    import casadi  # the values of the matrices need no symbols
-
-    n = len(topology.dofs)
-    q = casadi.SX.sym("q", n + 2 * len(topology.springs) + len(topology.dampers) + 1)
-    return _Expression(q, casadi.horzcat(*_assembled(topology, q, casadi.SX(n, n))))
-
-
-def _assembled(topology: _Topology, q: Any, zero: Any) -> tuple[Any, ...]:
-    """Return M, C0, Cp, K0, Kp in floats or in symbols, as the parameters `q` and the (n, n) `zero` are."""
-    n, n_springs, n_dampers = len(topology.dofs), len(topology.springs), len(topology.dampers)
-    M, C0, Cp, K0, Kp = (zero + 0.0 for _ in range(5))
-    k, c, c_spring = n, n + n_springs, n + n_springs + n_dampers
-    beta = q[c_spring + n_springs]
-    index = {dof: i for i, dof in enumerate(topology.dofs)}
-    for i in range(n):
-        M[i, i] = q[i]
-    for i, ends in enumerate(topology.springs):
-        _join(K0, Kp, ends, q[k + i], index)
-        _join(C0, Cp, ends, q[c_spring + i] + beta * q[k + i], index)
-    for i, ends in enumerate(topology.dampers):
-        _join(C0, Cp, ends, q[c + i], index)
-    return M, C0, Cp, K0, Kp
-
-
-def _join(X0: Any, Xp: Any, ends: _Ends, value: Any, index: dict[str, int]) -> None:
-    """Add one spring or dashpot between two ends to X0 + Xp e^{j theta} + Xp^T e^{-j theta}."""
-    here = [index[end.dof] for end in ends if end.dof is not None]
-    for i in here:
-        X0[i, i] += value
-    if len(here) < 2:
-        return
-    a, b = here
-    if ends[1].next:
-        Xp[a, b] -= value
-    elif ends[0].next:
-        Xp[b, a] -= value
-    else:
-        X0[a, b] -= value
-        X0[b, a] -= value
-
-
-@lru_cache(maxsize=256)
-def _matrices(
-    topology: _Topology, numbers: tuple[float, ...], bodies: tuple[Body, ...], ratios: Ratios | None
-) -> _Matrices:
-    n = len(topology.dofs)
-    own = n - sum(len(body.dofs) for body in bodies)
-    found = _Matrices(*_assembled(topology, numbers, np.zeros((n, n))))
-    if ratios is not None:
-        found.C0[:own, :own] += modal_damping(found.M[:own, :own], found.K0[:own, :own], ratios)
-    if bodies:
-        found.M[:] += bodies_mass(own, bodies)
-    return _Matrices(*map(_frozen, found))
-
-
-@lru_cache(maxsize=256)
-def _derivative(
-    topology: _Topology, numbers: tuple[float, ...], i: int, own: int, ratios: Ratios | None
-) -> LinearModelDerivative:
-    import casadi
-
-    expression = _expression(topology)
-    derivative, affine = _derivative_function(topology, i)
-    stacked = casadi.reshape(derivative(np.asarray(numbers)), *expression.stacked.shape)
-    dense = np.asarray(casadi.DM(stacked).full(), dtype=np.float64)
-    n = dense.shape[0]
-    d = _Matrices(*(dense[:, i * n : (i + 1) * n].copy() for i in range(5)))
-    if ratios is not None:
-        at = _matrices(topology, numbers, (), None)
-        d.C0[:own, :own] += modal_damping_derivative(
-            at.M[:own, :own], at.K0[:own, :own], ratios, d.M[:own, :own], d.K0[:own, :own]
-        )
-        affine = affine and not (np.any(d.M) or np.any(d.K0))
-    d = _Matrices(*map(_frozen, d))
-    return LinearModelDerivative(dM=d.M, dC0=d.C0, dCp=d.Cp, dK0=d.K0, dKp=d.Kp, affine=affine)
-
-
-@lru_cache(maxsize=256)
-def _derivative_function(topology: _Topology, i: int) -> tuple[Any, bool]:
-    """Derivative of the stacked matrices by parameter i as a function of all, and whether it is constant."""
-    import casadi
-
-    q, stacked = _expression(topology)
-    vector = casadi.vec(stacked)
-    jacobian = casadi.jacobian(vector, q[i])
-    return casadi.Function("derivative", [q], [jacobian]), bool(casadi.is_linear(vector, q[i]))
 
 
 @lru_cache(maxsize=256)

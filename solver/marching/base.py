@@ -1,8 +1,8 @@
 """A base that moves as prescribed, as two more coordinates of the time march.
 
-The first is the motion y of the base itself, that of a mass on a spring and a dashpot of its own which is
-driven so that its steady motion is the one prescribed, y'' + 2ω y' + ω² y = f(t); it dies out into it within
-a few periods. Its acceleration drives the rest. The second adds up the observed motion: it has the acceleration
+The first is the motion y of the base itself, that of a mass on a spring and a dashpot of its own, driven so
+that its steady motion is the one prescribed, y'' + 2ω y' + ω² y = f(t): what else it does dies out within a
+few periods. Its acceleration drives the rest. The second adds up the observed motion: it has the acceleration
 of what is observed, and begins at rest with it.
 """
 

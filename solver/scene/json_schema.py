@@ -25,10 +25,12 @@ from solver.scene.bodies.validation import further_ends
 from solver.scene.descriptions import EXAMPLES, WORDS
 from solver.scene.scene import Scene
 from solver.scene.terms import linear_terms as scene_terms
+from solver.scene.terms import recovery as scene_recovery
+from solver.scene.terms import speed as scene_speed
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*\n((?:    .*\n?)+)", re.MULTILINE)
-_HOMES = (scene_parts, scene_bodies, scene_shapes, scene_terms, matrices_part)
+_HOMES = (scene_parts, scene_bodies, scene_shapes, scene_terms, scene_speed, scene_recovery, matrices_part)
 
 
 class _Generator(GenerateJsonSchema):

@@ -33,10 +33,7 @@ from solver.scene.parts import (
     Reduction,
     Spring,
 )
-from solver.scene.terms.excitation import PLACES
-from solver.scene.terms.linear_terms import Aerodynamics, Coupling, DiameterCoefficient, Influence
-from solver.scene.terms.recovery import Recovered
-from solver.scene.terms.speed import SpeedDependence
+from solver.scene.terms.keys import TERM_KEYS
 
 MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
 RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe", "speed")
@@ -59,12 +56,7 @@ _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     ("bodies",): ("a body", tuple(Body.model_fields)),
     ("nodes",): ("a node", tuple(Node.model_fields)),
     ("loads",): ("a load", tuple(Load.model_fields)),
-    ("with_speed",): ("a dependence on the speed", tuple(SpeedDependence.model_fields)),
-    ("recovery",): ("a recovered quantity", tuple(Recovered.model_fields)),
-    ("couplings",): ("a coupling", tuple(Coupling.model_fields)),
-    ("aerodynamics",): ("aerodynamics", tuple(Aerodynamics.model_fields)),
-    ("aerodynamics", "influence"): ("an influence", tuple(Influence.model_fields)),
-    ("aerodynamics", "nodal_diameters"): ("a nodal diameter", tuple(DiameterCoefficient.model_fields)),
+    **TERM_KEYS,
     **{
         ("dampers", shape): (f"a damper of the shape `{shape}`", tuple(each.model_fields))
         for shape, each in SHAPES.items()
@@ -330,13 +322,6 @@ def _dof_issues(raw: dict[str, Any], dofs: _Known | None, sectors: object) -> It
     if dofs is None:
         return
     recovered = {row.get("name"): None for _, row in rows_of(raw, "recovery")}
-    for steps, row in rows_of(raw, "excitation"):
-        for key in PLACES[1:]:
-            for dof in row[key] if isinstance(row.get(key), dict) else ():
-                if dof not in dofs:
-                    yield Issue(
-                        pointer=pointer_of([*steps, key, dof]), message=unknown_dof(key, dof, dof, list(dofs))
-                    )
     for steps, row in [*rows_of(raw, "excitation"), *rows_of(raw, "observe")]:
         dof = row.get("dof")
         if steps[0] == "observe" and dof in recovered:

@@ -7,6 +7,7 @@ from itertools import islice
 from typing import Any
 
 from solver.errors import Issue
+from solver.scene.terms.excitation import PLACES
 from solver.scene.validation import MOST_ISSUES, dofs_of, duplicates, pointer_of, rows_of, unknown_dof
 
 AMPLITUDE_PATH = "excitation.amplitude"
@@ -33,6 +34,10 @@ def _issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
     for key in ("G", "K_omega2"):
         if structure.get(key) is not None and not _has_speed(raw):
             yield _needs_speed(["structure", key], key)
+    for steps, row in rows_of(raw, "excitation"):
+        for key in PLACES[1:]:
+            keys = tuple(row[key]) if isinstance(row.get(key), dict) else ()
+            yield from _places([*steps, key], dict(zip(keys, keys, strict=True)), keys, dofs)
     yield from _base_issues(raw, cyclic)
     yield from _speed_issues(raw)
     yield from _recovery_issues(raw, dofs)
