@@ -321,7 +321,7 @@ def unknown_dof(key: str, text: str, dof: str, known: Sequence[str]) -> str:
 def _dof_issues(raw: dict[str, Any], dofs: _Known | None, sectors: object) -> Iterator[Issue]:
     if dofs is None:
         return
-    recovered = {row.get("name"): None for _, row in rows_of(raw, "recovery")}
+    recovered = [row.get("name") for _, row in rows_of(raw, "recovery")]
     for steps, row in [*rows_of(raw, "excitation"), *rows_of(raw, "observe")]:
         dof = row.get("dof")
         if steps[0] == "observe" and dof in recovered:

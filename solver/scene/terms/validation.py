@@ -49,7 +49,7 @@ def _issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
     tables = ("aerodynamics", "bodies", "nodes", "loads", "dampers", "contacts")
     rows = [row for table in tables for row in rows_of(raw, table)]
     named = [([*steps, "name"], row["name"]) for steps, row in rows if isinstance(row.get("name"), str)]
-    mine = {row.get("name") for _, row in rows_of(raw, "aerodynamics")}
+    mine = [row.get("name") for _, row in rows_of(raw, "aerodynamics")]
     yield from duplicates([(s, name) for s, name in reversed(named) if name in mine], "paths")
 
 
@@ -94,7 +94,8 @@ def _speed_issues(raw: dict[str, Any]) -> Iterator[Issue]:
     if raw.get("speed") is not None and raw.get("speed_order") is not None:
         message = "`speed_order` stands in place of `speed`: the speed follows the frequency; remove one"
         yield Issue(pointer="/speed_order", message=message)
-    contacts = {row.get(key): row for _, row in rows_of(raw, "contacts") for key in ("name", "group")}
+    named = [row.get(key) for _, row in rows_of(raw, "contacts") for key in ("name", "group")]
+    contacts = dict.fromkeys(name for name in named if isinstance(name, str))
     seen: list[object] = []
     for steps, row in rows_of(raw, "with_speed"):
         path, pointer = row.get("path"), pointer_of([*steps, "path"])
@@ -102,7 +103,7 @@ def _speed_issues(raw: dict[str, Any]) -> Iterator[Issue]:
             continue
         owner, _, key = path.rpartition(".")
         if path != AMPLITUDE_PATH and not (key == "N0" and owner in contacts):
-            known = ", ".join(f"{name}.N0" for name in contacts if name)
+            known = ", ".join(f"{name}.N0" for name in contacts)
             message = f"`path` must be `{AMPLITUDE_PATH}` or one of {known or 'no contact'}, got {path!r}"
             yield Issue(pointer=pointer, message=message)
         elif path in seen:
@@ -131,7 +132,7 @@ def _recovery_issues(raw: dict[str, Any], dofs: dict[str, None] | None) -> Itera
             if dof not in (dofs or ()):
                 message = unknown_dof("terms", dof, dof, list(dofs or ()))
                 yield Issue(pointer=pointer_of([*steps, "terms", dof]), message=message)
-        if row.get("name") in (dofs or ()):
+        if row.get("name") in list(dofs or ()):
             message = f"`name` = {row['name']!r} is that of a DOF: give what is recovered another name"
             yield Issue(pointer=pointer_of([*steps, "name"]), message=message)
 
