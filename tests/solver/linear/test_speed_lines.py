@@ -118,6 +118,7 @@ def test_centrifugal_loads_of_bodies_follow_the_line() -> None:
         assert branch.mean[i] == pytest.approx(0.01 * 0.2 * spin**2 / 5e3, rel=1e-9)
 
 
+@pytest.mark.long
 def test_a_design_along_the_line_is_better() -> None:
     scene = Scene.from_dict(rotor())
     found = optim.design(scene, variables={"rub.kt": (100.0, 3000.0)}, harmonics=3)
