@@ -24,7 +24,7 @@ from solver.continuation.branches.sweep import sweep
 from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 from solver.matrices.normal_modes import undamped_modes
-from solver.response.time_history import matrices
+from solver.response.time_history import mass, matrices
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.scene import Scene
 
@@ -64,7 +64,7 @@ def campbell_diagram(
     begun = time.perf_counter()
     speeds, chosen = _speeds(speeds_rpm), _orders(scene, orders)
     looked_at = None if band_hz is None else _positive_pair("band_hz", band_hz, "Hz")
-    cyclic = scene.structure.kind == "cyclic"
+    cyclic = scene.structure.has_sectors
     groups = [(order,) for order in chosen] if cyclic else [chosen]
     found: list[OrderResponse] = []
     stopped, count = False, 0
@@ -123,11 +123,11 @@ def natural_frequencies(scene: Scene, *, stuck: bool) -> Real:
     """
     scene = written_out(scene)
     model = linear_model(scene)
-    K, _, L = matrices(model, 1)
+    (K, _, L), M = matrices(model, 1), mass(model, 1)
     if stuck:
         stiffness = np.array([k for contact in scene.contacts for k in contact.stiffnesses])
         K = K + L.conj().T @ (stiffness[:, None] * L)
-    modes = undamped_modes(K if np.any(K.imag) else K.real, model.M)
+    modes = undamped_modes(K if np.any(K.imag) or np.any(M.imag) else K.real, M)
     return np.sort(np.sqrt(np.maximum(modes.omega2, 0.0))) / (2.0 * math.pi)
 
 

@@ -134,11 +134,11 @@ def matrices_of_paths(balance: Balance, parameters: Sequence[Parameter]) -> Matr
     by, forces_by, motions_by = {}, {}, {}
     for i, name in structural.items():
         d = structure_derivative(scene, name)
-        dK = d.dK0 + d.dKp * turn + d.dKp.T * turn.conj()
+        dK, dC, dM = d.at(diameters, model.sectors)
         if d.contact_here is not None and d.contact_next is not None:
             dL = motions_by[i] = d.contact_here + d.contact_next * turn
             dK = dK + _stiffness(dL, shift, L) + _stiffness(L, shift, dL)
-        by[i] = (dK, d.dC0 + d.dCp * turn + d.dCp.T * turn.conj(), d.dM + 0.0 * turn)
+        by[i] = (dK, dC, dM)
         if d.forces:
             forces_by[i] = term_amplitudes(d.forces, dense.observe.size, ks)
     # The stiffness moved from the contacts into the structure is that of the balance.

@@ -7,6 +7,7 @@ has its derivative from the same lines that give the value.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from solver.linear.body_matrices import bodies_mass, mass_derivative, matrices_w
 from solver.linear.model import ForceTerm as ForceTerm
 from solver.linear.model import LinearModel as LinearModel
 from solver.linear.model import LinearModelDerivative as LinearModelDerivative
+from solver.linear.sector_matrices import ProportionalDamping, sector_matrices
 from solver.scene.bodies.body import MOMENTS, Body
 from solver.scene.bodies.kinematics import Form, dof_names, force_derivatives
 from solver.scene.bodies.paths import is_body_path
@@ -73,6 +75,9 @@ def linear_model(scene: Scene) -> LinearModel:
     """
     scene = written_out(scene)
     structure = scene.structure
+    if isinstance(structure, MatricesStructure) and structure.has_sectors:
+        sector = sector_matrices(structure, scene.bodies)
+        return replace(_model(scene, _Matrices(*(_nothing(0),) * 5), sector.shapes), sector=sector)
     if isinstance(structure, MatricesStructure):
         found = matrices_with_bodies(structure, scene.bodies)
         nothing = _nothing(found.M.shape[0])
@@ -105,7 +110,7 @@ def _model(scene: Scene, matrices: _Matrices, shapes: FloatArray) -> LinearModel
         forces=_terms(scene.forces, dofs, shapes if whole else None),
         observe=rows(_unit(dofs, scene.observe.dof)),
         engine_order=scene.engine_order,
-        sectors=structure.sectors if isinstance(structure, CyclicStructure) else 1,
+        sectors=structure.sector_count,
     )
 
 
@@ -192,6 +197,8 @@ def _shapes(scene: Scene) -> FloatArray | None:
     """The DOFs in the coordinates of the matrices; None where they are the coordinates."""
     if not isinstance(scene.structure, MatricesStructure):
         return None
+    if scene.structure.has_sectors:
+        return sector_matrices(scene.structure, scene.bodies).shapes
     return matrices_with_bodies(scene.structure, scene.bodies).shapes
 
 
@@ -215,6 +222,13 @@ def _proportional(structure: MatricesStructure, bodies: tuple[Body, ...], name: 
     """Derivatives by the proportional damping, the only parameter of a structure given by its matrices."""
     if name not in PROPORTIONAL:
         raise _unknown(name, PROPORTIONAL)
+    if structure.has_sectors:
+        sector = sector_matrices(structure, bodies)
+        nothing = _nothing(sector.shapes.shape[1])
+        damping = ProportionalDamping(sector=sector, which="K" if name == PROPORTIONAL[0] else "M")
+        return LinearModelDerivative(
+            dM=nothing, dC0=nothing, dCp=nothing, dK0=nothing, dKp=nothing, affine=True, damping=damping
+        )
     found = matrices_with_bodies(structure, bodies)
     nothing = _nothing(found.M.shape[0])
     dC = found.K if name == PROPORTIONAL[0] else found.M

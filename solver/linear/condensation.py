@@ -80,7 +80,7 @@ def reduce_model(
     theta = 2.0 * np.pi * diameters / model.sectors
     forces = force_amplitudes(model, ks)
     L = model.contact_here + model.contact_next * np.exp(1j * theta)[:, None, None]
-    held = matrices_of(model, theta)
+    held = matrices_of(model, diameters)
     shift, loose = np.zeros(kt.size), np.zeros((0, kt.size))
     if 0 in ks:
         loose = loose_motions(held.K[which[0]], L[which[0]], kt)
@@ -93,7 +93,7 @@ def reduce_model(
         found = decompose(held)
     if found is None:
         modes: dict[str, Any] = _no_modes(theta.size, ks.size, kt.size)
-        dense: dict[str, Any] = _dense(held, theta, L, model, forces, derivative)
+        dense: dict[str, Any] = _dense(held, diameters, L, model, forces, derivative)
         given = ((), ()) if derivative is None else (derivative.forces, derivative.second_forces)
         dense["dforces"] = np.array([term_amplitudes(each, model.observe.size, ks) for each in given])
     else:
@@ -127,7 +127,7 @@ def loose_ports(scene: Scene) -> tuple[Real, Real]:
     """
     model = linear_model(scene)
     kt = port_stiffnesses(scene, model)
-    static = matrices_of(model, np.zeros(1))
+    static = matrices_of(model, np.zeros(1, np.int64))
     return loose_motions(static.K[0], model.contact_here + model.contact_next, kt), kt
 
 
@@ -196,19 +196,16 @@ _DENSE_AXES = {
 
 def _dense(
     held: Held,
-    theta: Real,
+    diameters: Integer,
     L: Complex,
     model: LinearModel,
     forces: Complex,
     derivative: LinearModelDerivative | None,
 ) -> dict[str, Complex]:
     """Return the matrices and their derivatives by the structural parameter (zero if there is none)."""
-    turn = np.exp(1j * theta)[:, None, None]
     dK = dC = dM = np.zeros(held.K.shape, np.complex128)
     if derivative is not None:
-        dK = dK + derivative.dK0 + derivative.dKp * turn + derivative.dKp.T * turn.conj()
-        dC = dC + derivative.dC0 + derivative.dCp * turn + derivative.dCp.T * turn.conj()
-        dM = dM + derivative.dM
+        dK, dC, dM = (dK + each for each in derivative.at(diameters, model.sectors))
     return {
         "K": _contiguous(held.K), "C": _contiguous(held.C), "M": _contiguous(held.M), "dK": dK, "dC": dC,
         "dM": dM, "L": _contiguous(L), "observe": _contiguous(model.observe), "forces": forces,

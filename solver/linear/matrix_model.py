@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,7 @@ class MatrixModel:
 @lru_cache(maxsize=16)
 def matrix_model(structure: MatricesStructure) -> MatrixModel:
     """The matrices of a structure; the same arrays each time, so that what follows from them can be kept."""
-    M, K, own, shapes = _base(structure.model_copy(update=_NO_PROPORTIONAL))
+    M, K, own, shapes = _base(structure.model_copy(update=NO_PROPORTIONAL))
     C = own
     if structure.stiffness_proportional_damping or structure.mass_proportional_damping:
         C = own + structure.stiffness_proportional_damping * K + structure.mass_proportional_damping * M
@@ -43,7 +44,7 @@ def matrix_model(structure: MatricesStructure) -> MatrixModel:
     return MatrixModel(M=M, C=C, K=K, shapes=shapes)
 
 
-_NO_PROPORTIONAL = {"stiffness_proportional_damping": 0.0, "mass_proportional_damping": 0.0}
+NO_PROPORTIONAL = {"stiffness_proportional_damping": 0.0, "mass_proportional_damping": 0.0}
 
 
 @lru_cache(maxsize=16)
@@ -59,7 +60,7 @@ def _base(structure: MatricesStructure) -> tuple[FloatArray, FloatArray, FloatAr
         M, K = structure.M.array, structure.K.array
         C = np.zeros_like(M) if structure.C is None else structure.C.array
         if ratio:
-            C = C + _modal_damping(M, K, ratio)
+            C = C + modal_damping(M, K, ratio)
         shapes = np.zeros((len(rows), M.shape[0]))
         shapes[np.arange(len(rows)), rows] = 1.0
     else:
@@ -69,9 +70,9 @@ def _base(structure: MatricesStructure) -> tuple[FloatArray, FloatArray, FloatAr
     return M, K, C, shapes
 
 
-def _modal_damping(M: FloatArray, K: FloatArray, ratio: float) -> FloatArray:
-    """C with the damping ratio in every mode, Σ 2 ζ ω (Mφ)(Mφ)ᵀ; a rigid body has none."""
+def modal_damping(M: NDArray[Any], K: NDArray[Any], ratio: float) -> NDArray[Any]:
+    """C with the damping ratio in every mode of Hermitian M, K, Σ 2 ζ ω (Mφ)(Mφ)ᴴ; a rigid body has none."""
     found = undamped_modes(K, M)
     momenta = M @ found.phi
     omega = np.sqrt(np.maximum(found.omega2, 0.0))
-    return np.asarray((momenta * (2.0 * ratio * omega)) @ momenta.T)
+    return np.asarray((momenta * (2.0 * ratio * omega)) @ momenta.conj().T)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from solver.contacts.kernels.system import MODES, POLES
 from solver.jit import eigen
-from solver.jit.fourier import Complex, Real
+from solver.jit.fourier import Complex, Integer, Real
 from solver.linear.assembly import LinearModel
 from solver.matrices.normal_modes import UndampedModes, least_stiffness, undamped_modes
 
@@ -42,7 +42,7 @@ class _Identity:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Held:
-    """Matrices at each interblade phase, (ns, n, n) each, real where all phases are 0.
+    """Matrices at each nodal diameter, (ns, n, n) each, real where all phases are.
 
     Attributes
     ----------
@@ -81,24 +81,37 @@ class Decomposition:
     left: NDArray[Any]
 
 
-def matrices_of(model: LinearModel, theta: Real) -> Held:
-    """Return the matrices at each interblade phase."""
-    parts = tuple(_Identity(a) for a in (model.K0, model.Kp, model.C0, model.Cp, model.M))
-    return _matrices(parts, tuple(theta.tolist()))
+def matrices_of(model: LinearModel, diameters: Integer) -> Held:
+    """Return the matrices at each nodal diameter.
+
+    Raises
+    ------
+    SettingError
+        A reduced sector was not built for one of them.
+    """
+    arrays = (model.K0, model.Kp, model.C0, model.Cp, model.M)
+    parts: tuple[object, ...] = (model.sector,) if model.sector else tuple(_Identity(a) for a in arrays)
+    return _matrices(_ByParts(model, (*parts, model.sectors)), tuple(diameters.tolist()))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _ByParts:
+    """A model as a key: equal to another with the same matrices, whatever its contacts and forces are."""
+
+    model: LinearModel = field(repr=False)
+    parts: tuple[object, ...]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _ByParts) and self.parts == other.parts
+
+    def __hash__(self) -> int:
+        return hash(self.parts)
 
 
 @lru_cache(maxsize=32)
-def _matrices(parts: tuple[_Identity, ...], theta: tuple[float, ...]) -> Held:
-    K0, Kp, C0, Cp, M = (part.array for part in parts)
-    turn = np.exp(1j * np.array(theta))[:, None, None]
-
-    def at(zero: Real, plus: Real) -> NDArray[Any]:
-        if not np.any(plus):
-            return np.broadcast_to(zero, (len(theta), *zero.shape))
-        return np.asarray(zero + plus * turn + plus.T * turn.conj())
-
-    held = np.broadcast_to(M, (len(theta), *M.shape))
-    return Held(at(K0, Kp), at(C0, Cp), held, (parts, theta))
+def _matrices(of: _ByParts, diameters: tuple[int, ...]) -> Held:
+    K, C, M = of.model.at(np.array(diameters, dtype=np.int64))
+    return Held(K, C, M, (of.parts, diameters))
 
 
 @lru_cache(maxsize=32)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.linear.sector_matrices import ProportionalDamping, SectorMatrices
+
 FloatArray = NDArray[np.float64]
+Integer = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +68,9 @@ class LinearModel:
         Engine order of the excitation, 0 if lumped.
     sectors : int
         Number of sectors, 1 if lumped.
+    sector : SectorMatrices or None
+        What the matrices of a sector given by them are at each nodal diameter; M, C0, Cp, K0 and Kp are then
+        empty, (0, 0).
     """
 
     dofs: tuple[str, ...]
@@ -79,11 +86,39 @@ class LinearModel:
     observe: FloatArray
     engine_order: int
     sectors: int
+    sector: SectorMatrices | None = None
 
     @property
     def interblade_phase(self) -> float:
         """Phase of harmonic 1 from one sector to the next [rad]."""
         return 2.0 * math.pi * self.engine_order / self.sectors
+
+    def at(self, diameters: Integer) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """K, C and M at nodal diameters, (nd, n, n) each, real where all phases are 0 or all blocks are.
+
+        Raises
+        ------
+        SettingError
+            A reduced sector was not built for one of them.
+        """
+        if self.sector is not None:
+            found = [self.sector.at(int(n)) for n in diameters]
+            K, C, M = (np.array(each) for each in zip(*found, strict=True))
+            return K, C, M
+        turn = np.exp(2j * np.pi * np.asarray(diameters) / self.sectors)[:, None, None]
+
+        def turned(zero: FloatArray, plus: FloatArray) -> NDArray[Any]:
+            if not np.any(plus):
+                return np.broadcast_to(zero, (len(turn), *zero.shape))
+            return np.asarray(zero + plus * turn + plus.T * turn.conj())
+
+        M = np.broadcast_to(self.M, (len(turn), *self.M.shape))
+        return turned(self.K0, self.Kp), turned(self.C0, self.Cp), M
+
+    @property
+    def every_diameter(self) -> bool:
+        """Whether the matrices of all nodal diameters are known."""
+        return self.sector is None or self.sector.every_diameter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,6 +129,8 @@ class LinearModelDerivative:
     ----------
     dM, dC0, dCp, dK0, dKp : (n, n) array
         Derivatives of the matrices; read-only.
+    damping : ProportionalDamping or None
+        Of a sector given by its matrices: dC at each nodal diameter, in place of dC0 and dCp.
     affine : bool
         The matrices are affine in this parameter, so these derivatives are constant.
     contact_here, contact_next : (n_ports, n) array or None
@@ -112,3 +149,13 @@ class LinearModelDerivative:
     contact_next: FloatArray | None = None
     forces: tuple[ForceTerm, ...] = ()
     second_forces: tuple[ForceTerm, ...] = ()
+    damping: ProportionalDamping | None = None
+
+    def at(self, diameters: Integer, sectors: int) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """dK, dC and dM at nodal diameters, (nd, n, n) each, complex."""
+        turn = np.exp(2j * np.pi * np.asarray(diameters) / sectors)[:, None, None]
+        dK = self.dK0 + self.dKp * turn + self.dKp.T * turn.conj()
+        dC = self.dC0 + self.dCp * turn + self.dCp.T * turn.conj()
+        if self.damping is not None:
+            dC = dC + np.array([self.damping.at(int(n)) for n in diameters])
+        return dK, dC, self.dM + 0.0 * turn

@@ -24,7 +24,7 @@ from solver.marching.kernels import state as kernel
 from solver.marching.kernels import taylor as stepping
 from solver.marching.result import MarchResult, MarchStatus, describe
 from solver.scene.cyclic.annulus import annulus
-from solver.scene.scene import CyclicStructure, Excitation, Scene
+from solver.scene.scene import Excitation, Scene
 from solver.scene.validation import listing
 
 FloatArray = NDArray[np.float64]
@@ -118,7 +118,7 @@ def march(
     """
     begin = time.perf_counter()
     _check(frequency_hz, tolerance, max_periods)
-    whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
+    whole = annulus(scene) if scene.structure.has_sectors else scene
     omega = 2.0 * math.pi * frequency_hz
     system, dof = equations_of_motion(whole, omega)
     steps = _steps(system, scene.forces, steps_per_period)

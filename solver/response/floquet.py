@@ -21,7 +21,7 @@ from solver.response.solution import Solution
 from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import annulus
-from solver.scene.scene import CyclicStructure, Scene
+from solver.scene.scene import Scene
 
 GROWS = 1e-9  # a multiplier's modulus beyond 1 that is more than rounding
 REAL = 1e-7  # imaginary part, relative to the modulus, that counts as none
@@ -161,7 +161,7 @@ def scene_monodromy(scene: Scene, frequency_hz: float, slips: Real) -> Monodromy
     frequency_hz : excitation frequency [Hz].
     slips : (n_contacts, 2H + 1) full coefficients of the slip motions [m].
     """
-    whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
+    whole = annulus(scene) if scene.structure.has_sectors else scene
     model = linear_model(whole)
     pieces = _pieces(scene, slips)
     elements = tuple(
@@ -182,9 +182,9 @@ def _pieces(scene: Scene, slips: Real) -> dict[str, tuple[Piece, ...]]:
             raise SettingError("solution", contact.name, wanted)
         own[contact.name] = pieces
     structure = scene.structure
-    if not isinstance(structure, CyclicStructure):
+    if not structure.has_sectors:
         return own
-    n, order = structure.sectors, scene.engine_order
+    n, order = structure.sector_count, scene.engine_order
     return {
         f"{name}@{j}": tuple(_earlier(piece, PERIOD * (order * j % n) / n) for piece in pieces)
         for j in range(n)

@@ -28,6 +28,7 @@ more from no motion, and says so if it finds one, but no more than that.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -239,31 +240,27 @@ class _Fits:
         return not bool(np.any(given.size(forces + change) + between >= limit))
 
 
-def _sector_turns(model: LinearModel) -> Complex:
-    """Return e^{jθ} of every nodal diameter, (sectors,)."""
-    return np.asarray(np.exp(2j * np.pi * np.arange(model.sectors) / model.sectors))
-
-
-def _at_turn(model: LinearModel, turn: complex) -> tuple[Complex, Complex]:
-    """Return K and L at the interblade phase factor `turn`."""
-    return (
-        np.asarray(model.K0 + model.Kp * turn + model.Kp.T / turn),
-        np.asarray(model.contact_here + model.contact_next * turn),
-    )
+def _of_diameters(model: LinearModel) -> Iterator[tuple[Complex, Complex, Complex]]:
+    """Yield K, C and L at every nodal diameter."""
+    for n in range(model.sectors):
+        K, C, _ = (each[0] for each in model.at(np.array([n])))
+        turn = np.exp(2j * np.pi * n / model.sectors)
+        yield K, C, np.asarray(model.contact_here + model.contact_next * turn)
 
 
 def _compliances(model: LinearModel, stiffness: Real, ports: list[slice]) -> list[tuple[float, float]] | None:
     """Return L K_s⁻¹ Lᵀ of slip and approach of each contact [m/N].
 
-    None where nothing holds a part, or where damping gives power, so that distances may grow.
+    None where nothing holds a part, a nodal diameter is not known, or damping gives power, so that distances
+    may grow.
 
     Of two directions the larger one stands for both: it is the largest eigenvalue. In an annulus it is the
     average over its nodal diameters.
     """
     total = np.zeros((stiffness.size, stiffness.size), dtype=np.complex128)
-    for turn in _sector_turns(model):
-        K, L = _at_turn(model, turn)
-        C = model.C0 + model.Cp * turn + model.Cp.T / turn
+    if not model.every_diameter:
+        return None
+    for K, C, L in _of_diameters(model):
         if np.linalg.eigvalsh(C)[0] < -_ROUNDING * np.abs(C).max():
             return None
         held = K + L.conj().T @ (stiffness[:, None] * L)
@@ -338,13 +335,15 @@ def _mean_range(solution: Solution, sticking: tuple[_Contact, ...]) -> tuple[flo
 
 
 def _mean_gains(model: LinearModel) -> Real | None:
-    """Return observe K⁻¹ Lᵀ of contacts of each sector [m/N], (sectors, n_ports); None if it is singular.
+    """Return observe K⁻¹ Lᵀ of contacts of each sector [m/N], (sectors, n_ports); None if it is singular or
+    not known at every nodal diameter.
 
     What rounding leaves of the stiffness against a rigid-body motion is none.
     """
     rows = []
-    for turn in _sector_turns(model):
-        K, L = _at_turn(model, turn)
+    if not model.every_diameter:
+        return None
+    for K, _, L in _of_diameters(model):
         if least_stiffness(K) <= CANCELLED:
             return None
         rows.append(model.observe @ np.linalg.solve(K, L.conj().T))

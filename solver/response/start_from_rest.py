@@ -57,8 +57,10 @@ class Start:
         """Return the energy of displacements and velocities (sectors, n) [J]."""
         beyond = np.roll(x, -1, axis=0)
         u = x @ self.model.contact_here.T + beyond @ self.model.contact_next.T
-        kinetic = np.sum(v * (v @ self.model.M))
-        elastic = np.sum(x * (x @ self.model.K0)) + 2.0 * np.sum(x * (beyond @ self.model.Kp.T))
+        K, _, M = self.model.at(np.arange(len(x)))
+        xs, vs = np.fft.fft(x, axis=0), np.fft.fft(v, axis=0)
+        kinetic = np.einsum("si,sij,sj->", vs.conj(), M, vs).real / len(x)
+        elastic = np.einsum("si,sij,sj->", xs.conj(), K, xs).real / len(x)
         return 0.5 * float(kinetic + elastic + np.sum(self.stiffness * u**2))
 
 
@@ -86,10 +88,9 @@ class _Transient:
         turns = np.exp(2j * np.pi * np.arange(len(start.x)) / len(start.x))[:, None, None]
         model, omega = start.model, start.omega
         L = model.contact_here + model.contact_next * turns
-        K = model.K0 + model.Kp * turns + model.Kp.T / turns
+        K, C, M = model.at(np.arange(len(start.x)))
         K = K + np.swapaxes(L.conj(), 1, 2) @ (start.stiffness[:, None] * L)
-        C = model.C0 + model.Cp * turns + model.Cp.T / turns
-        inverse, n = np.linalg.inv(model.M), start.x.shape[1]
+        inverse, n = np.linalg.inv(M), start.x.shape[1]
         generator = np.zeros((len(turns), 2 * n, 2 * n), np.complex128)
         generator[:, :n, n:] = np.eye(n)
         generator[:, n:, :n], generator[:, n:, n:] = -inverse @ K / omega**2, -inverse @ C / omega

@@ -87,6 +87,7 @@ def coordinates(solution: Solution, k: int) -> Complex:
     _check_converged(solution)
     model = linear_model(solution.scene)
     K, C, L = matrices(model, k)
+    M = mass(model, k)
     force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]
     forces = [fourier.to_complex(force)[k] for c in solution.contacts for force in c.forces]
     friction = np.array(forces, dtype=np.complex128)
@@ -95,7 +96,7 @@ def coordinates(solution: Solution, k: int) -> Complex:
         friction = friction - kt * np.array([motion[0] for c in solution.contacts for motion in c.motions])
         K = K + L.conj().T @ (kt[:, None] * L)
     speed = 2.0 * math.pi * solution.frequency_hz * k
-    dynamic = K - speed**2 * model.M + 1j * speed * C
+    dynamic = K - speed**2 * M + 1j * speed * C
     return np.asarray(np.linalg.solve(dynamic, force - L.conj().T @ friction), dtype=np.complex128)
 
 
@@ -105,8 +106,8 @@ def all_coordinates(solution: Solution) -> Complex:
     model = linear_model(solution.scene)
     ks = np.arange(solution.highest_harmonic + 1)
     turns = np.exp(1j * ks * model.interblade_phase)[:, None, None]
-    K = model.K0 + model.Kp * turns + model.Kp.T / turns
-    C = model.C0 + model.Cp * turns + model.Cp.T / turns
+    K, C, M = model.at(ks * model.engine_order)
+    K = K.astype(np.complex128)
     L = model.contact_here + model.contact_next * turns
     forces = [fourier.to_complex(force) for c in solution.contacts for force in c.forces]
     friction = np.array(forces, dtype=np.complex128).reshape(-1, ks.size).T
@@ -116,17 +117,19 @@ def all_coordinates(solution: Solution) -> Complex:
         K[0] += L[0].conj().T @ (kt[:, None] * L[0])
     speed = (2.0 * math.pi * solution.frequency_hz * ks)[:, None, None]
     pushes = force_amplitudes(model, ks) - np.einsum("kpn,kp->kn", L.conj(), friction)
-    return np.asarray(np.linalg.solve(K - speed**2 * model.M + 1j * speed * C, pushes[:, :, None])[:, :, 0])
+    return np.asarray(np.linalg.solve(K - speed**2 * M + 1j * speed * C, pushes[:, :, None])[:, :, 0])
 
 
 def matrices(model: LinearModel, k: int) -> tuple[Complex, Complex, Complex]:
     """Return K [N/m], C [N s/m] and the contact rows L as harmonic k sees them (its interblade phase)."""
+    K, C, _ = model.at(np.array([k * model.engine_order]))
     turn = np.exp(1j * k * model.interblade_phase)
-    return (
-        model.K0 + model.Kp * turn + model.Kp.T / turn,
-        model.C0 + model.Cp * turn + model.Cp.T / turn,
-        model.contact_here + model.contact_next * turn,
-    )
+    return K[0], C[0], model.contact_here + model.contact_next * turn
+
+
+def mass(model: LinearModel, k: int) -> Complex:
+    """Return M [kg] as harmonic k sees it."""
+    return np.asarray(model.at(np.array([k * model.engine_order]))[2][0])
 
 
 def _check_converged(solution: Solution) -> None:

@@ -22,7 +22,7 @@ from solver.linear.kernels.receptance import receptance
 from solver.results.base import Shown
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import sectors_needed
-from solver.scene.parts import CyclicStructure, MatricesStructure
+from solver.scene.parts import MatricesStructure
 from solver.scene.scene import (
     AnyContact,
     Scene,
@@ -189,7 +189,7 @@ def _reduction(scene: Scene) -> tuple[Effect, ...]:
 
 def _one_sector(scene: Scene, asked: Effects) -> Effect:
     extent = sectors_needed(scene)
-    cyclic = isinstance(scene.structure, CyclicStructure)
+    cyclic = scene.structure.has_sectors
     forced = cyclic and extent.sectors == 1 and asked.every_sector
     return Effect(
         name="one sector for the annulus",
