@@ -15,6 +15,7 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 from solver.matrices.values import MOST_MODES
 
 FloatArray = NDArray[np.float64]
+Array = NDArray[Any]  # real, or complex where the matrices are Hermitian
 DENSE = 600  # rows below which all modes are found at once
 FREE = (
     "with the DOFs named in `dofs` held, the rest of the structure can still move freely {how}: name DOFs "
@@ -47,10 +48,10 @@ class Interior:
 
     K: Any
     M: Any
-    couplings: dict[str, FloatArray]
+    couplings: dict[str, Array]
     shift: float
     solve: Any
-    follow: FloatArray
+    follow: Array
     residual: float
 
 
@@ -64,7 +65,7 @@ def interior(K: Any, M: Any, rest: NDArray[np.int64], kept: NDArray[np.int64]) -
     """
     inner, mass = _block(K, rest, rest), _block(M, rest, rest)
     couplings = {"K": _block(K, rest, kept).toarray(), "M": _block(M, rest, kept).toarray()}
-    stiffness, inertia = inner.diagonal(), mass.diagonal()
+    stiffness, inertia = inner.diagonal().real, mass.diagonal().real
     empty = np.flatnonzero((stiffness == 0.0) & (np.diff(inner.indptr) == 0))
     if empty.size:
         how = f"in {empty.size} rows without any stiffness, the first of them row {rest[empty[0]]}"
@@ -83,7 +84,7 @@ def _block(matrix: Any, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> 
     return csc_array(matrix[rows][:, columns])
 
 
-def _factorised(K: Any, M: Any, couplings: dict[str, FloatArray], shift: float) -> Interior | None:
+def _factorised(K: Any, M: Any, couplings: dict[str, Array], shift: float) -> Interior | None:
     """K − σ M factorised; None if it is singular to working accuracy."""
     matrix = csc_array(K - shift * M) if shift else K
     try:
@@ -106,15 +107,15 @@ def _factorised(K: Any, M: Any, couplings: dict[str, FloatArray], shift: float) 
 
 def _lowest_estimate(rest: Interior) -> float:
     """About the lowest ω² of the rest, by two steps of inverse iteration."""
-    shape = np.linspace(1.0, 2.0, rest.K.shape[0])
+    shape = np.linspace(1.0, 2.0, rest.K.shape[0]).astype(rest.K.dtype)
     for _ in range(2):
         shape = rest.solve(rest.M @ shape)
         shape /= np.abs(shape).max(initial=1e-300)
-    inertia = float(shape @ (rest.M @ shape))
-    return float(shape @ (rest.K @ shape)) / inertia if inertia > 0.0 else np.inf
+    inertia = float(np.vdot(shape, rest.M @ shape).real)
+    return float(np.vdot(shape, rest.K @ shape).real) / inertia if inertia > 0.0 else np.inf
 
 
-def held_modes(rest: Interior, count: int | None, up_to_hz: float | None) -> tuple[FloatArray, FloatArray]:
+def held_modes(rest: Interior, count: int | None, up_to_hz: float | None) -> tuple[FloatArray, Array]:
     """The lowest modes of the rest with the DOFs in use held.
 
     Parameters
@@ -153,15 +154,15 @@ def held_modes(rest: Interior, count: int | None, up_to_hz: float | None) -> tup
     return values[:kept], modes[:, :kept]
 
 
-def _lowest(rest: Interior, count: int) -> tuple[FloatArray, FloatArray]:
+def _lowest(rest: Interior, count: int) -> tuple[FloatArray, Array]:
     n = rest.K.shape[0]
     if not count:
         return np.zeros(0), np.zeros((n, 0))
     if n <= DENSE or count > n // 2:
         values, modes = linalg.eigh(rest.K.toarray(), rest.M.toarray(), subset_by_index=(0, count - 1))
         return values, modes
-    inverse = LinearOperator((n, n), matvec=rest.solve, dtype=np.float64)
-    start = np.linspace(1.0, 2.0, n)  # fixed, so that the same files give the same scene
+    inverse = LinearOperator((n, n), matvec=rest.solve, dtype=rest.K.dtype)
+    start = np.linspace(1.0, 2.0, n).astype(rest.K.dtype)  # fixed, so that the same files give the same scene
     try:
         values, modes = eigsh(rest.K, k=count, M=rest.M, sigma=rest.shift, OPinv=inverse, v0=start)
     except (ArpackError, RuntimeError) as error:

@@ -149,7 +149,7 @@ def _end_issues(
         elif end.next and row.get("normal") is not None and not _has_axis(structure):
             message = (
                 f"`between`: {text!r} lies in the next sector, which is turned: "
-                "give the direction of the axis as `axis` of the structure (by matrices: of [structure.cyclic])"
+                "give the direction of the axis as `axis` of the structure (matrices: of [structure.cyclic])"
             )
             yield Issue(pointer=pointer, message=message)
 
