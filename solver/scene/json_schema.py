@@ -19,8 +19,8 @@ from solver.contacts.laws.registry import laws
 from solver.matrices.load_set import UNITS
 from solver.scene import matrices_structure as matrices_part
 from solver.scene import parts as scene_parts
-from solver.scene.bodies.body import body as scene_bodies
-from solver.scene.bodies.body import shapes as scene_shapes
+from solver.scene.bodies import body as scene_bodies
+from solver.scene.bodies import shapes as scene_shapes
 from solver.scene.bodies.validation import further_ends
 from solver.scene.descriptions import EXAMPLES, WORDS
 from solver.scene.scene import Scene

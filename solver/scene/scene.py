@@ -25,7 +25,8 @@ from solver.contacts.laws.polynomial import PolynomialSpring
 from solver.contacts.laws.registry import on_change
 from solver.errors import Issue, SceneError
 from solver.scene import parameter_paths as scene_paths
-from solver.scene.bodies.body import Body, Load, Node, kinematics
+from solver.scene.bodies import kinematics
+from solver.scene.bodies.body import Body, Load, Node
 from solver.scene.bodies.kinematics import Form
 from solver.scene.bodies.shape_parts import own_parts, with_shapes
 from solver.scene.bodies.shapes import AnyShape

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,10 +13,13 @@ from scipy import linalg
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
+from solver.matrices.reduction.block_lanczos import lowest_modes
+from solver.matrices.reduction.ordering import nested_dissection
 from solver.matrices.values import MOST_MODES
 
 FloatArray = NDArray[np.float64]
 Array = NDArray[Any]  # real, or complex where the matrices are Hermitian
+LARGE = 20_000  # rows above which an order by nested dissection and solutions in blocks cost less
 DENSE = 600  # rows below which all modes are found at once
 FREE = (
     "with the DOFs named in `dofs` held, the rest of the structure can still move freely {how}: name DOFs "
@@ -88,21 +92,28 @@ def _factorised(K: Any, M: Any, couplings: dict[str, Array], shift: float) -> In
     """K − σ M factorised; None if it is singular to working accuracy."""
     matrix = csc_array(K - shift * M) if shift else K
     try:
-        # Symmetric matrices: pivots from the diagonal, ordered for little fill.
-        factor = splu(
-            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=1e-3, options={"SymmetricMode": True}
-        )
+        solve = _factor(matrix)
     except RuntimeError:
         return None
     force = couplings["K"] - shift * couplings["M"]
-    follow = -factor.solve(force)
+    follow = -solve(force)
     size = np.abs(force).max(initial=0.0)
     residual = float(np.abs(matrix @ follow + force).max(initial=0.0) / size) if size else 0.0
     if not np.isfinite(follow).all() or np.abs(follow).max(initial=0.0) > _FAR:
         return None
-    return Interior(
-        K=K, M=M, couplings=couplings, shift=shift, solve=factor.solve, follow=follow, residual=residual
-    )
+    return Interior(K=K, M=M, couplings=couplings, shift=shift, solve=solve, follow=follow, residual=residual)
+
+
+def _factor(matrix: Any) -> Callable[[Array], Array]:
+    """The inverse of a symmetric or Hermitian matrix: pivots from the diagonal, ordered for little fill."""
+    symmetric = {"diag_pivot_thresh": 1e-3, "options": {"SymmetricMode": True}}
+    if matrix.shape[0] < LARGE:
+        direct: Callable[[Array], Array] = splu(matrix, permc_spec="MMD_AT_PLUS_A", **symmetric).solve
+        return direct
+    order = nested_dissection(matrix)
+    back = np.argsort(order)
+    factor = splu(csc_array(matrix[order][:, order]), permc_spec="NATURAL", **symmetric)
+    return lambda forces: factor.solve(forces[order])[back]
 
 
 def _lowest_estimate(rest: Interior) -> float:
@@ -161,6 +172,8 @@ def _lowest(rest: Interior, count: int) -> tuple[FloatArray, Array]:
     if n <= DENSE or count > n // 2:
         values, modes = linalg.eigh(rest.K.toarray(), rest.M.toarray(), subset_by_index=(0, count - 1))
         return values, modes
+    if np.iscomplexobj(rest.K) or n >= LARGE:
+        return lowest_modes(rest.M, rest.solve, rest.shift, count, np.result_type(rest.K.dtype, np.float64))
     inverse = LinearOperator((n, n), matvec=rest.solve, dtype=rest.K.dtype)
     start = np.linspace(1.0, 2.0, n).astype(rest.K.dtype)  # fixed, so that the same files give the same scene
     try:

@@ -58,9 +58,7 @@ class Quality:
         return np.asarray(self.effective_mass.sum(axis=0))
 
 
-def measured(
-    held: Interior, values: FloatArray, modes: Array, matrices: dict[str, Array]
-) -> Quality:
+def measured(held: Interior, values: FloatArray, modes: Array, matrices: dict[str, Array]) -> Quality:
     """Measure a reduction.
 
     A mode (λ, y) of the reduced model, ψ = T y in the full one, leaves the forces r = K ψ − λ M ψ on the
