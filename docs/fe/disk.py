@@ -1,11 +1,11 @@
-"""A sector of a bladed disk as CalculiX reads it: a rim, a blade, and a shroud that touches its neighbours.
+"""A sector of a bladed disk as CalculiX reads it: disk, blade, and a shroud that touches its neighbours.
 
 Bricks of 20 nodes on a grid in cylindrical coordinates, of which those outside the part are taken away; units
 are m, kg, N, s. Into the folder it is run in it writes
 
-- sector.inp, the mesh with its sets: LOW and HIGH, the boundaries of the rim to the sectors before and behind,
-  and FOOT, the inner radius of the rim, which is held;
-- matrices.inp, the analysis that stores stiffness and mass: `ccx matrices`;
+- sector.inp, the mesh with its sets: LOW and HIGH, the boundaries of the disk to the sectors before and
+  behind, and FOOT, its inner radius, which is held;
+- matrices.inp, which stores stiffness and mass: `ccx matrices`;
 - cyclic.inp, CalculiX's own analysis of the disk, for a comparison: `ccx cyclic`.
 """
 
@@ -20,11 +20,10 @@ import numpy as np
 SECTORS = 24
 PITCH = 2.0 * math.pi / SECTORS
 # Radius [m], angle from the middle of the blade as a share of the pitch, and height [m] of the grid.
-RADII = np.array([0.18, 0.195, 0.21, 0.23, 0.25, 0.27, 0.29, 0.31, 0.315])
+RADII = np.array([0.09, 0.13, 0.17, 0.20, 0.225, 0.25, 0.275, 0.30, 0.305])
 ANGLES = PITCH * np.array([-0.5, -0.25, -0.04, 0.04, 0.25, 0.5])
-HEIGHTS = np.array([0.0, 0.015, 0.03])
-RIM, TIP = 0.21, 0.31  # m, where the rim ends and where the shroud begins
-FACES = (4.0e-6, "steel")
+HEIGHTS = np.array([0.0, 0.01, 0.02])
+RIM, TIP = 0.20, 0.30  # m, where the disk ends and where the shroud begins
 # Corners of a brick, then the middles of its edges, in the order of C3D20.
 CORNERS = [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)]
 MIDDLES = [(1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)]
@@ -94,17 +93,13 @@ def main() -> None:
         f"*SELECT CYCLIC SYMMETRY MODES, NMIN=0, NMAX={SECTORS // 2}\n*END STEP\n"
     )
     print(f"{len(elements)} bricks, {len(places)} nodes, {3 * (len(places) - len(sets['FOOT']))} rows")
-    top, middle, end = 2 * RADII.size - 2, z.size // 2, angle.size - 1
-    for name, place in {
-        "tip": (top, angle.size // 2, middle),
-        "shroud behind": (top - 1, 0, middle),
-        "shroud ahead": (top - 1, end, middle),
-    }.items():
-        node = number[place] if place in number else number[(place[0], place[1], place[2] - 1)]
-        i, j, k = places[node - 1]
-        print(
-            f"{name:14} node {node} at {r[i] * math.cos(angle[j]):.5f}, {r[i] * math.sin(angle[j]):.5f}, {z[k]:.5f} m"
-        )
+    tip, end, top = 2 * RADII.size - 2, angle.size - 1, z.size - 1
+    named = {"tip": (tip, angle.size // 2, 2)}
+    named |= {"ahead": (tip - 2, end, 0), "ahead above": (tip - 2, end, top)}
+    named |= {"behind": (tip - 2, 0, 0), "behind above": (tip - 2, 0, top)}
+    for name, (i, j, k) in named.items():
+        x, y = r[i] * math.cos(angle[j]), r[i] * math.sin(angle[j])
+        print(f"{name:12} node {number[i, j, k]} at {x:.5f}, {y:.5f}, {z[k]:.5f} m")
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from solver.errors import pointer as json_pointer
 from solver.scene.bodies.body import Body, Load, Node, body_dofs
 from solver.scene.bodies.shapes import SHAPES, WITH_BODY
 from solver.scene.contacts import LAW_TAG
+from solver.scene.cyclic.boundary import is_cyclic
 from solver.scene.parts import (
     KINDS,
     CyclicBoundary,
@@ -225,13 +226,6 @@ def cross_issues(raw: dict[str, Any]) -> list[Issue]:
 
 
 _Known = dict[str, None]
-
-
-def is_cyclic(structure: dict[str, Any]) -> bool:
-    """Whether a table [structure] is one sector of a disk."""
-    return structure.get("kind") == "cyclic" or (
-        structure.get("kind") == "matrices" and structure.get("sectors") is not None
-    )
 
 
 def dofs_of(raw: dict[str, Any]) -> _Known | None:

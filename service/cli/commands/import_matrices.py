@@ -20,6 +20,7 @@ from service.cli.importing.sector import (
     WrittenSector,
     checked_boundaries,
     disk,
+    found_by_position,
     reduce_disk,
     sector_file,
 )
@@ -139,8 +140,8 @@ Tolerance = Annotated[
 EngineOrder = Annotated[
     int | None,
     typer.Option(
-        "--engine-order", metavar="E", parser=whole_number, help="Of the force; 1 if left out. With --reduce the nodal "
-        "diameters that its harmonics meet are built.",
+        "--engine-order", metavar="E", parser=whole_number,
+        help="Of the force; 1 if left out. --reduce builds the nodal diameters that its harmonics meet.",
     ),
 ]  # fmt: skip
 
@@ -190,8 +191,8 @@ def import_scene(
     """Make a scene of matrices or modes in files.
 
     The files are read and checked first. The scene refers to them or, with --reduce, to the reduced model,
-    which is written beside it. Contacts are then added by hand: a template stands in the scene. With --sectors
-    the matrices are of one sector of a disk, reduced at every nodal diameter that the engine order meets.
+    which is written beside it. Contacts are then added by hand: a template stands in the scene. With
+    --sectors the matrices are of one sector of a disk, reduced at every nodal diameter that is met.
     """
     target = output_path("--out", out, (".toml",))
     if target is None or target.exists():
@@ -206,16 +207,10 @@ def import_scene(
     table = dof_table(dofs, found, given)
     with ExitStack() as undo:
         structure, written = found.table(target), None
-        if reduce_once and of is not None:
-            path = sector_file(reduced, target)
+        if reduce_once:
+            path = reduced_file(reduced, target) if of is None else sector_file(reduced, target)
             undo.callback(path.unlink, missing_ok=True)
-            written = _reduced_sector(given, table, modes, up_to, of, path)
-            structure = written.table(target)
-            table = dict(written.rows)
-        elif reduce_once:
-            path = reduced_file(reduced, target)
-            undo.callback(path.unlink, missing_ok=True)
-            written = _reduced(given, table, modes, up_to, path)
+            written = _reduced(given, table, modes, up_to, path, of)
             structure = written.table(target)
             table = dict(written.rows)
         else:
@@ -231,7 +226,9 @@ def import_scene(
         frequencies = [math.sqrt(max(float(value), 0.0)) / (2.0 * math.pi) for value in omega2]
         scene = _write(target, raw.table(band(start, stop, frequencies)), found, written)
         undo.pop_all()
-    _report(scene, target, frequencies, written, given, _notes(given, omega2), as_json)
+    _report(
+        scene, target, frequencies, written, given, [*_notes(given, omega2), *found_by_position(of)], as_json
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -255,22 +252,16 @@ class _Parts:
 
 
 def _reduced(
-    given: MatrixSet | None, table: dict[str, int | str], modes: int | None, up_to: float | None, path: Path
-) -> Written:
+    given: MatrixSet | None, table: dict[str, int | str], modes: int | None, up_to: float | None, path: Path,
+    of: Disk | None,
+) -> Written | WrittenSector:  # fmt: skip
     if given is None:
         raise InputError("`--reduce` is for matrices; modes are reduced already")
-    return reduce(given, rows_of(table, given), modes, up_to, path)
-
-
-def _reduced_sector(
-    given: MatrixSet | None, table: dict[str, int | str], modes: int | None, up_to: float | None, of: Disk,
-    path: Path,
-) -> WrittenSector:  # fmt: skip
-    if given is None:
-        raise InputError("`--sectors` is for matrices, not for modes")
-    if up_to is not None:
+    if of is not None and up_to is not None:
         raise InputError("`--up-to` is not for a sector: give --modes N, as many at each nodal diameter")
-    return reduce_disk(given, rows_of(table, given), modes, of, path)
+    if of is not None:
+        return reduce_disk(given, rows_of(table, given), modes, of, path)
+    return reduce(given, rows_of(table, given), modes, up_to, path)
 
 
 def _joined(given: MatrixSet | None, of: Disk, target: Path, kept: dict[str, int]) -> dict[str, object]:

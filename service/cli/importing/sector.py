@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -148,7 +149,11 @@ class WrittenSector:
                 {
                     "diameter": n, "frequencies_hz": quality.system_hz[:10].tolist(),
                     "good_to_hz": quality.good_to_hz, "static_residual": quality.static_residual,
-                    "relative_errors": quality.system_error[:10].tolist(), "seconds": seconds,
+                    "relative_errors": [
+                        error if math.isfinite(error) else None
+                        for error in quality.system_error[:10].tolist()
+                    ],
+                    "seconds": seconds,
                 }
                 for n, quality, seconds in zip(
                     found.matrices.diameters, found.quality, found.seconds, strict=True
@@ -161,7 +166,7 @@ class WrittenSector:
         found = self.reduced
         told = [
             ("reduced", f"{self.full} rows to {len(self.rows)} DOFs and {found.modes} modes at each of "
-                        f"{len(found.quality)} nodal diameters in {self.seconds:.1f} s, written to {self.path}"),
+                        f"{len(found.quality)} nodal diameters in {self.seconds:.1f} s, in {self.path}"),
             ("boundary", f"{self.pairs_of_rows} rows of the high boundary follow the low one"),
             ("good to", f"{found.good_to_hz:.5g} Hz: frequencies up to there are estimated 0.1 % exact at "
                         "every nodal diameter; harmonics that matter should lie below"),
@@ -222,6 +227,16 @@ def checked_boundaries(given: MatrixSet, of: Disk) -> Any:
         raise InputError(
             f"`--{issue.pointer.rpartition('/')[2].replace('_', '-')}`: {issue.message}"
         ) from error
+
+
+def found_by_position(of: Disk | None) -> list[str]:
+    """What to know of boundaries that were not named."""
+    if of is None or of.low is not None:
+        return []
+    return [
+        "the boundaries were found by position: faces that only touch the next sector, as of shrouds, lie "
+        "there too and are joined with it; where there are any, name the sets with --low and --high"
+    ]
 
 
 def sector_file(text: str | None, target: Path) -> Path:

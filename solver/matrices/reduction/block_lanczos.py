@@ -18,6 +18,7 @@ Array = NDArray[Any]
 BLOCK = 8
 RESIDUAL = 1e-9  # of a Ritz vector, relative to its eigenvalue: the eigenvalue is exact to its square
 _MOST = 12  # blocks for each wanted one
+_LEFT = 1e-22  # squared length of what is new in a block, relative to the block, that is rounding
 _DEPENDENT = 1e-12  # squared length of a direction, relative to the longest of a block, that is rounding
 
 
@@ -76,11 +77,14 @@ def lowest_modes(
 
 def _orthonormal(block: Array, M: Any, against: list[tuple[Array, Array]]) -> Array:
     """Return an M-orthonormal basis of what of a block is M-orthogonal to others, given with M times them."""
+    given = float(np.abs(np.einsum("ij,ij->j", block.conj(), M @ block)).max(initial=0.0))
     for _ in range(2):
         for vectors, weighted in against:
             block = block - vectors @ (weighted.conj().T @ block)
         gram = block.conj().T @ (M @ block)
         sizes, turned = np.linalg.eigh(0.5 * (gram + gram.conj().T))
-        kept = sizes > _DEPENDENT * max(float(sizes[-1]), 1e-300)
-        block = block @ (turned[:, kept] / np.sqrt(sizes[kept]))
+        kept = sizes > max(_DEPENDENT * float(sizes[-1]), _LEFT * given)
+        block, given = block @ (turned[:, kept] / np.sqrt(sizes[kept])), 1.0
+        if not kept.any():
+            break
     return np.asarray(block)

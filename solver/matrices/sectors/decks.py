@@ -1,8 +1,8 @@
 """Positions and sets of nodes from the input deck of a finite-element program.
 
-CalculiX and Abaqus: ``*NODE`` with numbers and coordinates, ``*NSET`` with ``GENERATE``, ``*INCLUDE``; node sets
-of ``*NODE, NSET=``. Ansys (``CDWRITE``): ``NBLOCK`` and ``CMBLOCK``. Nastran: ``GRID`` in the basic coordinate
-system, which has no sets.
+CalculiX and Abaqus: ``*NODE`` with numbers and coordinates, ``*NSET`` with ``GENERATE``, ``*INCLUDE``; node
+sets of ``*NODE, NSET=``. Ansys (``CDWRITE``): ``NBLOCK`` and ``CMBLOCK``. Nastran: ``GRID`` in the basic
+coordinate system, which has no sets.
 """
 
 from __future__ import annotations
@@ -166,7 +166,7 @@ def _cmblock(lines: list[str], at: int, deck: Deck) -> int:
     if form is None:
         raise FormatError(f"line {at + 2} must hold the format of CMBLOCK, such as (8i10)")
     width, count = int(form.group(2)), int(parts[3])
-    at, found = at + 2, []
+    at, found = at + 2, list[int]()
     while len(found) < count and at < len(lines):
         line = lines[at].rstrip()
         found += [int(line[i : i + width]) for i in range(0, len(line), width)]

@@ -155,7 +155,7 @@ def as_sector(tables: dict[str, Any], found: MatrixSet, folder: Path, orders: li
     except ValueError as error:
         raise SceneError([Issue(pointer="/structure/dofs", message=str(error))]) from error
     return {
-        **tables,
+        **{key: value for key, value in tables.items() if key not in matrices},
         "diameters": reduced.matrices,
         "dofs": reduced.rows,
         "cyclic": {**kept, "axis": list(ends.axis)},
@@ -167,11 +167,11 @@ def as_sector(tables: dict[str, Any], found: MatrixSet, folder: Path, orders: li
 
 def _from_file(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
     try:
-        matrices, _, _ = read_diameters(folder / tables["diameters"])
+        matrices, was = read_diameters(folder / tables["diameters"])
     except MatrixFileError as error:
         message = f"`diameters`: {error}"
         raise SceneError([Issue(pointer="/structure/diameters", message=message)]) from error
-    return {**tables, "diameters": matrices}
+    return {**tables, "diameters": matrices, "reduction": was}
 
 
 def _dense(found: MatrixSet) -> dict[str, Matrix]:
@@ -179,8 +179,8 @@ def _dense(found: MatrixSet) -> dict[str, Matrix]:
         if matrix.shape[0] > MOST_DOFS:
             message = (
                 f"`{key}` has {matrix.shape[0]} rows, {MOST_DOFS} are the most without reduction: `stickslip "
-                "import --sectors … --reduce` reduces them once; `keep_modes` = 40 (say) in [structure.cyclic] "
-                "does it whenever the scene is loaded"
+                "import --sectors … --reduce` reduces them once; `keep_modes` = 40 (say) in "
+                "[structure.cyclic] does it whenever the scene is loaded"
             )
             raise SceneError([Issue(pointer=f"/structure/{key}", message=message)])
     return {key: Matrix(matrix.toarray()) for key, matrix in found.matrices.items()}

@@ -81,8 +81,8 @@ def _near(points: NDArray[np.float64]) -> float:
 def _check_found(pairs: Pairs, sectors: int) -> None:
     if not pairs:
         raise ValueError(
-            f"no node lies where another one comes by a turn of 1/{sectors}: name the boundaries with `low` and "
-            "`high`, check `axis` and `sectors`, or give a `tolerance`"
+            f"no node lies where another one comes by a turn of 1/{sectors}: name the boundaries with `low` "
+            "and `high`, check `axis` and `sectors`, or give a `tolerance`"
         )
     both = {one for one, _ in pairs} & {other for _, other in pairs}
     if both:

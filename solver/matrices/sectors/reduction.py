@@ -1,8 +1,7 @@
-"""A full sector reduced onto its DOFs in use, nodal diameter by nodal diameter; and the file of the result."""
+"""A full sector reduced onto its DOFs in use, one nodal diameter after the other; and the file of it."""
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -31,6 +30,8 @@ class ReducedSector:
         The DOFs in use first, then the modes of the rest.
     rows : dict
         Row of each DOF in use.
+    full : int
+        Rows of the full sector.
     modes : int
         Modes kept at each nodal diameter.
     highest_hz : float
@@ -43,6 +44,7 @@ class ReducedSector:
 
     matrices: DiameterMatrices
     rows: dict[str, int]
+    full: int
     modes: int
     highest_hz: float
     quality: tuple[Quality, ...]
@@ -55,7 +57,7 @@ class ReducedSector:
 
 
 def diameters_met(orders: Sequence[int], sectors: int) -> tuple[int, ...]:
-    """Nodal diameters that harmonics of these engine orders meet: their multiples, from 0 to half the sectors."""
+    """Nodal diameters from 0 to half the sectors that harmonics of these engine orders meet: multiples."""
     met = {order * k % sectors for order in orders for k in range(sectors)}
     return tuple(sorted({min(n, sectors - n) for n in met}))
 
@@ -98,13 +100,14 @@ def reduce_sector(
     if len({each.modes for each in found}) > 1:
         most = max(each.modes for each in found)
         raise ValueError(
-            f"`keep_modes` = {keep_modes} is too few: a nodal diameter has {most} with its rigid-body modes; ask "
-            "for that many"
+            f"`keep_modes` = {keep_modes} is too few: a nodal diameter has {most} with its rigid-body modes; "
+            "ask for that many"
         )
     stacks = {key: np.array([each.matrices[key] for each in found]) for key in circulants}
     return ReducedSector(
         matrices=DiameterMatrices(diameters=tuple(diameters), **stacks),
         rows={name: row for row, name in enumerate(own)},
+        full=int(eliminated.here.shape[0]),
         modes=found[0].modes,
         highest_hz=min(each.highest_hz for each in found),
         quality=tuple(each.quality for each in found),
@@ -121,8 +124,8 @@ def _kept_rows(dofs: Mapping[str, int], eliminated: Elimination) -> DofTable:
         place = eliminated.row(row)
         if place >= eliminated.kept.size or eliminated.kept[place] != row:
             raise ValueError(
-                f"`dofs`: {name!r} is on the high boundary: name the DOF of the low boundary that it is paired "
-                "with; in contacts it is NAME@next"
+                f"`dofs`: {name!r} is on the high boundary: name the DOF of the low boundary that it is "
+                "paired with; in contacts it is NAME@next"
             )
         table[name] = place
     return DofTable.read(table)
@@ -145,13 +148,14 @@ def write_diameters(path: Path, reduced: ReducedSector) -> None:
         **arrays,
         diameters=np.array(found.diameters, np.int64),
         names=np.array(names),
+        full=np.array(reduced.full),
         good_to_hz=np.array([quality.good_to_hz for quality in reduced.quality]),
         held_hz=np.array([quality.held_hz for quality in reduced.quality]),
     )
 
 
-def read_diameters(path: Path) -> tuple[DiameterMatrices, int, float]:
-    """Read a reduced sector, its number of modes and the least frequency of the highest of them [Hz].
+def read_diameters(path: Path) -> tuple[DiameterMatrices, dict[str, Any]]:
+    """Read a reduced sector, and what it was: `dofs` of the full one, `modes` kept and `highest_hz`.
 
     Raises
     ------
@@ -173,4 +177,5 @@ def read_diameters(path: Path) -> tuple[DiameterMatrices, int, float]:
         reason = f"has no array {error}" if isinstance(error, KeyError) else f"is no reduced sector: {error}"
         raise MatrixFileError(f"{str(path)!r} {reason}") from error
     highest = float(held[:, -1].min()) if held.size else 0.0
-    return matrices, int(held.shape[1]), highest if math.isfinite(highest) else 0.0
+    full = int(arrays.get("full", matrices.size))
+    return matrices, {"dofs": full, "modes": int(held.shape[1]), "highest_hz": highest}

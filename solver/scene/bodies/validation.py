@@ -10,6 +10,7 @@ from solver.contacts.fields import GROUND, parse_end
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.errors import Issue
 from solver.scene.bodies.shapes import WITH_BODY
+from solver.scene.cyclic.boundary import is_cyclic
 from solver.scene.validation import (
     MOST_ISSUES,
     RESERVED_PREFIXES,
@@ -17,7 +18,6 @@ from solver.scene.validation import (
     dofs_of,
     duplicates,
     in_space,
-    is_cyclic,
     listing,
     nearest,
     pointer_of,

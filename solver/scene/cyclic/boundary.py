@@ -35,3 +35,10 @@ class CyclicBoundary(Part):
         if not isinstance(data, list | tuple):
             return data
         return [[row] if isinstance(row, int) and not isinstance(row, bool) else row for row in data]
+
+
+def is_cyclic(structure: dict[str, Any]) -> bool:
+    """Whether a table [structure] is one sector of a disk."""
+    return structure.get("kind") == "cyclic" or (
+        structure.get("kind") == "matrices" and structure.get("sectors") is not None
+    )
