@@ -55,12 +55,14 @@ def craig_bampton(
     keep_modes: int | None,
     *,
     up_to_hz: float | None = None,
+    weigh: bool = True,
 ) -> Reduced:
     """Reduce a model onto the DOFs named and `keep_modes` modes of the rest, or all up to `up_to_hz` [Hz].
 
     Parameters
     ----------
     M, K, C : sparse (n, n), symmetric or Hermitian.
+    weigh : whether to find the effective masses too, which takes solutions with M.
 
     Raises
     ------
@@ -91,7 +93,7 @@ def craig_bampton(
         matrices=matrices,
         modes=values.size,
         highest_hz=highest,
-        quality=measured(held, values, modes, matrices),
+        quality=measured(held, values, modes, matrices, weigh=weigh),
     )
 
 

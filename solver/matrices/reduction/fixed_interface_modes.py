@@ -92,7 +92,7 @@ def _factorised(K: Any, M: Any, couplings: dict[str, Array], shift: float) -> In
     """K − σ M factorised; None if it is singular to working accuracy."""
     matrix = csc_array(K - shift * M) if shift else K
     try:
-        solve = _factor(matrix)
+        solve = factor(matrix)
     except RuntimeError:
         return None
     force = couplings["K"] - shift * couplings["M"]
@@ -104,7 +104,7 @@ def _factorised(K: Any, M: Any, couplings: dict[str, Array], shift: float) -> In
     return Interior(K=K, M=M, couplings=couplings, shift=shift, solve=solve, follow=follow, residual=residual)
 
 
-def _factor(matrix: Any) -> Callable[[Array], Array]:
+def factor(matrix: Any) -> Callable[[Array], Array]:
     """The inverse of a symmetric or Hermitian matrix: pivots from the diagonal, ordered for little fill."""
     symmetric = {"diag_pivot_thresh": 1e-3, "options": {"SymmetricMode": True}}
     if matrix.shape[0] < LARGE:
