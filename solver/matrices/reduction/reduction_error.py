@@ -28,7 +28,8 @@ class Quality:
     held_hz : (m,) array
         Frequencies of the modes kept, the DOFs in use held [Hz].
     effective_mass : (m, n_kept) array
-        Share of the inertia of the rest, when one DOF in use is moved, that each mode carries.
+        Share of the inertia of the rest, when one DOF in use is moved, that each mode carries; (m, 0) where
+        it was not asked for.
     system_hz : (n,) array
         Frequencies of the reduced model without contacts [Hz].
     system_error : (n,) array
@@ -58,7 +59,9 @@ class Quality:
         return np.asarray(self.effective_mass.sum(axis=0))
 
 
-def measured(held: Interior, values: FloatArray, modes: Array, matrices: dict[str, Array]) -> Quality:
+def measured(
+    held: Interior, values: FloatArray, modes: Array, matrices: dict[str, Array], *, weigh: bool = True
+) -> Quality:
     """Measure a reduction.
 
     A mode (λ, y) of the reduced model, ψ = T y in the full one, leaves the forces r = K ψ − λ M ψ on the
@@ -74,7 +77,7 @@ def measured(held: Interior, values: FloatArray, modes: Array, matrices: dict[st
     last = int(bad[0]) - 1 if bad.size else errors.size - 1
     return Quality(
         held_hz=np.sqrt(np.maximum(values, 0.0)) / (2.0 * math.pi),
-        effective_mass=_effective_mass(held, modes),
+        effective_mass=_effective_mass(held, modes) if weigh else np.zeros((modes.shape[1], 0)),
         system_hz=hertz,
         system_error=errors,
         good_to_hz=float(hertz[last]) if last >= 0 else 0.0,

@@ -93,7 +93,7 @@ def reduce_sector(
     for n in diameters:
         begun = time.perf_counter()
         at = {key: circulant.at(n, sectors) for key, circulant in circulants.items()}
-        found.append(craig_bampton(at["M"], at["K"], at.get("C"), own, keep_modes))
+        found.append(craig_bampton(at["M"], at["K"], at.get("C"), own, keep_modes, weigh=False))
         seconds.append(time.perf_counter() - begun)
         if on_progress is not None:
             on_progress(n)
