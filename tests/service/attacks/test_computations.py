@@ -142,7 +142,7 @@ def test_another_client_is_answered_while_one_computes(site: Site) -> None:
     def ask() -> int:
         return site.send(plan("two-dof"), site.other).status
 
-    assert site.meanwhile([plan(masses(1000))] * 2, ask, at_once=2) == 200
+    assert site.meanwhile([plan(masses(1000))] * 8, ask, at_once=2) == 200
 
 
 def test_a_service_that_computes_ends_within_the_grace(tmp_path: Path) -> None:
