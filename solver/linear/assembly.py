@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 
 from solver.errors import SettingError
 from solver.linear.body_matrices import bodies_mass, mass_derivative, matrices_with_bodies
-from solver.linear.model import ForceTerm as ForceTerm
-from solver.linear.model import LinearModel as LinearModel
-from solver.linear.model import LinearModelDerivative as LinearModelDerivative
+from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
 from solver.scene.bodies.body import MOMENTS, Body
 from solver.scene.bodies.kinematics import Form, dof_names, force_derivatives
 from solver.scene.bodies.paths import is_body_path

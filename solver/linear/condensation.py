@@ -15,9 +15,10 @@ import numpy as np
 
 from solver.contacts.kernels.system import DENSE
 from solver.jit.fourier import Complex, Integer, Real
-from solver.linear.assembly import ForceTerm, LinearModel, LinearModelDerivative, linear_model
+from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.modal import Decomposition, Held, decompose, held_alone, held_by, matrices_of
+from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
 from solver.linear.rigid_body_modes import loose_motions
 from solver.scene.scene import Scene
 

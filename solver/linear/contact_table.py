@@ -12,7 +12,7 @@ from solver.contacts.kernels import columns
 from solver.contacts.kernels.laws import law_number
 from solver.contacts.kernels.second_laws import second_number
 from solver.jit.fourier import Integer, Real
-from solver.linear.assembly import LinearModel
+from solver.linear.model import LinearModel
 from solver.scene.scene import Scene
 
 

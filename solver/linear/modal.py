@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from solver.contacts.kernels.system import MODES, POLES
 from solver.jit import eigen
 from solver.jit.fourier import Complex, Real
-from solver.linear.assembly import LinearModel
+from solver.linear.model import LinearModel
 from solver.matrices.normal_modes import UndampedModes, least_stiffness, undamped_modes
 
 CLASSICAL = 1e-11  # largest off-diagonal modal damping, relative to the diagonal, that counts as none

@@ -37,8 +37,9 @@ from solver.balance.workspace import Workspace
 from solver.contacts.laws.parts import Slider
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
-from solver.linear.assembly import LinearModel, linear_model
+from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts, port_stiffnesses
+from solver.linear.model import LinearModel
 from solver.linear.rigid_body_modes import CANCELLED
 from solver.matrices.normal_modes import least_stiffness
 from solver.response.contact_response import ContactResponse, ContactState

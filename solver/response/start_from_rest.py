@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.jit.fourier import Complex, Real
-from solver.linear.assembly import LinearModel
+from solver.linear.model import LinearModel
 
 LARGEST = 400  # coordinates of the annulus: above, the modes would cost more than the response
 _TURN = 0.1  # rad of the fastest motion from instant to instant

@@ -13,9 +13,10 @@ import numpy as np
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
-from solver.linear.assembly import LinearModel, linear_model
+from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.linear.contact_table import port_stiffnesses
+from solver.linear.model import LinearModel
 from solver.response.solution import Solution
 from solver.scene.validation import listing
 

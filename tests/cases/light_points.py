@@ -17,9 +17,10 @@ from solver.balance.kernels.newton import newton
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import evaluation_by_value
 from solver.jit.fourier import Complex, Real, to_complex, to_full
-from solver.linear.assembly import LinearModel, linear_model
+from solver.linear.assembly import linear_model
 from solver.linear.condensation import force_amplitudes
 from solver.linear.kernels.receptance import receptance
+from solver.linear.model import LinearModel
 from solver.response.time_history import matrices
 
 SAMPLES = 256  # instants of a period at least

@@ -19,8 +19,8 @@ from scipy import linalg
 
 from solver import Scene
 from solver.jit.fourier import Real
-from solver.linear.assembly import LinearModel
 from solver.linear.contact_table import port_stiffnesses
+from solver.linear.model import LinearModel
 from solver.response.time_history import matrices
 
 BASE = 160  # points over the band, half of them evenly spaced, half of them evenly in the logarithm

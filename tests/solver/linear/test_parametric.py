@@ -11,7 +11,8 @@ import pytest
 from scipy.linalg import eigvalsh
 
 from solver.errors import SettingError
-from solver.linear.assembly import LinearModel, linear_model, structure_derivative
+from solver.linear.assembly import linear_model, structure_derivative
+from solver.linear.model import LinearModel
 from solver.scene.scene import Scene, load_scene
 
 

@@ -9,8 +9,9 @@ from scipy.linalg import block_diag, expm
 import solver
 from solver import Scene
 from solver.jit.fourier import Real
-from solver.linear.assembly import LinearModel, linear_model
+from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
+from solver.linear.model import LinearModel
 from solver.response.start_from_rest import Start, keeps_sticking
 
 
