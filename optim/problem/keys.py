@@ -17,6 +17,7 @@ from optim.criteria.key import Form, Key, Option
 from optim.criteria.registry import criteria, limit_keys, weight_words
 from optim.problem.uncertainty_type import Uncertain
 from optim.problem.words import AimWord, MethodWord, ScalingWord
+from solver.scene.examples import DAMPER_LOAD, DISK_LOAD, DISK_LOADS
 
 MAX_VARIABLES = 50
 MAX_CASES = 50
@@ -86,25 +87,25 @@ class ProblemKeys(BaseModel):
         Annotated[dict[VariableName, Pair], Field(min_length=1, max_length=MAX_VARIABLES)] | None,
         Option(
             Form.BOUNDS, "--variable", "PATH LO HI",
-            help="A parameter and its bounds, for example shroud.N0 20 3000; paths that share a value are "
+            help=f"A parameter and its bounds, for example {DISK_LOAD} 20 3000; paths that share a value are "
             "separated by commas; repeatable. If left out, the normal load of the contact whose load varies.",
         ),
     ] = Field(
         default=None,
         description="Variable to [low, high]: a parameter path, or several that share a value, separated "
         "by commas. The normal load of the contact whose load varies if left out.",
-        examples=[{"damper.N0": [20, 1000]}, {"shroud.N0,root.N0": [20, 3000]}],
+        examples=[{DAMPER_LOAD: [20, 1000]}, {DISK_LOADS: [20, 3000]}],
     )  # fmt: skip
     scaling: Annotated[
         dict[VariableName, ScalingWord] | None,
         Option(
-            Form.WORDS_BY_PATH, "--scaling", "PATH=HOW", example="shroud.N0=logarithmic",
+            Form.WORDS_BY_PATH, "--scaling", "PATH=HOW", example=f"{DISK_LOAD}=logarithmic",
             help="Scale a variable linear or logarithmic; by its bounds.",
         ),
     ] = Field(
         default=None, max_length=MAX_VARIABLES,
         description="Whether equal steps or equal ratios of a variable count equally; by its bounds.",
-        examples=[{"damper.N0": "logarithmic"}],
+        examples=[{DAMPER_LOAD: "logarithmic"}],
     )  # fmt: skip
     cases: Annotated[list[CaseRequest], Field(min_length=1, max_length=MAX_CASES)] | None = Field(
         default=None, description="The responses that count; the scene as it is if left out."
@@ -122,7 +123,7 @@ class ProblemKeys(BaseModel):
     start: Annotated[
         dict[VariableName, Number] | None,
         Option(
-            Form.NUMBERS_BY_PATH, "--start", "PATH=VALUE", example="shroud.N0=150",
+            Form.NUMBERS_BY_PATH, "--start", "PATH=VALUE", example=f"{DISK_LOAD}=150",
             help="A design to start from; repeatable.",
         ),
     ] = Field(

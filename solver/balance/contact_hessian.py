@@ -13,12 +13,13 @@ import numpy as np
 
 from solver.balance.kernels.residual import contact_values
 from solver.balance.parameter import Parameter
-from solver.contacts.kernels.columns import COLUMNS, N0, N1, PHASE, RATIO
+from solver.contacts.kernels.columns import COLUMNS
 from solver.contacts.kernels.laws import law_force
 from solver.contacts.kernels.second_laws import law_second
 from solver.contacts.kernels.stick_slip_events import FAILED, SEGMENT_COLUMNS, segment_capacity
 from solver.contacts.kernels.system import LOAD_COEFFICIENTS, System
 from solver.contacts.laws.base import without_second
+from solver.contacts.load_derivatives import contradicting
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Integer, Real
 from solver.scene.scene import Scene
@@ -123,37 +124,11 @@ def check_laws(scene: Scene) -> None:
 
 
 def check_loads(system: System, parameters: Sequence[Parameter], slopes: Real) -> None:
-    """Raise SettingError where paths of one load contradict each other.
-
-    N1_ratio ties N1 to N0 and N1 unties it: what both, or N0 beside one that changes this, mean together is
-    not one function of the parameters.
-    """
-    tied = ~np.isnan(system.contacts[:, RATIO])
-    by_mean, by_ratio = (np.any(slopes[:, :, column] != 0.0, axis=0) for column in (N0, RATIO))
-    by_amplitude = np.any((slopes[:, :, N1] != 0.0) & (slopes[:, :, [N0, RATIO]] == 0.0).all(axis=2), axis=0)
-    clash = (by_ratio & by_amplitude) | (by_mean & by_amplitude & tied) | (by_mean & by_ratio & ~tied)
+    """Raise SettingError where paths of one load contradict each other."""
+    clash = contradicting(system.contacts, slopes)
     if clash.any():
         paths = [p.path for p in parameters if np.any(p.active[clash] > 0.0)]
         raise SettingError("paths", paths, "contradict each other: give the scene N1_ratio or N1 first")
-
-
-def second_loads(system: System, slopes: Real) -> Real:
-    """Return ∂²N/∂p_i∂p_j, (n_paths, n_paths, nc, 3), of the loads N0, N1 cos(phase), −N1 sin(phase).
-
-    N1 = N1_ratio·N0 is a product where it is tied.
-    """
-    rows = system.contacts
-    cosine, sine, size = np.cos(rows[:, PHASE]), np.sin(rows[:, PHASE]), rows[:, N1]
-
-    def pair(one: int, other: int) -> Real:
-        product = np.einsum("ic,jc->ijc", slopes[..., one], slopes[..., other])
-        return np.asarray(product + product.transpose(1, 0, 2))
-
-    amplitude, turned, twice = pair(N0, RATIO), pair(N1, PHASE), 0.5 * pair(PHASE, PHASE)
-    along = amplitude - size * twice
-    return np.stack(
-        [np.zeros(along.shape), along * cosine - turned * sine, -along * sine - turned * cosine], axis=-1
-    )
 
 
 def second_forces(ks: Integer, forces: Complex, level: Real, phase: Real) -> Complex:

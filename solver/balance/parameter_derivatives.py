@@ -10,8 +10,9 @@ import numpy as np
 from solver.balance.balance import Balance, check_level
 from solver.balance.parameter import Kind, Parameter, resolve
 from solver.balance.simplifications import even_harmonics_reason
-from solver.contacts.kernels.columns import COLUMNS, N0, N1, PHASE, RATIO
+from solver.contacts.kernels.columns import COLUMNS
 from solver.contacts.kernels.system import LOAD_COEFFICIENTS, MODES
+from solver.contacts.load_derivatives import load_slopes
 from solver.errors import SettingError
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model, structure_derivative
@@ -49,26 +50,17 @@ def contact_slopes(balance: Balance, parameters: Sequence[Parameter]) -> tuple[R
 
     Returns
     -------
-    (n_paths, n_contacts, COLUMNS) of the rows of the contact table, and (n_paths, n_contacts, 3) of the load
-    N0, N1 cos(phase), −N1 sin(phase). A path of N1 unties it from N0, one of N1_ratio ties it.
+    (n_paths, n_contacts, COLUMNS) of the rows of the contact table, and (n_paths, n_contacts, 3) of the
+    coefficients of the loads, see `solver.contacts.load_derivatives`.
     """
     rows = balance.system.contacts
     slopes = np.zeros((len(parameters), rows.shape[0], COLUMNS))
     loads = np.zeros((len(parameters), rows.shape[0], LOAD_COEFFICIENTS))
     for slope, load, parameter in zip(slopes, loads, parameters, strict=True):
         acts = parameter.active > 0.0
-        if not acts.any():
-            continue
-        column = parameter.column
-        slope[acts, column] = parameter.active[acts]
-        if column == N0:
-            slope[:, N1] = np.nan_to_num(rows[:, RATIO]) * slope[:, N0]
-        elif column == RATIO:
-            slope[:, N1] = rows[:, N0] * slope[:, RATIO]
-        cosine, sine = np.cos(rows[:, PHASE]), np.sin(rows[:, PHASE])
-        load[:, 0] = slope[:, N0]
-        load[:, 1] = slope[:, N1] * cosine - rows[:, N1] * sine * slope[:, PHASE]
-        load[:, 2] = -slope[:, N1] * sine - rows[:, N1] * cosine * slope[:, PHASE]
+        if acts.any():
+            slope[acts, parameter.column] = parameter.active[acts]
+            load[:] = load_slopes(rows, slope, parameter.column)
     return slopes, loads
 
 

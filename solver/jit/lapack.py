@@ -45,6 +45,15 @@ def set_to(target: Real, source: Real, factor: float, direction: Real) -> None:
 
 
 @compiled
+def dot(a: Real, b: Real) -> float:
+    """Return a · b."""
+    total = 0.0
+    for i in range(a.size):
+        total += a[i] * b[i]
+    return total
+
+
+@compiled
 def copy_block(target: Real, source: Real) -> None:
     """Copy a matrix into the upper left block of another."""
     for i in range(source.shape[0]):

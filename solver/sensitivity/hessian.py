@@ -19,8 +19,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.balance.contact_hessian import ContactForces, second_forces, second_loads
+from solver.balance.contact_hessian import ContactForces, second_forces
 from solver.balance.dynamic_stiffness import WholeMotion, times, times_transposed
+from solver.contacts.load_derivatives import second_loads
 from solver.jit.fourier import Complex, Integer, Real
 from solver.results.told import Piece
 
@@ -229,7 +230,7 @@ def _dot(y: Complex, x: Complex) -> float:
 def _of_contacts(contacts: ContactForces, along: Directions, dU: Real, w: Real) -> Real:
     """Return w·F_ij of all contacts along the directions."""
     pulls = np.einsum("cn,cnm->cm", w, contacts.dF_dN)
-    twice = second_loads(contacts.system, along.slopes)
+    twice = second_loads(contacts.system.contacts, along.slopes)
     total = np.einsum("cm,ijcm->ij", pulls, twice[:, :, contacts.system.owner])
     for e in range(along.slopes.shape[1]):
         ports, slopes, loads = contacts.ports(e), along.slopes[:, e], along.loads[:, e]

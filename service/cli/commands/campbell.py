@@ -9,7 +9,7 @@ import typer
 from service.cli.failures import end
 from service.cli.options import inputs
 from service.cli.options import shared as options
-from service.cli.options.inputs import whole_number
+from service.cli.options.numeric import count
 from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.rendering.tables import campbell as campbell_reports
@@ -20,12 +20,13 @@ Speeds = Annotated[
 ]
 Orders = Annotated[
     list[int] | None,
-    typer.Option(
-        "--order", metavar="N", parser=whole_number,
-        help="Excitations a revolution, repeatable; in a cyclic scene the engine order. The scene's own, or "
+    count(
+        "--order",
+        "N",
+        "Excitations a revolution, repeatable; in a cyclic scene the engine order. The scene's own, or "
         "1, if left out.",
     ),
-]  # fmt: skip
+]
 Limit = Annotated[
     float | None,
     typer.Option(

@@ -15,7 +15,8 @@ import typer
 from service.cli.importing.files import Sources, dof_table, read_sources, rows_of, sources
 from service.cli.importing.reduction import Written, reduce, reduced_file
 from service.cli.importing.scene import band, toml
-from service.cli.options.inputs import number, output_path, whole_number
+from service.cli.options.inputs import output_path
+from service.cli.options.numeric import amount, count
 from service.errors import InputError
 from service.rendering.tables.text import print_json, print_pairs
 from solver.results.files import whole
@@ -50,32 +51,25 @@ Observed = Annotated[
     str | None,
     typer.Option("--observe", metavar="NAME", help="DOF to observe; that of the force if left out."),
 ]
-From = Annotated[
-    float | None, typer.Option("--from", metavar="HZ", parser=number, help="Start of the band of interest.")
-]
-To = Annotated[
-    float | None, typer.Option("--to", metavar="HZ", parser=number, help="End of the band of interest.")
-]
+From = Annotated[float | None, amount("--from", "HZ", "Start of the band of interest.")]
+To = Annotated[float | None, amount("--to", "HZ", "End of the band of interest.")]
 Keep = Annotated[
     int | None,
-    typer.Option(
-        "--keep-modes", metavar="N", parser=whole_number,
-        help="Let the scene refer to the full matrices and reduce them whenever it is loaded.",
+    count(
+        "--keep-modes", "N", "Let the scene refer to the full matrices and reduce them whenever it is loaded."
     ),
-]  # fmt: skip
+]
 Reduce = Annotated[
     bool,
     typer.Option("--reduce", help="Reduce a large model once, onto the DOFs in use and modes of the rest."),
 ]
 ModesKept = Annotated[
     int | None,
-    typer.Option(
-        "--modes", metavar="N", parser=whole_number, help="With --reduce: modes of the rest to keep."
-    ),
+    count("--modes", "N", "With --reduce: modes of the rest to keep."),
 ]
 UpTo = Annotated[
     float | None,
-    typer.Option("--up-to", metavar="HZ", parser=number, help="With --reduce: keep all modes up to here."),
+    amount("--up-to", "HZ", "With --reduce: keep all modes up to here."),
 ]
 ReducedFile = Annotated[
     str | None,

@@ -9,7 +9,7 @@ import typer
 from service.cli.failures import end
 from service.cli.options import inputs
 from service.cli.options import shared as options
-from service.cli.options.inputs import number, whole_number
+from service.cli.options.numeric import amount, count
 from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.rendering.tables import mistuning as tables
@@ -22,15 +22,11 @@ Parts = Annotated[
         help="What has factors, repeatable: springs, dashpots and masses by name, or DOFs.",
     ),
 ]  # fmt: skip
-Spread = Annotated[
-    float, typer.Option("--spread", metavar="S", parser=number, help="Standard deviation of the factors.")
-]
-Samples = Annotated[int, typer.Option("--samples", metavar="N", parser=whole_number, help="How many disks.")]
+Spread = Annotated[float, amount("--spread", "S", "Standard deviation of the factors.")]
+Samples = Annotated[int, count("--samples", "N", "How many disks.")]
 Seed = Annotated[
     int,
-    typer.Option(
-        "--seed", metavar="N", parser=whole_number, help="Of the first disk; those of the others follow."
-    ),
+    count("--seed", "N", "Of the first disk; those of the others follow."),
 ]
 Dof = Annotated[
     str | None,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.options import shared as options
-from service.cli.options.inputs import whole_number
+from service.cli.options.numeric import count
 from service.errors import InputError
 from service.rendering.tables.text import say
 
@@ -18,9 +18,7 @@ if TYPE_CHECKING:
 
 def serve(
     host: Annotated[str | None, typer.Option("--host", metavar="H", help="Address to listen on.")] = None,
-    port: Annotated[
-        int | None, typer.Option("--port", metavar="P", parser=whole_number, help="Port to listen on.")
-    ] = None,
+    port: Annotated[int | None, count("--port", "P", "Port to listen on.")] = None,
     database: options.Database = None,
     workers: options.Workers = None,
 ) -> None:

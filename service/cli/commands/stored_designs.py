@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.options.inputs import number, whole_number
+from service.cli.options.numeric import amount, count
 from service.errors import InputError
 from service.rendering.tables.text import print_json, print_table
 from solver.results import units
@@ -28,11 +28,11 @@ OfVariable = Annotated[
 ]
 PeakMax = Annotated[
     float | None,
-    typer.Option("--peak-max", metavar="A", parser=number, help="Highest peak at most [m]; for the list."),
+    amount("--peak-max", "A", "Highest peak at most [m]; for the list."),
 ]
 BandMax = Annotated[
     float | None,
-    typer.Option("--band-max", metavar="HZ", parser=number, help="Band at most [Hz]; for the list."),
+    amount("--band-max", "HZ", "Band at most [Hz]; for the list."),
 ]
 Reached = Annotated[
     bool | None,
@@ -50,7 +50,7 @@ Sort = Annotated[
 ]  # fmt: skip
 Count = Annotated[
     int | None,
-    typer.Option("--count", metavar="N", parser=whole_number, help=f"At most so many; {_MOST}."),
+    count("--count", "N", f"At most so many; {_MOST}."),
 ]
 
 

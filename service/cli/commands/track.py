@@ -10,34 +10,28 @@ from service.cli import completion
 from service.cli.failures import end
 from service.cli.options import inputs
 from service.cli.options import shared as options
-from service.cli.options.inputs import number, whole_number
+from service.cli.options.numeric import amount, count
 from service.cli.output_files import Outputs
 from service.cli.progress import bar
 from service.rendering.tables import track as track_reports
 from service.rendering.tables.text import show
+from solver.scene.examples import DISK_LOAD
 
 Followed = Annotated[
     str,
     typer.Option(
-        "--parameter", metavar="PATH", help="What changes, for example shroud.N0.",
+        "--parameter", metavar="PATH", help=f"What changes, for example {DISK_LOAD}.",
         autocompletion=completion.paths,
     ),
 ]  # fmt: skip
-Start = Annotated[float, typer.Option("--from", metavar="A", parser=number, help="Start of the range.")]
-Stop = Annotated[float, typer.Option("--to", metavar="B", parser=number, help="End of the range.")]
+Start = Annotated[float, amount("--from", "A", "Start of the range.")]
+Stop = Annotated[float, amount("--to", "B", "End of the range.")]
 Checks = Annotated[
     int,
-    typer.Option(
-        "--checks", metavar="N", parser=whole_number,
-        help="Sweeps between the ends that look for peaks nothing has followed.",
-    ),
-]  # fmt: skip
-Steps = Annotated[
-    int, typer.Option("--steps", metavar="N", parser=whole_number, help="Values of the parameter.")
+    count("--checks", "N", "Sweeps between the ends that look for peaks nothing has followed."),
 ]
-Frequencies = Annotated[
-    int, typer.Option("--frequencies", metavar="N", parser=whole_number, help="Frequencies over the band.")
-]
+Steps = Annotated[int, count("--steps", "N", "Values of the parameter.")]
+Frequencies = Annotated[int, count("--frequencies", "N", "Frequencies over the band.")]
 
 NoRidge = Annotated[
     bool, typer.Option("--no-ridge", help="Do not track the peaks: faster, and for contacts of every law.")

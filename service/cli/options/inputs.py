@@ -11,6 +11,7 @@ import typer
 
 from service.errors import InputError
 from solver.errors import SettingError
+from solver.scene.examples import DISK_LOAD
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -97,7 +98,7 @@ def bounds(option: str, texts: Sequence[str]) -> dict[str, list[float]]:
     for text in texts:
         words = text.split()
         if len(words) != 3:
-            raise InputError(f"`{option}` takes PATH LO HI, for example shroud.N0 20 3000, got {text!r}")
+            raise InputError(f"`{option}` takes PATH LO HI, for example {DISK_LOAD} 20 3000, got {text!r}")
         path, low, high = words
         if path in variables:
             raise InputError(f"`{option}` names {path!r} twice; keep one")
@@ -112,7 +113,7 @@ def settings(texts: Sequence[str] | None) -> dict[str, float]:
         path, equals, value = text.partition("=")
         path = path.strip()
         if not equals or not path:
-            raise InputError(f"`--set` takes PATH=VALUE, for example shroud.N0=150, got {text!r}")
+            raise InputError(f"`--set` takes PATH=VALUE, for example {DISK_LOAD}=150, got {text!r}")
         values.pop(path, None)
         values[path] = part("--set", text, value)
     return values

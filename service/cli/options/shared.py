@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 from service.cli import completion
-from service.cli.options.inputs import number, whole_number
+from service.cli.options.numeric import amount, count
+from solver.scene.examples import DISK_LOAD
 
 EFFECTS = ("even-harmonics", "every-contact", "every-sector", "whole-matrices")
 
@@ -28,37 +29,30 @@ AnyScene = Annotated[
 Values = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="PATH=VALUE", help="Value of a parameter, for example shroud.N0=150; repeatable.",
+        "--set", metavar="PATH=VALUE", help=f"Value of a parameter, for example {DISK_LOAD}=150; repeatable.",
         autocompletion=completion.settings,
     ),
 ]  # fmt: skip
-Frequency = Annotated[
-    float, typer.Option("--frequency", metavar="HZ", parser=number, help="Excitation frequency [Hz].")
-]
+Frequency = Annotated[float, amount("--frequency", "HZ", "Excitation frequency [Hz].")]
 FixedFrequency = Annotated[
     float | None,
-    typer.Option(
-        "--frequency", metavar="HZ", parser=number,
-        help="Excitation frequency [Hz], needed when another parameter is swept.",
-    ),
-]  # fmt: skip
+    amount("--frequency", "HZ", "Excitation frequency [Hz], needed when another parameter is swept."),
+]
 StudyFrequency = Annotated[
     float | None,
-    typer.Option(
-        "--frequency", metavar="HZ", parser=number,
-        help="Excitation frequency [Hz]; the highest peak of the scene's band if left out.",
+    amount(
+        "--frequency", "HZ", "Excitation frequency [Hz]; the highest peak of the scene's band if left out."
     ),
-]  # fmt: skip
-Harmonics = Annotated[
-    int, typer.Option("--harmonics", metavar="H", parser=whole_number, help="Highest harmonic kept.")
 ]
+Harmonics = Annotated[int, count("--harmonics", "H", "Highest harmonic kept.")]
 Accuracy = Annotated[
     float | None,
-    typer.Option(
-        "--accuracy", metavar="E", parser=number,
-        help="Estimated error relative to the amplitude; chooses the harmonics, in place of --harmonics.",
+    amount(
+        "--accuracy",
+        "E",
+        "Estimated error relative to the amplitude; chooses the harmonics, in place of --harmonics.",
     ),
-]  # fmt: skip
+]
 Effects = Annotated[
     str,
     typer.Option(
@@ -71,32 +65,26 @@ Effects = Annotated[
 Parameter = Annotated[
     str,
     typer.Option(
-        "--parameter", metavar="PATH", help="What is swept: frequency, shroud.N0, …",
+        "--parameter", metavar="PATH", help=f"What is swept: frequency, {DISK_LOAD}, …",
         autocompletion=completion.parameters,
     ),
 ]  # fmt: skip
 From = Annotated[
     float | None,
-    typer.Option(
-        "--from", metavar="A", parser=number,
-        help="Start of the range; for the frequency, the scene's band if left out.",
-    ),
-]  # fmt: skip
-To = Annotated[float | None, typer.Option("--to", metavar="B", parser=number, help="End of the range.")]
+    amount("--from", "A", "Start of the range; for the frequency, the scene's band if left out."),
+]
+To = Annotated[float | None, amount("--to", "B", "End of the range.")]
 Limit = Annotated[
     float | None,
-    typer.Option(
-        "--limit", metavar="A", parser=number,
-        help="Amplitude [m] above which the resonance band is measured; peak/√2 if left out.",
-    ),
-]  # fmt: skip
+    amount("--limit", "A", "Amplitude [m] above which the resonance band is measured; peak/√2 if left out."),
+]
 Steps = Annotated[
     int | None,
-    typer.Option("--steps", metavar="N", parser=whole_number, help="Steps per period; chosen if left out."),
+    count("--steps", "N", "Steps per period; chosen if left out."),
 ]
 MaxPeriods = Annotated[
     int,
-    typer.Option("--max-periods", metavar="N", parser=whole_number, help="Periods to march at most."),
+    count("--max-periods", "N", "Periods to march at most."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Plot = Annotated[
@@ -120,7 +108,7 @@ Database = Annotated[
 ]
 Workers = Annotated[
     int | None,
-    typer.Option("--workers", metavar="N", parser=whole_number, help="Worker processes; one a processor."),
+    count("--workers", "N", "Worker processes; one a processor."),
 ]
 Url = Annotated[
     str,

@@ -12,8 +12,9 @@ from service.http.dependencies import CallerDependency, ServiceDependency, Typed
 from service.jobs.answering import PLAN
 from service.jobs.common.scenes import HarmonicRequest
 from service.schemas.answers import Answer
+from solver.scene.examples import DISK_LOAD
 
-_EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "set": {"shroud.N0": 150}}
+_EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "set": {DISK_LOAD: 150}}
 
 router = APIRouter(prefix="/v1/plan", tags=["scenes"], route_class=TypedRoute)
 

@@ -12,11 +12,12 @@ from service.http.dependencies import CallerDependency, ServiceDependency, Typed
 from service.http.routes.described import TEXT, media
 from service.jobs import answering
 from service.jobs.common.scenes import SceneRequest
+from solver.scene.examples import DAMPER_LOAD
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"], route_class=TypedRoute)
 
 _FILE: dict[str, Any] = {"text": 'name = "half a scene"', "form": "toml"}
-_SCENE: dict[str, Any] = {"scene": "two-dof", "set": {"damper.N0": 80}, "comments": ["as set"]}
+_SCENE: dict[str, Any] = {"scene": "two-dof", "set": {DAMPER_LOAD: 80}, "comments": ["as set"]}
 MOST_CHARACTERS = 4_000_000
 
 

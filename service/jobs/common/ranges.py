@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Field
 
 from service.jobs.common.scenes import HarmonicRequest, Number, ParameterPath, check, refusal
 from solver.errors import Issue
+from solver.scene.examples import DISK_LOAD
 from solver.scene.scene import Scene
 
 FREQUENCY = "frequency"
@@ -26,7 +27,7 @@ class RangeRequest(HarmonicRequest):
 
     model_config = ConfigDict(validate_by_alias=True)
 
-    parameter: ParameterPath = Field(description="Path of what changes, for example shroud.N0.")
+    parameter: ParameterPath = Field(description=f"Path of what changes, for example {DISK_LOAD}.")
     from_: Number = Field(alias="from", description="Start of the range.")
     to: Number = Field(description="End of the range.")
 

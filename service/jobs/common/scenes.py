@@ -20,6 +20,7 @@ from service.errors import InvalidRequestError
 from service.jobs.registry import JobRequest, Resolved, SceneSource
 from service.jobs.strict_json import digest
 from solver.errors import Issue, SceneError, SettingError, pointer
+from solver.scene.examples import DAMPER_LOAD
 from solver.scene.scene import Scene, load_scene, shipped_scenes
 
 MOST_SET = 1000
@@ -63,7 +64,7 @@ class SceneRequest(JobRequest):
 
     scene: SceneReference = Field(description="Name of a shipped or stored scene, or the scene as an object.")
     set: Annotated[dict[ParameterPath, Number], BeforeValidator(_few)] = Field(
-        default={}, max_length=MOST_SET, description='Values of parameters, {"damper.N0": 100}.'
+        default={}, max_length=MOST_SET, description=f'Values of parameters, {{"{DAMPER_LOAD}": 100}}.'
     )
 
 

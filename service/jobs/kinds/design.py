@@ -18,6 +18,7 @@ from service.jobs.kinds.registry.results import Amplitude, PeakAt, ReachedResult
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, pointer
+from solver.scene.examples import DISK_LOAD
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ _NOT_ROBUST = ("basins",)
 
 _EXAMPLE: dict[str, Any] = {
     "scene": "bladed-disk",
-    "variables": {"shroud.N0": [20, 3000], "root.kt": [1e6, 1e8]},
+    "variables": {DISK_LOAD: [20, 3000], "root.kt": [1e6, 1e8]},
     "cases": [{"name": "first bending"}, {"name": "twice the force", "set": {"excitation.amplitude": 100}}],
     "limit": 8e-5,
     "max_band_hz": 60,

@@ -21,6 +21,7 @@ from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue
+from solver.scene.examples import DISK_LOAD
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 _EXAMPLE: dict[str, Any] = {
     "scene": "bladed-disk",
-    "parameter": "shroud.N0",
+    "parameter": DISK_LOAD,
     "from": 20,
     "to": 3000,
     "steps": 60,

@@ -18,13 +18,14 @@ from service.jobs.kinds.registry.results import Amplitude, ReachedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue
+from solver.scene.examples import DISK_LOAD
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "variables": {"shroud.N0": [20, 3000]}, "limit": 8e-5}
+_EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "variables": {DISK_LOAD: [20, 3000]}, "limit": 8e-5}
 
 
 class _ParetoRequest(PointsOfFront, ProblemRequest):

@@ -16,13 +16,14 @@ from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep
 from service.jobs.kinds.registry.results import Curve, EndedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
+from solver.scene.examples import DISK_LOAD
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "parameter": "shroud.N0", "from": 20, "to": 3000}
+_EXAMPLE: dict[str, Any] = {"scene": "bladed-disk", "parameter": DISK_LOAD, "from": 20, "to": 3000}
 
 
 class PeaksRequest(RangeRequest):

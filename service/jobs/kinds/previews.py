@@ -31,6 +31,7 @@ from service.jobs.linear_limits import linear_limit
 from service.jobs.outputs import JobOutput, Point, Progress, ShouldStop
 from service.jobs.registry import JobKind, Registry, Resolved, SceneSource
 from solver.errors import Issue
+from solver.scene.examples import DAMPER_LOAD
 from solver.scene.scene import Scene
 
 MOST_POINTS = 2000
@@ -44,7 +45,7 @@ FEW_MOTIONS = 8
 """Of contacts: so few are quick with all harmonics."""
 SAMPLES = 400
 LEAST_HZ = 1e-9
-_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "set": {"damper.N0": 80}, "client": "a1b2"}
+_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "set": {DAMPER_LOAD: 80}, "client": "a1b2"}
 
 
 class PreviewRequest(HarmonicRequest):

@@ -14,13 +14,14 @@ from service.jobs.kind_view import Json, KindView, ReadSweep, StoredSweep
 from service.jobs.kinds.registry.results import Amplitude, KindResult
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
+from solver.scene.examples import DAMPER_LOAD
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2, "set": {"damper.N0": 80}}
+_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2, "set": {DAMPER_LOAD: 80}}
 
 
 class SolveRequest(HarmonicRequest):

@@ -29,6 +29,7 @@ from service.jobs.kinds.registry.results import Amplitude, Curve, EndedResult, P
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, SettingError
+from solver.scene.examples import DISK_LOAD
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -39,11 +40,11 @@ _EXAMPLE: dict[str, Any] = {
     "scene": "bladed-disk",
     "from": 500,
     "to": 900,
-    "set": {"shroud.N0": 150},
+    "set": {DISK_LOAD: 150},
 }
 _OVER_A_LOAD: dict[str, Any] = {
     "scene": "bladed-disk",
-    "parameter": "shroud.N0",
+    "parameter": DISK_LOAD,
     "from": 20,
     "to": 300,
     "frequency_hz": 755,

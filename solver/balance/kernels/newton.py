@@ -15,7 +15,8 @@ import numpy as np
 from solver.balance.kernels.gauge import rebase
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.residual import contact_values, evaluate
-from solver.contacts.kernels.columns import KT, MU, N0, N1
+from solver.contacts.kernels.columns import KT, MU
+from solver.contacts.kernels.normal_load import largest_load, least_load
 from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count, cosine_position
@@ -148,7 +149,7 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
 
     Contacts that open and close begin closed where loads press the parts together.
 
-    (I + A kt) u = ū harmonic by harmonic; a contact stays stuck while max|kt u| ≤ μ (N0 − |N1| + added).
+    (I + A kt) u = ū harmonic by harmonic; a contact stays stuck while max|kt u| ≤ μ (min N + added).
     """
     nc, n = system.owner.size, coefficient_count(system.ks)
     table, _, _, _ = contact_values(system, p, 0.0)
@@ -175,7 +176,7 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
         row, normal = table[e], system.normal_port[e]
         if row[MU] <= 0.0 or system.rubs[c] == 0:
             continue
-        needed = 1.05 * row[KT] * _reach(system, u, c) / row[MU] - (row[N0] - abs(row[N1]))
+        needed = 1.05 * row[KT] * _reach(system, u, c) / row[MU] - least_load(row)
         if normal >= 0:
             needed += 1.05 * row[system.held[normal, 0]] * _reach(system, u, normal)
         added = max(added, needed)
@@ -209,7 +210,7 @@ def load_scale(system: System, p: float) -> float:
     table, _, _, _ = contact_values(system, p, 0.0)
     scale = 0.0
     for c in range(table.shape[0]):
-        scale = max(scale, abs(table[c, N0]) + abs(table[c, N1]))
+        scale = max(scale, largest_load(table[c]))
     return scale
 
 

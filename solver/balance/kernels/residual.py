@@ -7,8 +7,9 @@ import math
 import numpy as np
 
 from solver.balance.kernels.gauge import find_gauge, let_hold
-from solver.contacts.kernels.columns import COLUMN_KIND, COLUMNS, KT, N0, N1, PHASE, RATIO
+from solver.contacts.kernels.columns import COLUMN_KIND, COLUMNS, KT, N1, RATIO
 from solver.contacts.kernels.laws import call_law
+from solver.contacts.kernels.normal_load import fill_load, tie
 from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED
 from solver.contacts.kernels.system import LEVEL, LOAD_COEFFICIENTS, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
@@ -36,16 +37,10 @@ def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, 
             row[column], d[column] = system.active[c] * p, system.active[c]
             tied = column == RATIO or (tied and column != N1)
         if tied:
-            row[N1] = row[RATIO] * row[N0]
-            d[N1] = row[RATIO] * d[N0] + d[RATIO] * row[N0]
+            tie(row, d)
     load, dload = np.empty((nc, LOAD_COEFFICIENTS)), np.empty((nc, LOAD_COEFFICIENTS))
     for c in range(nc):
-        cosine, sine = math.cos(table[c, PHASE]), math.sin(table[c, PHASE])
-        amplitude, turn = table[c, N1], slope[c, PHASE]
-        load[c, 0], dload[c, 0] = table[c, N0] + added, slope[c, N0]
-        load[c, 1], load[c, 2] = amplitude * cosine, -amplitude * sine
-        dload[c, 1] = slope[c, N1] * cosine - amplitude * sine * turn
-        dload[c, 2] = -slope[c, N1] * sine - amplitude * cosine * turn
+        fill_load(table[c], slope[c], added, load[c], dload[c])
     return table, load, slope, dload
 
 

@@ -56,7 +56,7 @@ class System(NamedTuple):
     owner: Integer  # (nc,) element of each port
     rubs: Integer  # (nc,) 1: friction, which a larger normal load would hold, else 0
     held: Integer  # (nc, 3) of the stiffness at rest: its column, and the column and sign of what must be > 0
-    contacts: Real  # (ne, COLUMNS) kt, mu, N0, N1, N1_ratio (NaN: not tied), N1_phase, and a law's own
+    contacts: Real  # (ne, COLUMNS) the numbers of each law, see `solver.contacts.kernels.columns`
     active: Real  # (ne,) share of λ in the number it changes, 0.0 where it does not act
     shift: Real  # (nc,) stiffness moved into the structure [N/m]
     loose: Real  # (nr, nc) ports' part in the rigid-body motions of what contacts alone hold, see `loose`

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -58,17 +59,23 @@ def receptance(system: System, p: float, out: Receptance) -> None:
 
 
 @compiled
-def _clear(out: Receptance) -> None:
-    """Set a receptance to zero."""
-    nk, nc = out.x_linear.shape[1], out.B.shape[2]
-    for order in range(2):
-        for i in range(nk):
-            out.x_linear[order, i] = 0.0
-            for c in range(nc):
-                out.u_linear[order, i, c] = 0.0
-                out.B[order, i, c] = 0.0
-                for d in range(nc):
-                    out.A[order, i, c, d] = 0.0
+def clear(out: Any) -> None:
+    """Set all derivatives of a receptance, or of `Jets`, to zero."""
+    for order in range(out.x_linear.shape[0]):
+        for i in range(out.x_linear.shape[1]):
+            _clear_harmonic(out, order, i)
+
+
+@compiled
+def _clear_harmonic(out: Any, order: int, i: int) -> None:
+    """Set one derivative of harmonic number i to zero."""
+    nc = out.B.shape[2]
+    out.x_linear[order, i] = 0.0
+    for c in range(nc):
+        out.u_linear[order, i, c] = 0.0
+        out.B[order, i, c] = 0.0
+        for d in range(nc):
+            out.A[order, i, c, d] = 0.0
 
 
 @apart
@@ -81,7 +88,7 @@ def _modal_receptance(system: System, p: float, out: Receptance) -> None:
     omega = p if system.kind == FREQUENCY else system.omega
     by_omega = 1.0 if system.kind == FREQUENCY else 0.0
     nc, most = out.B.shape[2], min(BLOCK, system.eigenvalues.shape[1])
-    _clear(out)
+    clear(out)
     weights, driven = np.empty((2 * (nc * nc + nc), most)), np.empty((2 * (nc + 1), most))
     terms = np.empty((4, most))
     for s in range(system.eigenvalues.shape[0]):
@@ -311,12 +318,7 @@ def _project(
 ) -> None:
     """Project Z⁻¹ (or its derivative) of harmonic number i on contacts, excitation and observed DOF."""
     nc, n = out.B.shape[2], green.shape[0]
-    out.x_linear[order, i] = 0.0
-    for c in range(nc):
-        out.u_linear[order, i, c] = 0.0
-        out.B[order, i, c] = 0.0
-        for d in range(nc):
-            out.A[order, i, c, d] = 0.0
+    _clear_harmonic(out, order, i)
     for a in range(n):
         for b in range(n):
             value = sign * green[a, b]

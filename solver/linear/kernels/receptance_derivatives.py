@@ -18,7 +18,7 @@ from solver.jit.fourier import Complex
 from solver.jit.lapack import invert
 from solver.jit.reference import Reference
 from solver.jit.separate import apart
-from solver.linear.kernels.receptance import add_driven, excitation, fill_forces
+from solver.linear.kernels.receptance import add_driven, clear, excitation, fill_forces
 
 # First index of every array.
 VALUE, BY_OMEGA, BY_OMEGA_TWICE, BY_P, BY_BOTH = 0, 1, 2, 3, 4
@@ -61,7 +61,7 @@ def new_jets(system: System) -> Jets:
 @apart
 def fill_jets(system: System, omega: float, p: float, out: Jets) -> None:
     """Fill `out` at the frequency `omega` [rad/s] and the parameter λ = p (which is not the frequency)."""
-    _clear(out)
+    clear(out)
     if system.form == DENSE:
         _dense(system, omega, p, out)
     else:
@@ -80,20 +80,6 @@ def fill_jets(system: System, omega: float, p: float, out: Jets) -> None:
             u[BY_P] = f * u[BY_P] + df * u[VALUE]
             for order in range(BY_P):
                 u[order] *= f
-
-
-@compiled
-def _clear(out: Jets) -> None:
-    """Set everything to zero."""
-    nk, nc = out.u_linear.shape[1], out.u_linear.shape[2]
-    for order in range(ORDERS):
-        for i in range(nk):
-            out.x_linear[order, i] = 0.0
-            for c in range(nc):
-                out.u_linear[order, i, c] = 0.0
-                out.B[order, i, c] = 0.0
-                for d in range(nc):
-                    out.A[order, i, c, d] = 0.0
 
 
 @compiled

@@ -24,29 +24,13 @@ from solver.contacts.kernels.circle.panels import (
 )
 from solver.contacts.kernels.circle.path import FROM, START, TO
 from solver.contacts.kernels.circle.radau import NODES, SLOPES, STAGES, WEIGHTS
+from solver.contacts.kernels.coulomb.force import bases_at
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer
 from solver.jit.separate import apart
 
 # Sums over sticks (1), and over slips weighted by cos θ and sin θ, of cos qτ and sin qτ.
 STUCK_COS, STUCK_SIN, ALONG_COS, ALONG_SIN, ACROSS_COS, ACROSS_SIN = 0, 1, 2, 3, 4, 5
-
-
-@compiled
-def basis_of(tau: Number, ks: Integer, e: Array, de: Array) -> None:
-    """Fill `e` with the basis for `ks` at `tau`, real or complex, and `de` with its slope."""
-    cos1, sin1 = np.cos(tau), np.sin(tau)
-    cosine, sine = 0.0 * cos1 + 1.0, 0.0 * cos1
-    k, here = 0, 0
-    for i in range(ks.size):
-        while k < ks[i]:
-            cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
-            k += 1
-        e[here], de[here] = cosine, -k * sine
-        here += 1
-        if k > 0:
-            e[here], de[here] = sine, k * cosine
-            here += 1
 
 
 @compiled
@@ -135,7 +119,7 @@ def panel_back(
     begin, h = panel[FROM], panel[TO] - panel[FROM]
     for i in range(STAGES):
         tau, theta = begin + h * NODES[i], panel[START + 1 + i]
-        basis_of(tau, all_ks, e, de)
+        bases_at(tau, all_ks, e, de)
         _curves_of_basis(packed, e, de, at)
         _, slope, g, dg = turning(at, kappa, theta)
         c, s = np.cos(theta), np.sin(theta)

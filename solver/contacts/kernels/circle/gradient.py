@@ -21,7 +21,6 @@ import numpy as np
 from solver.contacts.kernels.circle.adjoint import (
     STUCK_COS,
     STUCK_SIN,
-    basis_of,
     moments_between,
     panel_back,
 )
@@ -55,7 +54,7 @@ from solver.contacts.kernels.circle.path import (
 )
 from solver.contacts.kernels.circle.radau import STAGES
 from solver.contacts.kernels.circle.state import CLOSES, HOW, PIECES, SETTLES
-from solver.contacts.kernels.coulomb.force import moment_rows, products
+from solver.contacts.kernels.coulomb.force import bases_at, moment_rows, products
 from solver.contacts.kernels.stick_slip_events import AFTER_SEPARATION, STICK, UNLOADED
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer
@@ -83,13 +82,13 @@ def _stick_back(
     e, de, moment = np.empty(size, dtype), np.empty(size, dtype), np.empty(n, dtype)
     at = np.empty(CURVES, dtype)
     curves_at(waves, row[END], at)
-    basis_of(row[END], all_ks, e, de)
+    bases_at(row[END], all_ks, e, de)
     _add_row(G, 0, psi[0], 1.0, e)
     _add_row(G, size, psi[1], 1.0 / kappa, e)
     for r in range(m):
         G[r, 3 * size] -= psi[1, r] * at[Y] / (kappa * kappa)
     curves_at(waves, row[BEGIN], at)
-    basis_of(row[BEGIN], all_ks, e, de)
+    bases_at(row[BEGIN], all_ks, e, de)
     if active:
         here = np.empty((2, sums.shape[1]), dtype)
         moments_between(row[BEGIN], row[END], here[0], here[1])
@@ -128,7 +127,7 @@ def _contact_back(
     e, de = np.empty(size, waves.dtype), np.empty(size, waves.dtype)
     at = np.empty(CURVES, waves.dtype)
     curves_at(waves, tau, at)
-    basis_of(tau, all_ks, e, de)
+    bases_at(tau, all_ks, e, de)
     _, slope, g, _ = turning(at, kappa, theta)
     c, s = np.cos(theta), np.sin(theta)
     more = (kappa - 1.0) * s * c
@@ -158,7 +157,7 @@ def _slip_begin(
     if after_stick and kappa != 1.0:
         size = (G.shape[1] - 1) // 3
         e, de = np.empty(size, waves.dtype), np.empty(size, waves.dtype)
-        basis_of(tau, all_ks, e, de)
+        bases_at(tau, all_ks, e, de)
         _add_row(G, 2 * size, eta, along / at[LIMIT], e)
 
 
@@ -171,7 +170,7 @@ def _slip_end(
     e, de = np.empty(size, waves.dtype), np.empty(size, waves.dtype)
     at = np.empty(CURVES, waves.dtype)
     curves_at(waves, tau, at)
-    basis_of(tau, all_ks, e, de)
+    bases_at(tau, all_ks, e, de)
     c, s = np.cos(theta), np.sin(theta)
     for r in range(eta.size):
         eta[r] = at[LIMIT] * (c * psi[1, r] - s * psi[0, r])
@@ -186,7 +185,7 @@ def _unloaded_back(waves: Array, kappa: Number, all_ks: Integer, cut: bool, psi:
     e, de = np.empty(size, waves.dtype), np.empty(size, waves.dtype)
     at = np.empty(CURVES, waves.dtype)
     curves_at(waves, 0.0 * waves[0, 0, 0], at)
-    basis_of(0.0 * waves[0, 0, 0], all_ks, e, de)
+    bases_at(0.0 * waves[0, 0, 0], all_ks, e, de)
     tx, ty = at[X], at[Y] / kappa
     if cut:
         length = np.sqrt(tx * tx + ty * ty)

@@ -1,7 +1,7 @@
 """Elastic Coulomb friction in two tangential directions, |t| ≤ μN, under a load that may move.
 
 Ports: the tangential motions u and w and, if there is a third, the normal motion v, with
-N = N0 + N1 cos(τ + φ) + kn v and the normal force max(N, 0). The arguments are those of
+a normal force max(N, 0) of the given load and kn v. The arguments are those of
 `solver.contacts.kernels.laws`.
 
 Circle: `solver.contacts.kernels.circle.panels` has the law, `state` and `path` beside it find the motion
@@ -150,6 +150,22 @@ def circle_path(
     return find_path(waves, kappa, cos_table, sin_table, pieces, panels, found, intervals)
 
 
+@compiled
+def whole_path(
+    U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, cos_table: Real, sin_table: Real,
+    found: Real, intervals: Real,
+) -> tuple[int, Real, Real]:  # fmt: skip
+    """Return the state of `circle_path` with its pieces and panels, in tables as long as it takes."""
+    top, times = merged(ks, load_ks)[-1], 1
+    pieces, panels = new_tables(top, times)
+    while True:
+        state = circle_path(U, ks, load, load_ks, row, cos_table, sin_table, pieces, panels, found, intervals)
+        if state != TABLE_FULL or times >= MOST_TABLES:
+            return state, pieces, panels
+        times *= 4
+        pieces, panels = new_tables(top, times)
+
+
 @apart
 def coulomb_circle(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,
@@ -171,16 +187,9 @@ def coulomb_circle(
         motion, given = U.copy(), row.copy()
         fill_block(motion[:2], 0.0)
         given[MU], given[KT], given[KT_SECOND] = 1.0, 1.0, 1.0
-    state, times = int(TABLE_FULL), 1
-    pieces, panels = new_tables(all_ks[-1], times)
-    while True:
-        state = circle_path(
-            motion, ks, load, load_ks, given, cos_table, sin_table, pieces, panels, found, intervals
-        )
-        if state != TABLE_FULL or times >= MOST_TABLES:
-            break
-        times *= 4
-        pieces, panels = new_tables(all_ks[-1], times)
+    state, pieces, panels = whole_path(
+        motion, ks, load, load_ks, given, cos_table, sin_table, found, intervals
+    )
     if state < 0 or state == FAILED:
         fill_block(F, np.nan)
         return FAILED, 0
@@ -247,7 +256,7 @@ def press(
 ) -> None:  # fmt: skip
     """Fill the normal force max(N, 0): nothing if separated, N if always closed, else from the intervals.
 
-    Of a prestressed contact it counts from the state in which N0, if positive, is in equilibrium already.
+    Of a prestressed contact it counts from the state in which a positive mean load is in equilibrium.
     """
     all_ks = merged(ks, load_ks)
     n, size, of_motion = U.shape[1], coefficient_count(all_ks), positions(ks, all_ks)

@@ -10,9 +10,8 @@ import math
 import numpy as np
 
 from solver.contacts.kernels.circle.hessian import circle_second
-from solver.contacts.kernels.circle.law import MOST_TABLES, circle_path, with_second
-from solver.contacts.kernels.circle.path import TABLE_FULL
-from solver.contacts.kernels.circle.state import FOUND_SIZE, INTERVALS, new_tables
+from solver.contacts.kernels.circle.law import whole_path, with_second
+from solver.contacts.kernels.circle.state import FOUND_SIZE, INTERVALS
 from solver.contacts.kernels.columns import KT, KT_SECOND, MU
 from solver.contacts.kernels.coulomb.elastic_normal import merged
 from solver.contacts.kernels.coulomb.second_law import tie_second
@@ -54,16 +53,9 @@ def circle_law_second(
         motion, direction, weights = _without_friction(U, dU, w, given, moved)
     top = merged(ks, load_ks)[-1]
     intervals, found = np.empty((top + 2, 2)), np.zeros(FOUND_SIZE)
-    state, times = int(TABLE_FULL), 1
-    pieces, panels = new_tables(top, times)
-    while True:
-        state = circle_path(
-            motion, ks, load, load_ks, given, cos_table, sin_table, pieces, panels, found, intervals
-        )
-        if state != TABLE_FULL or times >= MOST_TABLES:
-            break
-        times *= 4
-        pieces, panels = new_tables(top, times)
+    state, pieces, panels = whole_path(
+        motion, ks, load, load_ks, given, cos_table, sin_table, found, intervals
+    )
     if state < 0 or state == FAILED:
         return FAILED
     circle_second(

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from solver.contacts.kernels.coulomb.force import basis_at, dot, moment_rows, products
+from solver.contacts.kernels.coulomb.force import basis_at, moment_rows, products
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SEPARATION,
     AFTER_SLIP,
@@ -37,7 +37,7 @@ from solver.contacts.kernels.stick_slip_events import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
-from solver.jit.lapack import fill, fill_block
+from solver.jit.lapack import dot, fill, fill_block
 from solver.jit.separate import apart
 
 # What a contact does at a sample.

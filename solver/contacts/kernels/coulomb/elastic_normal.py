@@ -1,4 +1,4 @@
-"""Elastic Coulomb friction under a load that moves with the contact: N = N0 + N1 cos(τ + φ) + kn v.
+"""Elastic Coulomb friction under a load that moves with the contact: N is the given load and kn v.
 
 Two relative motions, the tangential u and the normal v. The friction force is the closed form of
 `solver.contacts.kernels.coulomb.force` for a load with the harmonics of v, its derivative by v is kn ∂T/∂N.
@@ -62,7 +62,7 @@ def elastic_normal(
     """Fill friction (port 0) and normal force (port 1), their Jacobian and their derivative by λ.
 
     The arguments are those of `solver.contacts.kernels.laws`. With `row[PRESTRESSED]` the normal force is
-    counted from the state in which N0 (if positive) is in equilibrium already: P − max(N0, 0).
+    counted from the state in which the mean load (if positive) is in equilibrium already: P less that.
     """
     n, kn = U.shape[1], row[KN]
     all_ks = merged(ks, load_ks)

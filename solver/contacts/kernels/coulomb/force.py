@@ -16,8 +16,10 @@ from, doi:10.1177/1461348419834759, equations 24–31; design derivation of ∂F
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.contacts.kernels.state_durations import find_segments, is_symmetric
 from solver.contacts.kernels.stick_slip_events import (
@@ -37,7 +39,7 @@ from solver.contacts.kernels.stick_slip_events import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
-from solver.jit.lapack import fill, fill_block
+from solver.jit.lapack import dot, fill, fill_block
 from solver.jit.separate import apart
 
 
@@ -194,12 +196,20 @@ def contact_force(
 
 
 @compiled
-def dot(a: Real, b: Real) -> float:
-    """Return a · b."""
-    total = 0.0
-    for i in range(a.size):
-        total += a[i] * b[i]
-    return total
+def bases_at(tau: Any, ks: Integer, e: NDArray[Any], de: NDArray[Any]) -> None:
+    """Fill `e` with the basis for the harmonics `ks` at `tau`, real or complex, and `de` with its slope."""
+    cos1, sin1 = np.cos(tau), np.sin(tau)
+    cosine, sine = 0.0 * cos1 + 1.0, 0.0 * cos1
+    k, here = 0, 0
+    for i in range(ks.size):
+        while k < ks[i]:
+            cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
+            k += 1
+        e[here], de[here] = cosine, -k * sine
+        here += 1
+        if k > 0:
+            e[here], de[here] = sine, k * cosine
+            here += 1
 
 
 @apart

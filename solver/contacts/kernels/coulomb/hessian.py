@@ -19,6 +19,7 @@ import math
 
 import numpy as np
 
+from solver.contacts.kernels.coulomb.force import bases_at
 from solver.contacts.kernels.stick_slip_events import (
     AFTER_SLIP,
     BEGAN,
@@ -36,28 +37,12 @@ from solver.contacts.kernels.stick_slip_events import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real
-from solver.jit.lapack import fill
+from solver.jit.lapack import dot, fill
 from solver.jit.separate import apart
 
 # Derivatives by the two numbers of the law, and wᵀ ∂F/∂N dN without the sticks after separation, which is the
 # share of ∂F/∂μ that a change of the load brings, times μ.
 _KT, _MU, _LOAD = 0, 1, 2
-
-
-@compiled
-def bases_at(tau: float, ks: Integer, e: Real, de: Real) -> None:
-    """Fill `e` with the basis for the harmonics `ks` at `tau` and `de` with its slope d/dτ."""
-    cos1, sin1 = math.cos(tau), math.sin(tau)
-    cosine, sine, k, here = 1.0, 0.0, 0, 0
-    for i in range(ks.size):
-        while k < ks[i]:
-            cosine, sine = cosine * cos1 - sine * sin1, sine * cos1 + cosine * sin1
-            k += 1
-        e[here], de[here] = cosine, -k * sine
-        here += 1
-        if k > 0:
-            e[here], de[here] = sine, k * cosine
-            here += 1
 
 
 @compiled
@@ -70,15 +55,6 @@ def curvature_at(e: Real, ks: Integer, q: Real) -> float:
             total -= k * k * (q[here] * e[here] + q[here + 1] * e[here + 1])
             here += 1
         here += 1
-    return total
-
-
-@compiled
-def inner(a: Real, b: Real) -> float:
-    """Return a · b."""
-    total = 0.0
-    for i in range(a.size):
-        total += a[i] * b[i]
     return total
 
 
@@ -127,7 +103,7 @@ def second_along(
         return 0.0, 0.0
     n, m = U.size, N.size
     if state == STUCK and segments[0, BEGAN] == UNLOADED:
-        return inner(w, dU), 0.0
+        return dot(w, dU), 0.0
     weights = np.empty(n)
     for i in range(n):
         weights[i] = w[i] / math.pi
@@ -163,13 +139,11 @@ def second_along(
             )
         else:
             _onset_after_separation(
-                U, ks, N, load_ks, kt, held, inner(weights, at[0]), at, over, dU, dN, out_U, out_N, rates
+                U, ks, N, load_ks, kt, held, dot(weights, at[0]), at, over, dU, dN, out_U, out_N, rates
             )
         if followed and segments[index + 1, MOTION] == SLIP:
             way = segments[index + 1, DIRECTION]
-            _end_of_stick(
-                U, N, kt, mu, row, way, inner(weights, at[2]), at, over, dU, dN, out_U, out_N, rates
-            )
+            _end_of_stick(U, N, kt, mu, row, way, dot(weights, at[2]), at, over, dU, dN, out_U, out_N, rates)
     if rates[_LOAD] != 0.0:
         rates[_MU] += rates[_LOAD] / mu
     return rates[_KT], rates[_MU]
@@ -189,11 +163,11 @@ def _ends_of_slip(
 ) -> None:  # fmt: skip
     """Add what moves with N = 0 where a slip, force `limit` · N, begins at contact or ends at separation."""
     if not follows:
-        factor = limit * inner(weights, at[0]) / inner(over[1], N)
-        _add(out_N, factor * inner(over[0], dN), over[0])
+        factor = limit * dot(weights, at[0]) / dot(over[1], N)
+        _add(out_N, factor * dot(over[0], dN), over[0])
     if not followed:
-        factor = -limit * inner(weights, at[2]) / inner(over[3], N)
-        _add(out_N, factor * inner(over[2], dN), over[2])
+        factor = -limit * dot(weights, at[2]) / dot(over[3], N)
+        _add(out_N, factor * dot(over[2], dN), over[2])
 
 
 @compiled
@@ -204,12 +178,12 @@ def _onset_after_slip(
     """Add ξ dq dq' M/q': the onset moves, where the rate of the limit, q = ξ kt u' − μN', is 0."""
     e, de, en, den = at[0], at[1], over[0], over[1]
     bend = xi * kt * curvature_at(e, ks, U) - mu * curvature_at(en, load_ks, N)
-    along = xi * kt * inner(de, dU) - mu * inner(den, dN)
+    along = xi * kt * dot(de, dU) - mu * dot(den, dN)
     factor = xi * along * held / bend
     _add(out_U, factor * xi * kt, de)
     _add(out_N, -factor * mu, den)
-    rates[_KT] += factor * xi * inner(de, U)
-    rates[_MU] -= factor * inner(den, N)
+    rates[_KT] += factor * xi * dot(de, U)
+    rates[_MU] -= factor * dot(den, N)
 
 
 @compiled
@@ -219,17 +193,17 @@ def _onset_after_separation(
 ) -> None:  # fmt: skip
     """Add what moves with the onset where N = 0: the offset c = −kt u(τs) and the beginning of the force."""
     e, de, en, den = at[0], at[1], over[0], over[1]
-    speed, rise = inner(de, U), inner(den, N)
-    moved = -inner(en, dN) / rise  # dτs
-    turn = inner(den, dN)
+    speed, rise = dot(de, U), dot(den, N)
+    moved = -dot(en, dN) / rise  # dτs
+    turn = dot(den, dN)
     _add(out_U, -held * kt * moved, de)
     rates[_KT] -= held * speed * moved
-    factor = held * kt * (inner(de, dU) + curvature_at(e, ks, U) * moved) / rise
+    factor = held * kt * (dot(de, dU) + curvature_at(e, ks, U) * moved) / rise
     factor -= held * kt * speed * (turn + curvature_at(en, load_ks, N) * moved) / (rise * rise)
     factor -= kt * speed * weight * moved / rise
     _add(out_N, factor, en)
     _add(out_N, held * kt * speed * moved / rise, den)
-    rates[_LOAD] -= held * kt * speed * inner(en, dN) / rise
+    rates[_LOAD] -= held * kt * speed * dot(en, dN) / rise
 
 
 @compiled
@@ -240,19 +214,19 @@ def _end_of_stick(
     """Add −J J' W/D where the force of a stick reaches the limit ξ = `way`."""
     e, de, eb, deb = at[0], at[1], at[2], at[3]
     en, den, enb, denb = over[0], over[1], over[2], over[3]
-    slope = kt * inner(deb, U) - way * mu * inner(denb, N)
-    along = kt * (inner(eb, dU) - inner(e, dU)) - way * mu * inner(enb, dN)
-    at_onset, by_friction = 0.0, -way * inner(enb, N)
+    slope = kt * dot(deb, U) - way * mu * dot(denb, N)
+    along = kt * (dot(eb, dU) - dot(e, dU)) - way * mu * dot(enb, dN)
+    at_onset, by_friction = 0.0, -way * dot(enb, N)
     if row[BEGAN] == AFTER_SLIP:
         at_onset = row[DIRECTION] * mu
-        by_friction += row[DIRECTION] * inner(en, N)
+        by_friction += row[DIRECTION] * dot(en, N)
     else:
-        at_onset = kt * inner(de, U) / inner(den, N)
-    along += at_onset * inner(en, dN)
+        at_onset = kt * dot(de, U) / dot(den, N)
+    along += at_onset * dot(en, dN)
     factor = -along * weight / slope
     for i in range(e.size):
         out_U[i] += factor * kt * (eb[i] - e[i])
     for j in range(en.size):
         out_N[j] += factor * (at_onset * en[j] - way * mu * enb[j])
-    rates[_KT] += factor * (inner(eb, U) - inner(e, U))
+    rates[_KT] += factor * (dot(eb, U) - dot(e, U))
     rates[_MU] += factor * by_friction

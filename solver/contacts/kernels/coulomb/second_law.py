@@ -19,8 +19,8 @@ import numpy as np
 from solver.contacts.kernels.circle.law import with_second
 from solver.contacts.kernels.columns import KN, KT, KT_SECOND, MU
 from solver.contacts.kernels.coulomb.elastic_normal import merged, positions
-from solver.contacts.kernels.coulomb.force import add_moments, contact_force, products
-from solver.contacts.kernels.coulomb.hessian import bases_at, inner, second_along
+from solver.contacts.kernels.coulomb.force import add_moments, bases_at, contact_force, products
+from solver.contacts.kernels.coulomb.hessian import second_along
 from solver.contacts.kernels.stick_slip_events import (
     BEGIN,
     END,
@@ -32,14 +32,14 @@ from solver.contacts.kernels.stick_slip_events import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Integer, Real, coefficient_count
-from solver.jit.lapack import fill, fill_block
+from solver.jit.lapack import dot, fill, fill_block
 from solver.jit.separate import apart
 
 
 @compiled
 def weight_at(ks: Integer, w: Real, e: Real) -> float:
     """Return W = w·e where the basis is `e`, as it stands under the integral of a force coefficient."""
-    total = inner(w, e) / math.pi
+    total = dot(w, e) / math.pi
     return total - 0.5 * w[0] * e[0] / math.pi if ks[0] == 0 else total
 
 
@@ -80,12 +80,12 @@ def _along_line(
         g_N[j] += pull
         by_N[j] += along_N[j] + (swell * pull if dmu != 0.0 else 0.0)
     if dkt != 0.0:
-        rates[0] -= stretch * inner(w, by_kt)
+        rates[0] -= stretch * dot(w, by_kt)
         for j in range(n):
             for i in range(n):
                 out_u[j] += stretch * w[i] * by_u[i, j]
     if dmu != 0.0:
-        rates[1] -= swell * inner(w, by_mu)
+        rates[1] -= swell * dot(w, by_mu)
     return state, count
 
 
@@ -117,7 +117,7 @@ def _pressing(
             bases_at(tau, all_ks, over, slopes)
             bases_at(tau, ks, e, de)
             # The begin of contact moves by −dN/N' and leaves out what it passes, the end takes it in.
-            factor = weight_at(ks, w, e) * inner(over, dN) / abs(inner(slopes, N))
+            factor = weight_at(ks, w, e) * dot(over, dN) / abs(dot(slopes, N))
             for j in range(size):
                 by_N[j] += factor * over[j]
     products(cosines, sines, ks, all_ks, 1.0, block)

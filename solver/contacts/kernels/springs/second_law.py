@@ -12,13 +12,12 @@ import math
 import numpy as np
 
 from solver.contacts.kernels.columns import A_1, CLOSED, DEFORMING, GAP, K_GAP, MOST_DEGREE, TOUCHING
-from solver.contacts.kernels.coulomb.force import add_moments, basis_at, moment_rows, products
-from solver.contacts.kernels.coulomb.hessian import bases_at, inner
+from solver.contacts.kernels.coulomb.force import add_moments, bases_at, basis_at, moment_rows, products
 from solver.contacts.kernels.coulomb.second_law import weight_at
 from solver.contacts.kernels.springs.force import positive_intervals
 from solver.contacts.kernels.stick_slip_events import SEPARATED
 from solver.jit.fourier import Integer, Real, coefficient_count
-from solver.jit.lapack import fill, fill_block
+from solver.jit.lapack import dot, fill, fill_block
 from solver.jit.separate import apart
 from solver.jit.trig_polynomial import unpack
 
@@ -46,14 +45,14 @@ def gap_second(
         add_moments(intervals[i, 0], intervals[i, 1], 1.0, cosines, sines)
         for side in range(2):
             bases_at(intervals[i, side], ks, e, de)
-            factor = k * weight_at(ks, w[0], e) * (inner(e, dU[0]) - dgap) / abs(inner(de, U[0]))
+            factor = k * weight_at(ks, w[0], e) * (dot(e, dU[0]) - dgap) / abs(dot(de, U[0]))
             for j in range(n):
                 out_U[0, j] += factor * e[j]
             out_row[GAP] -= factor
     block, constant = np.empty((n, n)), np.empty(n)
     products(cosines, sines, ks, ks, 1.0, block)
     moment_rows(cosines, sines, ks, constant)
-    held = inner(w[0], constant)
+    held = dot(w[0], constant)
     for j in range(n):
         pull = 0.0
         for i in range(n):
@@ -85,7 +84,7 @@ def polynomial_second(
     share, e = 2.0 * math.pi / samples, np.empty(n)
     for j in range(samples):
         basis_at(share * j, ks, e)
-        u, du = inner(U[0], e), inner(dU[0], e)
+        u, du = dot(U[0], e), dot(dU[0], e)
         weight, bend, turn = share * weight_at(ks, w[0], e), 0.0, 0.0
         for d in range(MOST_DEGREE, 0, -1):
             turn = turn * u + d * drow[A_1 + d - 1]

@@ -22,7 +22,6 @@ import numpy as np
 from solver.balance.kernels.jacobian import factorise, step_back, step_back_transposed
 from solver.balance.kernels.output import extremes
 from solver.balance.kernels.residual import contact_values, least_size
-from solver.contacts.kernels.coulomb.hessian import inner
 from solver.contacts.kernels.system import System
 from solver.continuation.extrema.kernels.contact_curvatures import (
     add_slopes_times,
@@ -43,7 +42,7 @@ from solver.continuation.extrema.kernels.peak_state import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real, coefficient_count, cosine_position
-from solver.jit.lapack import copy_block, fill, fill_block
+from solver.jit.lapack import copy_block, dot, fill, fill_block
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance_derivatives import (
     BY_BOTH,
@@ -217,8 +216,8 @@ def slopes_at(system: System, at: Summit) -> bool:
     numbers[DA_DP] = _linear_part(system, at, BY_P)
     _linear_part(system, at, VALUE)
     for d in range(nc):
-        numbers[G] += inner(at.z[BY_OMEGA, d], at.F[d])
-        numbers[DA_DP] += inner(at.z[BY_P, d], at.F[d]) + inner(at.z[VALUE, d], at.dF_dp[d])
+        numbers[G] += dot(at.z[BY_OMEGA, d], at.F[d])
+        numbers[DA_DP] += dot(at.z[BY_P, d], at.F[d]) + dot(at.z[VALUE, d], at.dF_dp[d])
     return math.isfinite(numbers[G])
 
 
@@ -304,10 +303,10 @@ def curvatures_at(system: System, u: Real, at: Summit) -> None:
     for d in range(nc):
         for i in range(n):
             turned[d, i] = at.z[BY_OMEGA, d, i] + numbers[DTAU] * turned[d, i]
-        k += inner(at.z[BY_OMEGA_TWICE, d], at.F[d]) + inner(at.z[BY_OMEGA, d], at.along[d])
-        m += inner(at.z[BY_BOTH, d], at.F[d]) + inner(at.z[BY_P, d], at.along[d])
-        m += inner(turned[d], at.dF_dp[d])
+        k += dot(at.z[BY_OMEGA_TWICE, d], at.F[d]) + dot(at.z[BY_OMEGA, d], at.along[d])
+        m += dot(at.z[BY_BOTH, d], at.F[d]) + dot(at.z[BY_P, d], at.along[d])
+        m += dot(turned[d], at.dF_dp[d])
     m += second_forces_at(system, u, at)
     add_slopes_times(system, at, True, 1.0, turned, h)
-    numbers[CURVE] = k - inner(at.h, at.rhs[1])
-    numbers[DG_DP] = m - inner(at.h, at.rhs[2])
+    numbers[CURVE] = k - dot(at.h, at.rhs[1])
+    numbers[DG_DP] = m - dot(at.h, at.rhs[2])

@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.contacts.kernels.columns import COLUMNS, KT, MU
 from solver.contacts.kernels.coulomb.force import contact_force
-from solver.contacts.kernels.coulomb.hessian import inner, second_along
+from solver.contacts.kernels.coulomb.hessian import second_along
 from solver.contacts.kernels.laws import call_law
 from solver.contacts.kernels.second_laws import call_second
 from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED
@@ -18,6 +18,7 @@ from solver.contacts.kernels.system import LOAD_COEFFICIENTS, System
 from solver.continuation.extrema.kernels.peak_state import Summit
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real, coefficient_count
+from solver.jit.lapack import dot
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance_derivatives import VALUE
 
@@ -121,7 +122,7 @@ def _second_of_jenkins(system: System, e: int, u: Real, at: Summit) -> float:
         at.segments[e], at.counts[e], at.dF_dU[block], at.dF_dN[e], at.z[VALUE, c], along, none,
         at.h[c * n : (c + 1) * n], out_N,
     )  # fmt: skip
-    total = inner(out_N, at.dload[e])
+    total = dot(out_N, at.dload[e])
     if at.slope[e, KT] != 0.0:
         total += by_kt * at.slope[e, KT]
     if at.slope[e, MU] != 0.0:
@@ -145,7 +146,7 @@ def _second_of(system: System, e: int, u: Real, at: Summit) -> float:
     )  # fmt: skip
     if state == FAILED:
         return np.nan
-    total = inner(out_load, at.dload[e])
+    total = dot(out_load, at.dload[e])
     for column in range(COLUMNS):
         if at.slope[e, column] != 0.0:
             total += out_row[column] * at.slope[e, column]

@@ -12,7 +12,6 @@ import math
 
 import numpy as np
 
-from solver.contacts.kernels.coulomb.hessian import inner
 from solver.contacts.kernels.system import System
 from solver.continuation.extrema.kernels.amplitude_hessian import (
     balance_at,
@@ -41,7 +40,7 @@ from solver.continuation.extrema.kernels.peak_state import (
 )
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
-from solver.jit.lapack import copy_to, set_to
+from solver.jit.lapack import copy_to, dot, set_to
 from solver.jit.separate import apart
 
 # What is kept of one side of a bracket.
@@ -100,7 +99,7 @@ def find_summit(
         if not fixed:
             if not numbers[CURVE] < 0.0:
                 return False, iteration, omega
-            move = -(numbers[G] - inner(at.h, at.rhs[0])) / numbers[CURVE]
+            move = -(numbers[G] - dot(at.h, at.rhs[0])) / numbers[CURVE]
         off = abs(move) / omega
         if numbers[NORM] <= (TARGET if sharp <= SHARP else ACCEPTED) and off <= sharp:
             return True, iteration, omega
