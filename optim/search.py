@@ -19,9 +19,9 @@ from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
 from optim.problem.keys import ROBUST, DesignKeys
 from optim.problem.keywords import keywords
 from optim.problem.problem import Method, Problem, pose
-from optim.problem.watch import OnProgress, ShouldStop
 from optim.results.basins import SAME_PLACE, Basin
 from optim.results.design import DesignResult, DesignStatus
+from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ from optim.criteria.rows import Evaluation, Response
 from optim.problem.cases import Case
 from optim.problem.problem import Problem
 from optim.problem.variables import parameter_values
-from optim.problem.watch import ShouldStop
 from solver.balance.simplifications import Effects, even_harmonics_reason
 from solver.continuation.branch import Branch
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
+from solver.results.watch import ShouldStop
 from solver.scene.scene import Scene
 
 

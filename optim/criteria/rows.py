@@ -51,6 +51,15 @@ class Evaluation:
         """Return the rows of one quantity, largest first."""
         return tuple(sorted((r for r in self.rows if r.quantity is quantity), key=lambda row: -row.value))
 
+    def highest(self, within: float) -> list[Row]:
+        """Return, of every quantity that is minimised, the rows as high as its highest but for a share."""
+        found: list[Row] = []
+        for quantity in dict.fromkeys(row.quantity for row in self.rows):
+            rows = [row for row in self.of(quantity) if row.weight > 0.0]
+            top = max((row.weight * row.value for row in rows), default=0.0)
+            found += [row for row in rows if row.weight * row.value >= top * (1.0 - within)]
+        return found
+
     @property
     def peaks(self) -> tuple[Row, ...]:
         """The peaks that compete, highest first."""

@@ -12,11 +12,11 @@ from optim.criteria.rows import Evaluation
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.kkt import KEPT, KKT_TOLERANCE
 from optim.methods.plateau import Plateau, plateau_of
-from optim.problem.watch import ShouldStop
 from optim.results.basins import Basin, Checked
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import DOUBTFUL, open_peaks
 from optim.results.json import errors_of
+from solver.results.watch import ShouldStop
 
 HELD = 1e-7  # multiplier of a bound, relative objective per scaled variable, from which it holds the design
 MOST_CHECKED = 4

@@ -10,8 +10,8 @@ from optim.criteria.linearised import Model, model_of
 from optim.criteria.rows import Evaluation
 from optim.problem.problem import Problem
 from optim.problem.variables import Variable
-from optim.problem.watch import OnProgress, ShouldStop
 from optim.results.design import DesignStatus
+from solver.results.watch import OnProgress, ShouldStop
 
 MOST_EVALUATIONS = 800
 

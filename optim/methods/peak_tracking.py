@@ -8,9 +8,9 @@ from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
 from optim.criteria.peak import PEAK
 from optim.criteria.rows import Evaluation, Response
 from optim.problem.problem import Problem
-from optim.problem.watch import OnProgress, ShouldStop
 from optim.results.basins import Basin
 from optim.results.design import DesignStatus
+from solver.results.watch import OnProgress, ShouldStop
 from solver.studies.peaks.minimise_peak import least_peak
 from solver.studies.peaks.results import LeastPeak, TrackStatus
 

@@ -20,9 +20,9 @@ from optim.methods.evaluator import StoppedError
 from optim.methods.kkt import KEPT
 from optim.problem.problem import Problem
 from optim.problem.variables import Variable, parameter_values
-from optim.problem.watch import ShouldStop
 from optim.results.design import DesignStatus
 from solver.response.solve import solve
+from solver.results.watch import ShouldStop
 
 LEVEL = 1e-6  # relative change below which what is minimised counts as constant
 STEP = 0.01  # scaled, to the first designs that are compared
@@ -131,7 +131,7 @@ class _Level:
         slope = abs(variable.slope(here.values[variable.name]))
         held = [
             row
-            for row in _holding(here)
+            for row in here.highest(LEVEL)
             if not abs(row.gradient[i]) * slope > LEVEL * abs(row.value)
         ]  # fmt: skip
         return any(self._stays(here, variable, row, side) for row in held for side in (-STEP, STEP))
@@ -181,7 +181,7 @@ class _Level:
         if high - low < STEP:
             return None
         self._found[variable.name, z] = low, high
-        held = _holding(here)[0]
+        held = here.highest(LEVEL)[0]
         criteria: dict[str, TieBreak] = {
             "the next highest peak": lambda there: _next_peak(self._problem, there, held),
             "the resonance band": lambda there: None if there.band is None else there.band.value,
@@ -247,16 +247,6 @@ def _least(along: Along, criterion: TieBreak, low: float, high: float) -> tuple[
     if found.fun < least:
         best, least = float(found.x), float(found.fun)
     return best, least + LEVEL * 1e-3 * abs(least)
-
-
-def _holding(here: Evaluation) -> list[Row]:
-    """Return the rows that hold what is minimised, the highest first."""
-    held: list[Row] = []
-    for quantity in dict.fromkeys(row.quantity for row in here.rows):
-        rows = [row for row in here.of(quantity) if row.weight > 0.0]
-        top = max((row.weight * row.value for row in rows), default=0.0)
-        held += [row for row in rows if row.weight * row.value >= top * (1.0 - LEVEL)]
-    return held
 
 
 def _next_peak(problem: Problem, there: Evaluation, held: Row) -> float | None:

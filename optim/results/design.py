@@ -221,7 +221,7 @@ class DesignResult(Drawn):
         """What holds the optimum in place, in words: equally high peaks, bounds, limits."""
         if self.evaluation is None or not self.evaluation.rows:
             return ()
-        held = [row.what for row in _highest(self.evaluation)]
+        held = [row.what for row in self.evaluation.highest(SAME_HEIGHT)]
         for variable in self.problem.variables:
             value = self.evaluation.values[variable.name]
             for bound, name in ((variable.low, "lower"), (variable.high, "upper")):
@@ -310,13 +310,3 @@ def at_limit(row: Row) -> bool:
 def limit_words(row: Row) -> str:
     """Return the limit of a row in words."""
     return row.quantity.limit_words(row)
-
-
-def _highest(evaluation: Evaluation) -> list[Row]:
-    """Return the rows that are equally high, of every quantity that is minimised."""
-    found: list[Row] = []
-    for quantity in dict.fromkeys(row.quantity for row in evaluation.rows):
-        rows = [row for row in evaluation.of(quantity) if row.weight > 0.0]
-        top = max((row.weight * row.value for row in rows), default=0.0)
-        found += [row for row in rows if row.weight * row.value >= top * (1.0 - SAME_HEIGHT)]
-    return found

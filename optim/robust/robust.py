@@ -27,7 +27,6 @@ from optim.problem.numbers import is_number, whole
 from optim.problem.problem import pose
 from optim.problem.uncertainty_input import check_settings, read_uncertain
 from optim.problem.uncertainty_set import Scenario
-from optim.problem.watch import OnProgress, ShouldStop
 from optim.problem.words import Aim
 from optim.results.design import DesignResult, DesignStatus
 from optim.robust.assessment import side_of
@@ -36,6 +35,7 @@ from optim.robust.result import RobustResult, RobustStatus, Side
 from optim.robust.search import RobustSearch
 from optim.robust.worst_case import Aspect, UnknownScenarioError
 from optim.search import solve_problem
+from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from solver.jit.fourier import Real
 from solver.linear.assembly import linear_model
 from solver.matrices.normal_modes import undamped_modes
 from solver.response.time_history import matrices
+from solver.results.watch import OnProgress, ShouldStop, part_of
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.scene import Scene
 
@@ -39,8 +40,8 @@ def campbell_diagram(
     limit: float | None = None,
     band_hz: Sequence[float] | None = None,
     harmonics: int = 11,
-    on_progress: Callable[[float, int], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    on_progress: OnProgress = None,
+    should_stop: ShouldStop = None,
 ) -> CampbellDiagram:
     """Compute the Campbell diagram of a scene.
 
@@ -71,11 +72,7 @@ def campbell_diagram(
     for i, group in enumerate(groups):
         here = with_engine_order(scene, group[0]) if cyclic else scene
         low, high = looked_at or _needed(scene, speeds, group)
-
-        def progress(share: float, points: int, done: int = i, before: int = count) -> None:
-            if on_progress is not None:
-                on_progress((done + share) / len(groups), before + points)
-
+        progress = part_of(on_progress, i / len(groups), (i + 1) / len(groups), count)
         branch = sweep(
             here, start=low, stop=high, harmonics=harmonics, limit=limit, on_progress=progress,
             should_stop=should_stop,

@@ -29,10 +29,10 @@ from optim.problem.keys import FEWEST_POINTS, POINTS, FrontKeys
 from optim.problem.keywords import keywords
 from optim.problem.problem import Method, Problem, pose
 from optim.problem.variables import Variable, scaled, unscaled
-from optim.problem.watch import OnProgress, ShouldStop
 from optim.results.design import DesignResult, DesignStatus
 from optim.search import judge, local_search_of, solve_problem
 from optim.studies.pareto_result import ParetoPoint, ParetoResult, ParetoStatus, front_of
+from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from sqlalchemy.exc import DBAPIError
 
-from service.db.engine import database_name, database_path, is_sqlite, read_engine, shown
+from service.db.engine import database_name, database_path, is_sqlite, read_engine
 from service.db.repositories.integrity import (
     Contents,
     arrays,
@@ -15,7 +15,7 @@ from service.db.repositories.integrity import (
     damage,
     damaged_results,
 )
-from service.db.revisions import current_revision, head_revision
+from service.db.revisions import head_revision, off_head
 from service.errors import DamagedDatabaseError, DatabaseError, WrongRevisionError
 from service.jobs.arrays import decode
 
@@ -68,12 +68,9 @@ def check(url: str) -> Findings:
     name = database_name(url)
     if is_sqlite(url) and not database_path(url).exists():
         raise DatabaseError(f"there is no database {name} to check")
-    revision, wanted = current_revision(url), head_revision()
-    if revision != wanted:
-        raise WrongRevisionError(
-            f"{name} is at revision {revision}, this version checks {wanted}: "
-            f"run `stickslip db upgrade --database {shown(url)}`"
-        )
+    wrong = off_head(url, "checks")
+    if wrong is not None:
+        raise WrongRevisionError(wrong)
     engine = read_engine(url)
     try:
         with engine.begin() as connection:
@@ -92,5 +89,8 @@ def check(url: str) -> Findings:
         engine.dispose()
     more = [f"{len(damaged) - MOST_NAMED} more arrays and results"] if len(damaged) > MOST_NAMED else []
     return Findings(
-        revision=revision, wanted=wanted, trouble=(*trouble, *damaged[:MOST_NAMED], *more), contents=held
+        revision=head_revision(),
+        wanted=head_revision(),
+        trouble=(*trouble, *damaged[:MOST_NAMED], *more),
+        contents=held,
     )

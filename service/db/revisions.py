@@ -105,6 +105,17 @@ def upgrade(url: str, target: str = "head") -> str:
     return now or "base"
 
 
+def off_head(url: str, does: str) -> str | None:
+    """Say what is wrong with a database whose revision is not this version's, which `does` it; None if it is."""
+    revision, wanted = current_revision(url), head_revision()
+    if revision == wanted:
+        return None
+    return (
+        f"{database_name(url)} is at revision {revision}, this version {does} {wanted}: "
+        f"run `stickslip db upgrade --database {shown(url)}`"
+    )
+
+
 def prepare(url: str) -> None:
     """Make a new database's tables, or check those of an existing one.
 

@@ -7,10 +7,10 @@ from datetime import timedelta
 
 from sqlalchemy.exc import DBAPIError
 
-from service.db.engine import Database, database_name, database_path, is_sqlite, shown, shrink
+from service.db.engine import Database, database_name, database_path, is_sqlite, shrink
 from service.db.repositories.jobs.repository import JobRepository
 from service.db.repositories.retention import Pruned, RetentionRepository
-from service.db.revisions import current_revision, head_revision
+from service.db.revisions import off_head
 from service.errors import DatabaseError
 from service.queue.retention import prune, prune_uploads
 
@@ -40,12 +40,9 @@ def prune_database(
         )
     if is_sqlite(url) and not database_path(url).exists():
         raise DatabaseError(f"there is no database {name}")
-    revision, wanted = current_revision(url), head_revision()
-    if revision != wanted:
-        raise DatabaseError(
-            f"{name} is at revision {revision}, this version needs {wanted}: "
-            f"run `stickslip db upgrade --database {shown(url)}`"
-        )
+    wrong = off_head(url, "needs")
+    if wrong is not None:
+        raise DatabaseError(wrong)
     database = Database(url)
     try:
         before = JobRepository(database).now() - timedelta(seconds=seconds)

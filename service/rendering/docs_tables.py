@@ -11,6 +11,7 @@ from pathlib import Path
 
 from optim.criteria.table import criteria_table
 from optim.problem.keyword_source import keyword_source
+from service.jobs.kinds.registry.table import placed
 from service.rendering.problem_table import problem_table
 from service.settings.table import settings_table
 from solver.contacts.laws.table import laws_table
@@ -30,10 +31,7 @@ SOURCES: Mapping[str, Callable[[], str]] = {"optim/problem/keyword_types.py": ke
 def with_tables(text: str, tables: Mapping[str, Callable[[], str]]) -> str:
     """A page with its tables as they are now (ValueError if a mark is not there)."""
     for name, table in tables.items():
-        begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-        before, rest = text.split(begin)
-        _, after = rest.split(end)
-        text = f"{before}{begin}\n\n{table()}\n{end}{after}"
+        text = placed(text, name, table())
     return text
 
 

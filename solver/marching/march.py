@@ -127,13 +127,9 @@ def march(
     system, dof, index = equations_of_motion(whole, omega)
     steps = _steps(system, scene.forces, steps_per_period)
     plan = _Plan(
-        system=system,
-        dof=dof,
-        tolerance=tolerance,
-        max_periods=max_periods,
-        on_progress=on_progress,
+        system=system, dof=dof, tolerance=tolerance, max_periods=max_periods, on_progress=on_progress,
         should_stop=should_stop,
-    )
+    )  # fmt: skip
     names = tuple(row.name for row in rows(whole.contacts))
     if start is not None and tractions is not None:
         raise SettingError("tractions", dict(tractions), "must be those of `start` where that is given")
@@ -144,18 +140,11 @@ def march(
     if on_progress is not None and fine.settled:
         on_progress(1.0, periods)
     return describe(
-        record=fine.record,
-        coarse=coarse.record,
-        order=kernel.ORDER,
-        transient=_left_to_decay(coarse.changes, fine.changes),
-        periods=periods,
-        contacts=names,
-        frequency_hz=frequency_hz,
-        steps_per_period=fine.steps,
-        status=fine.status,
-        drift=fine.drift,
+        record=fine.record, coarse=coarse.record, order=kernel.ORDER,
+        transient=_left_to_decay(coarse.changes, fine.changes), periods=periods, contacts=names,
+        frequency_hz=frequency_hz, steps_per_period=fine.steps, status=fine.status, drift=fine.drift,
         seconds=time.perf_counter() - begin,
-    )
+    )  # fmt: skip
 
 
 def _check(frequency_hz: float, tolerance: float, max_periods: int) -> None:

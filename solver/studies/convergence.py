@@ -25,6 +25,7 @@ from solver.jit.fourier import Real
 from solver.results.base import Drawn
 from solver.results.told import Piece
 from solver.results.views import Views
+from solver.results.watch import ShouldStop
 from solver.scene.harmonics import kept_harmonics
 from solver.scene.scene import Scene
 
@@ -141,6 +142,21 @@ class AccuracyStudy(Drawn):
         }  # fmt: skip
 
 
+def _highest_peak(scene: Scene, should_stop: ShouldStop) -> tuple[Branch, float]:
+    """Return the response over the scene's band and the frequency of its highest peak [Hz]."""
+    branch = sweep(scene, should_stop=should_stop)
+    if branch.peak is None:
+        raise SettingError("frequency_hz", None, "is needed: the scene's band gave no response")
+    return branch, branch.peak.at
+
+
+def _ways(scene: Scene, harmonics: Sequence[int], samples: Sequence[int]) -> list[tuple[int, int]]:
+    """Return highest harmonic and samples a period of each way to evaluate; no samples: the closed form."""
+    shortest = {h: int(kept_harmonics(scene, (), h, odd=False)[-1]) for h in harmonics}
+    sampled = [(h, n) for n in samples for h in harmonics if n >= _PER_WAVE * max(shortest[h], 1)]
+    return [(h, 0) for h in harmonics] + sampled
+
+
 def accuracy_study(
     scene: Scene,
     frequency_hz: float | None = None,
@@ -172,18 +188,13 @@ def accuracy_study(
     _check_ways(harmonics, samples, repeats)
     branch = None
     if frequency_hz is None:
-        branch = sweep(scene, should_stop=should_stop)
-        if branch.peak is None:
-            raise SettingError("frequency_hz", None, "is needed: the scene's band gave no response")
-        frequency_hz = branch.peak.at
+        branch, frequency_hz = _highest_peak(scene, should_stop)
     p = 2.0 * math.pi * check_frequency("frequency_hz", frequency_hz)
     reference = _reference(scene, p, max(LEAST_REFERENCE, _BEYOND * max(harmonics)))
     if reference is None:
         raise SettingError("frequency_hz", frequency_hz, "has no solution to compare with")
     workspace, u, exact = reference
-    ways = [(h, 0) for h in harmonics]
-    shortest = {h: int(kept_harmonics(scene, (), h, odd=False)[-1]) for h in harmonics}
-    ways += [(h, n) for n in samples for h in harmonics if n >= _PER_WAVE * max(shortest[h], 1)]
+    ways = _ways(scene, harmonics, samples)
     prepared: list[tuple[AccuracyRow, Callable[[], object]]] = []
     asked = should_stop or (lambda: False)
     tell = on_progress or (lambda _share, _rows: None)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import ClassVar
@@ -21,6 +21,7 @@ from solver.jit.fourier import Real
 from solver.results.base import Drawn
 from solver.results.told import Piece
 from solver.results.views import Views
+from solver.results.watch import OnProgress, ShouldStop, part_of
 from solver.scene.parts import Mistuning
 from solver.scene.scene import CyclicStructure, Scene
 from solver.studies.blades import BladePeaks, blade_peaks, mistuned, with_mistuning
@@ -159,6 +160,21 @@ class MistuningStudy(Drawn):
         }
 
 
+def _until_stopped(
+    drawn: Iterable[BladePeaks], tuned: BladePeaks, asked: Callable[[], bool]
+) -> tuple[list[BladePeaks], tuple[Branch, ...], bool]:
+    """Return the disks without their responses, the tuned response with the worst, and whether it stopped."""
+    disks: list[BladePeaks] = []
+    highest, branches = -math.inf, worst_branch(tuned)
+    for peaks in drawn:
+        if asked():
+            return disks, branches, True
+        disks.append(replace(peaks, branches=()))
+        if peaks.largest > highest:
+            highest, branches = peaks.largest, worst_branch(tuned) + worst_branch(peaks)
+    return disks, branches, False
+
+
 def mistuning_study(
     scene: Scene,
     *,
@@ -170,8 +186,8 @@ def mistuning_study(
     stop: float | None = None,
     dof: str | None = None,
     harmonics: int = 11,
-    on_progress: Callable[[float, int], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    on_progress: OnProgress = None,
+    should_stop: ShouldStop = None,
 ) -> MistuningStudy:
     """Compute the peaks of every blade of disks with random factors.
 
@@ -204,31 +220,24 @@ def mistuning_study(
     asked = should_stop or (lambda: False)
 
     def peaks_of(disk: Scene, done: int) -> BladePeaks:
-        def progress(share: float, _sweeps: int) -> None:
-            if on_progress is not None:
-                on_progress((done + share) / (samples + 1.0), max(done - 1, 0))
-
+        share, disks = 1.0 / (samples + 1.0), max(done - 1, 0)
+        progress = part_of(on_progress, done * share, (done + 1) * share, disks, counting=False)
         return blade_peaks(
             disk, start, stop, dof=dof, harmonics=harmonics, on_progress=progress, should_stop=should_stop
         )
 
     tuned = peaks_of(without_mistuning(scene), 0)
-    disks: list[BladePeaks] = []
-    first = worst_branch(tuned)
-    highest, branches, stopped = -math.inf, first, asked()
-    for k in range(samples if first and not stopped else 0):
-        peaks = peaks_of(mistuned(scene, of=names, spread=spread, seed=seed + k), k + 1)
-        stopped = asked()
-        if stopped:
-            break
-        disks.append(replace(peaks, branches=()))
-        if peaks.largest > highest:
-            highest, branches = peaks.largest, first + worst_branch(peaks)
+    stopped = asked()
+    ahead = range(samples if worst_branch(tuned) and not stopped else 0)
+    drawn = (peaks_of(mistuned(scene, of=names, spread=spread, seed=seed + k), k + 1) for k in ahead)
+    disks, branches, cut = _until_stopped(drawn, tuned, asked)
     study = joined_study(
         scene, of=names, spread=spread, seed=seed, harmonics=harmonics, tuned=tuned, disks=disks,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
-    return replace(study, branches=branches, status=MistuningStatus.STOPPED if stopped else study.status)
+    return replace(
+        study, branches=branches, status=MistuningStatus.STOPPED if stopped or cut else study.status
+    )
 
 
 def joined_study(

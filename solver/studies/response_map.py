@@ -19,6 +19,7 @@ from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.results.base import Drawn
 from solver.results.views import Views
+from solver.results.watch import part_of
 from solver.scene.scene import Scene
 from solver.studies.kernels.map_rows import GIVEN, MAX_ABS, RESIDUAL, ROW_VALUES, SOLVED, solve_row
 from solver.studies.peaks.results import PeakTrack, TrackStatus
@@ -146,24 +147,16 @@ def response_map(
     )  # fmt: skip
     strips: list[Strip] = []
     stopped = False
+    of_a_row = (OF_THE_GRID if ridge else 1.0) / steps
     for first, last in grid.strips:
-
-        def progress(share: float, points: int, first: int = first, rows: int = last - first) -> None:
-            if on_progress is not None:
-                done = (first + share * rows) / steps
-                on_progress(done * (OF_THE_GRID if ridge else 1.0), first * frequencies + points)
-
+        progress = part_of(on_progress, first * of_a_row, last * of_a_row, first * frequencies)
         strips.append(grid.solve(first, last, on_progress=progress, should_stop=should_stop))
         stopped = strips[-1].stopped
         if stopped:
             break
     track = None
     if ridge and not stopped:
-
-        def tracked(share: float, _sweeps: int) -> None:
-            if on_progress is not None:
-                on_progress(OF_THE_GRID + (1.0 - OF_THE_GRID) * share, steps * frequencies)
-
+        tracked = part_of(on_progress, OF_THE_GRID, 1.0, steps * frequencies, counting=False)
         track = track_peak(
             scene, parameter, start, stop, harmonics=harmonics, effects=effects, on_progress=tracked,
             should_stop=should_stop,

@@ -102,6 +102,13 @@ def unpacked(
     )
 
 
+def _variables(result: DesignResult | RobustResult) -> tuple[VariableValues, ...]:
+    return tuple(
+        VariableValues(name=v.name, value=result.optimum.get(v.name), low=v.low, high=v.high)
+        for v in result.problem.variables
+    )
+
+
 def design_record(result: DesignResult) -> DesignRecord:
     """The design with the columns people filter by."""
     problem, evaluation, peak = result.problem, result.evaluation, result.peak
@@ -129,10 +136,7 @@ def design_record(result: DesignResult) -> DesignRecord:
         evaluations=result.evaluations,
         work=_finite(result.work),
         seconds=result.seconds,
-        variables=tuple(
-            VariableValues(name=v.name, value=result.optimum.get(v.name), low=v.low, high=v.high)
-            for v in problem.variables
-        ),
+        variables=_variables(result),
     )
 
 
@@ -160,10 +164,7 @@ def robust_record(result: RobustResult) -> DesignRecord:
         evaluations=result.designs,
         work=float(result.responses),
         seconds=result.seconds,
-        variables=tuple(
-            VariableValues(name=v.name, value=result.optimum.get(v.name), low=v.low, high=v.high)
-            for v in problem.variables
-        ),
+        variables=_variables(result),
     )
 
 

@@ -63,13 +63,18 @@ def _way(kind: JobKind) -> str:
     return "anew" if kind.parts is None else "parts"
 
 
+def placed(text: str, name: str, table: str) -> str:
+    """A page with a table between its marks (ValueError if one is not there)."""
+    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+    before, rest = text.split(begin)
+    _, after = rest.split(end)
+    return f"{before}{begin}\n\n{table}\n{end}{after}"
+
+
 def with_tables(text: str, registry: Registry) -> str:
     """The page with the tables between their marks as they are now (ValueError if a mark is not there)."""
     for name, table in ((KINDS, kinds_table(registry)), (AGAIN, interrupted_table(registry))):
-        begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-        before, rest = text.split(begin)
-        _, after = rest.split(end)
-        text = f"{before}{begin}\n\n{table}\n{end}{after}"
+        text = placed(text, name, table)
     return text
 
 
