@@ -88,9 +88,10 @@ def check(url: str) -> Findings:
     finally:
         engine.dispose()
     more = [f"{len(damaged) - MOST_NAMED} more arrays and results"] if len(damaged) > MOST_NAMED else []
+    head = head_revision()
     return Findings(
-        revision=head_revision(),
-        wanted=head_revision(),
+        revision=head,
+        wanted=head,
         trouble=(*trouble, *damaged[:MOST_NAMED], *more),
         contents=held,
     )

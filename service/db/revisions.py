@@ -106,7 +106,7 @@ def upgrade(url: str, target: str = "head") -> str:
 
 
 def off_head(url: str, does: str) -> str | None:
-    """Say what is wrong with a database whose revision is not this version's, which `does` it; None if it is."""
+    """Say that a database is at another revision than the one this version `does`; None if it is at that."""
     revision, wanted = current_revision(url), head_revision()
     if revision == wanted:
         return None

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Integral, Real
 
 import numpy as np
@@ -134,16 +134,23 @@ def march(
     if start is not None and tractions is not None:
         raise SettingError("tractions", dict(tractions), "must be those of `start` where that is given")
     begins = state_at(system, start or MarchStart(tractions=tractions or {}), index, names, omega)
-    coarse = _run(plan, begins, steps // 2, done=0)
+    found = _twice(plan, begins, steps, names, frequency_hz)
+    return replace(found, seconds=time.perf_counter() - begin)
+
+
+def _twice(
+    plan: _Plan, start: kernel.State, steps: int, names: tuple[str, ...], frequency_hz: float
+) -> MarchResult:
+    """March with double the step, then from its end with `steps` a period if it settled."""
+    coarse = _run(plan, start, steps // 2, done=0)
     fine = _run(plan, coarse.state, steps, done=coarse.changes.size) if coarse.settled else coarse
     periods = coarse.changes.size + (fine.changes.size if coarse.settled else 0)
-    if on_progress is not None and fine.settled:
-        on_progress(1.0, periods)
+    if plan.on_progress is not None and fine.settled:
+        plan.on_progress(1.0, periods)
     return describe(
         record=fine.record, coarse=coarse.record, order=kernel.ORDER,
         transient=_left_to_decay(coarse.changes, fine.changes), periods=periods, contacts=names,
         frequency_hz=frequency_hz, steps_per_period=fine.steps, status=fine.status, drift=fine.drift,
-        seconds=time.perf_counter() - begin,
     )  # fmt: skip
 
 

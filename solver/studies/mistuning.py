@@ -166,6 +166,8 @@ def _until_stopped(
     """Return the disks without their responses, the tuned response with the worst, and whether it stopped."""
     disks: list[BladePeaks] = []
     highest, branches = -math.inf, worst_branch(tuned)
+    if asked():
+        return disks, branches, True
     for peaks in drawn:
         if asked():
             return disks, branches, True
@@ -227,17 +229,14 @@ def mistuning_study(
         )
 
     tuned = peaks_of(without_mistuning(scene), 0)
-    stopped = asked()
-    ahead = range(samples if worst_branch(tuned) and not stopped else 0)
+    ahead = range(samples if worst_branch(tuned) else 0)
     drawn = (peaks_of(mistuned(scene, of=names, spread=spread, seed=seed + k), k + 1) for k in ahead)
-    disks, branches, cut = _until_stopped(drawn, tuned, asked)
+    disks, branches, stopped = _until_stopped(drawn, tuned, asked)
     study = joined_study(
         scene, of=names, spread=spread, seed=seed, harmonics=harmonics, tuned=tuned, disks=disks,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
-    return replace(
-        study, branches=branches, status=MistuningStatus.STOPPED if stopped or cut else study.status
-    )
+    return replace(study, branches=branches, status=MistuningStatus.STOPPED if stopped else study.status)
 
 
 def joined_study(
