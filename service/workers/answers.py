@@ -8,7 +8,7 @@ import logging
 import signal
 import threading
 from collections import Counter, deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any
@@ -23,9 +23,9 @@ from service.errors import (
     TooManyRequestsError,
 )
 from service.jobs.ids import new_id
-from service.jobs.outputs import FailureKind, JobFailure, Pace, Piece, Point
+from service.jobs.outputs import FailureKind, JobFailure, Pace
 from service.jobs.registry import RunOn, WarmUp
-from service.workers.base import Finished, Lost, Outcome, Stopped
+from service.workers.base import Finished, Lost, Outcome, Stopped, Unwatched
 from service.workers.local import LocalExecutor
 from service.workers.process_limits import ProcessLimits
 from solver.errors import Issue
@@ -82,7 +82,7 @@ class _Asked:
     outcome: Future[Outcome] = field(default_factory=Future)
 
 
-class Answers:
+class Answers(Unwatched):
     """Computes answers; a `Sink` of its executor.
 
     Parameters
@@ -188,15 +188,6 @@ class Answers:
             _settle(asked, Stopped())
         if executor is not None:
             executor.close()
-
-    def progress(self, attempt: Attempt, fraction: float, points: int) -> None:
-        """Nobody watches."""
-
-    def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
-        """Nobody watches."""
-
-    def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:
-        """An answer has no later attempt."""
 
     def ended(self, attempt: Attempt, outcome: Outcome) -> None:
         """Tell the one who waits for it."""

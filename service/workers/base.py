@@ -59,6 +59,19 @@ class Sink(Protocol):
         """There may be room for another attempt."""
 
 
+class Unwatched:
+    """The part of a `Sink` whose attempts nobody watches, and which have no later attempt."""
+
+    def progress(self, attempt: Attempt, fraction: float, points: int) -> None:
+        """Nobody watches."""
+
+    def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
+        """Nobody watches."""
+
+    def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:
+        """There is no later attempt."""
+
+
 class Executor(Protocol):
     """Runs attempts; never touches the database."""
 

@@ -10,7 +10,6 @@ import asyncio
 import logging
 import threading
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,9 +24,9 @@ from service.errors import (
 )
 from service.jobs.ids import new_id
 from service.jobs.kinds.previews import PREVIEWS
-from service.jobs.outputs import FailureKind, Pace, Piece, Point
+from service.jobs.outputs import FailureKind, Pace
 from service.jobs.registry import Registry
-from service.workers.base import Failed, Finished, Lost, Outcome
+from service.workers.base import Failed, Finished, Lost, Outcome, Unwatched
 from service.workers.local import LocalExecutor
 from service.workers.process_limits import ProcessLimits
 from solver.errors import Issue
@@ -67,7 +66,7 @@ class _Asked:
             self.answer.set_result(outcome)
 
 
-class Previews:
+class Previews(Unwatched):
     """Computes previews; a `Sink` of its executor.
 
     Parameters
@@ -149,15 +148,6 @@ class Previews:
             asked.settle(PreviewError("the service stops"))
         if executor is not None:
             executor.close()
-
-    def progress(self, attempt: Attempt, fraction: float, points: int) -> None:
-        """Nobody watches a preview."""
-
-    def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
-        """Nobody watches a preview."""
-
-    def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:
-        """A preview has no later attempt."""
 
     def ended(self, attempt: Attempt, outcome: Outcome) -> None:
         """Answer the one who waits for it."""

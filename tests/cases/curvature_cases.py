@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from contact_cases import central_difference
 
+import solver
 from solver.balance.balance import Balance, build
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
@@ -65,3 +66,30 @@ def error_of_hessian(scene: Scene, hz: float, paths: tuple[str, ...], effects: E
         error = np.abs(difference(moved, wanted, size[i]) - wanted) * size[i]
         worst = float(np.maximum(worst, error.max() / scale))
     return worst
+
+
+def peak_of(scene: Scene, near: float) -> tuple[solver.Branch, solver.Peak]:
+    branch = solver.sweep(scene, harmonics=HARMONICS, effects=ALL)
+    assert branch.completed
+    return branch, min((p for p in branch.peaks if p.interior), key=lambda p: abs(p.at - near))
+
+
+def check_hessian_of_a_peak(scene: Scene, near: float, paths: tuple[str, ...]) -> None:
+    """The Hessian of a peak, its gradient and its drift equal differences through the whole sweep."""
+    branch, peak = peak_of(scene, near)
+    found = Sensitivities(branch.balance, paths).peak_hessian(peak.solution, peak.at)
+    assert np.isfinite(found.hessian).all()
+    np.testing.assert_allclose(found.hessian, found.hessian.T, rtol=1e-9, atol=1e-12 * peak.value)
+    size = sizes(scene, paths)
+    scale = max(1.0, float(np.abs(found.hessian * np.outer(size, size)).max()) / peak.value)
+    for i, path in enumerate(paths):
+
+        def moved(x: float, path: str = path) -> np.ndarray:
+            there, shifted = peak_of(scene.with_values({path: scene.value(path) + x}), peak.at)
+            slopes = Sensitivities(there.balance, paths).gradient(shifted.solution, shifted.at).by_parameters
+            return np.append(slopes * size / peak.value, [shifted.at / peak.at, shifted.value / peak.value])
+
+        wanted = np.append(found.hessian[i] * size / peak.value,
+                           [found.drift[i] / peak.at, found.gradient[i] / peak.value])  # fmt: skip
+        error = np.abs(difference(moved, wanted, size[i]) - wanted) * size[i]
+        assert error.max() <= 1e-6 * scale, (path, error)

@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from lumped_structure import lumped
+
 from solver import (
     Scene,
 )
@@ -26,14 +28,9 @@ def two_blades(**extra: Any) -> Scene:
     return Scene.from_dict(
         {
             "name": "two-blades",
-            "structure": {
-                "kind": "lumped",
-                "masses": {"b1": 0.1, "b2": 0.1, "d": 0.005},
-                "springs": [
-                    {"between": ["b1", "ground"], "k": 4e5, "c": 0.5},
-                    {"between": ["b2", "ground"], "k": 4.1e5, "c": 0.5},
-                ],
-            },
+            "structure": lumped(
+                {"b1": 0.1, "b2": 0.1, "d": 0.005}, ("b1", "ground", 4e5, 0.5), ("b2", "ground", 4.1e5, 0.5)
+            ),
             "contacts": [
                 {"name": name, "between": ["d", blade], "kt": 1e6, "mu": 0.3, "N0": 50.0, **extra}
                 for name, blade in (("left", "b1"), ("right", "b2"))

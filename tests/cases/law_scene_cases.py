@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from lumped_structure import lumped
+
 from solver.scene.scene import Scene
 
 RUB: dict[str, Any] = {
@@ -25,15 +27,12 @@ def scene(*contacts: dict[str, Any], amplitude: float = 1.0, second: float = 0.6
     return Scene.from_dict(
         {
             "name": "two-directions",
-            "structure": {
-                "kind": "lumped",
-                "masses": {"u": 1.0, "v": 1.3},
-                "springs": [
-                    {"between": ["u", "ground"], "k": 1.0, "c": 0.06},
-                    {"between": ["v", "ground"], "k": 1.6, "c": 0.08},
-                    {"between": ["u", "v"], "k": 0.4, "c": 0.02},
-                ],
-            },
+            "structure": lumped(
+                {"u": 1.0, "v": 1.3},
+                ("u", "ground", 1.0, 0.06),
+                ("v", "ground", 1.6, 0.08),
+                ("u", "v", 0.4, 0.02),
+            ),
             "contacts": [{"name": f"c{i}", "between": ["u", "ground"], **c} for i, c in enumerate(contacts)],
             "excitation": [
                 {"dof": "u", "amplitude": amplitude},

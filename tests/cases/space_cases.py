@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from lumped_structure import lumped
+
 from solver.scene.scene import Scene
 
 SPACE: dict[str, Any] = {
@@ -18,17 +20,14 @@ def in_space(contact: dict[str, Any], amplitude: float = 1.0) -> Scene:
     return Scene.from_dict(
         {
             "name": "in-space",
-            "structure": {
-                "kind": "lumped",
-                "masses": {"u": 1.0, "v": 1.3, "w": 1.1},
-                "springs": [
-                    {"between": ["u", "ground"], "k": 1.0, "c": 0.06},
-                    {"between": ["v", "ground"], "k": 1.6, "c": 0.08},
-                    {"between": ["w", "ground"], "k": 1.3, "c": 0.07},
-                    {"between": ["u", "v"], "k": 0.4, "c": 0.02},
-                    {"between": ["u", "w"], "k": 0.2, "c": 0.02},
-                ],
-            },
+            "structure": lumped(
+                {"u": 1.0, "v": 1.3, "w": 1.1},
+                ("u", "ground", 1.0, 0.06),
+                ("v", "ground", 1.6, 0.08),
+                ("w", "ground", 1.3, 0.07),
+                ("u", "v", 0.4, 0.02),
+                ("u", "w", 0.2, 0.02),
+            ),
             "contacts": [{"name": "c0", **contact}],
             "excitation": [
                 {"dof": "u", "amplitude": amplitude},

@@ -233,6 +233,18 @@ def others_are_served(service: Besieged, path: str, owner: str = "") -> None:
     pytest.fail(f"of {_WINDOWS} times {_WINDOW} requests the 99th of 100 took {slowest} s")
 
 
+def answered_in_time(
+    service: Besieged, method: str, path: str, status: int, *, seconds: float, **how: object
+) -> httpx.Response:
+    """The answer to a request, which has this status and comes within so many seconds."""
+    begun = time.monotonic()
+    answer = httpx.request(method, service.base + path, timeout=60.0, **how)
+    took = time.monotonic() - begun
+    assert answer.status_code == status, answer.text
+    assert took < seconds, f"{method} {path} took {took:.1f} s"
+    return answer
+
+
 def _timed(client: httpx.Client, path: str) -> float:
     begun = time.monotonic()
     answer = client.get(path)

@@ -62,26 +62,35 @@ def power_iteration(spec: Mapping[str, Any], progress: Progress, should_stop: Sh
     return JobOutput(result={"eigenvalue": value, "steps": steps}, sweeps=records)
 
 
+A_SWEEP = SweepRecord(
+    scene_name="matrix",
+    scene_hash="0" * 64,
+    parameter="frequency",
+    from_value=1.0,
+    to_value=2.0,
+    frequency_hz=None,
+    excitation_amplitude=1.0,
+    harmonics=1,
+    points=2,
+    peak=1.0,
+    peak_at=1.5,
+    limit=None,
+    band_hz=None,
+    newton_iterations=300,
+    rejected_steps=0,
+    seconds=0.1,
+    completed=True,
+    status="complete",
+)
+"""A stored sweep without contacts and arrays."""
+
+
 def _record(vector: np.ndarray, value: float, steps: int, index: int) -> SweepRecord:
-    return SweepRecord(
-        scene_name="matrix",
-        scene_hash="0" * 64,
-        parameter="frequency",
-        from_value=1.0,
-        to_value=2.0,
-        frequency_hz=None,
-        excitation_amplitude=1.0,
-        harmonics=1,
+    return replace(
+        A_SWEEP,
         points=vector.size,
         peak=value + index,
-        peak_at=1.5,
-        limit=None,
-        band_hz=None,
         newton_iterations=steps,
-        rejected_steps=0,
-        seconds=0.1,
-        completed=True,
-        status="complete",
         contacts=(ContactValues(name="damper", kt=1.0, mu=0.3, N0=100.0 * index, N1=0.0, N1_phase=0.0),),
         arrays={"parameter": encode(np.linspace(1.0, 2.0, vector.size)), "amplitude": encode(vector)},
     )

@@ -10,7 +10,6 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -391,14 +390,3 @@ def test_many_idle_connections_leave_room_for_others(service: ServedClient) -> N
     assert service.get("/health/live").status_code == 200
     for raw in idle:
         raw.close()
-
-
-def test_no_file_of_the_server_was_touched(service: ServedClient, tmp_path: Path) -> None:
-    """Names with paths name nothing: what they would point at stays as it was."""
-    secret = tmp_path / "secret.toml"
-    secret.write_text("name = 'secret'")
-    for name in (str(secret), f"file://{secret}", f"..{secret}"):
-        answer = service.post("/v1/plan", json={"scene": name})
-        assert answer.status_code == 422
-        assert "secret'" not in answer.json()["detail"].replace(str(secret), "")
-    assert secret.read_text() == "name = 'secret'"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from pathlib import Path
 
 import httpx
 import pytest
@@ -73,3 +74,14 @@ def test_a_number_that_is_none_is_named_and_stands_there_as_it_was_written(shipp
 def test_dates_and_numbers_that_are_none(shipped: httpx.Client) -> None:
     read = shipped.post("/v1/scenes/read", json={"text": "name = 2020-01-01\nx = nan\n"}).json()
     assert {"/x", "/structure"} <= {issue["pointer"] for issue in read["issues"]}
+
+
+def test_no_file_of_the_server_was_touched(shipped: httpx.Client, tmp_path: Path) -> None:
+    """Names with paths name nothing: what they would point at stays as it was."""
+    secret = tmp_path / "secret.toml"
+    secret.write_text("name = 'secret'")
+    for name in (str(secret), f"file://{secret}", f"..{secret}"):
+        answer = shipped.post("/v1/plan", json={"scene": name})
+        assert answer.status_code == 422
+        assert "secret'" not in answer.json()["detail"].replace(str(secret), "")
+    assert secret.read_text() == "name = 'secret'"

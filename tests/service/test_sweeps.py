@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from private_kinds import A_SWEEP
 from service_helpers import analyse
 
 from service.db.clock import utc_now
@@ -24,26 +25,7 @@ from service.schemas.answers import SweepDetail
 from service.schemas.sweep_queries import SweepQuery, sweep_page
 from service.settings.settings import load_settings
 
-ONE = SweepRecord(
-    scene_name="disk",
-    scene_hash="0" * 64,
-    parameter="frequency",
-    from_value=1.0,
-    to_value=2.0,
-    frequency_hz=None,
-    excitation_amplitude=1.0,
-    harmonics=11,
-    points=100,
-    peak=1.0,
-    peak_at=1.5,
-    limit=0.5,
-    band_hz=0.1,
-    newton_iterations=300,
-    rejected_steps=0,
-    seconds=0.1,
-    completed=True,
-    status="done",
-)
+ONE = replace(A_SWEEP, scene_name="disk", harmonics=11, points=100, limit=0.5, band_hz=0.1, status="done")
 
 NEW = NewJob(kind="sweep", request={}, spec={}, spec_hash="", request_hash="", max_attempts=1, fresh=True)
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import httpx
-from besieged import Besieged, besieged
+from besieged import answered_in_time, besieged
 from postgresql_cluster import Cluster
 from service_helpers import until
 
@@ -38,13 +38,7 @@ def frozen(cluster: Cluster) -> Iterator[None]:
             os.kill(pid, signal.SIGCONT)
 
 
-def in_time(service: Besieged, method: str, path: str, status: int, **how: object) -> httpx.Response:
-    begun = time.monotonic()
-    answer = httpx.request(method, service.base + path, timeout=60.0, **how)
-    took = time.monotonic() - begun
-    assert answer.status_code == status, answer.text
-    assert took < ANSWER_SECONDS, f"{method} {path} took {took:.1f} s"
-    return answer
+in_time = partial(answered_in_time, seconds=ANSWER_SECONDS)
 
 
 def test_a_frozen_server_is_answered_in_time_and_does_not_hold_up_the_end(

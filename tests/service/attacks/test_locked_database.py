@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import sqlite3
-import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import httpx
 import pytest
-from besieged import Besieged, besieged
+from besieged import answered_in_time, besieged
 from service_helpers import is_problem, until
 
 DATABASE_SECONDS = 1.0
@@ -33,13 +33,7 @@ def locked(file: Path) -> Iterator[None]:
         connection.close()
 
 
-def in_time(service: Besieged, method: str, path: str, status: int, **how: object) -> httpx.Response:
-    begun = time.monotonic()
-    answer = httpx.request(method, service.base + path, timeout=60.0, **how)
-    took = time.monotonic() - begun
-    assert answer.status_code == status, answer.text
-    assert took < ANSWER_SECONDS, f"{method} {path} took {took:.1f} s"
-    return answer
+in_time = partial(answered_in_time, seconds=ANSWER_SECONDS)
 
 
 def test_a_foreign_lock_is_answered_in_time_and_does_not_hold_up_the_end(tmp_path: Path) -> None:

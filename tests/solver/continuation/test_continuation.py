@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from contact_cases import central_difference
+from lumped_structure import lumped
 from scene_cases import bladed_disk, loose_mass, mixed_disk, oscillator, two_dof
 from walked_branches import UNSTABLE, walked, with_damping
 
@@ -287,15 +288,9 @@ def twins() -> Scene:
     return Scene.from_dict(
         {
             "name": "twins",
-            "structure": {
-                "kind": "lumped",
-                "masses": {"a": 1.0, "b": 1.0},
-                "springs": [
-                    {"between": ["a", "ground"], "k": 1.0, "c": 0.05},
-                    {"between": ["b", "ground"], "k": 1.0, "c": 0.05},
-                    {"between": ["a", "b"], "k": 0.01},
-                ],
-            },
+            "structure": lumped(
+                {"a": 1.0, "b": 1.0}, ("a", "ground", 1.0, 0.05), ("b", "ground", 1.0, 0.05), ("a", "b", 0.01)
+            ),
             "contacts": [
                 {"name": dof, "between": [dof, "ground"], "kt": 0.5, "mu": 0.3, "N0": 5.0} for dof in "ab"
             ],

@@ -13,14 +13,18 @@ from solver.marching.march import march
 from solver.response.time_history import time_history
 
 
+def agrees(given: Scene, frequency_hz: float, harmonics: int, *, rel: float) -> None:
+    marched = march(given, frequency_hz=frequency_hz)
+    solution = solve(given, frequency_hz=frequency_hz, harmonics=harmonics)
+    assert marched.converged
+    assert solution.converged
+    assert solution.half_peak_to_peak == pytest.approx(marched.half_peak_to_peak, rel=rel)
+
+
 @pytest.mark.parametrize("frequency_hz", [250.0, 330.0, 420.0])
 def test_a_pressed_wedge_agrees_with_the_march(frequency_hz: float) -> None:
     given = Scene.from_dict(planar_wedge())
-    marched = march(given, frequency_hz=frequency_hz)
-    solution = solve(given, frequency_hz=frequency_hz, harmonics=11)
-    assert marched.converged
-    assert solution.converged
-    assert solution.half_peak_to_peak == pytest.approx(marched.half_peak_to_peak, rel=1e-8)
+    agrees(given, frequency_hz, 11, rel=1e-8)
 
 
 def test_a_slipping_wedge_agrees_with_the_march() -> None:
@@ -55,22 +59,14 @@ def test_preload_of_a_wedge_is_its_equilibrium() -> None:
 
 def test_a_block_in_space_agrees_with_the_march() -> None:
     given = Scene.from_dict(block_in_space(limit="box"))
-    marched = march(given, frequency_hz=240.0)
-    solution = solve(given, frequency_hz=240.0, harmonics=25)
-    assert marched.converged
-    assert solution.converged
-    assert solution.half_peak_to_peak == pytest.approx(marched.half_peak_to_peak, rel=1e-6)
+    agrees(given, 240.0, 25, rel=1e-6)
 
 
 @pytest.mark.parametrize("limit", ["circle", "box"])
 def test_a_block_under_loads_that_move_agrees_with_the_march(limit: str) -> None:
     raw = block_in_space(law="coulomb-3d", limit=limit, kn=3e6, N0=60.0, prestressed=True)
     given = Scene.from_dict(raw)
-    marched = march(given, frequency_hz=240.0)
-    solution = solve(given, frequency_hz=240.0, harmonics=9)
-    assert marched.converged
-    assert solution.converged
-    assert solution.half_peak_to_peak == pytest.approx(marched.half_peak_to_peak, rel=1e-8)
+    agrees(given, 240.0, 9, rel=1e-8)
 
 
 def test_a_pressed_cylinder_agrees_with_the_march() -> None:
@@ -78,11 +74,7 @@ def test_a_pressed_cylinder_agrees_with_the_march() -> None:
     raw = cylinder_in_space(law="coulomb-3d")
     raw["structure"]["springs"] = [s for s in raw["structure"]["springs"] if "roll.z" not in s["between"]]
     given = Scene.from_dict(raw)
-    marched = march(given, frequency_hz=240.0)
-    solution = solve(given, frequency_hz=240.0, harmonics=7)
-    assert marched.converged
-    assert solution.converged
-    assert solution.half_peak_to_peak == pytest.approx(marched.half_peak_to_peak, rel=1e-8)
+    agrees(given, 240.0, 7, rel=1e-8)
 
 
 @pytest.mark.parametrize("form", ["matrices", "modes"])
@@ -127,8 +119,4 @@ def test_one_sector_with_a_body_stands_for_all() -> None:
 
 def test_a_disk_with_bodies_agrees_with_the_march() -> None:
     given = Scene.from_dict(sector_with_damper(4))
-    marched = march(given, frequency_hz=340.0)
-    solution = solve(given, frequency_hz=340.0, harmonics=15)
-    assert marched.converged
-    assert solution.converged
-    assert solution.half_peak_to_peak == pytest.approx(marched.half_peak_to_peak, rel=1e-4)
+    agrees(given, 340.0, 15, rel=1e-4)

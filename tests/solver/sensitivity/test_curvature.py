@@ -6,7 +6,16 @@ import math
 
 import numpy as np
 import pytest
-from curvature_cases import ALL, HARMONICS, difference, error_of_hessian, sizes, solved
+from curvature_cases import (
+    ALL,
+    HARMONICS,
+    check_hessian_of_a_peak,
+    difference,
+    error_of_hessian,
+    peak_of,
+    sizes,
+    solved,
+)
 from law_scene_cases import PLANE
 from law_scene_cases import scene as two_directions
 from matrix_cases import beam_scene
@@ -84,31 +93,10 @@ PEAKS: dict[str, tuple[Scene, float, tuple[str, ...]]] = {
 }  # fmt: skip
 
 
-def peak_of(scene: Scene, near: float) -> tuple[solver.Branch, solver.Peak]:
-    branch = solver.sweep(scene, harmonics=HARMONICS, effects=ALL)
-    assert branch.completed
-    return branch, min((p for p in branch.peaks if p.interior), key=lambda p: abs(p.at - near))
-
-
 @pytest.mark.parametrize("case", PEAKS)
 def test_the_hessian_of_a_peak_equals_differences_through_the_sweep(case: str) -> None:
     scene, near, paths = PEAKS[case]
-    branch, peak = peak_of(scene, near)
-    found = Sensitivities(branch.balance, paths).peak_hessian(peak.solution, peak.at)
-    size = sizes(scene, paths)
-    np.testing.assert_allclose(found.hessian, found.hessian.T, rtol=1e-9, atol=1e-12 * peak.value)
-    for i, path in enumerate(paths):
-
-        def moved(x: float, path: str = path) -> np.ndarray:
-            there, shifted = peak_of(scene.with_values({path: scene.value(path) + x}), peak.at)
-            slopes = Sensitivities(there.balance, paths).gradient(shifted.solution, shifted.at).by_parameters
-            return np.append(slopes * size / peak.value, [shifted.at / peak.at, shifted.value / peak.value])
-
-        wanted = np.append(found.hessian[i] * size / peak.value,
-                           [found.drift[i] / peak.at, found.gradient[i] / peak.value])  # fmt: skip
-        error = np.abs(difference(moved, wanted, size[i]) - wanted) * size[i]
-        scale = max(1.0, float(np.abs(found.hessian * np.outer(size, size)).max()) / peak.value)
-        assert error.max() <= 1e-6 * scale, (case, path, error)
+    check_hessian_of_a_peak(scene, near, paths)
 
 
 @pytest.mark.parametrize("half_power", [False, True])

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from curvature_cases import ALL, HARMONICS, difference, error_of_hessian, sizes, solved
+from curvature_cases import (
+    ALL,
+    check_hessian_of_a_peak,
+    error_of_hessian,
+    solved,
+)
 from law_scene_cases import CUBIC, GAP, PLANE, RUB, scene
 from space_cases import MOVING, SPACE, in_space
 
-import solver
 from solver.balance.simplifications import Effects
 from solver.errors import SettingError
 from solver.scene.scene import Scene
@@ -54,33 +58,12 @@ def test_hessians_of_random_scenes_equal_differences(law: str, count: int) -> No
     assert max(errors) <= 1e-5, sorted(errors)[-3:]
 
 
-def peak_of(there: Scene, near: float) -> tuple[solver.Branch, solver.Peak]:
-    branch = solver.sweep(there, harmonics=HARMONICS, effects=ALL)
-    assert branch.completed
-    return branch, min((p for p in branch.peaks if p.interior), key=lambda p: abs(p.at - near))
-
-
 @pytest.mark.parametrize(
     "case", ["elastic-normal", pytest.param("coulomb-3d", marks=pytest.mark.long), "gap"]
 )
 def test_gradient_and_hessian_of_a_peak_equal_differences_of_sweeps(case: str) -> None:
     there, paths = CASES[case][0], CASES[case][1][:3]
-    branch, peak = peak_of(there, 0.2)
-    found = Sensitivities(branch.balance, paths).peak_hessian(peak.solution, peak.at)
-    assert np.isfinite(found.hessian).all()
-    size = sizes(there, paths)
-    scale = max(1.0, float(np.abs(found.hessian * np.outer(size, size)).max()) / peak.value)
-    for i, path in enumerate(paths):
-
-        def moved(x: float, path: str = path) -> np.ndarray:
-            swept, shifted = peak_of(there.with_values({path: there.value(path) + x}), peak.at)
-            slopes = Sensitivities(swept.balance, paths).gradient(shifted.solution, shifted.at).by_parameters
-            return np.append(slopes * size / peak.value, [shifted.at / peak.at, shifted.value / peak.value])
-
-        wanted = np.append(found.hessian[i] * size / peak.value,
-                           [found.drift[i] / peak.at, found.gradient[i] / peak.value])  # fmt: skip
-        error = np.abs(difference(moved, wanted, size[i]) - wanted) * size[i]
-        assert error.max() <= 1e-6 * scale, (case, path, error)
+    check_hessian_of_a_peak(there, 0.2, paths)
 
 
 def test_the_hessian_in_space_without_even_harmonics() -> None:

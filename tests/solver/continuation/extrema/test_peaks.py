@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from lumped_structure import lumped
 from scene_cases import bladed_disk, oscillator, two_dof
 from scipy.optimize import minimize_scalar
 
@@ -141,15 +142,12 @@ def between_walls(**values: float) -> Scene:
     return Scene.from_dict(
         {
             "name": "between-walls",
-            "structure": {
-                "kind": "lumped",
-                "masses": {"m1": 1.0, "m2": 1.0},
-                "springs": [
-                    {"between": ["m1", "ground"], "k": k1, "c": 0.5},
-                    {"between": ["m1", "m2"], "k": k2, "c": 0.5},
-                    {"between": ["m2", "ground"], "k": k1, "c": 0.5},
-                ],
-            },
+            "structure": lumped(
+                {"m1": 1.0, "m2": 1.0},
+                ("m1", "ground", k1, 0.5),
+                ("m1", "m2", k2, 0.5),
+                ("m2", "ground", k1, 0.5),
+            ),
             "contacts": [{"name": "damper", "between": ["m2", "ground"], "kt": 30.0, "mu": 0.3, "N0": 100.0}],
             "excitation": {"dof": "m1", "amplitude": 100.0},
             "observe": {"dof": "m2", "band": [0.2, 2.5]},
