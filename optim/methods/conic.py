@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import cvxpy
@@ -143,6 +144,51 @@ class LimitRows:
     def duals(self) -> Real:
         """Return the multipliers of the rows."""
         return duals_of(self._row)
+
+
+class Programme(ABC):
+    """A convex programme for the step d, posed once and solved with the numbers of many models."""
+
+    def __init__(self, n: int) -> None:
+        self._d = cvxpy.Variable(n)
+        self._root, self._low, self._high = cvxpy.Parameter((n, n)), cvxpy.Parameter(n), cvxpy.Parameter(n)
+        self._share = cvxpy.Parameter(nonneg=True)
+
+    def _pose(self, objective: cvxpy.Expression, constraints: list[cvxpy.Constraint], limited: int) -> None:
+        """Make the programme of its own part, the bounds and so many limited rows."""
+        self._limits = LimitRows(limited, self._d) if limited else None
+        constraints = [*constraints, self._low <= self._d, self._d <= self._high]
+        if self._limits is not None:
+            constraints += self._limits.constraints
+            objective = objective + self._limits.penalty
+        self._problem = cvxpy.Problem(cvxpy.Minimize(objective), constraints)
+
+    @abstractmethod
+    def _fill(self, numbers: Numbers, places: list[Index]) -> Index:
+        """Set the objective rows, given which rows each group has; return which row of the model each is."""
+
+    @abstractmethod
+    def _duals(self) -> Real:
+        """Return the multipliers of the objective rows."""
+
+    def solve(self, model: Model, root: Real, radius: float) -> Step | None:
+        """Solve with the numbers of a model; None if the conic solver did not reach optimality."""
+        numbers = numbers_of(model, root, radius)
+        rows = self._fill(numbers, [np.flatnonzero(model.groups == g) for g in np.unique(model.groups)])
+        again = np.zeros(0, dtype=np.intp) if self._limits is None else self._limits.fill(numbers)
+        self._share.value, self._root.value = numbers.share, numbers.root
+        self._low.value, self._high.value = numbers.low, numbers.high
+        if not solved(self._problem, self._d):
+            return None
+        return numbers.step(
+            np.asarray(self._d.value, dtype=np.float64), self._duals(), rows,
+            np.zeros(0) if self._limits is None else self._limits.duals(), again,
+        )  # fmt: skip
+
+
+def padded(count: int, block: int) -> int:
+    """Return the number of rows, a multiple of a block, that many rows are padded to."""
+    return -(-count // block) * block
 
 
 def solved(problem: cvxpy.Problem, d: cvxpy.Variable) -> bool:
