@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import httpx
+import pytest
 from besieged import besieged
 from postgresql_cluster import Cluster
 from service_helpers import is_problem, until
