@@ -14,15 +14,21 @@ if TYPE_CHECKING:
     from solver.continuation.branch import Band, Branch, BranchStatus, Peak
     from solver.continuation.branches.sweep import sweep
     from solver.continuation.extrema.error_estimate import ErrorEstimate, branch_errors
+    from solver.continuation.marks import Bifurcations, Mark, MarkKind
     from solver.continuation.segment import Stretch, joined
     from solver.continuation.settings import ContinuationSettings, Predictor
     from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
     from solver.marching.march import march
     from solver.marching.start import MarchStart
-    from solver.response.floquet import Growth, Stability, branch_stability, stability
     from solver.response.power_balance import PowerBalance, power_balance
     from solver.response.solution import Solution, SolutionStatus
     from solver.response.solve import solve
+    from solver.response.stability.all_solutions import AllSolutions, FoundSolution, solve_all
+    from solver.response.stability.bifurcations import bifurcations
+    from solver.response.stability.floquet import Growth, Stability, branch_stability, stability
+    from solver.response.stability.residual_forces import AmplitudeRange, amplitude_range
+    from solver.response.stability.switching import Switched, switch_branches
+    from solver.response.stability.uniqueness import Uniqueness, uniqueness
     from solver.response.time_history import hysteresis_loop, motion, time_history
     from solver.response.wear import ContactWear, Measured, WearSensitivity, contact_wear
     from solver.response.wear_nonsmooth import worst_slopes
@@ -59,8 +65,16 @@ _HOME = {
     "Effects": "balance.simplifications", "Plan": "studies.plan", "plan": "studies.plan",
     "Scene": "scene.scene", "load_scene": "scene.scene", "shipped_scenes": "scene.scene",
     "Solution": "response.solution", "SolutionStatus": "response.solution", "solve": "response.solve",
-    "Growth": "response.floquet", "Stability": "response.floquet", "branch_stability": "response.floquet",
-    "stability": "response.floquet", "BladePeaks": "studies.blades", "blade_peaks": "studies.blades",
+    "Growth": "response.stability.floquet", "Stability": "response.stability.floquet",
+    "branch_stability": "response.stability.floquet", "stability": "response.stability.floquet",
+    "Bifurcations": "continuation.marks", "Mark": "continuation.marks",
+    "MarkKind": "continuation.marks", "bifurcations": "response.stability.bifurcations",
+    "AllSolutions": "response.stability.all_solutions", "FoundSolution": "response.stability.all_solutions",
+    "solve_all": "response.stability.all_solutions", "AmplitudeRange": "response.stability.residual_forces",
+    "amplitude_range": "response.stability.residual_forces", "Uniqueness": "response.stability.uniqueness",
+    "uniqueness": "response.stability.uniqueness", "Switched": "response.stability.switching",
+    "switch_branches": "response.stability.switching",
+    "BladePeaks": "studies.blades", "blade_peaks": "studies.blades",
     "MistunedDisk": "studies.mistuning", "MistuningStatus": "studies.mistuning",
     "MistuningStudy": "studies.mistuning", "mistuning_study": "studies.mistuning",
     "BladeAmplitudes": "studies.blades", "blade_amplitudes": "studies.blades", "mistuned": "studies.blades",
@@ -89,9 +103,12 @@ _HOME = {
 __all__ = [
     "AccuracyRow",
     "AccuracyStudy",
+    "AllSolutions",
     "AmplitudeHessian",
+    "AmplitudeRange",
     "Band",
     "Basin",
+    "Bifurcations",
     "BladeAmplitudes",
     "BladePeaks",
     "Branch",
@@ -103,12 +120,15 @@ __all__ = [
     "Effects",
     "ErrorEstimate",
     "Extent",
+    "FoundSolution",
     "Gradient",
     "Growth",
     "Issue",
     "LeastPeak",
     "MapStatus",
     "MarchStart",
+    "Mark",
+    "MarkKind",
     "Measure",
     "Measured",
     "MissingExtraError",
@@ -137,12 +157,16 @@ __all__ = [
     "Stability",
     "Stretch",
     "Summary",
+    "Switched",
     "TrackStatus",
+    "Uniqueness",
     "Variable",
     "WearSensitivity",
     "WorstWear",
     "accuracy_study",
+    "amplitude_range",
     "annulus",
+    "bifurcations",
     "blade_amplitudes",
     "blade_peaks",
     "branch_errors",
@@ -166,11 +190,14 @@ __all__ = [
     "sectors_needed",
     "shipped_scenes",
     "solve",
+    "solve_all",
     "stability",
     "start_of",
     "sweep",
+    "switch_branches",
     "time_history",
     "track_peak",
+    "uniqueness",
     "worst_friction_work",
     "worst_slopes",
     "worst_wear",

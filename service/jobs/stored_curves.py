@@ -13,7 +13,8 @@ def response_of(sweep: StoredCurve) -> Response:
     peak = None if sweep.peak is None else (sweep.peak.at, sweep.peak.value)
     values = np.asarray(sweep.arrays["parameter"], dtype=np.float64)
     amplitude = np.asarray(sweep.arrays["amplitude"], dtype=np.float64)
-    values, amplitude = with_peak(values, amplitude, peak)
+    unstable = np.asarray(sweep.arrays.get("unstable", np.zeros(values.size)), dtype=np.bool_)
+    values, amplitude, unstable = with_peak(values, amplitude, peak, unstable)
     limit = sweep.limit
     return Response(
         scene=sweep.scene,
@@ -23,4 +24,5 @@ def response_of(sweep: StoredCurve) -> Response:
         peak=peak,
         limit=limit,
         intervals=() if limit is None else above(values, amplitude, limit),
+        unstable=unstable,
     )

@@ -36,6 +36,9 @@ class SweepPreview(Answer):
     mean_undetermined: bool | None = Field(
         description="Whether the mean of the highest peak depends on the history."
     )
+    unstable: list[tuple[int, int]] = Field(
+        description="First and last point of every stretch that is not stable."
+    )
     flags: list[str]
     seconds: float
     completed: bool

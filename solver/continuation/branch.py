@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from solver.continuation.marks import Bifurcations
+
 
 class BranchStatus(Enum):
     """How a continuation ended; the value is a sentence a user can act on."""
@@ -254,6 +256,16 @@ class Branch(Drawn):
         """How often the branch turned back in its parameter."""
         return int(np.count_nonzero(np.diff(np.sign(np.diff(self.values)))))
 
+    @property
+    def bifurcations(self) -> Bifurcations:
+        """Its folds, branch points and early end, and which of it is not stable; found when asked for.
+
+        A branch of very many unknowns is not looked at, and says so: `solver.bifurcations` does it all the
+        same.
+        """
+        found: Bifurcations = on_demand("solver.response.stability.bifurcations:of_branch")(self)
+        return found
+
     VIEWS: ClassVar = Views("solver.views", "of_branch", "branch_dataset", "of_branch")
 
     def plot(self, ax: Axes | Sequence[Axes] | None = None, *, limit: float | None = None) -> Figure:
@@ -291,6 +303,7 @@ class Branch(Drawn):
             "newton_iterations": self.newton_iterations,
             "rejected_steps": self.rejected_steps,
             "folds": self.folds,
+            **self.bifurcations.of_a_branch(),
             "mean_undetermined": self.mean_undetermined,
             "largest_residual": float(self.residuals.max()) if len(self.values) else None,
             "seconds": self.seconds,

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from solver.jit.fourier import Real
 from solver.response.contact_response import ContactResponse
 from solver.results.base import Drawn
 from solver.results.views import Views, on_demand
 from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.response.stability.uniqueness import Uniqueness
 
 MEAN_UNDETERMINED = "mean_undetermined"
 HISTORY_DEPENDENT = "history_dependent"
@@ -101,13 +104,26 @@ class Solution(Drawn):
         """Whether they are, with the accuracy asked for."""
         return self.status is SolutionStatus.CONVERGED
 
+    @property
+    def uniqueness(self) -> Uniqueness:
+        """Whether the scene is proven to have no other response at this frequency, and why."""
+        found: Uniqueness = on_demand("solver.response.stability.uniqueness:uniqueness")(
+            self.scene, self.frequency_hz
+        )
+        return found
+
     VIEWS: ClassVar = Views("solver.views", "of_solution", "solution_dataset", "of_solution")
 
     def to_json(self, *, with_stability: bool = False) -> dict[str, object]:
         """Return the answer as one JSON object; on request with what `solver.stability` says, which costs."""
         if with_stability:
-            found = on_demand("solver.response.floquet:stability")(self).to_json() if self.converged else None
+            found = (
+                on_demand("solver.response.stability.floquet:stability")(self).to_json()
+                if self.converged
+                else None
+            )
             return {**self.to_json(), "stability": found}
+        only = self.uniqueness
         return {
             "scene": self.scene.name,
             "frequency_hz": self.frequency_hz,
@@ -119,6 +135,8 @@ class Solution(Drawn):
             "harmonics": self.harmonics.tolist() if self.converged else None,
             "flags": list(self.flags),
             "contacts": {contact.name: contact.state.value for contact in self.contacts},
+            "unique": only.unique,
+            "unique_ground": only.ground,
             "residual": _number(self.residual),
             "error_estimate": _number(self.error_estimate),
             "n_harmonics": self.n_harmonics,

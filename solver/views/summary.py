@@ -16,8 +16,8 @@ from solver.views.parameter_units import parameter
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
     from solver.marching.result import MarchResult
-    from solver.response.floquet import Stability
     from solver.response.solution import Solution
+    from solver.response.stability.floquet import Stability
     from solver.studies.blades import BladeAmplitudes, BladePeaks
     from solver.studies.convergence import AccuracyStudy
     from solver.studies.mistuning import MistuningStudy

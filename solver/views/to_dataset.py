@@ -16,8 +16,8 @@ from solver.views.io import scene_attributes
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
     from solver.marching.result import MarchResult
-    from solver.response.floquet import Stability
     from solver.response.solution import Solution
+    from solver.response.stability.floquet import Stability
     from solver.scene.scene import Scene
     from solver.studies.blades import BladeAmplitudes, BladePeaks
     from solver.studies.convergence import AccuracyStudy

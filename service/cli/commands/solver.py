@@ -51,15 +51,31 @@ def solve(
     harmonics: options.Harmonics = 11,
     accuracy: options.Accuracy = None,
     effects: options.Effects = "auto",
+    every: options.EverySolution = False,
+    starts: options.Starts = 40,
+    seed: options.Seed = 0,
     plot: options.Plot = None,
     out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
-    """Compute one periodic response."""
+    """Compute one periodic response, or look for all of them."""
     import solver
 
     outputs = Outputs.asked(plot, out)
     scene, asked = inputs.scene(name, values), solver.Effects.read(effects)
+    if every:
+        refused = [("--accuracy", accuracy), ("--plot", plot), ("--out", out)]
+        for option, given in refused:
+            if given is not None:
+                raise InputError(f"`{option}` does not go with `--all`, got {given!r}: leave one of them out")
+        with bar("solve --all", "solutions") as on_progress:
+            found = solver.solve_all(
+                scene, frequency_hz=frequency, harmonics=harmonics, starts=starts, seed=seed, effects=asked,
+                on_progress=on_progress,
+            )  # fmt: skip
+        show(found.to_json(), reports.all_solutions, as_json=as_json)
+        end(bool(found.solutions), "No solution was found: try more starts or more harmonics.")
+        return
     with patience():
         solution = solver.solve(
             scene, frequency_hz=frequency, harmonics=harmonics, accuracy=accuracy, effects=asked
@@ -81,6 +97,8 @@ def sweep(
     harmonics: options.Harmonics = 11,
     accuracy: options.Accuracy = None,
     effects: options.Effects = "auto",
+    multipliers: options.Multipliers = False,
+    switched: options.SwitchedBranches = False,
     plot: options.Plot = None,
     out: options.Out = None,
     as_json: options.Json = False,
@@ -103,7 +121,12 @@ def sweep(
             limit=limit, effects=asked, on_progress=on_progress,
         )  # fmt: skip
     outputs.write(branch, partial(branch.plot, limit=limit) if len(branch.values) else None)
-    show(branch.to_json(), reports.branch, as_json=as_json)
+    found = branch.to_json()
+    if multipliers:
+        found |= solver.bifurcations(branch, multipliers=True).of_a_branch()
+    if switched:
+        found["branches"] = [each.to_json() for each in solver.switch_branches(branch)]
+    show(found, reports.branch, as_json=as_json)
     end(branch.completed, branch.status.value)
 
 

@@ -53,6 +53,28 @@ Accuracy = Annotated[
         "Estimated error relative to the amplitude; chooses the harmonics, in place of --harmonics.",
     ),
 ]
+EverySolution = Annotated[
+    bool,
+    typer.Option(
+        "--all",
+        help="Look for all solutions, with their stability: random starts, deflation, branches followed.",
+    ),
+]
+Starts = Annotated[int, count("--starts", "N", "Random starts of --all.")]
+Seed = Annotated[int, count("--seed", "N", "Of the random starts of --all.")]
+Multipliers = Annotated[
+    bool,
+    typer.Option(
+        "--stability",
+        help="Floquet multipliers at every point: period doublings and second frequencies are marked too.",
+    ),
+]
+SwitchedBranches = Annotated[
+    bool,
+    typer.Option(
+        "--branches", help="Follow the branches that leave at branch points, to the ends of the range."
+    ),
+]
 Effects = Annotated[
     str,
     typer.Option(

@@ -37,6 +37,7 @@ def sweep_record(branch: Branch, frequency_hz: float | None = None) -> SweepReco
     peak = branch.peak
     band = branch.band if parameter == "frequency" else None
     amplitude = "excitation.amplitude"
+    unstable = branch.bifurcations.unstable
     return SweepRecord(
         scene_name=scene.name,
         scene_hash=digest(scene.to_dict()),
@@ -64,7 +65,8 @@ def sweep_record(branch: Branch, frequency_hz: float | None = None) -> SweepReco
             "residual": encode(branch.residuals),
             "states": encode(branch.states.astype(np.int8)),
         }
-        | {name: encode(getattr(branch, name)) for name in _ARRAYS},
+        | {name: encode(getattr(branch, name)) for name in _ARRAYS}
+        | ({"unstable": encode(unstable.astype(np.int8))} if unstable.any() else {}),
     )
 
 

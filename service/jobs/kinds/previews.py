@@ -146,7 +146,7 @@ def run_sweep(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldS
     found = branch.to_json()
     kept = (
         "parameter", "amplitude", "peak", "peaks", "band_hz", "band_limit", "band_intervals_hz", "points",
-        "peak_certificate", "band_known", "error_estimate", "mean_undetermined", "flags",
+        "peak_certificate", "band_known", "error_estimate", "mean_undetermined", "unstable", "flags",
         "seconds", "completed", "status",
     )  # fmt: skip
     result = {key: found[key] for key in kept}

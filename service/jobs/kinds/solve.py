@@ -45,6 +45,10 @@ class SolveResult(KindResult):
     harmonics: list[float] | None = Field(description="Amplitudes of the harmonics from 0 on [m].")
     flags: list[str]
     contacts: dict[str, str] = Field(description="What each contact does during the period.")
+    unique: str = Field(
+        default="not known", description="Whether it is the only response: proven or not known."
+    )
+    unique_ground: str = Field(default="", description="Why.")
     residual: float | None
     error_estimate: Amplitude
     n_harmonics: int

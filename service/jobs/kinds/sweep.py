@@ -104,6 +104,15 @@ class SweepResult(EndedResult):
     newton_iterations: int
     rejected_steps: int
     folds: int
+    unstable: list[list[int]] = Field(
+        default=[], description="First and last point of every stretch that is not stable."
+    )
+    marks: list[dict[str, Any]] = Field(
+        default=[], description="Folds, branch points and an early end, with the point each comes behind."
+    )
+    stability_known_by: str = Field(
+        default="", description="uniqueness, determinant (real perturbations of the same period) or nothing."
+    )
     mean_undetermined: bool
     largest_residual: float | None
     seconds: float

@@ -18,6 +18,7 @@ Json = Mapping[str, Any]
 Pairs = list[tuple[str, str]]
 
 _ACCURACY_COLUMNS = ("", "harmonics", "contact forces", "max|x|", "error", "ms", "iterations")
+_SOLUTION_COLUMNS = ("half peak to peak", "mean", "", "largest multiplier", "found by", "residual forces")
 _EFFECT_COLUMNS = ("used", "effect", "reason")
 _SCENE_COLUMNS = ("name", "kind", "DOFs", "contacts", "observed", "band")
 
@@ -68,12 +69,38 @@ def solution(found: Json) -> None:
         pairs.append(("estimated error", f"{units.length(found['error_estimate'])} of {of}"))
     pairs.append(("harmonics 1 to 5", ", ".join(units.length(a) for a in found["harmonics"][1:6])))
     pairs += [(f"contact {name}", state) for name, state in found["contacts"].items()]
+    if "unique" in found:
+        pairs.append(("one response alone", f"{found['unique']}: {found['unique_ground']}"))
     pairs += [("note", words) for words in flag_words(found["flags"])]
     low, high = found.get("mean_range", (None, None))
     if low is not None and high is not None:
         pairs.append(("mean, any history", f"{units.length(low)} to {units.length(high)}"))
     pairs += [("residual", f"{found['residual']:.1e}"), ("time", units.duration(found["seconds"]))]
     print_pairs(title, pairs)
+
+
+def all_solutions(found: Json) -> None:
+    """The solutions of one frequency, and whether there are others."""
+    rows = []
+    for each in found["solutions"]:
+        stable, left = each["stability"], each["residual_forces"]
+        ends = [] if left is None else [end for end in left["max_abs"] if end is not None]
+        rows.append(
+            (
+                units.length(each["half_peak_to_peak"]),
+                units.length(each["mean"]),
+                "not known" if stable is None else "stable" if stable["stable"] else "not stable",
+                "" if stable is None else f"{stable['radius']:.4g}",
+                each["found_by"],
+                f"max|x| {' to '.join(map(units.length, ends))}" if ends else "",
+            )
+        )
+    if found["solutions"]:
+        first = found["solutions"][0]
+        title = f"{first['scene']} at {first['frequency_hz']:g} Hz, {first['n_harmonics']} harmonics"
+        print_table(title, _SOLUTION_COLUMNS, rows, right="013")
+    say(f"One response alone: {found['unique']}. {found['unique_ground']}")
+    say(found["note"])
 
 
 def branch(found: Json) -> None:
@@ -89,12 +116,34 @@ def branch(found: Json) -> None:
     effort = f"{found['newton_iterations']} Newton iterations, {found['rejected_steps']} steps rejected"
     pairs += sure_of(found)
     pairs += [("note", words) for words in flag_words(found.get("flags", ()))]
+    pairs += _marks(found, path)
     pairs.append(("points", f"{found['points']} ({effort}, {found['folds']} folds)"))
     pairs.append(("time", units.duration(found["seconds"])))
     title = f"{found['scene']}, {path}"
     if values:
         title += f" from {parameter(path, values[0])} to {parameter(path, values[-1])}"
     print_pairs(f"{title}, {found['n_harmonics']} harmonics", pairs)
+
+
+def _marks(found: Json, path: str) -> Pairs:
+    """Folds, branch points and ends, what is not stable, and the branches that were followed."""
+    pairs = [
+        (
+            mark["kind"].replace("_", " "),
+            f"{units.length(mark['amplitude'])} at {parameter(path, mark['at'])}",
+        )
+        for mark in found.get("marks", ())
+    ]
+    values = found["parameter"]
+    for first, last in found.get("unstable", ()):
+        ends = f"{parameter(path, values[first])} to {parameter(path, values[last])}"
+        pairs.append(("not stable", f"{last - first + 1} points, {ends}"))
+    for each in found.get("branches", ()):
+        parts = [
+            f"{one['points']} points to {parameter(path, one['parameter'][-1])}" for one in each["branches"]
+        ]
+        pairs.append((f"leaving at {parameter(path, each['mark']['at'])}", ", ".join(parts) or "not met"))
+    return pairs
 
 
 def sure_of(found: Json) -> Pairs:

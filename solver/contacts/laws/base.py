@@ -18,10 +18,11 @@ from pydantic import model_validator
 
 from solver.contacts.fields import Between, Element, MemberName, Name, Real
 from solver.contacts.frames import NORMAL, TANGENT_1, TANGENT_2, InSpace
-from solver.contacts.laws.parts import Held, Motion, NormalLoad, Piece, Quantity, Row, Slider
+from solver.contacts.laws.parts import Held, Motion, NormalLoad, Quantity, Row, Slider
 from solver.errors import SettingError
 
 if TYPE_CHECKING:
+    from solver.contacts.pieces.piece import Part
     from solver.contacts.segments import Shares
 
 
@@ -226,6 +227,16 @@ class AnyContact(Element, InSpace):
         """Whether it never lets two motions under the same forces move apart."""
         return False
 
+    @property
+    def slopes(self) -> tuple[Real, Real] | None:
+        """It as springs, (ports,) [N/m], and how far what is left of it follows, (ports, ports) [N/m].
+
+        The force but for its springs differs between two motions, in the largest value over a period, by no
+        more than this matrix times the largest differences of the motions; residual forces aside. None where
+        there is no such bound. Of a law that opens without friction it holds at every instant.
+        """
+        return None
+
     # Plan
 
     @property
@@ -272,12 +283,18 @@ class AnyContact(Element, InSpace):
         del motions, load
         return None
 
-    def pieces(self, slip: Real) -> tuple[Piece, ...] | None:
-        """Return its states for the stability of a motion, of whose `slip` these are the full coefficients.
+    def perturbed(self, motions: Real, load: Real) -> tuple[Part, ...] | None:
+        """Return how it follows small perturbations of a motion: its parts with their states, for stability.
 
+        Parameters
+        ----------
+        motions : (ports, 2H + 1) full coefficients [m]; load : those of the normal load [N].
+
+        Returns
+        -------
         None where the stability is not computed.
         """
-        del slip
+        del motions, load
         return None
 
     def rows(self) -> tuple[Row, ...]:

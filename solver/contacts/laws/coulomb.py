@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-import numpy as np
-
 from solver.contacts.fields import NonNegative, Real
 from solver.contacts.laws.friction import FrictionContact
-from solver.contacts.laws.parts import SHORTEST, Motion, Piece, Row
-from solver.errors import SettingError
+from solver.contacts.laws.parts import Motion, Row
 
 if TYPE_CHECKING:
+    from solver.contacts.pieces.piece import Part
     from solver.contacts.segments import Shares
 
 
@@ -28,6 +26,15 @@ class SlidesOnALine(FrictionContact):
         from solver.contacts.segments import segments_of, shares_of
 
         return shares_of(segments_of(motions[0], load, self.kt, self.mu))
+
+    def perturbed(self, motions: Real, load: Real) -> tuple[Part, ...]:
+        """Return how it follows small perturbations of a motion."""
+        from solver.contacts.pieces.line import friction_pieces
+        from solver.contacts.pieces.piece import Part
+
+        kn = None if self.normal_port is None else self.stiffnesses[self.normal_port]
+        pieces = friction_pieces(motions[0], load, self.kt, self.mu, kn=kn)
+        return (Part(tuple(range(len(motions))), pieces),)
 
 
 class Contact(SlidesOnALine):
@@ -75,25 +82,6 @@ class Contact(SlidesOnALine):
 
         del force
         return motion_at(segments_of(motions[0], load, self.kt, self.mu), tau)
-
-    def pieces(self, slip: Real) -> tuple[Piece, ...]:
-        """Return its states: in stick the slider is held, in slip and separation the force is given."""
-        from solver.contacts.kernels.stick_slip_events import BEGIN, END, FAILED, MOTION, STICK
-        from solver.contacts.segments import segments_of
-
-        found = segments_of(slip, self.load.coefficients, self.kt, self.mu)
-        if found.state == FAILED:
-            raise SettingError(
-                "solution", self.name, "must have a motion of every contact that can be followed"
-            )
-        stiff, none = np.array([[self.kt]]), np.zeros((1, 1))
-        return tuple(
-            Piece(begin=row[BEGIN], end=row[END], tangent=stiff, grip=-stiff[0], catch=np.ones(1))
-            if row[MOTION] == STICK
-            else Piece(begin=row[BEGIN], end=row[END], tangent=none)
-            for row in found.rows
-            if row[END] - row[BEGIN] > SHORTEST
-        )
 
     def rows(self) -> tuple[Row, ...]:
         """Return its row of the time march."""

@@ -170,6 +170,24 @@ class FrictionContact(AnyContact):
         return self.normal_port is None
 
     @property
+    def slopes(self) -> tuple[Real, Real] | None:
+        """Stuck, what its sliders catch up is left: no more than motion and limit change.
+
+        That holds between two bounds; within a circle whose size changes no such is known.
+        """
+        if len(self.RUBBING) > 1 and not (self.friction is not None and self.friction.limits_apart):
+            return None
+        count, normal = len(self.end_keys), self.normal_port
+        centre, rest = np.array(self.stiffnesses[:count]), np.zeros((count, count))
+        for port in self.RUBBING:
+            rest[port, port] = centre[port]
+        if normal is not None:
+            rest[list(self.RUBBING), normal] = self.mu * centre[normal]
+            centre[normal] *= 0.5
+            rest[normal, normal] = centre[normal]
+        return centre, rest
+
+    @property
     def separation(self) -> tuple[bool, str]:
         """Whether it may open, and why."""
         if self.OPENS:

@@ -14,6 +14,7 @@ from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Follows, Held, Motion, Quantity, Row
 
 if TYPE_CHECKING:
+    from solver.contacts.pieces.piece import Part
     from solver.contacts.segments import Shares
 
 
@@ -57,6 +58,12 @@ class GapSpring(AnyContact):
         return f"{self.name} pushes on one side only"
 
     @property
+    def slopes(self) -> tuple[Real, Real]:
+        """Half its stiffness, and as much on both sides of it."""
+        half = 0.5 * self.k
+        return np.array([half]), np.array([[half]])
+
+    @property
     def evaluation(self) -> str:
         """How its force is found, in the words of a plan."""
         return "a spring on one side: closed form"
@@ -82,6 +89,14 @@ class GapSpring(AnyContact):
         opening = motions[0].copy()
         opening[0] -= self.gap
         return shares_of(segments_of(np.zeros(opening.size), opening, 1.0, 1.0))
+
+    def perturbed(self, motions: Real, load: Real) -> tuple[Part, ...]:
+        """Return how it follows small perturbations of a motion."""
+        from solver.contacts.pieces.piece import Part
+        from solver.contacts.pieces.springs import gap_pieces
+
+        del load
+        return (Part((0,), gap_pieces(motions[0], self.k, self.gap)),)
 
     def rows(self) -> tuple[Row, ...]:
         """Return its row of the time march."""

@@ -12,7 +12,6 @@ import numpy as np
 from solver.contacts.fields import Real
 
 _AROUND, _BOTH_WAYS = 20.0, 4.0  # times its value, how far a parameter is varied by hand
-SHORTEST = 1e-12  # rad; a state of a contact that lasts no longer does nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -174,39 +173,6 @@ class Held(NamedTuple):
     column: int
     when: int = 0
     sign: int = 0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Piece:
-    """One state of a contact with m relative motions (ports), and how its force follows a perturbation.
-
-    Attributes
-    ----------
-    begin, end : float
-        When it lasts [rad]; `begin` may be any angle, and the end at most a period later.
-    tangent : (m, m) array
-        df/du [N/m].
-    grip : (m,) array or None
-        df/dw [N/m] of a slider that is held; None if there is none in this state.
-    catch : (m,) array or None
-        dw/du where the state begins; given together with `grip`.
-    """
-
-    begin: float
-    end: float
-    tangent: Real
-    grip: Real | None = None
-    catch: Real | None = None
-
-    @property
-    def lasts(self) -> float:
-        """Its duration [rad]."""
-        return self.end - self.begin
-
-    def holds_at(self, tau: float) -> bool:
-        """Whether it lasts at `tau`."""
-        turn = 2.0 * math.pi
-        return (tau - self.begin) % turn < self.lasts or self.lasts >= turn
 
 
 class Follows(Enum):

@@ -10,6 +10,7 @@ from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.parts import Follows, Row, Slider
 
 if TYPE_CHECKING:
+    from solver.contacts.pieces.piece import Part
     from solver.contacts.segments import Shares
 
 CIRCLE = "solver.contacts.kernels.circle.law:coulomb_circle"
@@ -57,6 +58,26 @@ class SlidesInAPlane(FrictionContact):
         from solver.contacts.space_path import path_in_space, shares_in_space
 
         return shares_in_space(path_in_space(motions, load, *self.tangential, self.mu))
+
+    def perturbed(self, motions: Real, load: Real) -> tuple[Part, ...]:
+        """Return how it follows small perturbations of a motion; a sampled limit as the exact one does."""
+        from solver.contacts.pieces.circle import circle_pieces
+        from solver.contacts.pieces.line import friction_pieces
+        from solver.contacts.pieces.piece import Part
+        from solver.contacts.space_path import path_in_space
+
+        kn = None if self.normal_port is None else self.stiffnesses[self.normal_port]
+        if not self.limits_apart:
+            path = path_in_space(motions, load, *self.tangential, self.mu)
+            return (Part(tuple(range(len(motions))), circle_pieces(path, kn)),)
+        behind = () if self.normal_port is None else (self.normal_port,)
+        return tuple(
+            Part(
+                (port, *behind),
+                friction_pieces(motions[port], load, kt, self.mu, kn=kn, presses=port == 0),
+            )
+            for port, kt in enumerate(self.tangential)
+        )
 
     def rows(self) -> tuple[Row, ...]:
         """Return its rows of the time march, one for each direction; the first has the normal force."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from pydantic import model_validator
@@ -13,6 +13,9 @@ from solver.contacts.frames import NORMAL
 from solver.contacts.kernels import columns
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Follows, Held, Quantity, Row
+
+if TYPE_CHECKING:
+    from solver.contacts.pieces.piece import Part
 
 
 def _coefficient(power: int) -> Quantity:
@@ -89,6 +92,12 @@ class PolynomialSpring(AnyContact):
         return self.several_responses is None
 
     @property
+    def slopes(self) -> tuple[Real, Real] | None:
+        """Its stiffness where that is constant."""
+        first, *others = self.coefficients
+        return None if any(others) else (np.array([first]), np.zeros((1, 1)))
+
+    @property
     def evaluation(self) -> str:
         """How its force is found, in the words of a plan."""
         return "a polynomial: exact with enough samples"
@@ -100,6 +109,14 @@ class PolynomialSpring(AnyContact):
         del load
         u = fourier.basis(tau, (motions.shape[1] - 1) // 2) @ motions[0]
         return np.asarray(np.polyval([*self.coefficients[::-1], 0.0], u))
+
+    def perturbed(self, motions: Real, load: Real) -> tuple[Part, ...]:
+        """Return how it follows small perturbations of a motion."""
+        from solver.contacts.pieces.piece import Part
+        from solver.contacts.pieces.springs import polynomial_pieces
+
+        del load
+        return (Part((0,), polynomial_pieces(motions[0], self.coefficients)),)
 
     def rows(self) -> tuple[Row, ...]:
         """Return its row of the time march."""

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 Intervals = tuple[tuple[float, float], ...]
+Marks = tuple[tuple[str, float, float], ...]  # kind, parameter value, amplitude [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +36,10 @@ class Response:
         Amplitude [m] at which the band is measured.
     intervals : tuple of (low, high)
         Where the amplitude is above it.
+    unstable : (P,) array of bool or None
+        Points at which a perturbation grows.
+    marks : tuple of (kind, value, amplitude)
+        Folds, branch points and an early end.
     """
 
     scene: str
@@ -45,12 +50,15 @@ class Response:
     peak: tuple[float, float] | None = None
     limit: float | None = None
     intervals: Intervals = ()
+    unstable: NDArray[np.bool_] | None = None
+    marks: Marks = ()
 
     @classmethod
     def of_branch(cls, branch: Branch) -> Self:
         """The curve of a branch with at least one point."""
         peak = None if branch.peak is None else (branch.peak.at, branch.peak.value)
-        values, amplitude = with_peak(branch.values, branch.amplitude, peak)
+        found = branch.bifurcations
+        values, amplitude, unstable = with_peak(branch.values, branch.amplitude, peak, found.unstable)
         band = branch.band
         return cls(
             scene=branch.balance.scene.name,
@@ -61,21 +69,30 @@ class Response:
             peak=peak,
             limit=None if band is None else band.limit,
             intervals=() if band is None else band.intervals,
+            unstable=unstable,
+            marks=tuple((mark.kind.name.lower(), mark.at, mark.amplitude) for mark in found.marks),
         )
 
 
 def with_peak(
-    values: FloatArray, amplitude: FloatArray, peak: tuple[float, float] | None
-) -> tuple[FloatArray, FloatArray]:
+    values: FloatArray, amplitude: FloatArray, peak: tuple[float, float] | None,
+    unstable: NDArray[np.bool_] | None = None,
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:  # fmt: skip
     """The points of a curve with its polished peak among them, where the neighbours enclose it."""
+    unstable = np.zeros(values.size, bool) if unstable is None else unstable
     if peak is None or peak[1] <= amplitude.max():
-        return values, amplitude
+        return values, amplitude, unstable
     at, height = peak
     enclosing = np.flatnonzero((values[:-1] - at) * (values[1:] - at) <= 0.0)
     if enclosing.size == 0:
-        return values, amplitude
+        return values, amplitude, unstable
     index = 1 + enclosing[np.argmax(np.maximum(amplitude[enclosing], amplitude[enclosing + 1]))]
-    return np.insert(values, index, at), np.insert(amplitude, index, height)
+    between = unstable[index - 1] and unstable[index]
+    return (
+        np.insert(values, index, at),
+        np.insert(amplitude, index, height),
+        np.insert(unstable, index, between),
+    )
 
 
 def above(values: FloatArray, amplitude: FloatArray, limit: float) -> Intervals:

@@ -11,7 +11,7 @@ from solver.views.plots import style
 from solver.views.plots.style import Into
 
 if TYPE_CHECKING:
-    from solver.response.floquet import Stability
+    from solver.response.stability.floquet import Stability
 
 
 def multipliers_figure(found: Stability, *, ax: Into = None) -> Figure:

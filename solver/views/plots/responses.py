@@ -18,6 +18,7 @@ from solver.views.plots.style import Into
 
 _DOTTED = (0, (1.2, 1.8))
 _DASHED = (0, (5.0, 2.5))
+_MARKERS = {"fold": "o", "branch_point": "s", "period_doubling": "^", "torus": "v", "end": "X"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +84,7 @@ def response_figure(
         page, (axes,) = style.figure(6.0, 3.4, into=ax)
         for low, high in response.intervals:
             axes.axvspan(low, high, color=style.SKY, alpha=0.18, linewidth=0.0)
-        axes.plot(response.values, response.amplitude * unit.per_metre, color=style.BLUE)
+        _draw_stability(axes, response, unit)
         if response.peak is not None:
             _mark_peak(axes, response, response.peak, unit)
         style.label(axes, axis_name(response.parameter), _amplitude_name("amplitude", response.dof, unit))
@@ -181,6 +182,32 @@ def _draw(
 ) -> None:  # fmt: skip
     height = curve.amplitude * unit.per_metre
     axes.plot(curve.values, height, color=color, linewidth=width, linestyle=dashes, label=name, zorder=order)
+
+
+def _draw_stability(axes: Axes, curve: Response, unit: units.LengthUnit) -> None:
+    """The curve, dashed where it is not stable, with folds, branch points and ends on it."""
+    height = curve.amplitude * unit.per_metre
+    unstable = np.zeros(height.size, bool) if curve.unstable is None else curve.unstable
+    if not unstable.any():
+        axes.plot(curve.values, height, color=style.BLUE)
+    else:
+        axes.plot(curve.values, np.where(unstable, np.nan, height), color=style.BLUE, label="stable")
+        beside = unstable.copy()
+        beside[1:] |= unstable[:-1]
+        beside[:-1] |= unstable[1:]
+        axes.plot(
+            curve.values, np.where(beside, height, np.nan), color=style.BLUE, linestyle=_DASHED,
+            label="not stable",
+        )  # fmt: skip
+    for kind, marker in _MARKERS.items():
+        places = [(at, value * unit.per_metre) for name, at, value in curve.marks if name == kind]
+        if places:
+            axes.plot(
+                *zip(*places, strict=True), color=style.INK, marker=marker, markersize=4.5,
+                markerfacecolor="white", linestyle="none", label=kind.replace("_", " "), zorder=4,
+            )  # fmt: skip
+    if unstable.any() or curve.marks:
+        axes.legend(loc="best")
 
 
 def _mark_peak(axes: Axes, curve: Response, peak: tuple[float, float], unit: units.LengthUnit) -> None:

@@ -27,14 +27,15 @@ from solver import (
 )
 from solver.balance.balance import Balance, build
 from solver.balance.workspace import Workspace
+from solver.contacts.pieces.piece import Piece, spring
 from solver.continuation.branches.sweep import walk
 from solver.jit.fourier import to_full
 from solver.linear.assembly import linear_model
 from solver.marching.equations import equations_of_motion
 from solver.marching.kernels import taylor as kernel
-from solver.response.floquet import Growth, growth_of, scene_monodromy
-from solver.response.monodromy import PERIOD, Element, Monodromy, Piece, Structure, monodromy
 from solver.response.solution import Solution
+from solver.response.stability.floquet import Growth, growth_of, scene_monodromy
+from solver.response.stability.monodromy import PERIOD, Element, Monodromy, Structure, monodromy
 
 UNSTABLE = oscillator({"kt": 0.5, "mu": 0.3, "N0": 5.0}, k=1.0, c=0.05)
 
@@ -51,8 +52,8 @@ def sorted_by_value(values: np.ndarray) -> np.ndarray:
 
 
 def matrix_of(solution: Solution) -> Monodromy:
-    slips = np.array([contact.slip for contact in solution.contacts])
-    return scene_monodromy(solution.scene, solution.frequency_hz, slips)
+    motions = tuple(np.array(contact.motions) for contact in solution.contacts)
+    return scene_monodromy(solution.scene, solution.frequency_hz, motions)
 
 
 LINEAR = {
@@ -122,10 +123,17 @@ def with_damping(damping: float, harmonics: int) -> Balance:
     return replace(balance, system=balance.system._replace(dampings=dampings))
 
 
+def states_of(slip: np.ndarray) -> tuple[Piece, ...]:
+    (contact,) = UNSTABLE.contacts
+    motions = slip[None, :]
+    (part,) = contact.perturbed(motions, contact.normal_load(motions)) or ()
+    return part.pieces
+
+
 def negative_map(damping: float, frequency_hz: float, slip: np.ndarray) -> Monodromy:
     model = linear_model(UNSTABLE)
     structure = Structure(M=model.M, C=np.array([[damping]]), K=model.K0)
-    element = Element(ports=model.contact_here, pieces=UNSTABLE.contacts[0].pieces(slip))
+    element = Element(ports=model.contact_here, pieces=states_of(slip))
     return monodromy(structure, (element,), PERIOD * frequency_hz)
 
 
@@ -175,9 +183,9 @@ def trajectory(point: Point, damping: float, move: np.ndarray, periods: int) -> 
     system = system._replace(B_value=np.full_like(system.B_value, damping / omega))
     orders = np.arange(1, point.slip.size // 2 + 1)
     x, v = point.slip[0] + point.slip[1::2].sum(), float(orders @ point.slip[2::2])
-    (here,) = [piece for piece in contact.pieces(point.slip) if piece.holds_at(0.0)]
+    (here,) = [piece for piece in states_of(point.slip) if piece.holds_at(0.0)]
     mode, force = (1 if v > 0.0 else -1), math.copysign(contact.mu * contact.N0, v)
-    if here.grip is not None:
+    if here.memory:
         onset = point.slip[0] + sum(
             point.slip[2 * k - 1] * math.cos(k * here.begin) + point.slip[2 * k] * math.sin(k * here.begin)
             for k in orders
@@ -342,7 +350,7 @@ def test_kinds_of_growth(multipliers: list[complex], growth: Growth):
 def test_a_preloaded_stop_changes_the_stiffness_only():
     """A contact without a slider: its multipliers are those of two springs in turn."""
     M, C, K = np.eye(1), np.array([[0.1]]), np.array([[1.0]])
-    stop = Piece(begin=1.0, end=3.0, tangent=np.array([[2.0]]))
+    stop = spring(1.0, 3.0, np.array([[2.0]]))
     element = Element(ports=np.eye(1), pieces=(stop,))
     found = monodromy(Structure(M=M, C=C, K=K), (element,), 1.0)
 
@@ -353,7 +361,7 @@ def test_a_preloaded_stop_changes_the_stiffness_only():
     expected = over(PERIOD - 3.0, 1.0) @ over(2.0, 3.0) @ over(1.0, 1.0)
     np.testing.assert_allclose(found.matrix, expected, atol=1e-13)
     assert found.neutral == 0
-    turned = Piece(begin=1.0 - 2.5, end=3.0 - 2.5, tangent=np.array([[2.0]]))
+    turned = stop.earlier(2.5)
     again = monodromy(Structure(M=M, C=C, K=K), (replace(element, pieces=(turned,)),), 1.0)
     np.testing.assert_allclose(
         np.sort_complex(np.linalg.eigvals(again.matrix)),

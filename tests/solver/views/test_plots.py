@@ -207,7 +207,7 @@ def test_a_fold_counts_once() -> None:
 
 def test_a_peak_is_put_where_the_branch_is_highest() -> None:
     values, amplitude = np.array([0.0, 2.0, 1.0, 3.0]), np.array([0.0, 5.0, 4.0, 1.0])
-    more, height = with_peak(values, amplitude, (1.5, 6.0))
+    more, height, _ = with_peak(values, amplitude, (1.5, 6.0))
     assert more.tolist() == [0.0, 1.5, 2.0, 1.0, 3.0]
     assert height.tolist() == [0.0, 6.0, 5.0, 4.0, 1.0]
     assert with_peak(values, amplitude, None)[0] is values

@@ -84,16 +84,28 @@ function drawn(answer, { milliseconds, token }) {
   document.documentElement.dataset.live = String(Number(document.documentElement.dataset.live ?? 0) + 1);
 }
 
+// The amplitudes of the points that are stable, and of those that are not with their neighbours; null elsewhere.
+export function byStability({ amplitude, unstable }) {
+  if (!unstable?.length) return { stable: amplitude, unstable: null };
+  const inside = (i, more) => unstable.some(([first, last]) => i >= first - more && i <= last + more);
+  return {
+    stable: amplitude.map((a, i) => (inside(i, 0) ? null : a)),
+    unstable: amplitude.map((a, i) => (inside(i, 1) ? a : null)),
+  };
+}
+
 // A response as a chart: curve, peak, band. `more` are further curves.
 export function responseOf(answer, more = []) {
   const scale = lengthUnit(answer.peak?.value ?? 1);
-  const up = (values) => values.map((v) => v * scale.perMetre);
+  const up = (values) => values.map((v) => (v === null ? null : v * scale.perMetre));
+  const parts = byStability(answer);
   const { dof } = current.body.observe;
   return {
     x: { name: "frequency [Hz]" },
     y: { name: `max |${dof}| [${scale.name}]`, zero: true, low: 0, pad: 0.14 },
     series: [
-      { name: more.length ? "with friction" : "", x: answer.parameter, y: up(answer.amplitude), colour: 1 },
+      { name: more.length ? "with friction" : parts.unstable ? "stable" : "", x: answer.parameter, y: up(parts.stable), colour: 1 },
+      ...(parts.unstable ? [{ name: "not stable", x: answer.parameter, y: up(parts.unstable), colour: 1, dash: "dashed" }] : []),
       ...more.map((line) => ({ ...line, y: up(line.y) })),
     ],
     bands: answer.band_intervals_hz ?? [],

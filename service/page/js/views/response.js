@@ -82,7 +82,8 @@ function redraw() {
       ]
     : [];
   const shown = responseOf(result, more);
-  const top = shown.series[0].y.reduce((a, b) => Math.max(a, b), 0) * (more.length ? 1.7 : 1.15);
+  const own = shown.series.filter((line) => !line.bare).flatMap((line) => line.y);
+  const top = own.reduce((a, b) => Math.max(a, b), 0) * (more.length ? 1.7 : 1.15);
   plot.draw({ ...shown, y: { ...shown.y, high: top } });
 }
 
@@ -95,6 +96,7 @@ function describe() {
     ["error estimate", result.error_estimate === null ? "–" : length(result.error_estimate)],
     ...betweenPoints(result),
     ...notes([...(result.mean_undetermined ? ["mean_undetermined"] : []), ...(result.flags ?? [])]),
+    ...(result.marks ?? []).map((mark) => [mark.kind.replaceAll("_", " "), `${length(mark.amplitude)} at ${number(mark.at, 6)} Hz`]),
     ["removed, linear", linearPeak("free")],
     ["stuck, linear", linearPeak("stuck")],
   ];

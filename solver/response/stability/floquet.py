@@ -10,19 +10,21 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.contacts.laws.parts import Piece
+from solver.contacts.pieces.piece import Part
 from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
-from solver.response.monodromy import PERIOD, Element, Monodromy, Structure, monodromy
+from solver.linear.contact_table import port_counts
 from solver.response.solution import Solution
+from solver.response.stability.monodromy import PERIOD, Element, Monodromy, Structure, monodromy
 from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import CyclicStructure, Scene
 
+Motions = tuple[Real, ...]  # of every contact, (ports, 2H + 1) full coefficients [m]
 GROWS = 1e-9  # a multiplier's modulus beyond 1 that is more than rounding
 REAL = 1e-7  # imaginary part, relative to the modulus, that counts as none
 
@@ -100,8 +102,8 @@ def stability(solution: Solution) -> Stability:
     """
     if not solution.converged:
         raise SettingError("solution", solution.status.value, "must have converged")
-    slips = np.array([contact.slip for contact in solution.contacts])
-    return _stability(solution.scene, solution.frequency_hz, slips)
+    motions = tuple(np.array(contact.motions) for contact in solution.contacts)
+    return _stability(solution.scene, solution.frequency_hz, motions)
 
 
 def branch_stability(branch: Branch, points: Iterable[int] | None = None) -> tuple[Stability, ...]:
@@ -122,18 +124,19 @@ def branch_stability(branch: Branch, points: Iterable[int] | None = None) -> tup
         if not -len(branch.values) <= i < len(branch.values):
             raise SettingError("points", i, f"must be indices of a branch of {len(branch.values)} points")
         value = float(branch.values[i])
-        slips = fourier.to_full(branch.coefficients[i], balance.system.ks, balance.highest_harmonic)
+        every = fourier.to_full(branch.coefficients[i], balance.system.ks, balance.highest_harmonic)
+        motions = tuple(np.split(every, balance.system.first_port[1:-1]))
         if branch.parameter == "frequency":
-            found.append(_stability(balance.scene, value, slips))
+            found.append(_stability(balance.scene, value, motions))
         else:
             scene = balance.scene.with_values({branch.parameter: value})
-            found.append(_stability(scene, balance.system.omega / PERIOD, slips))
+            found.append(_stability(scene, balance.system.omega / PERIOD, motions))
     return tuple(found)
 
 
-def _stability(scene: Scene, frequency_hz: float, slips: Real) -> Stability:
+def _stability(scene: Scene, frequency_hz: float, motions: Motions) -> Stability:
     begun = time.perf_counter()
-    found = scene_monodromy(scene, frequency_hz, slips)
+    found = scene_monodromy(scene, frequency_hz, motions)
     values = np.linalg.eigvals(found.reduced).astype(np.complex128)
     multipliers = values[np.argsort(-np.abs(values), kind="stable")]
     return Stability(
@@ -152,51 +155,46 @@ def growth_of(multipliers: Complex) -> Growth:
     return Growth.FOLD if largest.real > 0.0 else Growth.PERIOD_DOUBLING
 
 
-def scene_monodromy(scene: Scene, frequency_hz: float, slips: Real) -> Monodromy:
+def scene_monodromy(scene: Scene, frequency_hz: float, motions: Motions) -> Monodromy:
     """Return the monodromy matrix of a scene in a periodic motion, of all sectors if it is cyclic.
 
     Parameters
     ----------
     scene : with the values of the motion.
     frequency_hz : excitation frequency [Hz].
-    slips : (n_contacts, 2H + 1) full coefficients of the slip motions [m].
+    motions : (ports, 2H + 1) full coefficients of the relative motions of every contact [m].
     """
     whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
     model = linear_model(whole)
-    pieces = _pieces(scene, slips)
+    parts, ends = _parts(scene, motions), np.cumsum(port_counts(whole))[:-1]
     elements = tuple(
-        Element(ports=row[None, :], pieces=pieces[contact.name])
-        for row, contact in zip(model.contact_here, whole.contacts, strict=True)
+        Element(ports=ports[list(part.ports)], pieces=part.pieces)
+        for ports, contact in zip(np.split(model.contact_here, ends), whole.contacts, strict=True)
+        for part in parts[contact.name]
     )
     structure = Structure(M=model.M, C=model.C0, K=model.K0)
     return monodromy(structure, elements, PERIOD * frequency_hz)
 
 
-def _pieces(scene: Scene, slips: Real) -> dict[str, tuple[Piece, ...]]:
+def _parts(scene: Scene, motions: Motions) -> dict[str, tuple[Part, ...]]:
     """The states of every contact; those of the next sector are the same a part of a period earlier."""
-    own: dict[str, tuple[Piece, ...]] = {}
-    for contact, slip in zip(scene.contacts, slips, strict=True):
-        pieces = contact.pieces(slip)
-        if pieces is None:
-            wanted = "must have contacts of the law coulomb only: the stability of others is not computed"
+    own: dict[str, tuple[Part, ...]] = {}
+    for contact, moved in zip(scene.contacts, motions, strict=True):
+        parts = contact.perturbed(moved, contact.normal_load(moved))
+        if parts is None:
+            wanted = f"must have contacts whose law says how it is perturbed ({contact.LAW} does not)"
             raise SettingError("solution", contact.name, wanted)
-        own[contact.name] = pieces
+        own[contact.name] = parts
     structure = scene.structure
     if not isinstance(structure, CyclicStructure):
         return own
     n, order = structure.sectors, scene.engine_order
     return {
-        f"{name}@{j}": tuple(_earlier(piece, PERIOD * (order * j % n) / n) for piece in pieces)
+        f"{name}@{j}": tuple(_earlier(part, PERIOD * (order * j % n) / n) for part in parts)
         for j in range(n)
-        for name, pieces in own.items()
+        for name, parts in own.items()
     }
 
 
-def _earlier(piece: Piece, turn: float) -> Piece:
-    return Piece(
-        begin=piece.begin - turn,
-        end=piece.end - turn,
-        tangent=piece.tangent,
-        grip=piece.grip,
-        catch=piece.catch,
-    )
+def _earlier(part: Part, turn: float) -> Part:
+    return part._replace(pieces=tuple(piece.earlier(turn) for piece in part.pieces))

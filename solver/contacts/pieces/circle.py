@@ -1,0 +1,196 @@
+"""States of friction in two directions under one circular limit L = μN, linearised about the motion.
+
+Stick: t = K (u − w), K = diag(k1, k2). In slip t = L n, n = (cos θ, sin θ), m = (−sin θ, cos θ), and with
+F = K⁻¹, Δ = 1/k2 − 1/k1, G = mᵀ F m
+
+    L G θ' = mᵀ u' − Δ sin θ cos θ L',      a = [−nᵀ u' − Δ (cos² θ − sin² θ) L' + 2 L Δ sin θ cos θ θ']/(L G)
+
+(`solver.contacts.kernels.circle.panels` has the law). A perturbation δt = n δL + m k1 η, k1 η = L δθ, has
+
+    k1 η' = (L'/L + a) k1 η + [mᵀ δu' − Δ sin θ cos θ δL' − G θ' δL]/G,      δL = μ kn δv.
+
+η stays finite where L goes to 0, and is 0 where a contact closes into slip: the direction there follows the
+motion and forgets. At the instant a stick reaches the limit, δτ = −(nᵀ δt − δL)/(nᵀ K u' − L') later, the
+direction begins to turn by another rate: k1 η = mᵀ δt − (mᵀ K n/nᵀ K n)(nᵀ δt − δL). Where a slip ends the
+slider is at rest, δw = δu − F δt; where a contact closes into stick, w = u there, δw = δu − u' δL/L'.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from solver.contacts.fields import Real
+from solver.contacts.kernels.circle.path import (
+    BEGIN,
+    COUNT,
+    END,
+    FIRST,
+    FROM,
+    MOTION,
+    PANEL_COLUMNS,
+    START,
+    TO,
+)
+from solver.contacts.kernels.circle.radau import between
+from solver.contacts.kernels.stick_slip_events import SLIP
+from solver.contacts.pieces.piece import SHORTEST, TURN, Entry, Piece, Rates, spring, steady
+from solver.contacts.space_path import SpacePath
+from solver.jit import fourier
+
+_TOGETHER = 1e-8  # rad: two states no further apart follow each other
+_LEAST = 1e-300
+
+
+class _Motion:
+    """The motion of a contact at an angle: rates of both directions, limit and its rate, direction."""
+
+    def __init__(self, path: SpacePath) -> None:
+        self.path = path
+        highest = max((path.motions.shape[1] - 1) // 2, (path.load.size - 1) // 2)
+        curves = np.zeros((4, 2 * highest + 1))
+        curves[:2, : path.motions.shape[1]] = fourier.derivative(path.motions)
+        curves[2, : path.load.size] = path.mu * path.load
+        curves[3, : path.load.size] = path.mu * fourier.derivative(path.load)
+        self._curves, self._highest = curves, highest
+
+    def at(self, tau: float) -> tuple[Real, float, float]:
+        """Return u' (2,) [m], L and L' [N]."""
+        here = self._curves @ fourier.basis(np.array([tau]), self._highest)[0]
+        return here[:2], float(here[2]), float(here[3])
+
+    def direction(self, piece: Real, tau: float) -> float:
+        """Return θ in a slip."""
+        first = int(piece[FIRST])
+        panels = self.path.panels[first : first + int(piece[COUNT])]
+        here = piece[BEGIN] + (tau - piece[BEGIN]) % TURN
+        if here - piece[END] > 0.5 * (TURN - (piece[END] - piece[BEGIN])):
+            here = piece[BEGIN]  # rounding has put the begin a period later
+        panel = panels[min(int(np.searchsorted(panels[:, TO], here)), len(panels) - 1)]
+        place = min(max((here - panel[FROM]) / (panel[TO] - panel[FROM]), 0.0), 1.0)
+        return float(between(panel[START], np.ascontiguousarray(panel[START + 1 : PANEL_COLUMNS]), place))
+
+
+def circle_pieces(path: SpacePath, kn: float | None) -> tuple[Piece, ...]:
+    """Return the states of a contact in space with two or, where the load moves, three motions."""
+    if path.mu == 0.0 or not len(path.pieces):
+        return _without_friction(path, kn)
+    motion = _Motion(path)
+    if path.settles:
+        row = path.pieces[-1]
+        return (_stick(path, kn, float(row[BEGIN]), float(row[BEGIN]) + TURN, None),)
+    rows = [row for row in path.pieces if row[END] - row[BEGIN] > SHORTEST]
+    pieces = []
+    for i, row in enumerate(rows):
+        before = rows[i - 1]
+        apart = (row[BEGIN] - before[END] + _TOGETHER) % TURN > 2.0 * _TOGETHER
+        slips, begin, end = row[MOTION] == SLIP, float(row[BEGIN]), float(row[END])
+        entry = _entry(motion, kn, row, None if apart else before)
+        if slips:
+            pieces.append(_slip(motion, kn, row, entry))
+        else:
+            pieces.append(_stick(path, kn, begin, end, entry))
+    return tuple(pieces)
+
+
+def _without_friction(path: SpacePath, kn: float | None) -> tuple[Piece, ...]:
+    """Return when the normal load alone acts."""
+    from solver.contacts.pieces.springs import gap_pieces
+
+    if kn is None:
+        return ()
+    tangent = np.diag([0.0, 0.0, kn])
+    return tuple(spring(piece.begin, piece.end, tangent) for piece in gap_pieces(path.load, kn, 0.0))
+
+
+def _padded(block: Real, kn: float | None, column: Real | None = None) -> Real:
+    """Return rows of two motions with the column of the third, if there is one."""
+    if kn is None:
+        return block
+    return np.column_stack([block, np.zeros(len(block)) if column is None else column])
+
+
+def _tangent(block: Real, kn: float | None, column: Real) -> Real:
+    if kn is None:
+        return block
+    return np.vstack([_padded(block, kn, column), [0.0, 0.0, kn]])
+
+
+def _stick(path: SpacePath, kn: float | None, begin: float, end: float, entry: Entry | None) -> Piece:
+    K = np.diag(path.kt)
+    grip = -K if kn is None else np.vstack([-K, np.zeros(2)])
+    carried = _padded(np.eye(2), kn)
+    rates = steady(_tangent(K, kn, np.zeros(2)), grip)
+    return Piece(begin=begin, end=end, rates=rates, entry=entry, carried=carried)
+
+
+def _entry(motion: _Motion, kn: float | None, row: Real, before: Real | None) -> Entry:
+    """Return what is remembered where a state begins, after another or after separation."""
+    path, begin = motion.path, float(row[BEGIN])
+    K, by_load = np.diag(path.kt), path.mu * (kn or 0.0)
+    m = 2 if kn is None else 3
+    rate, _, limit_rate = motion.at(begin)
+    slips = row[MOTION] == SLIP
+    if before is None:
+        if slips:
+            return Entry(np.zeros((1, m)), None)
+        return Entry(_padded(np.eye(2), kn, -rate * by_load / limit_rate if kn else None), None)
+    slipped = before[MOTION] == SLIP
+    if slipped and slips:
+        return Entry(np.zeros((1, m)), np.eye(1))
+    if not slipped and not slips:
+        return Entry(np.zeros((2, m)), np.eye(2))
+    n, m_way = _ways(motion.direction(row if slips else before, begin if slips else float(before[END])))
+    if slips:
+        along = float(m_way @ K @ n) / float(n @ K @ n)
+        onto = (m_way - along * n) / path.kt[0]
+        return Entry(
+            _padded((onto @ K)[None, :], kn, np.array([along * by_load / path.kt[0]])), -(onto @ K)[None, :]
+        )
+    F = np.linalg.inv(K)
+    return Entry(_padded(np.eye(2), kn, -F @ n * by_load), -path.kt[0] * (F @ m_way)[:, None])
+
+
+def _ways(theta: float) -> tuple[Real, Real]:
+    c, s = math.cos(theta), math.sin(theta)
+    return np.array([c, s]), np.array([-s, c])
+
+
+def _slip(motion: _Motion, kn: float | None, row: Real, entry: Entry) -> Piece:
+    path = motion.path
+    begin, end = float(row[BEGIN]), float(row[END])
+    panels = path.panels[int(row[FIRST]) : int(row[FIRST]) + int(row[COUNT])]
+    edges = tuple(float(edge) for edge in panels[:-1, TO])
+    size = 2 if kn is None else 3
+    return Piece(
+        begin=begin, end=end, rates=_slip_rates(motion, kn, row), entry=entry, carried=np.zeros((1, size)),
+        edges=edges,
+    )  # fmt: skip
+
+
+def _slip_rates(motion: _Motion, kn: float | None, row: Real) -> Callable[[float], Rates]:
+    """Return the rates in a slip as a function of the angle."""
+    (k1, k2), by_load = motion.path.kt, motion.path.mu * (kn or 0.0)
+    more = 1.0 / k2 - 1.0 / k1
+
+    def rates(tau: float) -> Rates:
+        theta = motion.direction(row, tau)
+        n, m_way = _ways(theta)
+        rate, limit, limit_rate = motion.at(tau)
+        limit = max(limit, _LEAST)
+        c, s = n
+        G = c * c / k2 + s * s / k1
+        turn = (float(m_way @ rate) - more * s * c * limit_rate) / (limit * G)
+        a = -float(n @ rate) - more * (c * c - s * s) * limit_rate + 2.0 * limit * more * s * c * turn
+        grip = k1 * m_way[:, None]
+        return Rates(
+            tangent=_tangent(np.zeros((2, 2)), kn, by_load * n),
+            grip=grip if kn is None else np.vstack([grip, [0.0]]),
+            by_motion=_padded(np.zeros((1, 2)), kn, np.array([-turn * by_load / k1])),
+            by_rate=_padded(m_way[None, :] / (k1 * G), kn, np.array([-more * s * c * by_load / (k1 * G)])),
+            own=np.array([[limit_rate / limit + a / (limit * G)]]),
+        )
+
+    return rates

@@ -1,0 +1,86 @@
+"""States of friction along one direction, under a load that is given or moves with the parts.
+
+Stick: f = kt (u − w). Slip in direction ξ: f = ξμN, N = N0 + N1 cos(τ + φ) + kn v, and kn v presses. Where a
+slip ends, w = u − ξμN/kt, and its rate ξ kt u' − μN' is 0 there, so that
+
+    δw = δu − ξ (μ kn/kt) δv,
+
+whatever the change of that instant. Where N rises through 0 the slider is where the part is, w = u, at an
+instant that moves by δτ = −kn δv/N':
+
+    δw = δu − (u' kn/N') δv.
+
+Forces never jump, so that nothing else does: the saltation matrices (R. I. Leine, H. Nijmeijer, Dynamics and
+Bifurcations of Non-Smooth Mechanical Systems, 2004, chapter 7, doi:10.1007/978-3-540-44398-8) act on sliders
+alone. At the instant N becomes 0 nothing is remembered any longer.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.contacts.fields import Real
+from solver.contacts.kernels.stick_slip_events import (
+    AFTER_SLIP,
+    BEGAN,
+    BEGIN,
+    DIRECTION,
+    END,
+    FAILED,
+    MOTION,
+    STICK,
+)
+from solver.contacts.pieces.piece import SHORTEST, TURN, Entry, Piece, spring, steady
+from solver.contacts.segments import segments_of
+from solver.errors import SettingError
+from solver.jit import fourier
+
+
+def friction_pieces(
+    slip: Real, load: Real, kt: float, mu: float, *, kn: float | None = None, presses: bool = True
+) -> tuple[Piece, ...]:
+    """Return the states of friction in one direction.
+
+    Parameters
+    ----------
+    slip : full coefficients of u [m]; load : of N, what the normal motion adds included [N].
+    kn : stiffness by which the second motion v changes the load [N/m]; None: the load is given.
+    presses : whether the normal force itself belongs to it.
+
+    Raises
+    ------
+    SettingError
+        A motion that cannot be followed.
+    """
+    found = segments_of(slip, load, kt, mu)
+    if found.state == FAILED:
+        raise SettingError("solution", "motion", "must be one of every contact that can be followed")
+    by_load = 0.0 if kn is None else kn
+    pressed = np.diag([0.0, by_load if presses else 0.0])
+    m = 1 if kn is None else 2
+    pieces = []
+    for row in found.rows:
+        begin, end = float(row[BEGIN]), float(row[END])
+        if end - begin <= SHORTEST:
+            continue
+        tangent = pressed.copy()
+        if row[MOTION] != STICK or mu == 0.0:
+            tangent[0, 1] = row[DIRECTION] * mu * by_load
+            pieces.append(spring(begin, end, tangent[:m, :m]))
+            continue
+        tangent[0, 0] = kt
+        follows = -row[DIRECTION] * mu * by_load / kt
+        if row[BEGAN] != AFTER_SLIP and by_load > 0.0 and end - begin < TURN - SHORTEST:
+            follows = -_slope(slip, begin) * by_load / _slope(load, begin)
+        always = end - begin >= TURN - SHORTEST
+        entry = None if always else Entry(np.array([[1.0, follows]])[:, :m], None)
+        rates = steady(tangent[:m, :m], np.array([[-kt], [0.0]])[:m])
+        pieces.append(Piece(begin=begin, end=end, rates=rates, entry=entry, carried=np.eye(1, m)))
+    return tuple(pieces)
+
+
+def _slope(coefficients: Real, tau: float) -> float:
+    """Return the derivative by τ of full coefficients."""
+    return float(
+        fourier.basis(np.array([tau]), (coefficients.size - 1) // 2)[0] @ fourier.derivative(coefficients)
+    )

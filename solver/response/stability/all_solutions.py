@@ -1,0 +1,212 @@
+"""All periodic responses that can be found at one frequency, with their stability and what history may leave.
+
+`solver.response.stability.search` looks for them. Nothing finds every solution for certain: the list is
+complete only where the response is proven to be the only one.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from solver.balance.balance import build, check_frequency
+from solver.balance.simplifications import Effects
+from solver.errors import SettingError
+from solver.response.solution import Solution
+from solver.response.solve import describe
+from solver.response.stability.floquet import Stability, stability
+from solver.response.stability.residual_forces import AmplitudeRange, amplitude_range
+from solver.response.stability.search import Search
+from solver.response.stability.uniqueness import Uniqueness, uniqueness
+from solver.results.told import Piece
+from solver.scene.scene import Scene
+
+MOST_STARTS = 10_000
+INCOMPLETE = "The list may be incomplete: no search finds every solution for certain."
+MISSING = (
+    "By the signs of the determinants at least {} more should exist: more starts may find them. " + INCOMPLETE
+)
+COMPLETE = "The list is complete: the response is proven to be the only one."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class FoundSolution(Piece):
+    """One of the solutions found.
+
+    Attributes
+    ----------
+    solution : Solution
+        As `solve` gives it.
+    stability : Stability or None
+        Its Floquet multipliers; None where a law does not say how it is perturbed.
+    sign : int
+        Of the determinant of dr/du: −1 where an odd number of real perturbations grows.
+    found_by : str
+        What led to it first: ``solve``, ``start`` (a random motion), ``deflation``, or ``branch`` (that of
+        another solution, followed through its folds and branch points).
+    times : int
+        How often the search came to it.
+    residual_forces : AmplitudeRange or None
+        What forces left in contacts that stick all the time may do to it; None where none sticks.
+    """
+
+    solution: Solution
+    stability: Stability | None
+    sign: int
+    found_by: str
+    times: int
+    residual_forces: AmplitudeRange | None
+
+    def to_json(self) -> dict[str, object]:
+        """Return it as one JSON object."""
+        left = self.residual_forces
+        return {
+            **self.solution.to_json(),
+            "stability": None if self.stability is None else self.stability.to_json(),
+            "sign": self.sign,
+            "found_by": self.found_by,
+            "times": self.times,
+            "residual_forces": None if left is None else left.to_json(),
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class AllSolutions(Piece):
+    """The distinct periodic responses found at one frequency.
+
+    Attributes
+    ----------
+    solutions : tuple of FoundSolution
+        Largest half peak to peak first.
+    uniqueness : Uniqueness
+        Whether there is one alone, and why.
+    starts : int
+        How many random starts were made, with and without deflation.
+    stopped : bool
+        The caller ended the search.
+    seconds : float
+        What it took.
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"seconds": "s"}
+
+    solutions: tuple[FoundSolution, ...]
+    uniqueness: Uniqueness
+    starts: int
+    stopped: bool
+    seconds: float
+
+    @property
+    def complete(self) -> bool:
+        """Whether there is certainly no other, but for residual forces."""
+        return self.uniqueness.proven and bool(self.solutions)
+
+    @property
+    def missing(self) -> int:
+        """How many more there are at least, by the signs of those found.
+
+        The signs of the determinants of all solutions add up to 1, the degree of the map, where forces of
+        contacts are bounded or only resist and everything takes out power.
+        """
+        return abs(1 - sum(found.sign for found in self.solutions))
+
+    @property
+    def note(self) -> str:
+        """What is to be known of the list."""
+        if self.complete:
+            return COMPLETE
+        return INCOMPLETE if self.missing == 0 else MISSING.format(self.missing)
+
+    def to_json(self) -> dict[str, object]:
+        """Return the answer as one JSON object."""
+        return {
+            "solutions": [found.to_json() for found in self.solutions],
+            "unique": self.uniqueness.unique,
+            "unique_ground": self.uniqueness.ground,
+            "complete": self.complete,
+            "missing_by_signs": self.missing,
+            "note": self.note,
+            "starts": self.starts,
+            "stopped": self.stopped,
+            "seconds": self.seconds,
+        }
+
+
+def solve_all(
+    scene: Scene,
+    *,
+    frequency_hz: float,
+    harmonics: int = 11,
+    starts: int = 40,
+    seed: int = 0,
+    effects: Effects | None = None,
+    on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> AllSolutions:
+    """Look for all periodic responses at one frequency.
+
+    Parameters
+    ----------
+    scene : what vibrates.
+    frequency_hz : excitation frequency [Hz].
+    harmonics : highest harmonic kept; even ones are kept unless the response is proven to be the only one.
+    starts : random motions to start from, each without deflation and with.
+    seed : of their random numbers.
+    effects : what is paid for though the scene does not call for it.
+    on_progress : called with the share done and the number of solutions so far.
+    should_stop : asked between starts; True ends the search.
+
+    Raises
+    ------
+    SettingError
+        A bad frequency, number of harmonics, of starts or seed.
+    """
+    begun = time.perf_counter()
+    check_frequency("frequency_hz", frequency_hz)
+    for name, value, least in (("starts", starts, 0), ("seed", seed, 0)):
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        if not whole or not least <= value <= (MOST_STARTS if name == "starts" else 2**63 - 1):
+            top = MOST_STARTS if name == "starts" else "2^63 - 1"
+            raise SettingError(name, value, f"must be a whole number from {least} to {top}")
+    only = uniqueness(scene, frequency_hz)
+    effects = effects or Effects()
+    if not only.proven:
+        effects = replace(effects, even_harmonics=True)
+    balance = build(scene, harmonics=harmonics, effects=effects)
+    search = Search(balance, 2.0 * math.pi * frequency_hz)
+    search.keep(search.workspace.solve(search.omega), "solve")
+    stopped = False
+    if not only.proven:
+        stopped = search.everywhere(starts, np.random.default_rng(seed), on_progress, should_stop)
+    found = tuple(_described(search, frequency_hz))
+    ordered = sorted(found, key=lambda each: -each.solution.half_peak_to_peak)
+    return AllSolutions(
+        solutions=tuple(ordered), uniqueness=only, starts=0 if only.proven else search.starts,
+        stopped=stopped, seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def _described(search: Search, frequency_hz: float) -> list[FoundSolution]:
+    """Return what is known as solutions."""
+    found = []
+    for each in search.known:
+        solution = describe(search.workspace, each.point, frequency_hz, time.perf_counter())
+        if not solution.converged:
+            continue
+        try:
+            stable = stability(solution)
+        except SettingError:
+            stable = None
+        found.append(
+            FoundSolution(
+                solution=solution, stability=stable, sign=search.sign(each.point.u),
+                found_by=each.found_by, times=each.times,
+                residual_forces=amplitude_range(solution, search.balance.effects),
+            )
+        )  # fmt: skip
+    return found

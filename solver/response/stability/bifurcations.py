@@ -1,0 +1,191 @@
+"""Where a branch turns back, where another branch leaves it, where it ends, and which of it is not stable.
+
+Along a branch the determinant of dr/du is that of 1 minus the monodromy matrix but for a positive factor: it
+is negative where an odd number of real perturbations of the same period grows. Its sign changes at a fold,
+where the parameter turns too, and at a simple branch point, where it does not (W. Govaerts, Numerical Methods
+for Bifurcations of Dynamical Equilibria, 2000, chapters 3 and 8, doi:10.1137/1.9780898719543). Where a motion
+goes over to twice its period, or a second frequency grows, Floquet multipliers alone tell.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.balance.balance import Balance
+from solver.balance.kernels.jacobian import factorise
+from solver.balance.kernels.output import MAX_ABS
+from solver.balance.workspace import Workspace
+from solver.continuation.branch import Branch, BranchStatus
+from solver.continuation.branches.point_by_point import is_unique
+from solver.continuation.extrema.nodes import Node, NodeSolver, Points
+from solver.continuation.folds import fold_between, motion_scales
+from solver.continuation.marks import Bifurcations, Mark, MarkKind
+from solver.jit.fourier import Real
+from solver.response.stability.floquet import Growth, branch_stability
+
+LARGE = 1200  # unknowns above which no result looks by itself
+_HALVINGS = 40
+_MULTIPLIERS = 14  # halvings with multipliers, which cost more
+_NEAR = 1e-9  # relative width of the interval a branch point is known to
+
+
+_CROSSED = {Growth.PERIOD_DOUBLING: MarkKind.PERIOD_DOUBLING, Growth.TORUS: MarkKind.TORUS}
+
+
+def bifurcations(branch: Branch, *, multipliers: bool = False) -> Bifurcations:
+    """Return which points of a branch are not stable, and its folds, branch points and early end.
+
+    Parameters
+    ----------
+    branch : from `sweep`.
+    multipliers : with Floquet multipliers at every point, which cost more than the branch itself: then
+        period doublings and second frequencies are seen too.
+
+    Raises
+    ------
+    SettingError
+        With `multipliers`: a law that does not say how it is perturbed.
+    """
+    begun = time.perf_counter()
+    if not len(branch.values):
+        return Bifurcations(
+            unstable=np.zeros(0, bool), marks=(), known_by="determinant", parameter=branch.parameter,
+            seconds=time.perf_counter() - begun,
+        )  # fmt: skip
+    if is_unique(branch.balance) and branch.completed:
+        return Bifurcations(
+            unstable=np.zeros(len(branch.values), bool), marks=(), known_by="uniqueness",
+            parameter=branch.parameter, seconds=time.perf_counter() - begun,
+        )  # fmt: skip
+    along = Along(
+        branch.balance,
+        Points(
+            solutions=branch.solutions, tangents=branch.tangents, measures=branch.measures,
+            observed=np.zeros((len(branch.values), branch.balance.n_coefficients)), states=branch.states,
+        ),
+    )  # fmt: skip
+    marks: tuple[Mark, ...] = ()
+    if is_unique(branch.balance):
+        unstable, known_by = np.zeros(len(branch.values), bool), "uniqueness"
+    elif multipliers:
+        unstable, marks, known_by = *_by_multipliers(branch, along), "multipliers"
+    else:
+        unstable, marks, known_by = along.signs < 0.0, along.by_determinant(), "determinant"
+    return Bifurcations(
+        unstable=unstable, marks=(*marks, *_end(branch, along)), known_by=known_by,
+        parameter=branch.parameter, seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def of_branch(branch: Branch) -> Bifurcations:
+    """Return `bifurcations`, or nothing but the end for a branch whose matrices take long."""
+    if branch.balance.n_unknowns <= LARGE or is_unique(branch.balance):
+        return bifurcations(branch)
+    return Bifurcations(
+        unstable=np.zeros(len(branch.values), bool), marks=(), known_by="nothing: it is large",
+        parameter=branch.parameter, seconds=0.0,
+    )  # fmt: skip
+
+
+class Along:
+    """Points along a branch with the sign of the determinant of dr/du at each of them."""
+
+    def __init__(self, balance: Balance, points: Points) -> None:
+        self.balance, self.workspace = balance, Workspace.of(balance)
+        self.solver = NodeSolver(self.workspace)
+        self.nodes = self.solver.nodes_of(points)
+        self._signs: Real | None = None
+
+    @property
+    def signs(self) -> Real:
+        """The sign of the determinant at every point, 0 where it is singular."""
+        if self._signs is None:
+            self._signs = np.array([self.sign(node) for node in self.nodes])
+        return self._signs
+
+    def sign(self, node: Node) -> float:
+        """The sign of the determinant at a node."""
+        workspace = self.workspace
+        workspace.evaluate(np.ascontiguousarray(node.solution[:-1]), node.at)
+        nothing = np.zeros(node.solution.size)
+        return float(factorise(workspace.system, workspace.linear, workspace.point, nothing, 0.0, 0.0))
+
+    def by_determinant(self) -> tuple[Mark, ...]:
+        """Folds and branch points."""
+        marks = []
+        for i, (left, right) in enumerate(pairwise(self.nodes)):
+            if left.tangent[-1] * right.tangent[-1] < 0.0:
+                marks.append(self._fold(i, left, right))
+            elif self.signs[i] * self.signs[i + 1] < 0.0:
+                sign = self.signs[i]
+                node = self.halved(i, partial(self._has_sign, sign), _HALVINGS)
+                marks.append(self.mark(MarkKind.BRANCH_POINT, node, i))
+        return tuple(marks)
+
+    def _has_sign(self, sign: float, node: Node) -> bool:
+        return self.sign(node) == sign
+
+    def _fold(self, i: int, left: Node, right: Node) -> Mark:
+        by_share = motion_scales(left, right)
+        ends = float(left.tangent[-1] * by_share[0]), float(right.tangent[-1] * by_share[1])
+        found = fold_between(partial(self.solver.between, left, right), *ends)
+        if found is None:
+            return self.mark(MarkKind.FOLD, left, i)
+        node, smooth = found
+        return self.mark(MarkKind.FOLD, node, i, corner=not smooth)
+
+    def halved(self, i: int, like_the_left: Callable[[Node], bool], most: int) -> Node:
+        """The last node behind point i that is like it, by halving."""
+        left, right = self.nodes[i], self.nodes[i + 1]
+        for _ in range(most):
+            middle = self.solver.between(left, right, 0.5)
+            if middle is None:
+                break
+            left, right = (middle, right) if like_the_left(middle) else (left, middle)
+            if abs(right.at - left.at) <= _NEAR * abs(left.at):
+                break
+        return left
+
+    def mark(self, kind: MarkKind, node: Node, after: int, *, corner: bool = False, why: str = "") -> Mark:
+        """A mark at a node behind a point."""
+        outside = self.balance.parameter.outside
+        return Mark(
+            kind=kind, at=float(outside(node.at)), amplitude=float(node.measures[MAX_ABS]),
+            solution=node.solution.copy(), after=after, corner=corner, why=why,
+        )  # fmt: skip
+
+
+def _by_multipliers(branch: Branch, along: Along) -> tuple[NDArray[np.bool_], tuple[Mark, ...]]:
+    """Points that are not stable, and marks of every kind."""
+    found = branch_stability(branch)
+    marks = list(along.by_determinant())
+    taken = {mark.after for mark in marks}
+
+    def like(stable: bool, node: Node) -> bool:
+        values = branch.balance.parameter.all_outside(np.array([node.at]))
+        point = replace(branch, values=values, solutions=node.solution[None, :])
+        return branch_stability(point)[0].stable == stable
+
+    for i, (here, there) in enumerate(pairwise(found)):
+        kind = _CROSSED.get((there if here.stable else here).growth)
+        if here.stable == there.stable or kind is None or i in taken:
+            continue
+        node = along.halved(i, partial(like, here.stable), _MULTIPLIERS)
+        marks.append(along.mark(kind, node, i))
+    unstable = np.array([not each.stable for each in found])
+    return unstable, tuple(sorted(marks, key=lambda mark: mark.after))
+
+
+def _end(branch: Branch, along: Along) -> tuple[Mark, ...]:
+    """The last point, where the branch did not reach the end of the range."""
+    if branch.completed or branch.status is BranchStatus.ACCURACY_NOT_REACHED:
+        return ()
+    last = along.nodes[-1]
+    return (along.mark(MarkKind.END, last, len(along.nodes) - 1, why=branch.status.value),)
