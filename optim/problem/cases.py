@@ -143,7 +143,9 @@ def _engine_order(scene: Scene, where: Place, wanted: object) -> Scene:
 
 def _observing(scene: Scene, where: Place, dof: str, band: tuple[float, float] | None) -> Scene:
     """Return the scene with another observed DOF and band."""
-    observe = Observe(dof=dof, band=scene.observe.band if band is None else band)
+    observe = Observe(
+        dof=dof, band=scene.observe.band if band is None else band, relative=scene.observe.relative
+    )
     changed = scene.model_copy(update={"observe": observe})
     # Only another DOF can fail to fit the structure; a large structure is not read again for a band.
     if dof == scene.observe.dof:

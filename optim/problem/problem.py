@@ -64,6 +64,10 @@ class Problem(Goals):
             return "tracked is for the highest peak of one case alone, without limits"
         if len(self.paths) != 1:
             return "tracked takes one variable with one parameter path"
+        if self.scene.speed_order is not None:
+            return (
+                "tracked takes no engine-order line (`speed_order`), along which loads follow the frequency"
+            )
         others = without_second(self.scene.contacts)
         if others:
             return f"tracked needs laws with second derivatives, which {others} has not"

@@ -21,8 +21,9 @@ from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import Branch
 from solver.continuation.branches.sweep import sweep
-from solver.jit.fourier import Real
+from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
+from solver.linear.model import LinearModel
 from solver.matrices.normal_modes import undamped_modes
 from solver.response.time_history import matrices
 from solver.results.watch import OnProgress, ShouldStop, part_of
@@ -48,7 +49,8 @@ def campbell_diagram(
     Parameters
     ----------
     scene : what vibrates. In a cyclic one order n excites as a wave of that engine order; elsewhere it is the
-        n-th multiple of the speed.
+        n-th multiple of the speed. One with a `speed_order` runs along the line of each order: gyroscopic
+        terms, stiffness and loads follow the speed.
     speeds_rpm : the running speeds [1/min], [low, high] or a list of such ranges.
     orders : excitations a revolution; the scene's engine order, or 1, if left out.
     limit : amplitude [m] that counts as resonance; half power of the highest peak of each order if left out.
@@ -66,11 +68,14 @@ def campbell_diagram(
     speeds, chosen = _speeds(speeds_rpm), _orders(scene, orders)
     looked_at = None if band_hz is None else _positive_pair("band_hz", band_hz, "Hz")
     cyclic = scene.structure.kind == "cyclic"
-    groups = [(order,) for order in chosen] if cyclic else [chosen]
+    alone = cyclic or scene.speed_order is not None  # each order has a response of its own
+    groups = [(order,) for order in chosen] if alone else [chosen]
     found: list[OrderResponse] = []
     stopped, count = False, 0
     for i, group in enumerate(groups):
         here = with_engine_order(scene, group[0]) if cyclic else scene
+        if scene.speed_order is not None:
+            here = here.model_copy(update={"speed_order": float(group[0])})
         low, high = looked_at or _needed(scene, speeds, group)
         progress = part_of(on_progress, i / len(groups), (i + 1) / len(groups), count)
         branch = sweep(
@@ -115,7 +120,8 @@ def natural_frequencies(scene: Scene, *, stuck: bool) -> Real:
 
     Parameters
     ----------
-    scene : its dashpots and forces do not count.
+    scene : its dashpots and forces do not count, gyroscopic terms at its speed do. Along an engine-order line
+        they are where the order meets them.
     stuck : with all contacts closed and stuck, so that each is its springs; otherwise with all open.
     """
     scene = written_out(scene)
@@ -124,8 +130,39 @@ def natural_frequencies(scene: Scene, *, stuck: bool) -> Real:
     if stuck:
         stiffness = np.array([k for contact in scene.contacts for k in contact.stiffnesses])
         K = K + L.conj().T @ (stiffness[:, None] * L)
+    if model.line is not None:
+        return _along_line(K, model)
+    if model.extra is not None:
+        C = model.extra.at(model.turns(np.ones(1, np.int64)), np.ones(1, np.bool_))[1][0]
+        free = model.free
+        return _of_poles(K[free][:, free], C[free][:, free], model.M[free][:, free])
     modes = undamped_modes(K if np.any(K.imag) else K.real, model.M)
     return np.sort(np.sqrt(np.maximum(modes.omega2, 0.0))) / (2.0 * math.pi)
+
+
+def _along_line(K: Complex, model: LinearModel) -> Real:
+    """Return the frequencies [Hz], ascending, at which an order meets K + Ω² K₂ + iω Ω G − ω² M, Ω = ω / e.
+
+    With the inertia M − K₂/e² − i G/e, Hermitian but perhaps not definite, ω² are those of its inverse
+    problem that are positive: an order of a stiffening rotor may meet none.
+    """
+    one = np.ones(1, np.int64)
+    inertia, free = model.inertia(model.turns(one), one)[0], model.free
+    even = 0.5 * (K + K.conj().T)[free][:, free]
+    mu = np.linalg.eigvals(np.linalg.solve(even, inertia[free][:, free])).real
+    return np.sort(1.0 / np.sqrt(mu[mu > 0.0])) / (2.0 * math.pi)
+
+
+def _of_poles(K: Complex, C: Complex, M: Real) -> Real:
+    """Return the frequencies [Hz] of M x'' + G x' + K x = 0, ascending: G and K without what damps or feeds.
+
+    Forward and backward whirl are two of them. Of conjugate poles one counts.
+    """
+    G, K = 0.5 * (C - C.conj().T), 0.5 * (K + K.conj().T)
+    n, inverse = len(M), np.linalg.inv(M)
+    state = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K, -inverse @ G]])
+    turning = np.sort(np.linalg.eigvals(state).imag)
+    return np.asarray(np.maximum(turning[n:], 0.0) / (2.0 * math.pi))
 
 
 def _response(branch: Branch, order: int, speeds: Ranges, stuck: Real, free: Real) -> OrderResponse:

@@ -9,6 +9,8 @@ import numpy as np
 
 from solver.balance.parameter import Kind, Parameter, resolve
 from solver.balance.simplifications import Effects, even_harmonics_reason
+from solver.balance.speed_line import speed_line
+from solver.contacts.kernels.columns import N0
 from solver.contacts.kernels.system import System
 from solver.errors import SettingError
 from solver.jit.fourier import Integer
@@ -21,6 +23,7 @@ from solver.scene.cyclic.annulus import check_in_annulus, written_out
 from solver.scene.harmonics import MOST_HARMONICS, forced_harmonics, kept_harmonics
 from solver.scene.parameter_paths import AMPLITUDE
 from solver.scene.scene import Scene
+from solver.scene.terms.speed import at_frequency
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,6 +133,7 @@ def build(
         if frequency_hz is None:
             raise SettingError("frequency_hz", None, f"is needed when the parameter is `{path}`")
         omega = 2.0 * math.pi * check_frequency("frequency_hz", frequency_hz)
+        scene = at_frequency(scene, frequency_hz)
     if parameter.kind is Kind.LEVEL:
         check_level(scene)
     if parameter.kind is Kind.LEVEL and scene.value("excitation.amplitude") == 0.0:
@@ -152,6 +156,10 @@ def for_parameter(balance: Balance, path: str, frequency_hz: float) -> Balance:
     SettingError
         Even harmonics were left out, but λ calls for them: build the first balance with them.
     """
+    if balance.scene.speed_order is not None:
+        scene = at_frequency(balance.scene, frequency_hz)
+        effects = replace(balance.effects, even_harmonics=int(balance.system.ks[0]) == 0)
+        return build(scene, path, harmonics=balance.n_harmonics, frequency_hz=frequency_hz, effects=effects)
     parameter = resolve(balance.scene, path)
     if parameter.kind is Kind.LEVEL:
         check_level(balance.scene)
@@ -222,18 +230,22 @@ def _system(
     )  # fmt: skip
     highest = max(int(ks[-1]), 1)
     cos_table, sin_table = grid_tables(grid_size(highest), highest)
+    line, table = speed_line(scene), contact_table(scene, int(ks[-1]))
+    table[line.follows, N0] = line.least
     return System(
         ks=ks, load_ks=np.arange(2, dtype=np.int64), which=reduced.which, cos_table=cos_table,
-        sin_table=sin_table, **contact_set(scene)._asdict(), contacts=contact_table(scene, int(ks[-1])),
+        sin_table=sin_table, **contact_set(scene)._asdict(), contacts=table,
         samples=0, condense=0 if effects.every_contact else 1,
         least_size=reduced.least_size,
-        active=parameter.active, shift=reduced.shift, loose=reduced.loose, hold=0,
+        active=parameter.active, load_rise=line.load_rise, level=line.level,
+        shift=reduced.shift, loose=reduced.loose, hold=0,
         kind=parameter.code, omega=omega,
         level_reference=_level(scene), phase_reference=scene.value("excitation.phase"),
         parameter_reference=scene.value(parameter.path) if derivative is not None else 0.0,
         form=reduced.form, eigenvalues=reduced.eigenvalues, dampings=reduced.dampings,
         contact_modes=reduced.contact_modes, contact_duals=reduced.contact_duals,
         observe_modes=reduced.observe_modes, modal_forces=reduced.modal_forces, K=reduced.K, C=reduced.C,
-        M=reduced.M, dK=reduced.dK, dC=reduced.dC, dM=reduced.dM, L=reduced.L, observe=reduced.observe,
+        M=reduced.M, dK=reduced.dK, dC=reduced.dC, dM=reduced.dM, ddK=reduced.ddK, L=reduced.L,
+        observe=reduced.observe,
         forces=reduced.forces, dforces=reduced.dforces, constant_mean=int(bool(static_forces(scene))),
     )  # fmt: skip

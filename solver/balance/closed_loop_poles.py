@@ -111,7 +111,7 @@ class ClosedLoop:
         """
         free, stuck = self.free, self.stuck
         half_width = np.minimum(free.half_width, stuck.half_width)
-        if not np.all(self.system.jenkins == 1):
+        if not np.all(self.system.jenkins == 1) or linear_model(self._balance.scene).extra is not None:
             return np.zeros_like(free.at), np.full_like(free.at, np.inf), half_width
         return free.at, np.maximum(stuck.at, free.at), half_width
 
@@ -246,17 +246,35 @@ class ClosedLoop:
     def _dense(self, moved: Complex, structures: Integer) -> Poles:
         """Return the resonances of full matrices: eigenvalues of the first-order form."""
         system = self.system
-        n = system.observe.size
-        inverse = np.linalg.inv(system.M)
+        # What has no inertia is a base that moves as prescribed, and does not resonate; nor does the mean.
+        free = np.any(system.M[-1], axis=1)
+        mean = system.which[0] if system.ks[0] == 0 else -1
         at, half_width = [], []
         for one, s in zip(moved, structures, strict=True):
-            L = system.L[s]
-            K = system.K[s] + L.conj().T @ one @ L
-            state = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse[s] @ K, -inverse[s] @ system.C[s]]])
-            values = np.linalg.eigvals(state)
+            if s == mean:
+                at.append(np.full(2 * int(free.sum()), _FASTEST))
+                half_width.append(np.zeros(at[-1].size))
+                continue
+            L = system.L[s][:, free]
+            K = system.K[s][free][:, free] + L.conj().T @ one @ L
+            values = rates(K, system.C[s][free][:, free], system.M[s][free][:, free])
             at.append(np.where(values.imag > 0.0, values.imag, _FASTEST))
             half_width.append(np.abs(values.real))
         return Poles(at=np.array(at), half_width=np.array(half_width))
+
+
+def rates(K: Complex, C: Complex, M: Complex) -> Complex:
+    """Return the s of (s² M + s C + K) x = 0, (2 n,); a real, negative one in place of an infinite one."""
+    nothing, one = np.zeros(K.shape), np.eye(len(K))
+    try:
+        inverse = np.linalg.inv(M)
+    except np.linalg.LinAlgError:  # an inertia that gyroscopic terms take away
+        flexibility = np.linalg.inv(K)
+        found = np.linalg.eigvals(np.block([[-flexibility @ C, -flexibility @ M], [one, nothing]]))
+        slow = np.abs(found) > np.abs(found).max(initial=0.0) / _FASTEST
+        return np.asarray(np.where(slow, 1.0 / np.where(slow, found, 1.0), -_FASTEST), np.complex128)
+    found = np.linalg.eigvals(np.block([[nothing, one], [-inverse @ K, -inverse @ C]]))
+    return np.asarray(found, np.complex128)
 
 
 def coupled(values: Complex, more: Complex | None, X: Complex, Y: Complex, moved: Complex) -> Complex:

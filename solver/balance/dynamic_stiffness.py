@@ -7,7 +7,7 @@ DOF, so one class serves both. Only a structural parameter needs the matrices th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -110,7 +110,7 @@ def whole_motion(
     numpy.linalg.LinAlgError
         Z is singular.
     """
-    ks = system.ks.astype(np.float64)
+    ks, given = system.ks.astype(np.float64), _levels(system, omega)
     if matrices is None and system.form == DENSE:
         which = system.which
         matrices = Matrices(
@@ -118,7 +118,10 @@ def whole_motion(
             observe=system.observe, forces=system.forces, by={},
         )  # fmt: skip
     if matrices is not None:
-        return _of_matrices(matrices, ks[:, None, None], omega)
+        # The mean has k = 1 and matrices without C and M, as in the compiled loops.
+        found = _of_matrices(matrices, np.maximum(ks, 1.0)[:, None, None], omega)
+        turned = {i: given * forces for i, forces in found.forces_by.items()}
+        return replace(found, forces=given * found.forces, forces_by=turned)
     values, which, k = system.eigenvalues[system.which], system.which, ks[:, None]
     if system.form == MODES:
         c = system.dampings[which]
@@ -133,8 +136,14 @@ def whole_motion(
     return WholeMotion(
         inverse=np.asarray(1.0 / d, np.complex128), by_omega=slope, by_omega_twice=bend, by_structure=by,
         contact=system.contact_modes[which], back=system.contact_duals[which],
-        observe=system.observe_modes[which], forces=system.modal_forces,
+        observe=system.observe_modes[which], forces=given * system.modal_forces,
     )  # fmt: skip
+
+
+def _levels(system: System, omega: float) -> Real:
+    """Return the factor of the forces of each harmonic at ω, (nk, 1): 1 but along an engine-order line."""
+    rows = np.where((system.ks == 0) & bool(system.constant_mean), 1, 0)
+    return np.asarray(system.level[rows] @ omega ** np.arange(3))[:, None]
 
 
 def _of_matrices(matrices: Matrices, k: Real, omega: float) -> WholeMotion:

@@ -12,10 +12,10 @@ from solver.contacts.kernels import columns
 from solver.contacts.kernels import system as kernel
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.scene.bodies.paths import is_body_path, least_value, unit_of
+from solver.scene.bodies.paths import SPEED, is_body_path, least_value, unit_of
 from solver.scene.bodies.shape_parts import contact_shares, least_shape_value, shape_of, shape_unit
 from solver.scene.bodies.shapes import POINTS
-from solver.scene.parameter_paths import has_parameter
+from solver.scene.parameter_paths import follows_speed, has_parameter, is_gas_path, is_loss
 from solver.scene.scene import Scene
 
 
@@ -113,6 +113,12 @@ def resolve(scene: Scene, path: str) -> Parameter:
     """
     scene.check_path(path)
     nobody = np.zeros(len(scene.contacts))
+    followed = follows_speed(scene, path)
+    if followed is not None:
+        raise SettingError("path", path, f"cannot be continued in: {followed} follows the speed")
+    if path == SPEED and (scene.speed_order is not None or scene.with_speed):
+        wanted = "is swept along an engine-order line (`speed_order`) alone where loads follow it"
+        raise SettingError("path", path, wanted)
     if path == "frequency":
         return _parameter(path, Kind.FREQUENCY, nobody)
     shape = shape_of(scene, path)
@@ -123,12 +129,17 @@ def resolve(scene: Scene, path: str) -> Parameter:
             path=path, kind=Kind.STRUCTURE, active=nobody, name=path, unit=unit_of(path),
             least=least_value(path),
         )  # fmt: skip
+    if is_gas_path(scene, path):
+        return Parameter(
+            path=path, kind=Kind.STRUCTURE, active=nobody, name=path, unit="1", least=-math.inf
+        )  # fmt: skip
     owner, _, key = path.rpartition(".")
     if owner == "excitation":
         return _parameter(path, Kind.LEVEL if key == "amplitude" else Kind.FORCE_PHASE, nobody)
     if owner == "structure":
         return Parameter(
-            path=path, kind=Kind.STRUCTURE, active=nobody, name=key, unit="SI", least=0.0
+            path=path, kind=Kind.STRUCTURE, active=nobody, name=key,
+            unit="1" if is_loss(scene.structure, key) else "SI", least=0.0,
         )  # fmt: skip
     acts = [has_parameter(contact, owner, key) for contact in scene.contacts]
     members = [contact.PARAMETERS[key] for contact, mine in zip(scene.contacts, acts, strict=True) if mine]

@@ -10,6 +10,7 @@ import numpy as np
 from solver.balance.balance import Balance, check_level
 from solver.balance.parameter import Kind, Parameter, resolve
 from solver.balance.simplifications import even_harmonics_reason
+from solver.balance.speed_line import check_given_loads
 from solver.contacts.kernels.columns import COLUMNS
 from solver.contacts.kernels.system import LOAD_COEFFICIENTS, MODES
 from solver.contacts.load_derivatives import load_slopes
@@ -19,7 +20,7 @@ from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.condensation import reduce_model, term_amplitudes
 from solver.linear.contact_table import port_stiffnesses
 from solver.scene.bodies.paths import FORCE
-from solver.scene.parameter_paths import PROPORTIONAL
+from solver.scene.parameter_paths import PROPORTIONAL, is_loss
 from solver.scene.scene import MatricesStructure, Scene
 
 
@@ -32,6 +33,7 @@ def resolved(balance: Balance, paths: Sequence[str]) -> tuple[Parameter, ...]:
         An unknown path, the frequency, or one that calls for even harmonics the balance left out.
     """
     scene, found = balance.scene, []
+    check_given_loads(scene, paths)
     for path in paths:
         parameter = resolve(scene, path)
         if parameter.kind is Kind.FREQUENCY:
@@ -71,7 +73,8 @@ class Matrices:
     Attributes
     ----------
     K, C, M : (nk, n, n) array
-        Stiffness, damping and mass; contacts that alone hold a part in place are in K.
+        Stiffness, damping and mass, of the mean none of the last two; contacts that alone hold a part in
+        place are in K.
     L : (nk, nc, n) array
         Relative motions u = L x.
     observe : (n,) array
@@ -104,7 +107,7 @@ def modal_dampings(balance: Balance, parameters: Sequence[Parameter]) -> dict[in
     system, structure = balance.system, balance.scene.structure
     if not isinstance(structure, MatricesStructure) or system.form != MODES or system.shift.any():
         return {}
-    if balance.scene.bodies:  # which have no such damping
+    if balance.scene.bodies or linear_model(balance.scene).extra is not None:  # which have no such damping
         return {}
     stiffness, mass = PROPORTIONAL
     values = {stiffness: system.eigenvalues, mass: np.ones_like(system.eigenvalues)}
@@ -119,18 +122,17 @@ def matrices_of_paths(balance: Balance, parameters: Sequence[Parameter]) -> Matr
     scene, ks = balance.scene, balance.system.ks
     model = linear_model(scene)
     dense = reduce_model(model, ks, port_stiffnesses(scene, model), whole_matrices=True)
-    diameters = (ks * model.engine_order) % model.sectors
-    turn = np.exp(2j * np.pi * diameters / model.sectors)[:, None, None]
-    which = dense.which
+    turns, moving, which = model.turns(ks), ks > 0, dense.which
+    moves, turn = moving[:, None, None], turns[:, None, None]
     L, shift = dense.L[which], balance.system.shift
     by, forces_by, motions_by = {}, {}, {}
     for i, name in structural.items():
         d = structure_derivative(scene, name)
-        dK = d.dK0 + d.dKp * turn + d.dKp.T * turn.conj()
+        dK, dC, dM = d.at(turns, moving)
         if d.contact_here is not None and d.contact_next is not None:
             dL = motions_by[i] = d.contact_here + d.contact_next * turn
             dK = dK + _stiffness(dL, shift, L) + _stiffness(L, shift, dL)
-        by[i] = (dK, d.dC0 + d.dCp * turn + d.dCp.T * turn.conj(), d.dM + 0.0 * turn)
+        by[i] = (dK, moves * dC, moves * dM)
         if d.forces:
             forces_by[i] = term_amplitudes(d.forces, dense.observe.size, ks)
     # The stiffness moved from the contacts into the structure is that of the balance.
@@ -148,6 +150,10 @@ def check_smooth_structure(scene: Scene, parameters: Sequence[Parameter]) -> Non
     """
     structural = [p for p in parameters if p.kind is Kind.STRUCTURE]
     bent = [p.path for p in structural if _is_bent(scene, p.name)]
+    lossy = [p.path for p in structural if structure_derivative(scene, p.name).extra is not None]
+    if len(lossy) > 1 and any(is_loss(scene.structure, p.name) for p in structural):
+        wanted = "must not have the loss factor beside a stiffness, whose product it is in: only gradients"
+        raise SettingError("paths", lossy, wanted)
     pulling = [p.path for p in structural if structure_derivative(scene, p.name).forces]
     if bent or len([path for path in pulling if not path.endswith(f".{FORCE}")]) > 1:
         raise SettingError(
@@ -157,7 +163,8 @@ def check_smooth_structure(scene: Scene, parameters: Sequence[Parameter]) -> Non
 
 def _is_bent(scene: Scene, name: str) -> bool:
     found = structure_derivative(scene, name)
-    return bool(found.second_forces) or found.contact_here is not None
+    bends = bool(found.second_forces) or found.second_extra is not None
+    return bends or found.contact_here is not None or not found.affine
 
 
 def _stiffness(left: Complex, k: Real, right: Complex) -> Complex:

@@ -81,7 +81,7 @@ def even_harmonics_reason(scene: Scene, paths: Iterable[str] = ()) -> str | None
     for force in scene.forces:
         if force.harmonic % 2 == 0:
             kind = "static" if force.harmonic == 0 else f"of harmonic {force.harmonic}"
-            return f"the force on {force.dof} is {kind}"
+            return f"the force on {force.place} is {kind}"
     for path in paths:
         if changes_loads(scene, path):
             return f"{path} changes a constant force"

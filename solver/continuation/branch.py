@@ -279,6 +279,12 @@ class Branch(Drawn):
         figure: Figure = self.VIEWS.call("plots.figures", self, ax, limit=limit)
         return figure
 
+    @property
+    def speeds_rpm(self) -> Real | None:
+        """Speeds of rotation [1/min] of the points along an engine-order line; None elsewhere."""
+        order = self.balance.scene.speed_order
+        return None if order is None else 60.0 / order * self.values
+
     def to_json(self) -> dict[str, object]:
         """Return the branch as one JSON object."""
         peak, band = self.peak, self.band
@@ -287,6 +293,7 @@ class Branch(Drawn):
             "parameter": self.values.tolist(),
             "parameter_path": self.parameter,
             "unit": self.balance.parameter.unit,
+            "speed_rpm": None if self.speeds_rpm is None else self.speeds_rpm.tolist(),
             "amplitude": self.amplitude.tolist(),
             "half_peak_to_peak": self.half_peak_to_peak.tolist(),
             "mean": self.mean.tolist(),

@@ -1,31 +1,46 @@
-"""The linear structure of a scene as matrices, and their derivatives: one CasADi expression carries both.
-
-The expression of a scene's structure is symbolic in every mass, stiffness and dashpot, so a named parameter
-has its derivative from the same lines that give the value.
-"""
+"""The linear structure of a scene as matrices with its contacts and forces, and their derivatives."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.errors import SettingError
-from solver.linear.body_matrices import bodies_mass, mass_derivative, matrices_with_bodies
+from solver.linear.body_matrices import mass_derivative, matrices_with_bodies
+from solver.linear.extra_terms import (
+    ExtraTerms,
+    Symmetric,
+    depends_on_speed,
+    extra_terms,
+    terms_by_gas,
+    terms_by_loss,
+    terms_by_speed,
+    terms_by_stiffness,
+    terms_of_line,
+)
+from solver.linear.lumped_matrices import (
+    Matrices,
+    derivative_by_number,
+    matrices_of_numbers,
+    numbers_of,
+    topology_of,
+)
 from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
+from solver.linear.moving_base import base_of, derivative_with_base, with_base
 from solver.scene.bodies.body import MOMENTS, Body
-from solver.scene.bodies.kinematics import Form, dof_names, force_derivatives
+from solver.scene.bodies.kinematics import Form, force_derivatives
 from solver.scene.bodies.paths import is_body_path
 from solver.scene.bodies.shape_parts import motion_derivatives
 from solver.scene.cyclic.annulus import written_out
-from solver.scene.parameter_paths import PROPORTIONAL, share, structure_names
+from solver.scene.matrices_structure import Ratios
+from solver.scene.parameter_paths import PROPORTIONAL, is_gas_path, is_loss, share, structure_names
 from solver.scene.scene import (
     CyclicStructure,
     Damper,
-    End,
     Excitation,
     LumpedStructure,
     Mass,
@@ -36,56 +51,64 @@ from solver.scene.scene import (
 from solver.scene.validation import listing, nearest
 
 FloatArray = NDArray[np.float64]
-_Ends = tuple[End, End]
-_Assembled = LumpedStructure | CyclicStructure
-
-
-class _Topology(NamedTuple):
-    """What joins what: everything of a structure but its numbers."""
-
-    dofs: tuple[str, ...]
-    springs: tuple[_Ends, ...]
-    dampers: tuple[_Ends, ...]
-
-
-class _Matrices(NamedTuple):
-    M: FloatArray
-    C0: FloatArray
-    Cp: FloatArray
-    K0: FloatArray
-    Kp: FloatArray
-
-
-class _Expression(NamedTuple):
-    """The matrices side by side, M | C0 | Cp | K0 | Kp, as an expression in all parameters."""
-
-    parameters: Any
-    stacked: Any
 
 
 def linear_model(scene: Scene) -> LinearModel:
-    """The matrices, contacts and forces of a scene, with the values it has now.
+    """The matrices, contacts and forces of a scene, with the values it has now, and the base that moves.
 
     Where one sector does not stand for all they are those of the whole annulus. The matrices are cached:
     changing contacts or excitation costs microseconds.
     """
     scene = written_out(scene)
+    model, base = _without_base(scene), base_of(scene)
+    return model if base is None else with_base(model, scene, base)
+
+
+def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
+    """Derivatives of the matrices by the structural parameter `name` (without ``structure.``).
+
+    By the value of a group they are the sum of those by its members, times their factors. Of a body, a load
+    or the speed the name is the path, and the forces have derivatives too.
+
+    Raises
+    ------
+    SettingError
+        The structure has no parameter of that name.
+    """
+    found, base = _derivative_by(scene, name), base_of(scene)
+    return found if base is None else derivative_with_base(found, _without_base(scene), base)
+
+
+def _without_base(scene: Scene) -> LinearModel:
+    """The same with forces alone."""
     structure = scene.structure
     if isinstance(structure, MatricesStructure):
         found = matrices_with_bodies(structure, scene.bodies)
         nothing = _nothing(found.M.shape[0])
-        return _model(scene, _Matrices(found.M, found.C, nothing, found.K, nothing), found.shapes)
-    topology = _topology(structure, scene.bodies)
-    matrices = _matrices(topology, _numbers(structure, scene.bodies), scene.bodies)
+        matrices = Matrices(found.M, found.C, nothing, found.K, nothing)
+        return _model(scene, matrices, found.shapes, found.skew)
+    topology = topology_of(structure, scene.bodies)
+    numbers = numbers_of(structure, scene.bodies)
+    matrices = matrices_of_numbers(topology, numbers, scene.bodies, _modal_ratios(structure))
     return _model(scene, matrices, _identity(len(topology.dofs)))
 
 
-def _model(scene: Scene, matrices: _Matrices, shapes: FloatArray) -> LinearModel:
+def _modal_ratios(structure: LumpedStructure | CyclicStructure) -> Ratios | None:
+    return structure.damping_ratio if isinstance(structure, LumpedStructure) else None
+
+
+def _model(
+    scene: Scene,
+    matrices: Matrices,
+    shapes: FloatArray,
+    skew: tuple[FloatArray, FloatArray] | None = None,
+) -> LinearModel:
     """Add contacts and forces to the matrices."""
     structure = scene.structure
     dofs = scene.dofs
     here, beyond = _contact_selection(dofs, tuple(form for forms in scene.forms for form in forms))
     whole = isinstance(structure, MatricesStructure)
+    symmetric = Symmetric(K0=matrices.K0, Kp=matrices.Kp, shapes=shapes, skew=skew)
 
     def rows(selected: FloatArray) -> FloatArray:
         return _frozen(selected @ shapes) if whole else selected
@@ -101,10 +124,38 @@ def _model(scene: Scene, matrices: _Matrices, shapes: FloatArray) -> LinearModel
         contact_here=rows(here),
         contact_next=rows(beyond),
         forces=_terms(scene.forces, dofs, shapes if whole else None),
-        observe=rows(_unit(dofs, scene.observe.dof)),
+        observe=rows(row_of(scene, scene.observe.dof)),
         engine_order=scene.engine_order,
         sectors=structure.sectors if isinstance(structure, CyclicStructure) else 1,
+        extra=extra_terms(scene, symmetric),
+        line=None if scene.speed_order is None else terms_of_line(scene, symmetric),
+        line_order=scene.speed_order or 1.0,
     )
+
+
+def row_of(scene: Scene, name: str) -> FloatArray:
+    """Return the row over the DOFs (n_dofs,) of a DOF or a recovered quantity of a scene.
+
+    Raises
+    ------
+    SettingError
+        There is none of that name.
+    """
+    terms = scene.seen(name)
+    if terms is None:
+        known = (*scene.dofs, *(each.name for each in scene.recovery))
+        raise SettingError("dof", name, f"must be one of {listing(known)}", nearest(str(name), known))
+    if terms == ((name, 1.0),):
+        return _unit(scene.dofs, name)
+    return _sum_of(scene.dofs, terms)
+
+
+@lru_cache(maxsize=64)
+def _sum_of(dofs: tuple[str, ...], terms: tuple[tuple[str, float], ...]) -> FloatArray:
+    found = np.zeros(len(dofs))
+    for dof, factor in terms:
+        found[dofs.index(dof)] += factor
+    return _frozen(found)
 
 
 def _terms(
@@ -112,13 +163,26 @@ def _terms(
 ) -> tuple[ForceTerm, ...]:
     """Forces on DOFs in the coordinates of the matrices."""
 
-    def vector(dof: str) -> FloatArray:
-        return _unit(dofs, dof) if shapes is None else _frozen(_unit(dofs, dof) @ shapes)
+    def vector(force: Excitation) -> NDArray[Any]:
+        found = _pattern(dofs, force.forces or ()) if force.dof is None else _unit(dofs, force.dof)
+        return found if shapes is None else _frozen(found @ shapes)
 
     return tuple(
-        ForceTerm(vector=vector(e.dof), amplitude=e.amplitude, phase=e.phase, harmonic=e.harmonic)
+        ForceTerm(vector=vector(e), amplitude=e.amplitude, phase=e.phase, harmonic=e.harmonic)
         for e in forces
+        if e.base is None
     )
+
+
+@lru_cache(maxsize=64)
+def _pattern(dofs: tuple[str, ...], parts: tuple[tuple[str, float, float], ...]) -> NDArray[Any]:
+    """Factors of the DOFs, complex where they have phases."""
+    at = {dof: i for i, dof in enumerate(dofs)}
+    found = np.zeros(len(dofs), np.complex128)
+    for dof, factor, phase in parts:
+        found[at[dof]] += factor * np.exp(1j * phase)
+    seen: NDArray[Any] = found if np.any(found.imag) else found.real.copy()
+    return _frozen(seen)
 
 
 @lru_cache(maxsize=16)
@@ -131,45 +195,61 @@ def _identity(n: int) -> FloatArray:
     return _frozen(np.eye(n))
 
 
-def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
-    """Derivatives of the matrices by the structural parameter `name` (without ``structure.``).
-
-    By the value of a group they are the sum of those by its members, times their factors. Of a body, a load
-    or the speed the name is the path, and the forces have derivatives too.
-
-    Raises
-    ------
-    SettingError
-        The structure has no parameter of that name.
-    """
+def _derivative_by(scene: Scene, name: str) -> LinearModelDerivative:
+    """Derivatives of what `_without_base` gives."""
     structure = scene.structure
     slopes = motion_derivatives(scene, name)
     if slopes is not None:
         return _of_motions(scene, slopes)
     if is_body_path(scene, name):
         return _of_bodies(scene, name)
+    if is_gas_path(scene, name):
+        return _of_extra(terms_by_gas(scene, name.rpartition(".")[0], _symmetric_of(scene)))
+    if is_loss(structure, name):
+        return _of_extra(terms_by_loss(_symmetric_of(scene)))
     if isinstance(structure, MatricesStructure):
         return _proportional(structure, scene.bodies, name)
     parts: tuple[Mass | Spring | Damper, ...] = (*structure.masses, *structure.springs, *structure.dampers)
     shares = [(i, weight) for i, part in enumerate(parts) if name and (weight := share(part, name))]
     if not shares:
         raise _unknown(name, structure_names(structure))
-    topology, numbers = _topology(structure, scene.bodies), _numbers(structure, scene.bodies)
+    topology, numbers = topology_of(structure, scene.bodies), numbers_of(structure, scene.bodies)
     behind = len(topology.dofs) - len(
         structure.dofs
     )  # places of the bodies' DOFs, between masses and springs
     shares = [(i if i < len(structure.masses) else i + behind, weight) for i, weight in shares]
-    members = [(_derivative(topology, numbers, i), weight) for i, weight in shares]
+    own, ratios = len(structure.dofs), _modal_ratios(structure)
+    members = [(derivative_by_number(topology, numbers, i, own, ratios), weight) for i, weight in shares]
 
     def total(key: str) -> FloatArray:
         return _frozen(
             sum((weight * getattr(d, key) for d, weight in members), np.zeros(members[0][0].dM.shape))
         )
 
+    dK0, dKp = total("dK0"), total("dKp")
     return LinearModelDerivative(
-        dM=total("dM"), dC0=total("dC0"), dCp=total("dCp"), dK0=total("dK0"), dKp=total("dKp"),
-        affine=all(d.affine for d, _ in members),
+        dM=total("dM"), dC0=total("dC0"), dCp=total("dCp"), dK0=dK0, dKp=dKp,
+        affine=all(d.affine for d, _ in members), extra=terms_by_stiffness(scene, dK0, dKp),
     )  # fmt: skip
+
+
+def _symmetric_of(scene: Scene) -> Symmetric:
+    """The symmetric matrices that extra terms go with."""
+    structure, bodies = scene.structure, scene.bodies
+    if isinstance(structure, MatricesStructure):
+        found = matrices_with_bodies(structure, bodies)
+        return Symmetric(K0=found.K, Kp=_nothing(found.K.shape[0]), shapes=found.shapes, skew=found.skew)
+    topology = topology_of(structure, bodies)
+    matrices = matrices_of_numbers(topology, numbers_of(structure, bodies), bodies, _modal_ratios(structure))
+    return Symmetric(K0=matrices.K0, Kp=matrices.Kp, shapes=_identity(len(topology.dofs)))
+
+
+def _of_extra(extra: ExtraTerms) -> LinearModelDerivative:
+    """Derivatives of the extra terms alone."""
+    nothing = _nothing(extra.K.shape[1])
+    return LinearModelDerivative(
+        dM=nothing, dC0=nothing, dCp=nothing, dK0=nothing, dKp=nothing, affine=True, extra=extra
+    )
 
 
 def _of_motions(scene: Scene, slopes: Mapping[str, tuple[Form, ...]]) -> LinearModelDerivative:
@@ -202,10 +282,14 @@ def _of_bodies(scene: Scene, path: str) -> LinearModelDerivative:
     massive = key == "mass" or key in MOMENTS
     nothing = _nothing(n)
     first, second = force_derivatives(scene, path)
+    extra: tuple[ExtraTerms | None, ExtraTerms | None] = (None, None)
+    if not owner and depends_on_speed(scene):
+        extra = terms_by_speed(scene, _symmetric_of(scene))
     return LinearModelDerivative(
         dM=mass_derivative(n - behind, scene.bodies, owner, key) if massive else nothing,
         dC0=nothing, dCp=nothing, dK0=nothing, dKp=nothing, affine=True,
         forces=_terms(first, dofs, shapes), second_forces=_terms(second, dofs, shapes),
+        extra=extra[0], second_extra=extra[1] if extra[1] is not None and np.any(extra[1].K) else None,
     )  # fmt: skip
 
 
@@ -215,7 +299,7 @@ def _proportional(structure: MatricesStructure, bodies: tuple[Body, ...], name: 
         raise _unknown(name, PROPORTIONAL)
     found = matrices_with_bodies(structure, bodies)
     nothing = _nothing(found.M.shape[0])
-    dC = found.K if name == PROPORTIONAL[0] else found.M
+    dC = found.K if name == PROPORTIONAL[0] else found.M  # the symmetric part of K
     if bodies:  # which have no such damping
         dC = dC.copy()
         dC[-sum(len(body.dofs) for body in bodies) :] = 0.0
@@ -225,104 +309,6 @@ def _proportional(structure: MatricesStructure, bodies: tuple[Body, ...], name: 
 
 def _unknown(name: str, known: Sequence[str]) -> SettingError:
     return SettingError("name", name, f"must be one of {listing(known)}", nearest(str(name), known))
-
-
-def _topology(structure: _Assembled, bodies: tuple[Body, ...]) -> _Topology:
-    springs = tuple(spring.ends for spring in structure.springs)
-    dampers = tuple(damper.ends for damper in structure.dampers)
-    return _Topology(dof_names(structure, bodies), springs, dampers)
-
-
-def _numbers(structure: _Assembled, bodies: tuple[Body, ...]) -> tuple[float, ...]:
-    """All numbers: masses, stiffnesses, dashpots, dashpots of springs, proportional damping.
-
-    The mass of a body is no point mass and stands apart: 0 here.
-    """
-    return (
-        *(mass.m for mass in structure.masses),
-        *(0.0 for body in bodies for _ in body.dofs),
-        *(spring.k for spring in structure.springs),
-        *(damper.c for damper in structure.dampers),
-        *(spring.c for spring in structure.springs),
-        structure.stiffness_proportional_damping,
-    )
-
-
-@lru_cache(maxsize=64)
-def _expression(topology: _Topology) -> _Expression:
-    """The matrices in symbols, in the order of `_numbers`, for their derivatives."""
-    import casadi  # the values of the matrices need no symbols
-
-    n = len(topology.dofs)
-    q = casadi.SX.sym("q", n + 2 * len(topology.springs) + len(topology.dampers) + 1)
-    return _Expression(q, casadi.horzcat(*_assembled(topology, q, casadi.SX(n, n))))
-
-
-def _assembled(topology: _Topology, q: Any, zero: Any) -> tuple[Any, ...]:
-    """Return M, C0, Cp, K0, Kp in floats or in symbols, as the parameters `q` and the (n, n) `zero` are."""
-    n, n_springs, n_dampers = len(topology.dofs), len(topology.springs), len(topology.dampers)
-    M, C0, Cp, K0, Kp = (zero + 0.0 for _ in range(5))
-    k, c, c_spring = n, n + n_springs, n + n_springs + n_dampers
-    beta = q[c_spring + n_springs]
-    index = {dof: i for i, dof in enumerate(topology.dofs)}
-    for i in range(n):
-        M[i, i] = q[i]
-    for i, ends in enumerate(topology.springs):
-        _join(K0, Kp, ends, q[k + i], index)
-        _join(C0, Cp, ends, q[c_spring + i] + beta * q[k + i], index)
-    for i, ends in enumerate(topology.dampers):
-        _join(C0, Cp, ends, q[c + i], index)
-    return M, C0, Cp, K0, Kp
-
-
-def _join(X0: Any, Xp: Any, ends: _Ends, value: Any, index: dict[str, int]) -> None:
-    """Add one spring or dashpot between two ends to X0 + Xp e^{j theta} + Xp^T e^{-j theta}."""
-    here = [index[end.dof] for end in ends if end.dof is not None]
-    for i in here:
-        X0[i, i] += value
-    if len(here) < 2:
-        return
-    a, b = here
-    if ends[1].next:
-        Xp[a, b] -= value
-    elif ends[0].next:
-        Xp[b, a] -= value
-    else:
-        X0[a, b] -= value
-        X0[b, a] -= value
-
-
-@lru_cache(maxsize=256)
-def _matrices(topology: _Topology, numbers: tuple[float, ...], bodies: tuple[Body, ...]) -> _Matrices:
-    n = len(topology.dofs)
-    M, *others = _assembled(topology, numbers, np.zeros((n, n)))
-    if bodies:
-        M += bodies_mass(n - sum(len(body.dofs) for body in bodies), bodies)
-    return _Matrices(*map(_frozen, (M, *others)))
-
-
-@lru_cache(maxsize=256)
-def _derivative(topology: _Topology, numbers: tuple[float, ...], i: int) -> LinearModelDerivative:
-    import casadi
-
-    expression = _expression(topology)
-    derivative, affine = _derivative_function(topology, i)
-    stacked = casadi.reshape(derivative(np.asarray(numbers)), *expression.stacked.shape)
-    dense = np.asarray(casadi.DM(stacked).full(), dtype=np.float64)
-    n = dense.shape[0]
-    d = _Matrices(*(_frozen(dense[:, i * n : (i + 1) * n].copy()) for i in range(5)))
-    return LinearModelDerivative(dM=d.M, dC0=d.C0, dCp=d.Cp, dK0=d.K0, dKp=d.Kp, affine=affine)
-
-
-@lru_cache(maxsize=256)
-def _derivative_function(topology: _Topology, i: int) -> tuple[Any, bool]:
-    """Derivative of the stacked matrices by parameter i as a function of all, and whether it is constant."""
-    import casadi
-
-    q, stacked = _expression(topology)
-    vector = casadi.vec(stacked)
-    jacobian = casadi.jacobian(vector, q[i])
-    return casadi.Function("derivative", [q], [jacobian]), bool(casadi.is_linear(vector, q[i]))
 
 
 @lru_cache(maxsize=256)

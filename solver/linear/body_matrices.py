@@ -43,6 +43,7 @@ def _with_bodies(structure: MatricesStructure, bodies: tuple[Body, ...]) -> Matr
     return MatrixModel(
         M=_frozen(block_diag(own.M, mass)), C=_frozen(block_diag(own.C, nothing)),
         K=_frozen(block_diag(own.K, nothing)), shapes=_frozen(block_diag(own.shapes, np.eye(n))),
+        skew=own.skew,
     )  # fmt: skip
 
 

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.contacts.kernels.system import DENSE
-from solver.jit.fourier import Complex, Integer, Real
+from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.modal import Decomposition, Held, decompose, held_alone, held_by, matrices_of
@@ -47,6 +48,7 @@ class Reduced:
     dK: Complex
     dC: Complex
     dM: Complex
+    ddK: Complex
     L: Complex
     observe: Complex
     forces: Complex
@@ -77,24 +79,33 @@ def reduce_model(
     numpy.linalg.LinAlgError
         The mass matrix is not positive definite.
     """
-    diameters, which = np.unique((ks * model.engine_order) % model.sectors, return_inverse=True)
-    theta = 2.0 * np.pi * diameters / model.sectors
+    dense_asked = whole_matrices or derivative is not None or model.prescribed or model.line is not None
+    apart = dense_asked or (model.extra is not None and not model.extra.is_real)
+    which, theta, moving = _structures(model, ks, apart=apart)
     forces = force_amplitudes(model, ks)
-    L = model.contact_here + model.contact_next * np.exp(1j * theta)[:, None, None]
-    held = matrices_of(model, theta)
+    L = model.ports_at(np.exp(1j * theta))
+    held = matrices_of(model, theta, moving)
     shift, loose = np.zeros(kt.size), np.zeros((0, kt.size))
     if 0 in ks:
-        loose = loose_motions(held.K[which[0]], L[which[0]], kt)
-        if len(loose) or not held_alone(held):
+        loose = _loose(model, held.K[which[0]], L[which[0]], kt)
+        if len(loose) or not (model.prescribed or held_alone(held)):
             shift, held = kt.copy(), held_by(held, L, kt)
-    found = None if whole_matrices or derivative is not None else decompose(held)
-    if found is None and not whole_matrices and derivative is None and not held_alone(held):
+    found = None if dense_asked else decompose(held)
+    if found is None and not dense_asked and not held_alone(held):
         # A free part has a double pole at 0, of which there are no two eigenvectors: held, it has not.
         shift, held = kt.copy(), held_by(held, L, kt)
         found = decompose(held)
+    if found is None and not apart:
+        which, theta, moving = _structures(model, ks, apart=True)
+        L = model.ports_at(np.exp(1j * theta))
+        held = matrices_of(model, theta, moving)
+        held = held_by(held, L, kt) if np.any(shift) else held
     if found is None:
         modes: dict[str, Any] = _no_modes(theta.size, ks.size, kt.size)
-        dense: dict[str, Any] = _dense(held, theta, L, model, forces, derivative)
+        inertia = model.inertia(np.exp(1j * theta), _first_of(ks, which))
+        dense: dict[str, Any] = _dense(held, theta, moving, L, model, forces, derivative) | {
+            "M": _contiguous(inertia * (1.0 if model.line is not None else moving[:, None, None]))
+        }
         given = ((), ()) if derivative is None else (derivative.forces, derivative.second_forces)
         dense["dforces"] = np.array([term_amplitudes(each, model.observe.size, ks) for each in given])
     else:
@@ -102,6 +113,25 @@ def reduce_model(
         dense = {name: np.zeros((0,) * axes, np.complex128) for name, axes in _DENSE_AXES.items()}
     least = 0.0 if found is None else _least_size(found, L, forces, which)
     return Reduced(which=which.astype(np.int64), shift=shift, loose=loose, least_size=least, **modes, **dense)
+
+
+def _structures(model: LinearModel, ks: Integer, *, apart: bool) -> tuple[Integer, Real, Flags]:
+    """Return the structure of each harmonic, and the interblade phase of each; (False) the one of the mean.
+
+    There is one for each nodal diameter in play; the mean has its own where `apart`.
+    """
+    diameters = (ks * model.engine_order) % model.sectors
+    still = (ks == 0) & apart
+    if model.line is not None:  # each harmonic has an inertia of its own
+        return np.arange(ks.size), 2.0 * np.pi * diameters / model.sectors, ks > 0
+    found, which = np.unique(np.where(still, -1, diameters), return_inverse=True)
+    return which, 2.0 * np.pi * np.maximum(found, 0) / model.sectors, found >= 0
+
+
+def _first_of(ks: Integer, which: Integer) -> Integer:
+    """Return a harmonic of each structure."""
+    _, first = np.unique(which, return_index=True)
+    return np.asarray(ks[first])
 
 
 def _least_size(found: Decomposition, L: Complex, forces: Complex, which: Integer) -> float:
@@ -128,8 +158,15 @@ def loose_ports(scene: Scene) -> tuple[Real, Real]:
     """
     model = linear_model(scene)
     kt = port_stiffnesses(scene, model)
-    static = matrices_of(model, np.zeros(1))
-    return loose_motions(static.K[0], model.contact_here + model.contact_next, kt), kt
+    static = matrices_of(model, np.zeros(1), np.zeros(1, np.bool_))
+    return _loose(model, static.K[0], model.contact_here + model.contact_next, kt), kt
+
+
+def _loose(model: LinearModel, K: NDArray[Any], L: NDArray[Any], kt: Real) -> Real:
+    """Return the rigid-body motions at the ports: of all coordinates but those of a base."""
+    if not model.prescribed:
+        return loose_motions(K, L, kt)
+    return loose_motions(K[model.free][:, model.free], L[:, model.free], kt)
 
 
 def force_amplitudes(model: LinearModel, ks: Integer) -> Complex:
@@ -190,7 +227,7 @@ def _no_modes(n_structures: int, n_harmonics: int, n_contacts: int) -> dict[str,
 
 
 _DENSE_AXES = {
-    "K": 3, "C": 3, "M": 3, "dK": 3, "dC": 3, "dM": 3, "L": 3, "observe": 1, "forces": 2,
+    "K": 3, "C": 3, "M": 3, "dK": 3, "dC": 3, "dM": 3, "ddK": 3, "L": 3, "observe": 1, "forces": 2,
     "dforces": 3,
 }  # fmt: skip
 
@@ -198,19 +235,25 @@ _DENSE_AXES = {
 def _dense(
     held: Held,
     theta: Real,
+    moving: Flags,
     L: Complex,
     model: LinearModel,
     forces: Complex,
     derivative: LinearModelDerivative | None,
 ) -> dict[str, Complex]:
-    """Return the matrices and their derivatives by the structural parameter (zero if there is none)."""
-    turn = np.exp(1j * theta)[:, None, None]
+    """Return the matrices and their derivatives by the structural parameter (zero if there is none).
+
+    The loops compute the mean with k = 1: its structure has no C and no M.
+    """
     dK = dC = dM = np.zeros(held.K.shape, np.complex128)
+    ddK = np.zeros((0, 0, 0), np.complex128)
     if derivative is not None:
-        dK = dK + derivative.dK0 + derivative.dKp * turn + derivative.dKp.T * turn.conj()
-        dC = dC + derivative.dC0 + derivative.dCp * turn + derivative.dCp.T * turn.conj()
-        dM = dM + derivative.dM
+        dK, dC, dM = derivative.at(np.exp(1j * theta), moving)
+        if derivative.second_extra is not None:
+            ddK = _contiguous(derivative.second_extra.at(np.exp(1j * theta), moving)[0])
+    moves = moving[:, None, None]
     return {
-        "K": _contiguous(held.K), "C": _contiguous(held.C), "M": _contiguous(held.M), "dK": dK, "dC": dC,
-        "dM": dM, "L": _contiguous(L), "observe": _contiguous(model.observe), "forces": forces,
+        "K": _contiguous(held.K), "C": _contiguous(moves * held.C), "M": _contiguous(moves * held.M),
+        "dK": _contiguous(dK), "dC": _contiguous(moves * dC), "dM": _contiguous(moves * dM), "ddK": ddK,
+        "L": _contiguous(L), "observe": _contiguous(model.observe), "forces": forces,
     }  # fmt: skip

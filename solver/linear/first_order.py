@@ -38,8 +38,8 @@ class Equations:
     index: dict[str, int]
 
 
-def equations(structure: MatricesStructure, used: Sequence[str]) -> Equations:
-    """The equations of motion with the DOFs `used` as coordinates.
+def equations(structure: MatricesStructure, used: Sequence[str], spin: float = 0.0) -> Equations:
+    """The equations of motion with the DOFs `used` as coordinates, at a speed of rotation `spin` [rad/s].
 
     Raises
     ------
@@ -52,18 +52,30 @@ def equations(structure: MatricesStructure, used: Sequence[str]) -> Equations:
     if structure.M is None or structure.K is None:
         raise SettingError("structure", structure.kind, "must have M and K, or `modes`")
     M, K = structure.M.array, structure.K.array
-    C = structure.stiffness_proportional_damping * K + structure.mass_proportional_damping * M
+    symmetric = 0.5 * (K + K.T)
+    C = structure.stiffness_proportional_damping * symmetric + structure.mass_proportional_damping * M
     if structure.C is not None:
         C = C + structure.C.array
-    if structure.damping_ratio:
+    if structure.damping_ratio is not None:
         # C = 2 ζ M sqrt(M⁻¹ K): the square root taken in the coordinates where M is 1.
         factor = linalg.cholesky(M, lower=True)
-        scaled = linalg.solve_triangular(factor, linalg.solve_triangular(factor, K, lower=True).T, lower=True)
-        values, vectors = linalg.eigh(scaled)
-        root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
-        C = C + 2.0 * structure.damping_ratio * (factor @ root @ factor.T)
+        half = linalg.solve_triangular(factor, symmetric, lower=True)
+        C = C + factor @ modal_damping_root(linalg.solve_triangular(factor, half.T, lower=True),
+                                            structure.damping_ratio) @ factor.T  # fmt: skip
+    if structure.G is not None:
+        C = C + spin * structure.G.array
+    if structure.K_omega2 is not None:
+        K = K + spin**2 * structure.K_omega2.array
     W = linalg.inv(M)
     return Equations(A=W @ K, B=W @ C, W=W, index={name: rows[name] for name in used})
+
+
+def modal_damping_root(scaled: FloatArray, ratios: float | Sequence[float]) -> FloatArray:
+    """Twice the square root of a stiffness where M is 1, each mode with its damping ratio."""
+    values, vectors = linalg.eigh(scaled)
+    given = np.atleast_1d(np.array(ratios, dtype=np.float64))
+    zeta = np.concatenate([given, np.full(max(values.size - given.size, 0), given[-1])])[: values.size]
+    return np.asarray((vectors * (2.0 * zeta * np.sqrt(np.maximum(values, 0.0)))) @ vectors.T)
 
 
 def _of_modes(structure: MatricesStructure, used: list[str], rows: dict[str, int]) -> Equations:
@@ -82,7 +94,10 @@ def _of_modes(structure: MatricesStructure, used: list[str], rows: dict[str, int
     S = np.vstack([seen, linalg.null_space(seen).T])
     inverse = linalg.inv(S)
     omega = np.sqrt(modes.omega2)
-    ratio = structure.damping_ratio or 0.0 if modes.damping_ratio is None else modes.damping_ratio
+    given = np.atleast_1d(np.array(structure.damping_ratio or 0.0, dtype=np.float64))
+    ratio = modes.damping_ratio
+    if ratio is None:
+        ratio = np.concatenate([given, np.full(max(omega.size - given.size, 0), given[-1])])[: omega.size]
     damping = (
         2.0 * ratio * omega
         + structure.stiffness_proportional_damping * modes.omega2

@@ -8,7 +8,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.matrices.normal_modes import undamped_modes
+from solver.linear.modal_damping import modal_damping, ratio_of_modes
+from solver.matrices.normal_modes import hermitian
 from solver.scene.parts import MatricesStructure
 
 FloatArray = NDArray[np.float64]
@@ -24,12 +25,15 @@ class MatrixModel:
         In physical coordinates, or in modal ones if the structure is given by its modes.
     shapes : (n_dofs, n) array
         The DOFs in use.
+    skew : tuple of (n, n) arrays or None
+        What K and C have beside these symmetric ones: their antisymmetric parts.
     """
 
     M: FloatArray
     C: FloatArray
     K: FloatArray
     shapes: FloatArray
+    skew: tuple[FloatArray, FloatArray] | None = None
 
 
 @lru_cache(maxsize=16)
@@ -40,7 +44,7 @@ def matrix_model(structure: MatricesStructure) -> MatrixModel:
     if structure.stiffness_proportional_damping or structure.mass_proportional_damping:
         C = own + structure.stiffness_proportional_damping * K + structure.mass_proportional_damping * M
         C.setflags(write=False)
-    return MatrixModel(M=M, C=C, K=K, shapes=shapes)
+    return MatrixModel(M=M, C=C, K=K, shapes=shapes, skew=_skew(structure))
 
 
 _NO_PROPORTIONAL = {"stiffness_proportional_damping": 0.0, "mass_proportional_damping": 0.0}
@@ -50,16 +54,18 @@ _NO_PROPORTIONAL = {"stiffness_proportional_damping": 0.0, "mass_proportional_da
 def _base(structure: MatricesStructure) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """M, K, C and shapes without proportional damping."""
     modes, rows = structure.modes, list(structure.dofs.rows)
-    ratio = structure.damping_ratio or 0.0
+    ratio = structure.damping_ratio
     if modes is not None:
-        ratios = modes.damping_ratio if modes.damping_ratio is not None else np.full(modes.omega2.size, ratio)
+        ratios = modes.damping_ratio
+        if ratios is None:
+            ratios = ratio_of_modes(0.0 if ratio is None else ratio, modes.omega2.size)
         M, K = np.eye(modes.omega2.size), np.diag(modes.omega2)
         C, shapes = np.diag(2.0 * ratios * np.sqrt(modes.omega2)), modes.modes[rows]
     elif structure.M is not None and structure.K is not None:
-        M, K = structure.M.array, structure.K.array
-        C = np.zeros_like(M) if structure.C is None else structure.C.array
-        if ratio:
-            C = C + _modal_damping(M, K, ratio)
+        M, K = structure.M.array, hermitian(structure.K.array)
+        C = np.zeros_like(M) if structure.C is None else hermitian(structure.C.array)
+        if ratio is not None:
+            C = C + modal_damping(M, K, ratio)
         shapes = np.zeros((len(rows), M.shape[0]))
         shapes[np.arange(len(rows)), rows] = 1.0
     else:
@@ -69,9 +75,17 @@ def _base(structure: MatricesStructure) -> tuple[FloatArray, FloatArray, FloatAr
     return M, K, C, shapes
 
 
-def _modal_damping(M: FloatArray, K: FloatArray, ratio: float) -> FloatArray:
-    """C with the damping ratio in every mode, Σ 2 ζ ω (Mφ)(Mφ)ᵀ; a rigid body has none."""
-    found = undamped_modes(K, M)
-    momenta = M @ found.phi
-    omega = np.sqrt(np.maximum(found.omega2, 0.0))
-    return np.asarray((momenta * (2.0 * ratio * omega)) @ momenta.T)
+@lru_cache(maxsize=16)
+def _skew(structure: MatricesStructure) -> tuple[FloatArray, FloatArray] | None:
+    """The antisymmetric parts of K and C; None where there are none."""
+    if structure.K is None or structure.symmetric:
+        return None
+    parts = (structure.K.array, np.zeros(1) if structure.C is None else structure.C.array)
+    K, C = (0.5 * (part - part.T) for part in parts)
+    if C.ndim == 1:
+        C = np.zeros_like(K)
+    if not (np.any(K) or np.any(C)):
+        return None
+    K.setflags(write=False)
+    C.setflags(write=False)
+    return K, C

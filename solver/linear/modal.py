@@ -16,9 +16,15 @@ from numpy.typing import NDArray
 
 from solver.contacts.kernels.system import MODES, POLES
 from solver.jit import eigen
-from solver.jit.fourier import Complex, Real
+from solver.jit.fourier import Complex, Flags, Real
+from solver.linear.extra_terms import ExtraTerms
 from solver.linear.model import LinearModel
-from solver.matrices.normal_modes import UndampedModes, least_stiffness, undamped_modes
+from solver.matrices.normal_modes import (
+    UndampedModes,
+    hermitian,
+    least_stiffness,
+    undamped_modes,
+)
 
 CLASSICAL = 1e-11  # largest off-diagonal modal damping, relative to the diagonal, that counts as none
 ROUNDING = 4.0  # the same in units of what the modes lack in orthogonality
@@ -81,10 +87,27 @@ class Decomposition:
     left: NDArray[Any]
 
 
-def matrices_of(model: LinearModel, theta: Real) -> Held:
-    """Return the matrices at each interblade phase."""
+def matrices_of(model: LinearModel, theta: Real, moving: Flags) -> Held:
+    """Return the matrices at each interblade phase, of motions or (False) of what is at rest."""
     parts = tuple(_Identity(a) for a in (model.K0, model.Kp, model.C0, model.Cp, model.M))
-    return _matrices(parts, tuple(theta.tolist()))
+    if model.extra is None:
+        return _matrices(parts, tuple(theta.tolist()))
+    return _with_extra(parts, tuple(theta.tolist()), tuple(moving.tolist()), model.extra)
+
+
+@lru_cache(maxsize=32)
+def _with_extra(
+    parts: tuple[_Identity, ...], theta: tuple[float, ...], moving: tuple[bool, ...], extra: ExtraTerms
+) -> Held:
+    """The matrices with terms that may be neither symmetric nor real."""
+    plain = _matrices(parts, theta)
+    turns = np.exp(1j * np.array(theta))
+    K, C = extra.at(turns, np.array(moving, np.bool_))
+    stiffness: NDArray[Any] = plain.K + K
+    damping: NDArray[Any] = plain.C + C
+    if not (np.any(stiffness.imag) or np.any(damping.imag)):
+        stiffness, damping = stiffness.real, damping.real
+    return Held(stiffness, damping, plain.M, (plain.key, extra, moving))
 
 
 @lru_cache(maxsize=32)
@@ -118,10 +141,18 @@ def held_by(held: Held, L: Complex, kt: Real) -> Held:
 @lru_cache(maxsize=32)
 def decompose(held: Held) -> Decomposition | None:
     """Return modes if the damping is classical, else poles; None if neither gives Z⁻¹ to rounding."""
-    undamped = [undamped_modes(K, M) for K, M in zip(held.K, held.M, strict=True)]
+    stiffness = list(held.K)
+    even = [hermitian(K) for K in stiffness]
+    undamped = [undamped_modes(K, M) for K, M in zip(even, held.M, strict=True)]
+    skew = [
+        None if part is K else u.psi.conj().T @ (K - part) @ u.psi
+        for u, part, K in zip(undamped, even, stiffness, strict=True)
+    ]
     damping = [u.psi.conj().T @ C @ u.psi for u, C in zip(undamped, held.C, strict=True)]
-    rounding = [_rounding(u, K, M) for u, K, M in zip(undamped, held.K, held.M, strict=True)]
-    if all(_classical(D, each) for D, each in zip(damping, rounding, strict=True)):
+    rounding = [_rounding(u, K, M) for u, K, M in zip(undamped, even, held.M, strict=True)]
+    if all(part is None for part in skew) and all(
+        _classical(D, each) for D, each in zip(damping, rounding, strict=True)
+    ):
         phi = np.array([u.phi for u in undamped])
         return Decomposition(
             form=MODES,
@@ -131,8 +162,8 @@ def decompose(held: Held) -> Decomposition | None:
             left=phi.conj(),
         )
     poles = [
-        _poles(u, D) if u.sigma == 0.0 else _plain_poles(K, C, M)
-        for u, D, K, C, M in zip(undamped, damping, held.K, held.C, held.M, strict=True)
+        _poles(u, D, E) if u.sigma == 0.0 else _plain_poles(K, C, M)
+        for u, D, E, K, C, M in zip(undamped, damping, skew, held.K, held.C, held.M, strict=True)
     ]
     found = [each for each in poles if each is not None]
     if len(found) < len(poles):
@@ -163,15 +194,20 @@ def _off_diagonal(matrix: NDArray[Any]) -> float:
     return float(np.abs(matrix - np.diag(np.diag(matrix))).max(initial=0.0))
 
 
-def _poles(undamped: UndampedModes, D: NDArray[Any]) -> tuple[Complex, Complex, Complex] | None:
+def _poles(
+    undamped: UndampedModes, D: NDArray[Any], E: NDArray[Any] | None = None
+) -> tuple[Complex, Complex, Complex] | None:
     """Return poles s_m, residues (x_m, y_mᴴ) with Z⁻¹(s) = Σ x_m y_mᴴ / (s − s_m); None if not to rounding.
 
     In the modes ψ with ψᴴ K ψ = 1 the motion z = (Ω p, p') has the inverse state matrix
-    [[−D, −Ω⁻¹], [Ω⁻¹, 0]] with eigenvalues 1/s, in which the slow poles are the large and accurate ones.
+    [[−D, −Ω⁻¹], [Ω⁻¹, 0]] with eigenvalues 1/s, in which the slow poles are the large and accurate ones. E
+    is what K has there beside 1, where it is not Hermitian: D and the upper Ω⁻¹ are (1 + E)⁻¹ times so much.
     """
     n = undamped.mu.size
     slow = np.diag(np.sqrt(undamped.mu))
-    state = np.block([[-D, -slow], [slow, np.zeros((n, n))]])
+    regular = np.eye(n) if E is None else np.linalg.inv(np.eye(n) + E)
+    first = (D, slow) if E is None else (regular @ D, regular @ slow)
+    state = np.block([[-first[0], -first[1]], [slow, np.zeros((n, n))]])
     values, w, v = eigen.two_sided(state)
     norm = np.einsum("nm,nm->m", w.conj(), v)
     if not np.all(np.abs(norm) > 0.0):
@@ -179,9 +215,12 @@ def _poles(undamped: UndampedModes, D: NDArray[Any]) -> tuple[Complex, Complex, 
     size = np.abs(values).max()
     values = np.where(np.abs(values) < LEAST_POLE * size, LEAST_POLE * size, values)
     x, yh = v[:n], w[:n].conj() * (-1.0 / (values * norm))
+    if E is not None:
+        yh = regular.T @ yh
     fast = 1.0 / np.sqrt(undamped.mu)
     for s in 1j * np.array([0.01 * fast[-1], 0.3 * fast[-1], 1.7 * fast[-1], 0.7 * fast[0], 3.1 * fast[0]]):
-        direct = np.linalg.inv(np.eye(n) + s * D + np.diag(s * s * undamped.mu))
+        still = np.eye(n) if E is None else np.eye(n) + E
+        direct = np.linalg.inv(still + s * D + np.diag(s * s * undamped.mu))
         summed = (x / (s - 1.0 / values)) @ yh.T
         if np.abs(summed - direct).max() > SPAN_ERROR * np.abs(direct).max():
             return None
@@ -206,7 +245,7 @@ def _plain_poles(
     if not np.all(np.abs(norm) > 0.0):
         return None
     yh = (y / norm.conj()).conj()
-    scale = np.sqrt(np.abs(np.linalg.eigvalsh(K)).max() / np.abs(np.linalg.eigvalsh(M)).max())
+    scale = np.sqrt(np.abs(np.linalg.eigvalsh(hermitian(K))).max() / np.abs(np.linalg.eigvalsh(M)).max())
     for s in (0.3j * scale, 1.7j * scale, 0.01j * scale):
         direct = np.linalg.inv(K + s * C + s * s * M)
         summed = (x / (s - values)) @ yh.T

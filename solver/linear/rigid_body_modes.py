@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.jit import eigen
-from solver.matrices.normal_modes import least_stiffness
+from solver.matrices.normal_modes import hermitian, least_stiffness
 
 Real = NDArray[np.float64]
 HELD = 1e-7  # smallest squared pivot of the scaled K from which every part is held, without a closer look
@@ -38,7 +38,7 @@ def loose_motions(K: NDArray[Any], L: NDArray[Any], kt: Real) -> Real:
     nothing = np.zeros((0, kt.size))
     if K.shape[0] == 0 or kt.size == 0 or least_stiffness(K) > HELD:
         return nothing
-    K, L = K.real, L.real
+    K, L = hermitian(K.real), L.real
     contact = L.T @ (kt[:, None] * L)
     diagonal = np.diag(K) + np.diag(contact)
     scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))

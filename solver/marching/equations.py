@@ -2,19 +2,42 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_array, diags_array
 
 from solver.errors import SettingError
-from solver.linear.first_order import equations
+from solver.linear.first_order import equations, modal_damping_root
+from solver.marching.base import base_force, with_base, with_sum
 from solver.marching.contacts import columns, selection
 from solver.marching.kernels import state as kernel
-from solver.scene.bodies.body import Body
+from solver.scene.bodies.body import REVOLUTIONS, Body
 from solver.scene.bodies.kinematics import dof_names, pair_form
 from solver.scene.scene import LumpedStructure, MatricesStructure, Scene
 
 FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Equations:
+    """The equations of a scene, and what its coordinates are.
+
+    Attributes
+    ----------
+    observed : coordinate observed; one behind those of the DOFs where it is a sum of several.
+    index : coordinate of each DOF.
+    seen : coordinates that `observed` adds up, with their factors.
+    """
+
+    system: kernel.System
+    observed: int
+    index: dict[str, int]
+    seen: tuple[tuple[int, float], ...]
+
+
+_IN_TIME = "cannot be marched in time: it is a term of the frequency domain; give dashpots or damping ratios"
 
 
 def _matrices(
@@ -30,6 +53,11 @@ def _matrices(
     dampers = selection([pair_form(damper.between) for damper in structure.dampers], index, len(index))
     K = springs.T @ diags_array(k) @ springs
     C = springs.T @ diags_array(c) @ springs + dampers.T @ diags_array(dashpots) @ dampers
+    if structure.damping_ratio is not None:
+        root, own = np.sqrt(M), M.size
+        scaled = K.toarray()[:own, :own] / np.outer(root, root)
+        modal = np.outer(root, root) * modal_damping_root(scaled, structure.damping_ratio)
+        C = csr_array(C) + csr_array(np.pad(modal, (0, len(index) - own)))
     return M, csr_array(C), csr_array(K)
 
 
@@ -55,8 +83,12 @@ def _of_matrices(
     """The same of a structure given by matrices, the bodies behind its coordinates."""
     own = [dof for body in scene.bodies for dof in body.dofs]
     ends = [term.dof for forms in scene.forms for form in forms for term in form]
-    used = [*ends, *(force.dof for force in scene.forces), scene.observe.dof]
-    found = equations(structure, [dof for dof in used if dof not in own])
+    pushed = [dof for force in scene.forces for dof, *_ in force.parts]
+    moved = [dof for force in scene.forces if force.base is not None for dof, _ in force.base.shares]
+    used = [*ends, *pushed, *moved, *(dof for dof, _ in scene.seen(scene.observe.dof) or ())]
+    used += [dof for coupling in scene.couplings for dof in (coupling.on, coupling.of)]
+    spin = (scene.speed or 0.0) * REVOLUTIONS
+    found = equations(structure, [dof for dof in used if dof not in own], spin)
     A, B, W = (csr_array(each) for each in (found.A, found.B, found.W))
     if not own:
         return A, B, W, found.index
@@ -66,11 +98,51 @@ def _of_matrices(
     return A, B, W, found.index | {dof: n + i for i, dof in enumerate(own)}
 
 
-def equations_of_motion(scene: Scene, omega: float) -> tuple[kernel.System, int, dict[str, int]]:
-    """The equations of a scene in the angle tau = omega t, the coordinate observed, and that of each DOF."""
-    A, B, W, index = _equations(scene)
+def _with_couplings(
+    scene: Scene, A: csr_array, B: csr_array, W: csr_array, index: dict[str, int]
+) -> tuple[csr_array, csr_array, csr_array, dict[str, int]]:
+    """The same with the couplings: each is a force on one DOF by the motion of another.
+
+    Raises
+    ------
+    SettingError
+        A term of the frequency domain: structural damping, an imaginary coefficient.
+    """
+    if scene.structure.loss_factor:
+        raise SettingError("loss_factor", scene.structure.loss_factor, _IN_TIME)
+    spin = (scene.speed or 0.0) * REVOLUTIONS
+    for entry in (entry for coupling in scene.couplings for entry in coupling.entries()):
+        if entry.k.imag != 0.0:
+            raise SettingError("k_imaginary", entry.k.imag, _IN_TIME)
+        push = csr_array(W[:, [index[entry.on]]])
+        at = csr_array(([1.0], ([0], [index[entry.of]])), shape=(1, W.shape[0]))
+        A = A + (entry.k.real + spin**2 * entry.k_omega2) * (push @ at)
+        B = B + (entry.c.real + spin * entry.g) * (push @ at)
+    return csr_array(A), csr_array(B), W, index
+
+
+def equations_of_motion(scene: Scene, omega: float) -> Equations:
+    """The equations of a scene in the angle tau = omega t."""
+    A, B, W, index = _with_couplings(scene, *_equations(scene))
+    seen = [(index[dof], factor) for dof, factor in scene.seen(scene.observe.dof) or ()]
+    observed = seen[0][0]
+    pushes = [
+        (index[dof], force.amplitude * factor, force.phase + phase, force.harmonic)
+        for force in scene.forces
+        for dof, factor, phase in force.parts
+    ]
+    bases = [force for force in scene.excitation if force.base is not None]
+    if scene.observed_unit != "m":
+        wanted = "is not followed by the march, whose tolerance is one of displacements: observe DOFs"
+        raise SettingError("observe", scene.observe.dof, wanted)
+    if scene.observe.dof not in index and not bases:
+        A, B, W, observed = with_sum(seen, A, B, W)
+    if bases:
+        A, B, W, observed = with_base(scene, bases[0], A, B, W, index, omega)
+        n = A.shape[0]
+        pushes += [(n - 2, *base_force(force, omega), force.harmonic) for force in bases]
     A, B, W = A / omega**2, B / omega, W / omega**2
-    forces = scene.forces
+    dof, amplitude, phase, harmonic = zip(*pushes, strict=True) if pushes else ((), (), (), ())
     placed = [(row, own) for one, own in zip(scene.contacts, scene.forms, strict=True) for row in one.rows()]
     system = kernel.System(
         A_start=A.indptr.astype(np.int64),
@@ -82,10 +154,10 @@ def equations_of_motion(scene: Scene, omega: float) -> tuple[kernel.System, int,
         W_start=W.indptr.astype(np.int64),
         W_column=W.indices.astype(np.int64),
         W_value=W.data,
-        force_dof=np.array([index[force.dof] for force in forces], dtype=np.int64),
-        force_amplitude=np.array([force.amplitude for force in forces]),
-        force_phase=np.array([force.phase for force in forces]),
-        force_harmonic=np.array([force.harmonic for force in forces], dtype=np.int64),
+        force_dof=np.array(dof, dtype=np.int64),
+        force_amplitude=np.array(amplitude, dtype=np.float64),
+        force_phase=np.array(phase, dtype=np.float64),
+        force_harmonic=np.array(harmonic, dtype=np.int64),
         **columns(placed, index, A.shape[0]),
     )
-    return system, index[scene.observe.dof], index
+    return Equations(system, observed, index, tuple(seen))

@@ -26,6 +26,7 @@ from solver.marching.result import MarchResult, MarchStatus, describe
 from solver.marching.start import MarchStart, state_at
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import CyclicStructure, Excitation, Scene
+from solver.scene.terms.speed import at_frequency
 
 FloatArray = NDArray[np.float64]
 LEAST_STEPS = 64
@@ -122,18 +123,19 @@ def march(
     """
     begin = time.perf_counter()
     _check(frequency_hz, tolerance, max_periods)
+    scene = at_frequency(scene, frequency_hz)
     whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
     omega = 2.0 * math.pi * frequency_hz
-    system, dof, index = equations_of_motion(whole, omega)
-    steps = _steps(system, scene.forces, steps_per_period)
+    equations = equations_of_motion(whole, omega)
+    steps = _steps(equations.system, scene.forces, steps_per_period)
     plan = _Plan(
-        system=system, dof=dof, tolerance=tolerance, max_periods=max_periods, on_progress=on_progress,
-        should_stop=should_stop,
+        system=equations.system, dof=equations.observed, tolerance=tolerance, max_periods=max_periods,
+        on_progress=on_progress, should_stop=should_stop,
     )  # fmt: skip
     names = tuple(row.name for row in rows(whole.contacts))
     if start is not None and tractions is not None:
         raise SettingError("tractions", dict(tractions), "must be those of `start` where that is given")
-    begins = state_at(system, start or MarchStart(tractions=tractions or {}), index, names, omega)
+    begins = state_at(equations, start or MarchStart(tractions=tractions or {}), names, omega)
     found = _twice(plan, begins, steps, names, frequency_hz)
     return replace(found, seconds=time.perf_counter() - begin)
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.errors import SettingError
+from solver.marching.equations import Equations
 from solver.marching.kernels import state as kernel
 from solver.scene.validation import listing
 
@@ -33,23 +34,25 @@ class MarchStart:
     tractions: Mapping[str, float] = field(default_factory=dict)
 
 
-def state_at(
-    system: kernel.System, start: MarchStart, index: Mapping[str, int], names: tuple[str, ...], omega: float
-) -> kernel.State:
+def state_at(equations: Equations, start: MarchStart, names: tuple[str, ...], omega: float) -> kernel.State:
     """Return the state of a march.
 
     Parameters
     ----------
-    index : coordinate of each degree of freedom; names : of the rows of the contacts.
+    equations : of the scene, at `omega` [rad/s]; names : of the rows of the contacts.
 
     Raises
     ------
     SettingError
         An unknown name, a number that is not finite, or a traction of a contact without friction.
     """
+    system, index = equations.system, equations.index
     n, rows = system.A_start.size - 1, system.kt.size
-    x, v = _vector("displacements", start.displacements, index, n), None
+    x = _vector("displacements", start.displacements, index, n)
     v = _vector("velocities", start.velocities, index, n) / omega
+    if equations.observed not in index.values():
+        for vector in (x, v):
+            vector[equations.observed] = sum(factor * vector[at] for at, factor in equations.seen)
     load = system.N0 + system.N1 * np.cos(system.N1_phase)
     moving = np.isin(system.law, (kernel.ELASTIC_NORMAL, kernel.CIRCLE))
     for c in np.flatnonzero(np.isin(system.law, _FRICTION)):

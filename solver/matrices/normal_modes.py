@@ -78,8 +78,18 @@ def _definite(K: NDArray[Any]) -> bool:
     return least_stiffness(K) > SMALL_PIVOT
 
 
+def hermitian(K: NDArray[Any]) -> NDArray[Any]:
+    """Return the Hermitian part of a matrix: the same array where that is all of it."""
+    turned = K.conj().T
+    return K if np.array_equal(K, turned) else 0.5 * (K + turned)
+
+
 def least_stiffness(K: NDArray[Any]) -> float:
-    """Return the smallest squared pivot of K scaled to a unit diagonal; 0 if it is not positive definite."""
+    """Return the smallest squared pivot of K scaled to a unit diagonal; 0 if it is not positive definite.
+
+    Of a K that is not Hermitian that of its Hermitian part: where that is definite, K is regular (Bendixson).
+    """
+    K = hermitian(K)
     diagonal = np.diag(K).real
     if not np.all(diagonal > 0.0):
         return 0.0

@@ -19,7 +19,8 @@ from solver.matrices.values import MOST_DOFS, Matrix, Modes
 
 KEEP_MODES = "keep_modes"
 MAPPING, IN_UNITS = "mapping", "units"
-_MATRICES = ("M", "K", "C")
+_MATRICES = ("M", "K", "C", "G", "K_omega2")
+_SKEW = {"K": "skew K", "C": "skew C"}  # what their symmetric parts leave
 
 
 def with_files(raw: Mapping[str, object], folder: Path) -> dict[str, object]:
@@ -137,13 +138,28 @@ def as_kept(tables: dict[str, Any], sparse: dict[str, coo_array]) -> tuple[dict[
         raise SceneError([_issue(KEEP_MODES, message)])
     try:
         dofs = DofTable.read(tables.get("dofs"))
-        found = craig_bampton(sparse["M"], sparse["K"], sparse.get("C"), dofs, keep)
+        found = _reduced(sparse, dofs, keep, symmetric=tables.get("symmetric") is not False)
     except ValueError as error:
         raise SceneError([_issue("dofs" if "`dofs`" in str(error) else KEEP_MODES, str(error))]) from error
-    matrices = {key: Matrix(np.asarray(value)) for key, value in found.matrices.items()}
+    values = {key: np.asarray(value) for key, value in found.matrices.items() if key not in _SKEW.values()}
+    for key, skew in _SKEW.items():
+        if skew in found.matrices:
+            values[key] = values[key] + np.asarray(found.matrices[skew])
+    matrices = {key: Matrix(value) for key, value in values.items()}
     reduction = {"dofs": sizes["M"], "modes": found.modes, "highest_hz": found.highest_hz}
     rows = {name: row for row, name in enumerate(dofs)}
     return {**tables, **matrices, "dofs": rows, "reduction": reduction}, found
+
+
+def _reduced(sparse: dict[str, coo_array], dofs: DofTable, keep: int, *, symmetric: bool) -> Reduced:
+    """The reduction of all matrices onto the vectors of the symmetric parts of M and K."""
+    others = {key: sparse[key] for key in _MATRICES[3:] if key in sparse}
+    given = dict(sparse)
+    for key, skew in () if symmetric else _SKEW.items():
+        if key in given:
+            turned = given[key].T
+            given[key], others[skew] = 0.5 * (given[key] + turned), 0.5 * (given[key] - turned)
+    return craig_bampton(given["M"], given["K"], given.get("C"), dofs, keep, others=others)
 
 
 def _too_large(key: str, size: int) -> str:

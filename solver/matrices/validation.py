@@ -118,15 +118,41 @@ def symmetric(key: str, matrix: Matrix) -> Matrix:
         raise ValueError(
             f"`{key}` must be symmetric to {ASYMMETRY:g} of its largest entry, "
             f"got {array[i, j]:.10g} in row {i}, column {j} and {array[j, i]:.10g} in row {j}, column {i}"
+            + ("" if key not in ("K", "C") else "; if it is meant so, set `symmetric` = false")
         )
     return Matrix(0.5 * (array + array.T))
 
 
+def antisymmetric(key: str, matrix: Matrix) -> Matrix:
+    """The matrix without the rounding by which it differs from minus its transpose.
+
+    Raises
+    ------
+    ValueError
+        It differs by more than that.
+    """
+    array = matrix.array
+    difference = np.abs(array + array.T)
+    if float(difference.max()) > ASYMMETRY * float(np.abs(array).max()):
+        i, j = (int(at) for at in np.unravel_index(np.argmax(difference), array.shape))
+        raise ValueError(
+            f"`{key}` must be antisymmetric to {ASYMMETRY:g} of its largest entry, "
+            f"got {array[i, j]:.10g} in row {i}, column {j} and {array[j, i]:.10g} in row {j}, column {i}"
+        )
+    return Matrix(0.5 * (array - array.T))
+
+
 def check_matrices(
-    M: Matrix | None, K: Matrix | None, C: Matrix | None, modes: Modes | None, dofs: DofTable
+    M: Matrix | None,
+    K: Matrix | None,
+    C: Matrix | None,
+    modes: Modes | None,
+    dofs: DofTable,
+    others: Mapping[str, Matrix],
 ) -> None:
     """Raise ValueError unless matrices or modes are there, of one size that has the rows of the DOFs."""
     given = {key: value for key, value in (("M", M), ("K", K), ("C", C)) if value is not None}
+    given |= others
     if modes is not None and given:
         raise ValueError(f"`modes` stands in place of the matrices: remove {', '.join(given)} or `modes`")
     if modes is None and (M is None or K is None):

@@ -250,24 +250,25 @@ def _sector_turns(model: LinearModel) -> Complex:
 
 def _at_turn(model: LinearModel, turn: complex) -> tuple[Complex, Complex]:
     """Return K and L at the interblade phase factor `turn`."""
-    return (
-        np.asarray(model.K0 + model.Kp * turn + model.Kp.T / turn),
-        np.asarray(model.contact_here + model.contact_next * turn),
-    )
+    turns = np.array([turn])
+    return model.at(turns, np.zeros(1, np.bool_))[0][0], model.ports_at(turns)[0]
 
 
 def _compliances(model: LinearModel, stiffness: Real, ports: list[slice]) -> list[tuple[float, float]] | None:
     """Return L K_s⁻¹ Lᵀ of slip and approach of each contact [m/N].
 
-    None where nothing holds a part, or where damping gives power, so that distances may grow.
+    None where nothing holds a part, or where damping or a stiffness that is not symmetric may give power, so
+    that distances may grow.
 
     Of two directions the larger one stands for both: it is the largest eigenvalue. In an annulus it is the
     average over its nodal diameters.
     """
     total = np.zeros((stiffness.size, stiffness.size), dtype=np.complex128)
+    if not model.is_symmetric:
+        return None
     for turn in _sector_turns(model):
         K, L = _at_turn(model, turn)
-        C = model.C0 + model.Cp * turn + model.Cp.T / turn
+        C = model.C0 + model.Cp * turn + model.Cp.T / turn  # gyroscopic terms do no work
         if np.linalg.eigvalsh(C)[0] < -_ROUNDING * np.abs(C).max():
             return None
         held = K + L.conj().T @ (stiffness[:, None] * L)

@@ -29,7 +29,7 @@ class PowerBalance(Piece):
     input_w : float
         Put in by the excitation [W].
     viscous_w : float
-        Taken out by the dampers of the structure [W].
+        Taken out by the dampers of the structure, structural damping and gas included [W].
     friction_w : float
         Taken out by all contacts [W].
     contacts_w : dict of str to float
@@ -58,7 +58,8 @@ class PowerBalance(Piece):
 def power_balance(solution: Solution) -> PowerBalance:
     """Return the mean powers of a periodic response.
 
-    With velocities v̂_k = ikω x̂_k: input ½ Re Σ f̂ᴴ v̂, viscous ½ Σ v̂ᴴ C v̂, friction ½ Re Σ F̂* ikω û.
+    With velocities v̂_k = ikω x̂_k: input ½ Re Σ f̂ᴴ v̂, viscous ½ Σ v̂ᴴ (C + K/(ikω)) v̂ (of
+    which a symmetric, real K takes nothing), friction ½ Re Σ F̂* ikω û.
 
     Raises
     ------
@@ -71,9 +72,11 @@ def power_balance(solution: Solution) -> PowerBalance:
         speed = 2.0 * math.pi * solution.frequency_hz * k
         velocity = 1j * speed * coordinates(solution, k)
         force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]
-        _, C, _ = matrices(model, k)
+        K, C, _ = matrices(model, k)
         put_in += 0.5 * float(np.vdot(force, velocity).real)
         taken += 0.5 * float(np.vdot(velocity, C @ velocity).real)
+        if k and model.extra is not None:  # what a stiffness that is not symmetric or not real takes out
+            taken += 0.5 / speed * float(np.vdot(velocity, K @ velocity).imag)
     omega = 2.0 * math.pi * solution.frequency_hz
     friction = {}
     for contact in solution.contacts:

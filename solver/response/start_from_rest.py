@@ -86,9 +86,8 @@ class _Transient:
         turns = np.exp(2j * np.pi * np.arange(len(start.x)) / len(start.x))[:, None, None]
         model, omega = start.model, start.omega
         L = model.contact_here + model.contact_next * turns
-        K = model.K0 + model.Kp * turns + model.Kp.T / turns
+        K, C = model.at(turns[:, 0, 0], np.zeros(len(turns), np.bool_))
         K = K + np.swapaxes(L.conj(), 1, 2) @ (start.stiffness[:, None] * L)
-        C = model.C0 + model.Cp * turns + model.Cp.T / turns
         inverse, n = np.linalg.inv(model.M), start.x.shape[1]
         generator = np.zeros((len(turns), 2 * n, 2 * n), np.complex128)
         generator[:, :n, n:] = np.eye(n)

@@ -13,7 +13,7 @@ import numpy as np
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Real
-from solver.linear.assembly import linear_model
+from solver.linear.assembly import linear_model, row_of
 from solver.linear.condensation import force_amplitudes
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import LinearModel
@@ -38,16 +38,16 @@ def motion(solution: Solution) -> Real:
 def time_history(solution: Solution, dof: str, *, samples: int = 512) -> tuple[Real, Real]:
     """Return instants [s] and motion [m] of a DOF over one period, (samples,) each, evenly spaced from 0.
 
+    Of a recovered quantity of the scene it is that, in its unit.
+
     Raises
     ------
     SettingError
         The solution did not converge, an unknown DOF, or a bad number of samples.
     """
-    dofs = solution.scene.dofs
-    if dof not in dofs:
-        raise SettingError("dof", dof, f"must be one of {listing(dofs)}")
+    row = row_of(solution.scene, dof)
     tau = _angles(samples)
-    x = fourier.basis(tau, solution.highest_harmonic) @ motion(solution)[dofs.index(dof)]
+    x = fourier.basis(tau, solution.highest_harmonic) @ (row @ motion(solution))
     return tau / (2.0 * math.pi * solution.frequency_hz), x
 
 
@@ -105,10 +105,8 @@ def all_coordinates(solution: Solution) -> Complex:
     _check_converged(solution)
     model = linear_model(solution.scene)
     ks = np.arange(solution.highest_harmonic + 1)
-    turns = np.exp(1j * ks * model.interblade_phase)[:, None, None]
-    K = model.K0 + model.Kp * turns + model.Kp.T / turns
-    C = model.C0 + model.Cp * turns + model.Cp.T / turns
-    L = model.contact_here + model.contact_next * turns
+    K, C = model.at(model.turns(ks), ks > 0)
+    L = model.ports_at(model.turns(ks))
     forces = [fourier.to_complex(force) for c in solution.contacts for force in c.forces]
     friction = np.array(forces, dtype=np.complex128).reshape(-1, ks.size).T
     if solution.contacts:
@@ -122,12 +120,9 @@ def all_coordinates(solution: Solution) -> Complex:
 
 def matrices(model: LinearModel, k: int) -> tuple[Complex, Complex, Complex]:
     """Return K [N/m], C [N s/m] and the contact rows L as harmonic k sees them (its interblade phase)."""
-    turn = np.exp(1j * k * model.interblade_phase)
-    return (
-        model.K0 + model.Kp * turn + model.Kp.T / turn,
-        model.C0 + model.Cp * turn + model.Cp.T / turn,
-        model.contact_here + model.contact_next * turn,
-    )
+    ks = np.array([k], dtype=np.int64)
+    (K,), (C,) = model.at(model.turns(ks), ks > 0)
+    return K, C, model.ports_at(model.turns(ks))[0]
 
 
 def _check_converged(solution: Solution) -> None:

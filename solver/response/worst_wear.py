@@ -131,7 +131,8 @@ class _Search:
         self._workspace = Workspace.of(branch.balance)
         self._point = evaluation_by_value(self._workspace.point)  # views: they follow the workspace
         frequency = branch.balance.parameter.kind is Kind.FREQUENCY
-        self._fixed = contact_values(branch.balance.system, 0.0, 0.0) if frequency else None
+        fixed = frequency and not np.any(branch.balance.system.load_rise)
+        self._fixed = contact_values(branch.balance.system, 0.0, 0.0) if fixed else None
         self._e = e
         self._measure = measure
         self._sign = -1.0 if measure is Measure.LEAST_LOAD else 1.0

@@ -24,10 +24,13 @@ from solver.scene.bodies import shapes as scene_shapes
 from solver.scene.bodies.validation import further_ends
 from solver.scene.descriptions import EXAMPLES, WORDS
 from solver.scene.scene import Scene
+from solver.scene.terms import linear_terms as scene_terms
+from solver.scene.terms import recovery as scene_recovery
+from solver.scene.terms import speed as scene_speed
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*\n((?:    .*\n?)+)", re.MULTILINE)
-_HOMES = (scene_parts, scene_bodies, scene_shapes, matrices_part)
+_HOMES = (scene_parts, scene_bodies, scene_shapes, scene_terms, scene_speed, scene_recovery, matrices_part)
 
 
 class _Generator(GenerateJsonSchema):
@@ -131,7 +134,7 @@ def _docstring(model: type) -> str:
 def _matrices(properties: dict[str, Any]) -> None:
     """The keys of a structure from matrices as a file gives them: names of files, rows, labels."""
     rows = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
-    for key in ("M", "K", "C"):
+    for key in ("M", "K", "C", "G", "K_omega2"):
         properties[key] |= {"anyOf": [{"type": "string"}, rows, {"type": "object"}]}
         properties[key].pop("default", None)
     properties["modes"] |= {"anyOf": [{"type": "string"}, {"type": "object"}]}

@@ -2,15 +2,35 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from solver.contacts.fields import NonNegative, Part
-from solver.matrices.validation import DofTable, check_matrices, symmetric
-from solver.matrices.values import Matrix, Modes
+from solver.matrices.validation import DofTable, antisymmetric, check_matrices, symmetric
+from solver.matrices.values import MOST_MODES, Matrix, Modes
 
 Ratio = Annotated[float, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=False)]
+
+
+def _number_or_numbers(data: Any) -> object:
+    """Refuse what is no damping ratio and no list of them, in one message."""
+    rows = data if isinstance(data, list | tuple) else [data]
+    good = all(
+        isinstance(one, int | float) and not isinstance(one, bool) and 0.0 <= one <= 10.0 for one in rows
+    )
+    if not good or not 0 < len(rows) <= MOST_MODES:
+        raise ValueError(
+            f"`damping_ratio` must be a number >= 0 and <= 10, or a list of 1 to {MOST_MODES} such numbers, "
+            f"got {str(data)[:80]}"
+        )
+    return tuple(map(float, rows)) if rows is data else float(rows[0])
+
+
+Ratios = Annotated[
+    Ratio | Annotated[tuple[Ratio, ...], Field(min_length=1)], BeforeValidator(_number_or_numbers)
+]
+LossFactor = Annotated[float, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=False)]
 
 
 class Reduction(Part):
@@ -37,13 +57,24 @@ class MatricesStructure(Part):
     Attributes
     ----------
     M, K, C : Matrix
-        Mass [kg], stiffness [N/m] and damping [N s/m], symmetric; C may be left out.
+        Mass [kg], stiffness [N/m] and damping [N s/m]; C may be left out. M is symmetric, K and C too unless
+        `symmetric` is false.
+    symmetric : bool
+        False: K and C may differ from their transposes (bearings, circulatory forces).
+    G : Matrix or None
+        Gyroscopic matrix, antisymmetric: C gains it times the speed of rotation [N s/m per rad/s].
+    K_omega2 : Matrix or None
+        Stiffness per squared speed of rotation, symmetric: K gains it times the speed squared [N/m per
+        (rad/s)²]; stiffening by centrifugal load and softening together.
     modes : Modes
         Mass-normalised modes in place of the matrices.
     dofs : DofTable
         Names of the DOFs in use, each with its row (zero-based); a list names all rows.
-    damping_ratio : float or None
-        Damping ratio of every mode, added to the rest.
+    damping_ratio : float, list or None
+        Damping ratio of every mode, or of each from the lowest on (the last one also of those above), added
+        to the rest.
+    loss_factor : float
+        Structural damping: the stiffness is K (1 + i loss_factor) at every frequency above 0.
     stiffness_proportional_damping, mass_proportional_damping : float
         C gains this many K [s] and M [1/s].
     reduction : Reduction or None
@@ -51,12 +82,16 @@ class MatricesStructure(Part):
     """
 
     kind: Literal["matrices"]
+    symmetric: bool = True  # read before the matrices it speaks of
     M: Matrix | None = None
     K: Matrix | None = None
     C: Matrix | None = None
+    G: Matrix | None = None
+    K_omega2: Matrix | None = None
     modes: Modes | None = None
     dofs: DofTable
-    damping_ratio: Ratio | None = None
+    damping_ratio: Ratios | None = None
+    loss_factor: LossFactor = 0.0
     stiffness_proportional_damping: NonNegative = 0.0
     mass_proportional_damping: NonNegative = 0.0
     reduction: Reduction | None = None
@@ -68,14 +103,21 @@ class MatricesStructure(Part):
             return int(self.modes.omega2.size)
         return 0 if self.M is None else self.M.size
 
-    @field_validator("M", "K", "C")
+    @field_validator("M", "K", "C", "K_omega2")
     @classmethod
     def _symmetric(cls, matrix: Matrix | None, info: ValidationInfo) -> Matrix | None:
-        return None if matrix is None else symmetric(str(info.field_name), matrix)
+        declared = info.field_name in ("K", "C") and info.data.get("symmetric") is False
+        return matrix if matrix is None or declared else symmetric(str(info.field_name), matrix)
+
+    @field_validator("G")
+    @classmethod
+    def _antisymmetric(cls, matrix: Matrix | None) -> Matrix | None:
+        return None if matrix is None else antisymmetric("G", matrix)
 
     @model_validator(mode="after")
     def _fit(self) -> MatricesStructure:
-        check_matrices(self.M, self.K, self.C, self.modes, self.dofs)
+        spinning = {key: value for key in ("G", "K_omega2") if (value := getattr(self, key)) is not None}
+        check_matrices(self.M, self.K, self.C, self.modes, self.dofs, spinning)
         if self.damping_ratio is not None and self.modes is not None and self.modes.damping_ratio is not None:
             raise ValueError(
                 f"`damping_ratio` = {self.damping_ratio!r} is given beside that of `modes`: keep one of them"

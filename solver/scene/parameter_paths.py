@@ -13,7 +13,7 @@ from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.parts import Quantity
 from solver.errors import SettingError
 from solver.scene.bodies.kinematics import HasBodies
-from solver.scene.bodies.paths import body_paths, body_value, changed_bodies, is_body_path
+from solver.scene.bodies.paths import SPEED, body_paths, body_value, changed_bodies, is_body_path
 from solver.scene.bodies.shape_parts import own_parts, shape_of, shape_paths, shape_value, with_shape_value
 from solver.scene.bodies.shapes import AnyShape
 from solver.scene.parts import (
@@ -24,12 +24,15 @@ from solver.scene.parts import (
     Spring,
     Structure,
 )
+from solver.scene.terms.speed import SpeedDependence, at_speed
 from solver.scene.validation import listing, nearest
 
 FREQUENCY = "frequency"
 AMPLITUDE = "excitation.amplitude"
 PHASE = "excitation.phase"
 PROPORTIONAL = ("stiffness_proportional_damping", "mass_proportional_damping")
+LOSS = "loss_factor"
+FACTOR = "factor"  # of aerodynamic influence
 _RANGES = {
     "m": "must be a number > 0 and <= 1e15 [kg]",
     "k": "must be a number >= 0 and <= 1e15 [N/m]",
@@ -53,6 +56,10 @@ class HasParts(HasBodies, Protocol):
         """Every force."""
 
     @property
+    def with_speed(self) -> tuple[SpeedDependence, ...]:
+        """What follows the speed."""
+
+    @property
     def dampers(self) -> tuple[AnyShape, ...]:
         """Every damper given by its shape."""
 
@@ -71,7 +78,8 @@ def parameter_paths(scene: HasParts) -> tuple[str, ...]:
     )
     contacts |= dict.fromkeys(f"{c.name}.{key}" for c in own for key in c.PARAMETERS)
     structural = (f"structure.{name}" for name in structure_names(scene.structure))
-    others = dict.fromkeys((*shape_paths(scene), *body_paths(scene)))
+    gas = (f"{each.name}.{FACTOR}" for each in scene.aerodynamics if each.name is not None)
+    others = dict.fromkeys((*shape_paths(scene), *body_paths(scene), *gas))
     return (AMPLITUDE, PHASE, *contacts, *structural, *others)
 
 
@@ -80,11 +88,12 @@ def structure_names(structure: Structure) -> tuple[str, ...]:
 
     Of a structure given by its matrices, the proportional damping is what can be changed.
     """
+    own = (LOSS,) if structure.loss_factor else ()
     if isinstance(structure, MatricesStructure):
-        return PROPORTIONAL
+        return (*PROPORTIONAL, *own)
     parts: tuple[_Named, ...] = (*structure.masses, *structure.springs, *structure.dampers)
     groups = dict.fromkeys(part.group for part in parts if part.group is not None)
-    return (*groups, *(part.name for part in parts if part.name is not None))
+    return tuple(dict.fromkeys((*groups, *(part.name for part in parts if part.name is not None), *own)))
 
 
 def share(part: _Named, name: str) -> float:
@@ -107,8 +116,36 @@ def changed_quantities(scene: HasParts, path: str) -> tuple[Quantity, ...]:
     return tuple(c.PARAMETERS[key] for c in scene.contacts if has_parameter(c, owner, key))
 
 
+def follows_speed(scene: HasParts, path: str) -> str | None:
+    """The parameter that follows the speed and that a path would set, itself or its group's; else None."""
+    owner, _, key = path.rpartition(".")
+    mine = {contact.name for contact in scene.contacts if owner in (contact.name, contact.group)}
+    for each in scene.with_speed:
+        other, _, wanted = each.path.rpartition(".")
+        theirs = {contact.name for contact in scene.contacts if other in (contact.name, contact.group)}
+        if path == each.path or (key == wanted and mine & theirs):
+            return each.path
+    return None
+
+
+def is_gas_path(scene: HasBodies, path: str) -> bool:
+    """Whether a path is the factor of aerodynamic influence."""
+    owner, _, key = path.rpartition(".")
+    return key == FACTOR and any(owner and each.name == owner for each in scene.aerodynamics)
+
+
+def is_loss(structure: Structure, name: str) -> bool:
+    """Whether a name is the loss factor of a structure that has one, and not of one of its parts."""
+    return name == LOSS and structure.loss_factor > 0.0 and not _structure_parts(structure, name)
+
+
 def check_path(scene: HasParts, path: str) -> None:
-    """Raise SettingError unless `path` is ``frequency`` or a path of the scene."""
+    """Raise SettingError unless `path` is ``frequency`` or a path of the scene.
+
+    Along an engine-order line the ``speed`` is one too.
+    """
+    if path == SPEED and scene.speed_order is not None:
+        return
     if path != FREQUENCY and path not in parameter_paths(scene):
         raise _unknown(scene, path, FREQUENCY)
 
@@ -125,6 +162,10 @@ def value(scene: HasParts, path: str) -> float:
     if isinstance(path, str) and is_body_path(scene, path):
         return body_value(scene, path)
     owner, _, key = path.rpartition(".") if isinstance(path, str) else ("", "", "")
+    if isinstance(path, str) and is_gas_path(scene, path):
+        return next(each.factor for each in scene.aerodynamics if each.name == owner)
+    if owner == "structure" and is_loss(scene.structure, key):
+        return scene.structure.loss_factor
     if owner == "structure" and isinstance(scene.structure, MatricesStructure) and key in PROPORTIONAL:
         return cast(float, getattr(scene.structure, key))
     if owner == "structure":
@@ -148,6 +189,11 @@ def with_values(scene: _SceneT, values: Mapping[str, float]) -> _SceneT:
 
 
 def _with_value(scene: _SceneT, path: str, new: float) -> _SceneT:
+    followed = follows_speed(scene, path)
+    if followed is not None:
+        raise SettingError(path, new, f"cannot be set: {followed} follows the speed (`with_speed`)")
+    if path == SPEED and scene.with_speed and scene.speed is not None:
+        return cast(_SceneT, at_speed(scene, changed_bodies(scene, path, new)[SPEED]))
     if path in (AMPLITUDE, PHASE):
         change = _with_amplitude if path == AMPLITUDE else _with_phase
         return scene.model_copy(update={"excitation": change(scene.excitation, new)})
@@ -156,6 +202,13 @@ def _with_value(scene: _SceneT, path: str, new: float) -> _SceneT:
     if is_body_path(scene, path):
         return scene.model_copy(update=changed_bodies(scene, path, new))
     owner, _, key = path.rpartition(".")
+    if is_gas_path(scene, path):
+        wanted = "must be a number from -1e15 to 1e15"
+        gas = tuple(
+            _changed(each, {FACTOR: new}, path, new, wanted) if each.name == owner else each
+            for each in scene.aerodynamics
+        )
+        return scene.model_copy(update={"aerodynamics": gas})
     if owner == "structure":
         return scene.model_copy(update={"structure": _with_structure(scene, path, key, new)})
     own = own_parts(scene)["contacts"] if scene.dampers else scene.contacts
@@ -176,6 +229,10 @@ def _with_structure(scene: HasParts, path: str, name: str, new: float) -> Struct
             unit = "s" if name == PROPORTIONAL[0] else "1/s"
             raise SettingError(path, new, f"must be a number >= 0 and <= 1e15 [{unit}]")
         return scene.structure.model_copy(update={name: new})
+    if is_loss(scene.structure, name):
+        if not 0.0 < new <= 10.0:
+            raise SettingError(path, new, "must be a number > 0 and <= 10")
+        return scene.structure.model_copy(update={LOSS: new})
     members = _structure_parts(scene.structure, name)
     if not members:
         raise _unknown(scene, path)

@@ -15,7 +15,6 @@ from pydantic import (
 from pydantic_core import CoreSchema, core_schema
 
 from solver.contacts.fields import (
-    Angle,
     DofName,
     Element,
     MemberName,
@@ -23,16 +22,15 @@ from solver.contacts.fields import (
     NonNegative,
     Part,
     Positive,
-    Signed,
     Vector,
 )
+from solver.scene.matrices_structure import LossFactor, Ratios
 from solver.scene.matrices_structure import MatricesStructure as MatricesStructure
 from solver.scene.matrices_structure import Reduction as Reduction
+from solver.scene.terms.excitation import Excitation as Excitation
 
 Sectors = Annotated[int, Field(strict=True, ge=1, le=10_000)]
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**63 - 1)]
-Order = Annotated[int, Field(strict=True, ge=0, le=10_000)]
-HarmonicIndex = Annotated[int, Field(strict=True, ge=0, le=1_000)]
 
 
 class _Grouped(Part):
@@ -126,9 +124,16 @@ class _MassTable:
 
 
 class _Structure(Part):
-    """Masses, springs and dashpots."""
+    """Masses, springs and dashpots.
+
+    Attributes
+    ----------
+    loss_factor : float
+        Structural damping: the stiffness is K (1 + i loss_factor) at every frequency above 0.
+    """
 
     stiffness_proportional_damping: NonNegative = 0.0
+    loss_factor: LossFactor = 0.0
     masses: Annotated[tuple[Mass, ...], _MassTable]
     springs: tuple[Spring, ...] = ()
     dampers: tuple[Damper, ...] = ()
@@ -140,9 +145,17 @@ class _Structure(Part):
 
 
 class LumpedStructure(_Structure):
-    """A structure of point masses."""
+    """A structure of point masses.
+
+    Attributes
+    ----------
+    damping_ratio : float or list
+        Damping ratio of every mode, or of each from the lowest on (the last one also of those above), added
+        to the rest; bodies have none.
+    """
 
     kind: Literal["lumped"]
+    damping_ratio: Ratios | None = None
 
 
 class Mistuning(Part):
@@ -207,49 +220,19 @@ Structure = LumpedStructure | CyclicStructure | MatricesStructure
 KINDS: tuple[str, ...] = ("lumped", "cyclic", "matrices")
 
 
-class Excitation(Part):
-    """A force amplitude * cos(harmonic * omega t + phase) on a DOF; harmonic 0 is a static load.
-
-    Attributes
-    ----------
-    dof : str
-        Where it acts.
-    amplitude : float
-        Force [N].
-    phase : float
-        Phase [rad]; 0 for a static load.
-    harmonic : int
-        Multiple of the excitation frequency.
-    engine_order : int or None
-        Cyclic structures only: sector j has harmonic * engine_order * j * 2 pi / sectors added to the phase.
-        A wave that runs backward with the order i is the engine order sectors - i: the forces are the same.
-    pattern : "travelling", "standing" or None
-        Cyclic structures only: a travelling wave (also if left out), or the same angle as a factor
-        cos(harmonic * engine_order * j * 2 pi / sectors) instead of a phase, half the sum of the two waves
-        that run forward and backward. The loads of the contacts follow the same pattern.
-    """
-
-    dof: DofName
-    amplitude: Signed
-    phase: Angle = 0.0
-    harmonic: HarmonicIndex = 1
-    engine_order: Order | None = None
-    pattern: Literal["travelling", "standing"] | None = None
-
-    @model_validator(mode="after")
-    def _static_has_no_phase(self) -> Excitation:
-        if self.harmonic == 0 and self.phase != 0.0:
-            raise ValueError(f"`phase` of a static load (harmonic = 0) must be 0, got {self.phase!r}")
-        return self
-
-
 class Observe(Part):
     """The observed DOF and the frequency band of interest [Hz].
 
     ``tip@3`` in a cyclic scene is the tip of sector 3, ``tip`` that of sector 0.
+
+    Attributes
+    ----------
+    relative : bool
+        Where a base moves: the motion relative to it, not the absolute one.
     """
 
     dof: DofName
+    relative: bool = False
     band: tuple[Positive, Positive]
 
     @field_validator("band")

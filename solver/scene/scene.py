@@ -14,7 +14,7 @@ from pydantic import (
     model_validator,
 )
 
-from solver.contacts.fields import End, Name, NonNegative, Part, parse_end
+from solver.contacts.fields import End, Name, NonNegative, Part, Positive, parse_end
 from solver.contacts.laws.base import AnyContact
 from solver.contacts.laws.coulomb import Contact
 from solver.contacts.laws.coulomb_2d import PlanarContact
@@ -23,7 +23,7 @@ from solver.contacts.laws.friction import FrictionContact
 from solver.contacts.laws.gap import GapSpring
 from solver.contacts.laws.polynomial import PolynomialSpring
 from solver.contacts.laws.registry import on_change
-from solver.errors import Issue, SceneError
+from solver.errors import Issue, SceneError, SettingError
 from solver.scene import parameter_paths as scene_paths
 from solver.scene.bodies import kinematics
 from solver.scene.bodies.body import Body, Load, Node
@@ -47,6 +47,11 @@ from solver.scene.parts import (
     Spring,
     Structure,
 )
+from solver.scene.terms.force_files import with_force_files
+from solver.scene.terms.linear_terms import Aerodynamics, Coupling
+from solver.scene.terms.recovery import Recovered
+from solver.scene.terms.speed import SpeedDependence, at_speed
+from solver.scene.terms.validation import term_issues
 from solver.scene.validation import cross_issues, field_issues, plain
 
 __all__ = [
@@ -80,7 +85,16 @@ __all__ = [
 ]
 
 
-_OPTIONAL = ("bodies", "nodes", "loads", "dampers")  # tables that are left out where they are empty
+_OPTIONAL = (
+    "bodies",
+    "nodes",
+    "loads",
+    "dampers",
+    "couplings",
+    "aerodynamics",
+    "with_speed",
+    "recovery",
+)  # left out if empty
 _FEW = 6  # contacts that are named where a scene says what it is
 
 
@@ -108,7 +122,19 @@ class Scene(Part):
     dampers : tuple of Wedge, Cylinder, Asymmetric, SplitRing and Shroud
         Dampers by their shape; their bodies and contacts are among `bodies` and `contacts`.
     speed : float or None
-        Speed of rotation [1/min] of which bodies with a `radius_of_rotation` are loaded.
+        Speed of rotation [1/min], by which bodies with a `radius_of_rotation` are loaded and on which
+        gyroscopic terms and K_omega2 depend.
+    speed_order : float or None
+        The speed follows the frequency f along an engine-order line: speed = 60 f / speed_order [1/min]; in
+        place of `speed`.
+    with_speed : tuple of SpeedDependence
+        Normal loads and the amplitude of the excitation that follow the speed.
+    couplings : tuple of Coupling
+        Entries of stiffness and damping that are no springs and dashpots: not symmetric, gyroscopic.
+    aerodynamics : tuple of Aerodynamics
+        Influence of the gas between blades, of a cyclic structure.
+    recovery : tuple of Recovered
+        Stresses, strains and other sums of DOFs that may be observed.
 
     Raises
     ------
@@ -129,6 +155,11 @@ class Scene(Part):
     loads: tuple[Load, ...] = ()
     dampers: tuple[AnyShape, ...] = ()
     speed: NonNegative | None = None
+    speed_order: Positive | None = None
+    with_speed: tuple[SpeedDependence, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    aerodynamics: tuple[Aerodynamics, ...] = ()
+    recovery: tuple[Recovered, ...] = ()
 
     def __repr__(self) -> str:
         """Say in a line what it is; `to_dict` has all of it."""
@@ -169,10 +200,11 @@ class Scene(Part):
             scene, issues = handler(data), []
         except ValidationError as error:
             scene, issues = None, field_issues(error, raw)
-        issues = [*issues, *cross_issues(raw), *cyclic_issues(raw), *body_issues(raw)]
+        issues = [*issues, *cross_issues(raw), *cyclic_issues(raw), *body_issues(raw), *term_issues(raw)]
         if scene is None or issues:
             raise SceneError(issues)
-        return scene if not scene.dampers else scene.model_copy(update=with_shapes(scene))
+        scene = scene if not scene.dampers else scene.model_copy(update=with_shapes(scene))
+        return scene if scene.speed is None or not scene.with_speed else _at_its_speed(scene)
 
     @classmethod
     def from_dict(cls, obj: Mapping[str, object]) -> Scene:
@@ -208,6 +240,17 @@ class Scene(Part):
     def forces(self) -> tuple[Excitation, ...]:
         """The excitation, and the constant forces of loads and of rotation, each on a DOF."""
         return (*self.excitation, *kinematics.static_forces(self))
+
+    def seen(self, name: str) -> tuple[tuple[str, float], ...] | None:
+        """The DOFs, each with its factor, that a DOF or a recovered quantity of that name is a sum of."""
+        if name in self.dofs:
+            return ((name, 1.0),)
+        return next((each.terms for each in self.recovery if each.name == name), None)
+
+    @property
+    def observed_unit(self) -> str:
+        """Unit of the amplitudes: m, or that of the recovered quantity that is observed."""
+        return next((each.unit for each in self.recovery if each.name == self.observe.dof), "m")
 
     @property
     def engine_order(self) -> int:
@@ -247,6 +290,15 @@ class Scene(Part):
         scene_paths.check_path(self, path)
 
 
+def _at_its_speed(scene: Scene) -> Scene:
+    """The scene with everything that follows the speed at its value there."""
+    try:
+        there: Scene = at_speed(scene, scene.speed or 0.0)
+    except SettingError as error:
+        raise SceneError([Issue(pointer="/with_speed", message=str(error))]) from error
+    return there
+
+
 def load_scene(name_or_path: object) -> Scene:
     """Load a shipped scene by name, or a scene file (.toml or .json) by path.
 
@@ -257,7 +309,7 @@ def load_scene(name_or_path: object) -> Scene:
     SceneError
         No such scene, a file that cannot be read, or everything that is wrong with its content.
     """
-    raw = load_raw(name_or_path)
+    raw = with_force_files(load_raw(name_or_path), scene_folder(name_or_path))
     structure = raw.get("structure")
     if isinstance(structure, Mapping) and structure.get("kind") == "matrices":
         from solver.matrices.scene_files import with_files

@@ -33,11 +33,13 @@ from solver.scene.parts import (
     Reduction,
     Spring,
 )
+from solver.scene.terms.keys import TERM_KEYS
 
 MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
 RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe", "speed")
 _SCENE_KEYS = (
     "name", "structure", "contacts", "excitation", "observe", "bodies", "nodes", "loads", "dampers", "speed",
+    "couplings", "aerodynamics", "speed_order", "with_speed", "recovery",
 )  # fmt: skip
 _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     (): ("a scene", _SCENE_KEYS),
@@ -54,6 +56,7 @@ _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     ("bodies",): ("a body", tuple(Body.model_fields)),
     ("nodes",): ("a node", tuple(Node.model_fields)),
     ("loads",): ("a load", tuple(Load.model_fields)),
+    **TERM_KEYS,
     **{
         ("dampers", shape): (f"a damper of the shape `{shape}`", tuple(each.model_fields))
         for shape, each in SHAPES.items()
@@ -318,11 +321,14 @@ def unknown_dof(key: str, text: str, dof: str, known: Sequence[str]) -> str:
 def _dof_issues(raw: dict[str, Any], dofs: _Known | None, sectors: object) -> Iterator[Issue]:
     if dofs is None:
         return
+    recovered = [row.get("name") for _, row in rows_of(raw, "recovery")]
     for steps, row in [*rows_of(raw, "excitation"), *rows_of(raw, "observe")]:
         dof = row.get("dof")
+        if steps[0] == "observe" and dof in recovered:
+            continue
         if isinstance(dof, str) and steps[0] == "observe" and isinstance(sectors, int):
             base, _, sector = dof.rpartition("@")
-            if base in dofs and sector.isdecimal() and int(sector[:10]) < sectors:
+            if (base in dofs or base in recovered) and sector.isdecimal() and int(sector[:10]) < sectors:
                 continue
         if isinstance(dof, str) and dof not in dofs:
             yield Issue(pointer=pointer_of([*steps, "dof"]), message=unknown_dof("dof", dof, dof, list(dofs)))

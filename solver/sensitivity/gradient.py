@@ -28,6 +28,7 @@ from solver.balance.parameter_derivatives import (
     modal_dampings,
     resolved,
 )
+from solver.balance.speed_line import check_no_line
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.laws import law_force
@@ -228,6 +229,7 @@ class Sensitivities:
     def check_second(self) -> None:
         """Raise SettingError where laws or paths have no exact second derivatives here."""
         check_laws(self.balance.scene)
+        check_no_line(self.balance.scene)
         check_smooth_structure(self.balance.scene, self._parameters)
 
     def peak_hessian(self, solution: Real, at_hz: float) -> PeakHessian:

@@ -23,7 +23,7 @@ from solver.response.time_history import motion
 from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import annulus, sectors_needed
-from solver.scene.scene import CyclicStructure, Observe, Scene
+from solver.scene.scene import CyclicStructure, Scene
 from solver.scene.validation import listing, nearest
 
 _OF_THE_SWEEP = 0.4  # share of the time; the rest looks for the peaks of the other blades
@@ -167,7 +167,7 @@ def blade_peaks(
 
 
 def _observing(scene: Scene, dof: str) -> Scene:
-    return scene.model_copy(update={"observe": Observe(dof=dof, band=scene.observe.band)})
+    return scene.model_copy(update={"observe": scene.observe.model_copy(update={"dof": dof})})
 
 
 def mistuned(

@@ -35,7 +35,7 @@ from solver.scene.scene import Scene
 if TYPE_CHECKING:
     from solver import Branch, Stretch
 
-FREQUENCY = "frequency"
+FREQUENCY, SPEED = "frequency", "speed"
 _EXAMPLE: dict[str, Any] = {
     "scene": "bladed-disk",
     "from": 500,
@@ -88,6 +88,7 @@ class SweepResult(EndedResult):
     parameter: Curve
     parameter_path: str
     unit: str
+    speed_rpm: Curve | None = Field(description="Speeds [1/min] of the points along an engine-order line.")
     amplitude: Curve
     half_peak_to_peak: Curve
     mean: Curve
@@ -123,6 +124,9 @@ def resolve(request: SweepRequest, source: SceneSource) -> Resolved:
     """Look up the scene, fill in the range, check that the sweep makes sense."""
     scene = resolve_scene(request, source)
     start, stop = request.from_, request.to
+    if request.parameter == SPEED and scene.speed_order is not None:  # the frequency in other units
+        start, stop = (None if end is None else end * scene.speed_order / 60.0 for end in (start, stop))
+        request = request.model_copy(update={"parameter": FREQUENCY})
     if request.parameter == FREQUENCY:
         start = scene.observe.band[0] if start is None else start
         stop = scene.observe.band[1] if stop is None else stop

@@ -117,7 +117,10 @@ def scene_section(scene: Scene) -> str:
     low, high = scene.observe.band
     about = [
         ("structure", f"{scene.structure.kind}, {len(scene.dofs)} DOFs"),
-        *(("force", f"{force.amplitude:g} N on {force.dof}") for force in scene.excitation),
+        *(
+            ("base" if e.base else "force", f"{e.amplitude:g} {e.unit} on {e.place}")
+            for e in scene.excitation
+        ),
         ("observed", f"{scene.observe.dof}, {low:g} to {high:g} Hz"),
     ]
     return f"<h2>Scene</h2>{pairs(about)}{table(['contact', 'between', 'as given'], contacts)}"

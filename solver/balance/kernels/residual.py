@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from solver.balance.kernels.gauge import find_gauge, let_hold
-from solver.contacts.kernels.columns import COLUMN_KIND, COLUMNS, KT, N1, RATIO
+from solver.contacts.kernels.columns import COLUMN_KIND, COLUMNS, KT, N0, N1, RATIO
 from solver.contacts.kernels.laws import call_law
 from solver.contacts.kernels.normal_load import fill_load, tie
 from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED
-from solver.contacts.kernels.system import LEVEL, LOAD_COEFFICIENTS, Evaluation, Receptance, System
+from solver.contacts.kernels.system import FREQUENCY, LEVEL, LOAD_COEFFICIENTS, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real, coefficient_count, cosine_position
 from solver.jit.lapack import copy_block
@@ -36,6 +36,9 @@ def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, 
             column = system.kind - COLUMN_KIND
             row[column], d[column] = system.active[c] * p, system.active[c]
             tied = column == RATIO or (tied and column != N1)
+        if system.kind == FREQUENCY:
+            row[N0] += p * (system.load_rise[0, c] + p * system.load_rise[1, c])
+            d[N0] = system.load_rise[0, c] + 2.0 * p * system.load_rise[1, c]
         if tied:
             tie(row, d)
     load, dload = np.empty((nc, LOAD_COEFFICIENTS)), np.empty((nc, LOAD_COEFFICIENTS))

@@ -58,6 +58,10 @@ class System(NamedTuple):
     held: Integer  # (nc, 3) of the stiffness at rest: its column, and the column and sign of what must be > 0
     contacts: Real  # (ne, COLUMNS) the numbers of each law, see `solver.contacts.kernels.columns`
     active: Real  # (ne,) share of λ in the number it changes, 0.0 where it does not act
+    load_rise: Real  # (2, ne) N0 gains these times ω and ω² where λ is the frequency [N s, N s²]
+    level: (
+        Real  # (2, 3) factor of the excitation, and of constant forces, by 1, ω, ω² where λ is the frequency
+    )
     shift: Real  # (nc,) stiffness moved into the structure [N/m]
     loose: Real  # (nr, nc) ports' part in the rigid-body motions of what contacts alone hold, see `loose`
     hold: int  # 1: where no contact holds such a part, a constant force does
@@ -83,6 +87,7 @@ class System(NamedTuple):
     dK: Complex  # derivative by the structural parameter
     dC: Complex
     dM: Complex
+    ddK: Complex  # second derivative of K; none at all where it is affine
     L: Complex  # (ns, nc, n)
     observe: Complex  # (n,)
     forces: Complex  # (nk, n) f̂_k at level 1

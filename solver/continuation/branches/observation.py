@@ -19,7 +19,6 @@ from solver.continuation.extrema.extrema import Survey, band_limit
 from solver.continuation.extrema.nodes import Points
 from solver.jit.fourier import Real, to_full
 from solver.linear.kernels.receptance import receptance
-from solver.scene.scene import Observe
 
 
 def observing(
@@ -44,7 +43,7 @@ def observing(
     """
     begun = time.perf_counter()
     scene = branch.balance.scene
-    other = scene.model_copy(update={"observe": Observe(dof=dof, band=scene.observe.band)})
+    other = scene.model_copy(update={"observe": scene.observe.model_copy(update={"dof": dof})})
     balance = build(other, "frequency", harmonics=branch.balance.n_harmonics, effects=effects)
     workspace = Workspace.of(balance)
     rows, measures = np.zeros((len(branch.values), balance.n_coefficients)), branch.measures.copy()

@@ -25,6 +25,7 @@ from solver.continuation.branch import BranchStatus
 from solver.continuation.extrema.nodes import Node, NodeSolver
 from solver.continuation.segment import Stretch
 from solver.jit.fourier import Real
+from solver.linear.assembly import linear_model
 
 LARGEST, FIRST, SMALLEST = 0.0143, 1e-3, 1e-9  # steps, as shares of the range
 TURN = 1e-6  # share of the range by which a branch has to turn back to be lost: less is a step over a kink
@@ -40,6 +41,8 @@ def is_unique(balance: Balance) -> bool:
     """Return whether every value of the parameter has one response: given loads, nothing that feeds it."""
     system = balance.system
     if not all(contact.load_is_given for contact in balance.scene.contacts):
+        return False
+    if not linear_model(balance.scene).is_symmetric:
         return False
     if system.form == DENSE:
         return all(_dissipates(C) for C in system.C)

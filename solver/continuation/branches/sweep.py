@@ -31,6 +31,8 @@ from solver.continuation.segment import Stretch, go_on_from, joined, rows_of, st
 from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real, to_full
+from solver.scene.bodies.paths import SPEED
+from solver.scene.parameter_paths import FREQUENCY
 from solver.scene.scene import Scene
 
 _STRETCH = 64  # points between two looks at the caller, at most
@@ -65,8 +67,10 @@ def sweep(
     Parameters
     ----------
     scene : what vibrates, with the values that stay fixed.
-    parameter : path of the parameter, for example ``frequency`` or ``shroud.N0``.
-    start, stop : the range in user units (Hz for a frequency, the scene's band if left out).
+    parameter : path of the parameter, for example ``frequency`` or ``shroud.N0``. The ``speed`` along an
+        engine-order line is the frequency in other units: the branch is one over the frequency.
+    start, stop : the range in user units (Hz for a frequency, the scene's band if left out; 1/min for a
+        speed).
     harmonics : highest harmonic kept, unless `accuracy` is given.
     accuracy : estimated error, relative to the amplitude, that the harmonics are chosen for; see
         `solver.continuation.branches.adaptive_harmonics.harmonics_for` for where and how it is judged.
@@ -94,6 +98,9 @@ def sweep(
     SettingError
         A bad path, range, frequency, limit, number of harmonics or accuracy; a beginning of another branch.
     """
+    if parameter == SPEED and scene.speed_order is not None:
+        parameter = FREQUENCY
+        start, stop = (None if end is None else end * scene.speed_order / 60.0 for end in (start, stop))
     if accuracy is not None:
         if guess is not None or resume is not None:
             raise SettingError(

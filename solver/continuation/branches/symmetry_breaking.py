@@ -77,8 +77,10 @@ def seen(workspace: Workspace, found: PointSolution, p: float) -> tuple[PointSol
 
 
 def assumed_flags(balance: Balance) -> tuple[str, ...]:
-    """Return the flag of what is assumed of every response of a balance."""
-    return (WAVE_ASSUMED,) if sectors_needed(balance.scene).assumed else ()
+    """Return the flags of every response of a balance: what is assumed, and a unit that is not the metre."""
+    assumed = (WAVE_ASSUMED,) if sectors_needed(balance.scene).assumed else ()
+    unit = balance.scene.observed_unit
+    return assumed if unit == "m" else (*assumed, f"amplitude_in_{unit}")
 
 
 def branch_flags(workspace: Workspace, solutions: Real) -> tuple[str, ...]:

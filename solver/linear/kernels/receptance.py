@@ -29,8 +29,12 @@ BLOCK = 512  # modes summed at a time: their weights stay in the near cache
 def excitation(system: System, p: float, k: int) -> tuple[complex, complex]:
     """Return the complex factor on the unit excitation of harmonic k at λ = p and its derivative by λ.
 
-    A static force has no phase to turn; the level scales it all the same, unless it is a load.
+    A static force has no phase to turn; the level scales it all the same, unless it is a load. Where λ is the
+    frequency the level may follow it.
     """
+    if system.kind == FREQUENCY:
+        row = system.level[1 if k == 0 and system.constant_mean == 1 else 0]
+        return complex(row[0] + p * (row[1] + p * row[2])), complex(row[1] + 2.0 * p * row[2])
     if k == 0 and (system.kind == FORCE_PHASE or system.constant_mean == 1):
         return complex(1.0), complex(0.0)
     if system.kind == LEVEL:
@@ -242,7 +246,10 @@ def _add_driven(size: int, i: int, driven: Real, terms: Real, out: Receptance) -
 
 @apart
 def _dense_receptance(system: System, p: float, out: Receptance) -> None:
-    """Invert Z_k itself; λ may be the frequency or a structural parameter: dZ⁻¹ = −Z⁻¹ dZ Z⁻¹."""
+    """Invert Z_k itself; λ may be the frequency or a structural parameter: dZ⁻¹ = −Z⁻¹ dZ Z⁻¹.
+
+    The mean is computed with k = 1 and matrices C and M of its own: 0, unless its stiffness follows ω².
+    """
     omega = p if system.kind == FREQUENCY else system.omega
     moved = p - system.parameter_reference if system.kind == STRUCTURE else 0.0
     n = system.observe.size
@@ -250,14 +257,18 @@ def _dense_receptance(system: System, p: float, out: Receptance) -> None:
     green = np.empty((2, n, n), np.complex128)
     half = np.empty((n, n), np.complex128)
     for i in range(system.ks.size):
-        k, s = system.ks[i], system.which[i]
+        k, s = max(system.ks[i], 1), system.which[i]
         speed = k * omega
         damped, inertia = complex(0.0, speed), speed * speed
         for a in range(n):
             for b in range(n):
                 dK, dC, dM = system.dK[s, a, b], system.dC[s, a, b], system.dM[s, a, b]
-                C, M = system.C[s, a, b] + moved * dC, system.M[s, a, b] + moved * dM
-                Z[a, b] = system.K[s, a, b] + moved * dK + damped * C - inertia * M
+                K, C, M = system.K[s, a, b], system.C[s, a, b] + moved * dC, system.M[s, a, b] + moved * dM
+                if system.ddK.shape[0] > 0:
+                    K += 0.5 * moved * moved * system.ddK[s, a, b]
+                Z[a, b] = K + moved * dK + damped * C - inertia * M
+                if system.ddK.shape[0] > 0:
+                    dK += moved * system.ddK[s, a, b]
                 dZ[a, b] = 0.0
                 if system.kind == STRUCTURE:
                     dZ[a, b] = dK + damped * dC - inertia * dM

@@ -132,14 +132,18 @@ def _dense(system: System, omega: float, p: float, out: Jets) -> None:
     )
     force, rise = np.empty(n, np.complex128), np.empty(n, np.complex128)
     for i in range(system.ks.size):
-        k, s = system.ks[i], system.which[i]
+        k, s = max(system.ks[i], 1), system.which[i]
         speed = k * omega
         ik = complex(0.0, float(k))
         for a in range(n):
             for b in range(n):
                 dK, dC, dM = system.dK[s, a, b], system.dC[s, a, b], system.dM[s, a, b]
-                C, M = system.C[s, a, b] + moved * dC, system.M[s, a, b] + moved * dM
-                Z[VALUE, a, b] = system.K[s, a, b] + moved * dK + ik * omega * C - speed * speed * M
+                K, C, M = system.K[s, a, b], system.C[s, a, b] + moved * dC, system.M[s, a, b] + moved * dM
+                if system.ddK.shape[0] > 0:
+                    K += 0.5 * moved * moved * system.ddK[s, a, b]
+                Z[VALUE, a, b] = K + moved * dK + ik * omega * C - speed * speed * M
+                if system.ddK.shape[0] > 0:
+                    dK += moved * system.ddK[s, a, b]
                 Z[BY_OMEGA, a, b] = ik * C - 2.0 * k * speed * M
                 Z[BY_OMEGA_TWICE, a, b] = -2.0 * k * k * M
                 if structural:

@@ -10,6 +10,7 @@ among the modes kept: the same space of motions but for a share σ / ω² of the
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,8 +55,11 @@ def craig_bampton(
     keep_modes: int | None,
     *,
     up_to_hz: float | None = None,
+    others: Mapping[str, coo_array] | None = None,
 ) -> Reduced:
     """Reduce a model onto the DOFs named and `keep_modes` modes of the rest, or all up to `up_to_hz` [Hz].
+
+    `others` are projected beside them, symmetric or not.
 
     Raises
     ------
@@ -81,6 +85,7 @@ def craig_bampton(
     basis[rest, kept.size :] = modes
     reduced = {key: basis.T @ (matrix @ basis) for key, matrix in sparse.items()}
     matrices = {key: 0.5 * (value + value.T) for key, value in reduced.items()}
+    matrices |= {key: basis.T @ (csc_array(matrix) @ basis) for key, matrix in (others or {}).items()}
     highest = math.sqrt(max(float(values[-1]), 0.0)) / (2.0 * math.pi) if values.size else 0.0
     return Reduced(
         matrices=matrices,

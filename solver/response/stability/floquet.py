@@ -23,6 +23,7 @@ from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import CyclicStructure, Scene
+from solver.scene.terms.speed import at_frequency
 
 Motions = tuple[Real, ...]  # of every contact, (ports, 2H + 1) full coefficients [m]
 GROWS = 1e-9  # a multiplier's modulus beyond 1 that is more than rounding
@@ -127,7 +128,7 @@ def branch_stability(branch: Branch, points: Iterable[int] | None = None) -> tup
         every = fourier.to_full(branch.coefficients[i], balance.system.ks, balance.highest_harmonic)
         motions = tuple(np.split(every, balance.system.first_port[1:-1]))
         if branch.parameter == "frequency":
-            found.append(_stability(balance.scene, value, motions))
+            found.append(_stability(at_frequency(balance.scene, value), value, motions))
         else:
             scene = balance.scene.with_values({branch.parameter: value})
             found.append(_stability(scene, balance.system.omega / PERIOD, motions))
@@ -172,7 +173,14 @@ def scene_monodromy(scene: Scene, frequency_hz: float, motions: Motions) -> Mono
         for ports, contact in zip(np.split(model.contact_here, ends), whole.contacts, strict=True)
         for part in parts[contact.name]
     )
-    structure = Structure(M=model.M, C=model.C0, K=model.K0)
+    K, C = (each[0] for each in model.at(np.ones(1, np.complex128), np.ones(1, np.bool_)))
+    if np.any(K.imag) or np.any(C.imag):
+        wanted = (
+            "must have no structural damping and no imaginary coefficients: they are terms of the frequency "
+            "domain, and stability is one in time"
+        )
+        raise SettingError("scene", scene.name, wanted)
+    structure = Structure(M=model.M, C=C.real, K=K.real)
     return monodromy(structure, elements, PERIOD * frequency_hz)
 
 

@@ -22,6 +22,7 @@ from solver.contacts.fields import NEXT, Between, Vector, parse_end
 from solver.contacts.frames import Axes, cross, unit
 from solver.scene.bodies.body import REVOLUTIONS, Body, Load, Node, Place
 from solver.scene.parts import CyclicStructure, Excitation, Structure
+from solver.scene.terms.linear_terms import Aerodynamics
 
 
 class Term(NamedTuple):
@@ -85,6 +86,14 @@ class HasBodies(Protocol):
     @property
     def loads(self) -> tuple[Load, ...]:
         """Every constant force."""
+
+    @property
+    def speed_order(self) -> float | None:
+        """Order of the line along which the speed follows the frequency."""
+
+    @property
+    def aerodynamics(self) -> tuple[Aerodynamics, ...]:
+        """Influence of the gas between blades."""
 
     @property
     def speed(self) -> float | None:
@@ -218,14 +227,19 @@ def written_form(form: Form) -> tuple[tuple[str, float], ...]:
 
 
 def static_forces(scene: HasBodies) -> tuple[Excitation, ...]:
-    """The constant forces of loads and of rotation as forces on DOFs."""
-    if not scene.loads and scene.speed is None:
+    """The constant forces of loads and of rotation as forces on DOFs; along a line those at 1 rad/s."""
+    if not scene.loads and scene.speed is None and scene.speed_order is None:
         return ()
     found = [part for load in scene.loads for part in _of_load(scene, load, load.force)]
-    spin = (scene.speed or 0.0) * REVOLUTIONS
+    spin = _spin(scene)
     for body in scene.bodies:
         found += _outward(body, body.mass * (body.radius_of_rotation or 0.0) * spin**2)
     return _static(found)
+
+
+def _spin(scene: HasBodies) -> float:
+    """Speed of rotation [rad/s]; 1 along a line, where it follows the frequency."""
+    return (scene.speed or 0.0) * REVOLUTIONS if scene.speed_order is None else 1.0
 
 
 def force_derivatives(scene: HasBodies, path: str) -> tuple[tuple[Excitation, ...], tuple[Excitation, ...]]:
@@ -233,7 +247,7 @@ def force_derivatives(scene: HasBodies, path: str) -> tuple[tuple[Excitation, ..
     owner, _, key = path.rpartition(".")
     first = [part for x in scene.loads if owner and x.name == owner for part in _of_load(scene, x, 1.0)]
     second: list[tuple[str, float]] = []
-    spin = (scene.speed or 0.0) * REVOLUTIONS
+    spin = _spin(scene)
     for body in scene.bodies:
         radius = body.radius_of_rotation or 0.0
         if not owner:

@@ -29,6 +29,8 @@ from solver.scene.scene import (
     Spring,
     parse_end,
 )
+from solver.scene.terms.linear_terms import Coupling
+from solver.scene.terms.recovery import Recovered
 from solver.scene.validation import listing
 
 _JoinT = TypeVar("_JoinT", Spring, Damper)
@@ -151,6 +153,7 @@ def annulus(scene: Scene) -> Scene:
         structure=LumpedStructure(
             kind="lumped",
             stiffness_proportional_damping=structure.stiffness_proportional_damping,
+            loss_factor=structure.loss_factor,
             masses=tuple(_mass(mass, j) for j in sectors for mass in scaled[j].masses),
             springs=tuple(_renamed(s, j) for j in sectors for s in _joining(scaled[j].springs, j, n)),
             dampers=tuple(_renamed(d, j) for j in sectors for d in _joining(scaled[j].dampers, j, n)),
@@ -172,6 +175,10 @@ def annulus(scene: Scene) -> Scene:
         nodes=tuple(_node(node, j) for j in sectors for node in scene.nodes),
         loads=tuple(_load(load, j) for j in sectors for load in scene.loads),
         speed=scene.speed,
+        speed_order=scene.speed_order,
+        with_speed=scene.with_speed,
+        recovery=tuple(_recovered(r, j) for j in sectors for r in scene.recovery),
+        couplings=tuple(_coupling(c, j, n) for j in sectors for c in scene.couplings + _gas(scene, n)),
     )
 
 
@@ -285,6 +292,42 @@ def _load(load: Load, j: int) -> Load:
     return load.model_copy(update={**places, **named})
 
 
+def _recovered(recovered: Recovered, j: int) -> Recovered:
+    terms = tuple((_in_sector(dof, j), factor) for dof, factor in recovered.terms)
+    return recovered.model_copy(update={"name": _in_sector(recovered.name, j), "terms": terms})
+
+
+def _coupling(coupling: Coupling, j: int, n: int) -> Coupling:
+    on, of = _in_sector(coupling.on, j), _in_sector(coupling.of, (j + coupling.offset) % n)
+    return coupling.model_copy(update={"on": on, "of": of, "offset": 0})
+
+
+def _gas(scene: Scene, n: int) -> tuple[Coupling, ...]:
+    """The aerodynamic influence between blades as couplings.
+
+    Raises
+    ------
+    SettingError
+        Damping of nodal diameters n and -n differs: no real dashpots between blades do that.
+    """
+    found = []
+    for gas in scene.aerodynamics:
+        for entry in gas.entries(n):
+            if entry.c.imag != 0.0:
+                wanted = (
+                    "must be the same for a nodal diameter and for its negative where all sectors are "
+                    "solved: give what differs as `imaginary`"
+                )
+                raise SettingError("damping", gas.dof, wanted)
+            found.append(
+                Coupling(
+                    on=entry.on, of=entry.of, offset=entry.offset, k=entry.k.real, k_imaginary=entry.k.imag,
+                    c=entry.c.real,
+                )
+            )  # fmt: skip
+    return tuple(found)
+
+
 def _renamed(part: _NamedT, j: int) -> _NamedT:
     if part.name is None:
         return part
@@ -307,7 +350,8 @@ def _contact(contact: ContactOfAnyLaw, j: int, turn: float, *, standing: bool) -
 def _force(force: Excitation, j: int, turn: float, *, standing: bool) -> Excitation:
     return force.model_copy(
         update={
-            "dof": _in_sector(force.dof, j),
+            "dof": None if force.dof is None else _in_sector(force.dof, j),
+            "forces": force.forces and tuple((_in_sector(dof, j), *rest) for dof, *rest in force.forces),
             "phase": force.phase + (0.0 if standing else turn),
             "amplitude": force.amplitude * (_cosine(turn) if standing else 1.0),
             "engine_order": None,

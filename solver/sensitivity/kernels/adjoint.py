@@ -75,6 +75,7 @@ def amplitude_slopes(
         step_back(system, point, pulls[top])
         _fill_pull(system, point, weights[top], pulls[top])
         _by_linear_part(system, linear, u, point, tops[top], pulls[top], by[top])
+        _by_loads(system, point, weights[top], by[top])
     _by_contacts(system, u, omega, point, wanted, count, weights, by)
     return count
 
@@ -164,6 +165,14 @@ def _by_linear_part(
             phase -= driven.imag
     first = system.laws.size * PER_ELEMENT
     by[first + BY_OMEGA], by[first + BY_LEVEL], by[first + BY_PHASE] = by_omega, level, phase
+
+
+@compiled
+def _by_loads(system: System, point: Evaluation, weights: Real, by: Real) -> None:
+    """Add w·∂F/∂ω to the slope by ω: of normal loads that follow the frequency."""
+    for c in range(system.owner.size):
+        for i in range(coefficient_count(system.ks)):
+            by[system.laws.size * PER_ELEMENT + BY_OMEGA] += weights[c, i] * point.dF_dp[c, i]
 
 
 @apart

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance.simplifications import Effects
+from solver.balance.speed_line import check_no_line
 from solver.contacts.kernels.system import System, by_reference
 from solver.contacts.laws.base import without_second
 from solver.continuation.branch import Peak
@@ -102,6 +103,7 @@ class Tracker(Looking):
         self, scene: Scene, parameter: str, start: float, stop: float, harmonics: int,
         effects: Effects | None, pace: Pace = EVERYWHERE, allowance: Allowance | None = None,
     ) -> None:  # fmt: skip
+        check_no_line(scene)
         super().__init__(scene, parameter, start, stop, harmonics, effects, pace, allowance)
         check_laws(self.balance.scene)
         self._first_step = pace.first_step

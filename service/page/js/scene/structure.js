@@ -162,7 +162,9 @@ function box(places, size) {
   ];
 }
 
-const forcesOf = (scene) => (Array.isArray(scene.excitation) ? scene.excitation : [scene.excitation]);
+const forcesOf = (scene) =>
+  (Array.isArray(scene.excitation) ? scene.excitation : [scene.excitation]).flatMap((force) =>
+    force.dof ? [force] : Object.keys(force.forces ?? force.driven ?? {}).map((dof) => ({ ...force, dof })));
 
 function lumped(drawing, scene, parts, states, width) {
   const { places, size, ground } = chain(parts, width, HEIGHT);

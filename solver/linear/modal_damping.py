@@ -1,0 +1,64 @@
+"""Damping ratios of modes as a damping matrix, and its derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.errors import SettingError
+from solver.matrices.normal_modes import undamped_modes
+from solver.scene.matrices_structure import Ratios
+
+FloatArray = NDArray[np.float64]
+_SAME = 1e-9  # relative distance of two squared frequencies below which their quotient is a derivative
+
+
+def ratio_of_modes(ratios: Ratios, count: int) -> FloatArray:
+    """Return the damping ratio of each of `count` modes: the last one given also of those above it."""
+    given = np.atleast_1d(np.asarray(ratios, dtype=np.float64))
+    return np.asarray(given[np.minimum(np.arange(count), given.size - 1)])
+
+
+def modal_damping(M: FloatArray, K: FloatArray, ratios: Ratios) -> FloatArray:
+    """Return C with damping ratios in the modes, Σ 2 ζ ω (Mφ)(Mφ)ᵀ; a rigid body has none."""
+    found = undamped_modes(K, M)
+    momenta = M @ found.phi
+    omega = np.sqrt(np.maximum(found.omega2, 0.0))
+    zeta = ratio_of_modes(ratios, omega.size)
+    return np.asarray((momenta * (2.0 * zeta * omega)) @ momenta.T)
+
+
+def modal_damping_derivative(
+    M: FloatArray, K: FloatArray, ratios: Ratios, dM: FloatArray, dK: FloatArray
+) -> FloatArray:
+    """Return the derivative of `modal_damping` where M and K change by dM and dK.
+
+    With φᵀMφ = 1, C = Mφ F φᵀM, F = 2ζω: modes turn into each other, φ' = φB with B_ij =
+    φ_iᵀ(dK − λ_j dM)φ_j / (λ_j − λ_i), B_ii = −½ φ_iᵀ dM φ_i (Fox, Kapoor, AIAA J. 6 (1968) 2426), so that
+    (BF + FBᵀ + F')_ij is a quotient of differences, which for equal frequencies is a derivative.
+
+    Raises
+    ------
+    SettingError
+        A mode with a frequency of zero, or two of one frequency with different ratios: C has a kink there.
+    """
+    found = undamped_modes(K, M)
+    values, phi = found.omega2, found.phi
+    zeta = ratio_of_modes(ratios, values.size)
+    if np.any(values <= 0.0):
+        raise SettingError("damping_ratio", list(zeta[:3]), "has no derivative where a mode is a rigid body")
+    f = 2.0 * zeta * np.sqrt(values)
+    kappa, mu = phi.T @ dK @ phi, phi.T @ dM @ phi
+    apart = values[None, :] - values[:, None]
+    same = np.abs(apart) <= _SAME * np.maximum(values[None, :], values[:, None])
+    if np.any(same & (zeta[:, None] != zeta[None, :])):
+        raise SettingError("damping_ratio", list(zeta[:3]), "must be equal for modes of one frequency here")
+    gap = np.where(same, 1.0, apart)
+    # f(λ) = 2ζ√λ and λ f(λ) as quotients of differences; of one frequency ζ/√λ and 3ζ√λ.
+    rise = np.where(same, zeta / np.sqrt(values), (f[None, :] - f[:, None]) / gap)
+    product = values * f
+    bend = np.where(same, 3.0 * zeta * np.sqrt(values), (product[None, :] - product[:, None]) / gap)
+    turned = kappa * rise - mu * bend
+    momenta = M @ phi
+    change = dM @ phi @ np.diag(f) @ momenta.T
+    return np.asarray(momenta @ turned @ momenta.T + change + change.T)

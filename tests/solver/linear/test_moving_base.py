@@ -1,0 +1,148 @@
+"""A base that moves, against forces in absolute motion, the march, differences; forces on many DOFs."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import solver
+from solver.balance.balance import build
+from solver.balance.workspace import Workspace
+from solver.errors import SceneError
+from solver.scene.scene import Scene
+from solver.sensitivity.gradient import Sensitivities
+
+M, K, C = np.diag([1.0, 0.5]), np.array([[60.0, -20.0], [-20.0, 20.0]]), np.array([[0.9, -0.3], [-0.3, 0.3]])
+SPRINGS = [
+    {"between": ["x", "ground"], "k": 40.0, "c": 0.6, "name": "foot"},
+    {"between": ["x", "y"], "k": 20.0, "c": 0.3, "name": "neck"},
+]
+RUB = {"name": "rub", "between": ["x", "y"], "kt": 30.0, "mu": 0.3, "N0": 1.1}
+ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
+
+
+def rig(**more: Any) -> dict[str, Any]:
+    return {
+        "name": "rig", "structure": {"kind": "lumped", "masses": {"x": 1.0, "y": 0.5}, "springs": SPRINGS},
+        "contacts": [], "excitation": {"ground": {"x": 1.0, "y": 1.0}, "amplitude": 0.7},
+        "observe": {"dof": "y", "band": [0.3, 2.0]},
+    } | more  # fmt: skip
+
+
+def driven(**more: Any) -> dict[str, Any]:
+    """The same with the ground as a DOF of its own that is driven."""
+    structure = {
+        "kind": "lumped", "masses": {"x": 1.0, "y": 0.5, "floor": 3.0},
+        "springs": [SPRINGS[0] | {"between": ["x", "floor"]}, SPRINGS[1]],
+    }  # fmt: skip
+    return rig(structure=structure, excitation={"driven": {"floor": 1.0}, "amplitude": 0.7}, **more)
+
+
+@pytest.mark.parametrize("way", [rig, driven])
+@pytest.mark.parametrize("relative", [False, True])
+@pytest.mark.parametrize("motion", list(ORDERS))
+def test_a_moving_base_is_the_absolute_motion(way: Any, motion: str, relative: bool) -> None:
+    """In absolute motion springs and dashpots to the ground push with (k + iωc) y."""
+    raw = way()
+    raw["excitation"]["motion"] = motion
+    raw["observe"]["relative"] = relative
+    omega = 2.0 * math.pi * 0.9
+    y = 0.7 / (1j * omega) ** ORDERS[motion]
+    x = np.linalg.solve(K + 1j * omega * C - omega**2 * M, np.array([(40.0 + 0.6j * omega) * y, 0.0]))
+    scene, wanted = Scene.from_dict(raw), abs(x[1] - y * relative)
+    found = solver.solve(scene, frequency_hz=0.9, harmonics=1)
+    assert found.max_abs == pytest.approx(wanted, rel=1e-9)
+    history = solver.time_history(found, "y")[1]
+    assert np.abs(history).max() == pytest.approx(wanted, rel=1e-3)
+    assert solver.march(scene, frequency_hz=0.9).max_abs == pytest.approx(wanted, rel=1e-7)
+
+
+def test_with_friction_it_is_the_scene_in_absolute_motion() -> None:
+    """The same forces at one frequency, written as two harmonic forces on the foot's DOF."""
+    omega = 2.0 * math.pi * 0.9
+    scene = Scene.from_dict(rig(contacts=[RUB], excitation={
+        "ground": {"x": 1.0, "y": 1.0}, "amplitude": 0.2, "motion": "displacement"}))  # fmt: skip
+    forces = [
+        {"dof": "x", "amplitude": 0.2 * 40.0},
+        {"dof": "x", "amplitude": 0.2 * 0.6 * omega, "phase": 0.5 * math.pi},
+    ]
+    absolute = Scene.from_dict(rig(contacts=[RUB], excitation=forces))
+    found, wanted = (solver.solve(each, frequency_hz=0.9, harmonics=15) for each in (scene, absolute))
+    assert found.contacts[0].state.value == "stick and slip"
+    assert found.max_abs == pytest.approx(wanted.max_abs, rel=1e-9)
+    precise = solver.solve(scene, frequency_hz=0.9, harmonics=61)
+    marched = solver.march(scene, frequency_hz=0.9)
+    assert precise.half_peak_to_peak == pytest.approx(marched.half_peak_to_peak, rel=1e-6)
+
+
+def test_a_sweep_over_the_frequency_and_over_the_level() -> None:
+    scene = Scene.from_dict(driven(contacts=[RUB]))
+    branch = solver.sweep(scene, harmonics=3)
+    assert branch.completed
+    assert branch.peak is not None
+    at_peak = solver.solve(scene, frequency_hz=branch.peak.at, harmonics=3)
+    assert branch.peak.value == pytest.approx(at_peak.max_abs, rel=1e-8)
+    levels = solver.sweep(scene, "excitation.amplitude", 0.1, 1.4, frequency_hz=0.9, harmonics=3)
+    assert levels.completed
+    double = solver.solve(scene.with_values({"excitation.amplitude": 1.4}), frequency_hz=0.9, harmonics=3)
+    assert levels.amplitude[-1] == pytest.approx(double.max_abs, rel=1e-8)
+
+
+@pytest.mark.parametrize("way", [rig, driven])
+def test_gradients_are_differences(way: Any) -> None:
+    scene = Scene.from_dict(way(contacts=[RUB]))
+    paths = ("structure.foot", "structure.neck", "rub.N0", "rub.kt", "excitation.amplitude")
+    balance = build(scene, harmonics=7)
+    u = Workspace.of(balance).solve(2.0 * math.pi * 0.8).u
+    gradient = Sensitivities(balance, paths).gradient(u, 0.8).by_parameters
+    for path, slope in zip(paths, gradient, strict=True):
+        value = scene.value(path)
+        high, low = (
+            solver.solve(scene.with_values({path: at}), frequency_hz=0.8, harmonics=7).max_abs
+            for at in ((1.0 + 1e-5) * value, (1.0 - 1e-5) * value)
+        )
+        assert slope == pytest.approx((high - low) / (2e-5 * value), rel=3e-6), path
+
+
+def test_a_pattern_is_the_sum_of_its_forces(tmp_path: Path) -> None:
+    pattern = {"forces": {"x": [0.5, 0.3], "y": -2.0}, "amplitude": 3.0, "phase": 0.1}
+    apart = [
+        {"dof": "x", "amplitude": 1.5, "phase": 0.4}, {"dof": "y", "amplitude": -6.0, "phase": 0.1},
+    ]  # fmt: skip
+    one, two = (Scene.from_dict(rig(contacts=[RUB], excitation=each)) for each in (pattern, apart))
+    found = solver.solve(one, frequency_hz=0.9, harmonics=7)
+    assert found.max_abs == pytest.approx(solver.solve(two, frequency_hz=0.9, harmonics=7).max_abs, rel=1e-12)
+    assert solver.march(one, frequency_hz=0.9).max_abs == pytest.approx(
+        solver.march(two, frequency_hz=0.9).max_abs, rel=1e-9
+    )
+    assert Scene.from_dict(one.to_dict()) == one
+    (tmp_path / "pressure.csv").write_text("dof, factor, phase\nx, 0.5, 0.3\ny, -2.0\n")
+    file = one.to_dict()
+    file["excitation"]["forces"] = "pressure.csv"  # type: ignore[index]
+    (tmp_path / "rig.json").write_text(__import__("json").dumps(file))
+    assert solver.load_scene(tmp_path / "rig.json") == one
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"excitation": {"amplitude": 1.0}}, "needs one of `dof`, `forces`, `ground`, `driven`, got none"),
+        ({"excitation": {"dof": "x", "motion": "velocity", "amplitude": 1.0}}, "needs `ground` or `driven`"),
+        ({"excitation": {"ground": {"z": 1.0}, "amplitude": 1.0}}, "there is no DOF 'z'"),
+        ({"excitation": {"ground": {"x": 1.0}, "amplitude": 1.0, "harmonic": 0}}, "must be at least 1"),
+        (
+            {
+                "excitation": {"dof": "x", "amplitude": 1.0},
+                "observe": {"dof": "x", "band": [1.0, 2.0], "relative": True},
+            },
+            "`relative` = true needs a base",
+        ),
+    ],
+)
+def test_what_is_wrong_is_said(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        Scene.from_dict(rig(**change))
