@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import solver
 from service.jobs.kinds import warm_up
+from solver.contacts.laws.registry import laws
 from solver.jit.parallel import compile_together
 
 
@@ -16,9 +17,15 @@ def referee() -> None:
     solver.march(solver.load_scene("two-dof"), frequency_hz=1.2, max_periods=2)
 
 
+def functions_of_laws() -> None:
+    """Compile the functions of the laws that are given by functions."""
+    for law in laws().values():
+        law.prepare()
+
+
 def main() -> None:
     """Run each kind of computation once, on a small problem, and compile what they might call besides."""
-    compile_together([warm_up, referee])
+    compile_together([warm_up, referee, functions_of_laws])
 
 
 if __name__ == "__main__":

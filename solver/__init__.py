@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from solver.balance.simplifications import Effects
+    from solver.contacts.laws.history.definition import LawParameter
+    from solver.contacts.laws.history.register import register_law
     from solver.contacts.segments import Shares
     from solver.continuation.branch import Band, Branch, BranchStatus, Peak
     from solver.continuation.branches.sweep import sweep
@@ -97,7 +99,8 @@ _HOME = {
     "Measure": "response.worst_wear", "WorstWear": "response.worst_wear",
     "worst_friction_work": "response.worst_wear", "worst_wear": "response.worst_wear",
     "worst_slopes": "response.wear_nonsmooth", "Stretch": "continuation.segment",
-    "joined": "continuation.segment",
+    "joined": "continuation.segment", "LawParameter": "contacts.laws.history.definition",
+    "register_law": "contacts.laws.history.register",
 }  # fmt: skip
 
 __all__ = [
@@ -124,6 +127,7 @@ __all__ = [
     "Gradient",
     "Growth",
     "Issue",
+    "LawParameter",
     "LeastPeak",
     "MapStatus",
     "MarchStart",
@@ -185,6 +189,7 @@ __all__ = [
     "plan",
     "power_balance",
     "progress_bar",
+    "register_law",
     "response_map",
     "save",
     "sectors_needed",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import threading
 from functools import cache
 from importlib import import_module
 from typing import TypeVar
@@ -43,10 +44,22 @@ def extension_classes(kind: type[T]) -> tuple[type[T], ...]:
     )
 
 
-@cache
+_here = threading.local()  # whether this thread is importing them
+
+
 def _named(text: str) -> tuple[object, ...]:
-    if not text.strip():
+    # A module that registers what it defines asks for what there is while it is being imported itself.
+    if not text.strip() or getattr(_here, "importing", False):
         return ()
+    _here.importing = True
+    try:
+        return _read(text)
+    finally:
+        _here.importing = False
+
+
+@cache
+def _read(text: str) -> tuple[object, ...]:
     try:
         names = json.loads(text)
     except json.JSONDecodeError as error:

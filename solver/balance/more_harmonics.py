@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from solver.balance.balance import Balance, build, with_harmonics
+from solver.contacts.kernels.columns import NODES
 from solver.contacts.kernels.system import System
 from solver.jit.fourier import Complex, Integer, Real
 from solver.jit.trig_polynomial import grid_size, grid_tables
@@ -29,6 +30,8 @@ def more_harmonics(balance: Balance, top: int, *, multiples: int = MULTIPLES) ->
         return _rebuilt(balance, top)
     cos_table, sin_table = _tables(max(int(ks[-1]), 1))
     contacts = contact_table(balance.scene, int(ks[-1]))
+    # Where a law is followed from node to node an estimate has to see what lies between them too.
+    contacts[:, NODES] = np.maximum(contacts[:, NODES], 2.0 * balance.system.contacts[:, NODES])
     system = system._replace(cos_table=cos_table, sin_table=sin_table, contacts=contacts)
     return replace(balance, system=system, n_harmonics=top)
 

@@ -91,7 +91,8 @@ class _Locator(caching._CacheLocator):
     @classmethod
     def from_function(cls, function: Any, file: str) -> _Locator:
         stamp = "named by its sources"
-        if not function.__module__.startswith("solver."):
+        package, *rest = function.__module__.split(".")
+        if package != "solver" or {"kernels", "jit"}.isdisjoint(rest):
             stamp = hashlib.sha256(Path(file).read_bytes()).hexdigest()
         return cls(f"{function.__module__}-{function.__code__.co_firstlineno}", stamp)
 

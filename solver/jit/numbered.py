@@ -60,6 +60,10 @@ class _Table:
             self._addresses[number] = address
         return number
 
+    def put(self, number: int, address: int) -> None:
+        """Have a function of the contract called by a number: one that is no kernel and has no name."""
+        self._addresses[number] = address
+
     def under(self, _form: object) -> tuple[bytes, ...]:
         """Return the names of the kernels that a call may need: those whose numbers are always the same."""
         form = self._form

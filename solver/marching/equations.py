@@ -158,6 +158,7 @@ def equations_of_motion(scene: Scene, omega: float) -> Equations:
         force_amplitude=np.array(amplitude, dtype=np.float64),
         force_phase=np.array(phase, dtype=np.float64),
         force_harmonic=np.array(harmonic, dtype=np.int64),
+        omega=omega,
         **columns(placed, index, A.shape[0]),
     )
     return Equations(system, observed, index, tuple(seen))

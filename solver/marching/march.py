@@ -30,6 +30,7 @@ from solver.scene.terms.speed import at_frequency
 
 FloatArray = NDArray[np.float64]
 LEAST_STEPS = 64
+FINER = 8  # times the least steps, where steps are of a lower order
 MOST_STEPS = 1_000_000
 SAMPLES_PER_PERIOD = 2048
 REPEATS = 1e-7  # relative change of velocities, forces and of the drift at which a part is said to drift
@@ -150,7 +151,7 @@ def _twice(
     if plan.on_progress is not None and fine.settled:
         plan.on_progress(1.0, periods)
     return describe(
-        record=fine.record, coarse=coarse.record, order=kernel.ORDER,
+        record=fine.record, coarse=coarse.record, order=_order(plan.system),
         transient=_left_to_decay(coarse.changes, fine.changes), periods=periods, contacts=names,
         frequency_hz=frequency_hz, steps_per_period=fine.steps, status=fine.status, drift=fine.drift,
     )  # fmt: skip
@@ -170,11 +171,20 @@ def _steps(system: kernel.System, forces: tuple[Excitation, ...], wanted: int | 
     full = system.W_value.size > system.W_start.size - 1 or bool(np.any(np.abs(system.L_value) != 1.0))
     turns = 2.0 * math.pi * _fastest(system, BALANCING if full else 1)
     least = max(LEAST_STEPS, 2 * math.ceil(turns / 1.5), 16 * max(force.harmonic for force in forces))
-    chosen = max(2 * LEAST_STEPS, 2 * least) if wanted is None else wanted
+    finer = 2 if _order(system) == kernel.ORDER else FINER
+    chosen = max(2 * LEAST_STEPS, finer * least) if wanted is None else wanted
     if isinstance(chosen, Integral) and chosen % 2 == 0 and least <= chosen <= MOST_STEPS:
         return int(chosen)
     needs = f"structure and forces need at least {least} steps per period at this frequency"
     raise SettingError("steps_per_period", chosen, f"must be an even number up to {MOST_STEPS}; {needs}")
+
+
+def _order(system: kernel.System) -> int:
+    """Order of the steps: less than that of the series with laws given by functions."""
+    given = system.law == kernel.HISTORY
+    if np.any(given & (system.in_steps == 1)):
+        return 2
+    return 4 if np.any(given) else kernel.ORDER
 
 
 def _fastest(system: kernel.System, products: int) -> float:
@@ -196,7 +206,8 @@ def _fastest(system: kernel.System, products: int) -> float:
         k = np.where(np.diff(motions.indptr) == 1, 2.0, 1.0) * k
         stuck = stuck + motions.T @ diags_array(k) @ motions
     stiffness = _largest(sizes[0] + sizes[2] @ stuck, products)
-    return float(max(math.sqrt(stiffness), _largest(sizes[1], products)))
+    damped = sizes[1] + system.omega * (sizes[2] @ (L.T @ diags_array(2.0 * system.damping) @ L))
+    return float(max(math.sqrt(stiffness), _largest(damped, products)))
 
 
 def _sizes(start: NDArray[np.int64], column: NDArray[np.int64], value: FloatArray, n: int) -> csr_array:
@@ -223,7 +234,7 @@ def _largest(matrix: csr_array, products: int) -> float:
 
 def _run(plan: _Plan, start: kernel.State, steps: int, *, done: int) -> _Run:
     """March until the motion repeats, then one period more with a record."""
-    state = kernel.State(start.x.copy(), start.v.copy(), start.force.copy(), start.mode.copy())
+    state = _copied(start)
     nothing = _record(plan, 0)
     status, changes, fraction = MarchStatus.MAX_PERIODS, np.empty(0), 0.9 if done else 0.0
     drift, places = 0.0, [_copied(state)]
@@ -257,7 +268,8 @@ def _run(plan: _Plan, start: kernel.State, steps: int, *, done: int) -> _Run:
 
 
 def _copied(state: kernel.State) -> kernel.State:
-    return kernel.State(state.x.copy(), state.v.copy(), state.force.copy(), state.mode.copy())
+    x, v, force, mode, own = (each.copy() for each in state)
+    return kernel.State(x, v, force, mode, own)  # type: ignore[arg-type]
 
 
 def _drift(places: list[kernel.State]) -> float:

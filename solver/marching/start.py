@@ -64,9 +64,11 @@ def state_at(equations: Equations, start: MarchStart, names: tuple[str, ...], om
     closed = np.where(system.law == kernel.GAP, slips > system.gap, closed) | (
         system.law == kernel.POLYNOMIAL
     )
+    closed |= system.law == kernel.HISTORY
     mode = np.where(closed, kernel.STICK, kernel.SEPARATED).astype(np.int64)
     force = _forces(system, start.tractions, names, np.maximum(load, 0.0))
-    return kernel.State(x, v, force, mode)
+    own = np.zeros((rows, max(int(np.max(system.states, initial=0)), 1)))
+    return kernel.State(x, v, force, mode, own)
 
 
 def _vector(key: str, given: Mapping[str, float], index: Mapping[str, int], n: int) -> kernel.Real:

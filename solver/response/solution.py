@@ -35,6 +35,10 @@ class SolutionStatus(Enum):
         "There is no periodic motion: a part that contacts alone hold ratchets, it drifts a little further "
         "every period. Press it harder, take away what pulls it to one side, or hold it by a spring."
     )
+    LAW_FAILED = (
+        "The law of a contact gives no finite force that repeats from period to period for a motion tried: "
+        "look at its functions and parameters, or give it more samples."
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -44,7 +48,7 @@ class Solution(Drawn):
     Attributes
     ----------
     status : SolutionStatus
-        Whether and why; every number below is NaN if it is NOT_CONVERGED or RATCHETS.
+        Whether and why; every number below is NaN where it is none.
     max_abs, half_peak_to_peak, mean : float
         Of the observed DOF over the period [m]. Not unique when `flags` has ``mean_undetermined``: the first
         and the last then depend on the history, and with ``history_dependent`` the second does too. Without
@@ -92,7 +96,7 @@ class Solution(Drawn):
     @property
     def converged(self) -> bool:
         """Whether the numbers are a solution."""
-        return self.status not in (SolutionStatus.NOT_CONVERGED, SolutionStatus.RATCHETS)
+        return self.status in (SolutionStatus.CONVERGED, SolutionStatus.ACCURACY_NOT_REACHED)
 
     @property
     def highest_harmonic(self) -> int:

@@ -11,16 +11,18 @@ import numpy as np
 
 from solver.balance.balance import Balance, build, check_frequency
 from solver.balance.kernels.gauge import FREE
+from solver.balance.kernels.newton import stuck_start
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS, MEAN
 from solver.balance.parameter import Kind
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import PointSolution, Workspace
-from solver.contacts.kernels.stick_slip_events import STUCK
+from solver.contacts.kernels.stick_slip_events import FAILED, STUCK
 from solver.contacts.kernels.system import UNHELD, evaluation_by_value
 from solver.continuation.branches.adaptive_harmonics import solve_to
 from solver.continuation.branches.symmetry_breaking import assumed_flags, seen
 from solver.continuation.extrema.error_estimate import UNKNOWN, truncation_error
 from solver.jit import fourier
+from solver.jit.fourier import Real
 from solver.linear.condensation import loose_ports
 from solver.response.contact_response import OPENS, ContactResponse, ContactState, contact_responses
 from solver.response.history_dependence import has_another_solution, history_of
@@ -71,7 +73,10 @@ def solve(
             lambda h: build(scene, harmonics=h, effects=effects), omega, accuracy
         )
     if not found.converged:
-        return _failure(workspace.balance, frequency_hz, found, time.perf_counter() - begun)
+        failed = _failure(workspace.balance, frequency_hz, found, time.perf_counter() - begun)
+        if not found.ratchets and _law_fails(workspace, found.u, omega):
+            failed = replace(failed, status=SolutionStatus.LAW_FAILED)
+        return failed
     found, flags = seen(workspace, found, omega)
     solution = describe(workspace, found, frequency_hz, begun)
     solution = replace(solution, flags=(*solution.flags, *assumed_flags(workspace.balance), *flags))
@@ -132,6 +137,20 @@ def peak_flags(branch: Branch) -> tuple[str, ...]:
         balance = build(scene, harmonics=balance.n_harmonics, effects=effects)
     found = PointSolution(converged=True, u=peak.solution, iterations=0, residual=0.0)
     return describe(Workspace.of(balance), found, frequency_hz, time.perf_counter(), estimated=False).flags
+
+
+def _law_fails(workspace: Workspace, u: Real, p: float) -> bool:
+    """Return whether a contact has no force where Newton's method ended, or where it begins."""
+    start = np.zeros(u.size)
+    workspace.receptance(p)
+    stuck_start(workspace.system, workspace.linear, p, start)
+    states = evaluation_by_value(workspace.point).states
+    for motion in (u, start):
+        states[:] = STUCK
+        workspace.evaluate(motion, p)
+        if np.any(states == FAILED):
+            return True
+    return False
 
 
 def _nothing_holds_a_part(workspace: Workspace) -> bool:

@@ -69,8 +69,8 @@ def hysteresis_loop(solution: Solution, contact: str, *, samples: int = 512) -> 
         raise SettingError("contact", contact, f"must be one of {listing(names)}")
     at = names.index(contact)
     given, found = solution.scene.contacts[at], solution.contacts[at]
-    basis = fourier.basis(tau, solution.highest_harmonic)
-    return basis @ found.slip, given.force_at(np.array(found.motions), found.load, tau)
+    basis, omega = fourier.basis(tau, solution.highest_harmonic), 2.0 * math.pi * solution.frequency_hz
+    return basis @ found.slip, given.at_frequency(omega).force_at(np.array(found.motions), found.load, tau)
 
 
 def response(solution: Solution, k: int) -> Complex:

@@ -41,8 +41,9 @@ class Return:
         force = self.orbit.force.copy()
         force[held] += kt[held] * (self.ports[held] @ move[:n] - move[2 * n :])
         return kernel.State(
-            self.orbit.x + move[:n], self.orbit.v + move[n : 2 * n], force, self.orbit.mode.copy()
-        )
+            self.orbit.x + move[:n], self.orbit.v + move[n : 2 * n], force, self.orbit.mode.copy(),
+            self.orbit.own.copy(),
+        )  # fmt: skip
 
     def places(self, state: kernel.State) -> np.ndarray:
         held = self.sliders

@@ -82,9 +82,10 @@ def march_case(scene: dict[str, Any], frequency_hz: float, tolerance: float = 1e
         force_amplitude=np.array([force["amplitude"] for force in forces]),
         force_phase=np.array([force["phase"] for force in forces]),
         force_harmonic=np.ones(len(forces), np.int64),
+        omega=omega,
         **columns([(row, forms) for row in contact_rows(scene["contacts"][0])], index, 3),
     )
-    state = kernel.State(np.zeros(3), np.zeros(3), np.zeros(2), np.full(2, kernel.STICK))
+    state = kernel.State(np.zeros(3), np.zeros(3), np.zeros(2), np.full(2, kernel.STICK), np.zeros((2, 1)))
     nothing = kernel.Record(np.empty(0), np.empty(0), *(np.empty((2, 0)) for _ in range(3)))
     code, _ = run_periods(system, state, STEPS, tolerance, 0, nothing, np.empty(4000))
     assert code == kernel.SETTLED

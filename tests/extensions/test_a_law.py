@@ -1,4 +1,4 @@
-"""A contact law of this folder (`iwan`): named once, it is solved, swept, marched, designed and described.
+"""A contact law of this folder (`sliders`): named once, it is solved, swept, marched, designed and described.
 
 Time marching of its sliders, each by itself, is the referee: it shares nothing with the kernel.
 """
@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contact_cases import central_difference
-from iwan import LIMIT, SLIDERS, IwanContact, K
 from joined_scene import JOINED as SCENE
 from launch import COMMAND, served
 from law_cases import Element, evaluate, jacobian
+from sliders import LIMIT, SLIDERS, K, SlidersContact
 
 import optim
 import solver
@@ -30,16 +30,16 @@ from solver.contacts.laws.registry import laws, register, unregister
 from solver.scene.json_schema import scene_schema
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-NAMED = {extensions.VARIABLE: json.dumps(["iwan:IwanContact"])}
+NAMED = {extensions.VARIABLE: json.dumps(["sliders:SlidersContact"])}
 HZ, HARMONICS = 0.19, 21
 
 
 @pytest.fixture
 def registered() -> Iterator[None]:
     """In this process."""
-    register(IwanContact)
+    register(SlidersContact)
     yield
-    unregister(IwanContact)
+    unregister(SlidersContact)
 
 
 def scene(**values: float) -> solver.Scene:
@@ -63,11 +63,11 @@ def command(*arguments: str, cwd: Path) -> str:
 def test_the_kernel_has_the_derivatives_of_its_force() -> None:
     row = np.zeros(columns.COLUMNS)
     row[K], row[LIMIT] = 2.0, 0.9
-    element = Element(law=IwanContact.KERNEL, U=np.random.default_rng(4).normal(size=(1, 7)), row=row)
+    element = Element(law=SlidersContact.KERNEL, U=np.random.default_rng(4).normal(size=(1, 7)), row=row)
     here = evaluate(element)
 
     def moved(U: np.ndarray, row: np.ndarray) -> np.ndarray:
-        found = evaluate(Element(law=IwanContact.KERNEL, U=U, row=row))
+        found = evaluate(Element(law=SlidersContact.KERNEL, U=U, row=row))
         assert found.piece == here.piece
         return found.F[0]
 
@@ -152,7 +152,7 @@ def test_what_is_wrong_is_told() -> None:
         solver.Scene.from_dict(wrong)
     said = {issue.pointer: issue.message for issue in refused.value.issues}
     assert said["/contacts/0/limit"] == "`limit` must be > 0, got -1.0"
-    assert "is not a key of a contact with the law `iwan`; known keys:" in said["/contacts/0/mu"]
+    assert "is not a key of a contact with the law `sliders`; known keys:" in said["/contacts/0/mu"]
     with pytest.raises(solver.SettingError, match=r"joint.limit.*must be a number > 0 and <= 1e15 \[N\]"):
         scene(limit=0.0)
     stable = solver.solve(scene(), frequency_hz=HZ, harmonics=3)
@@ -161,31 +161,33 @@ def test_what_is_wrong_is_told() -> None:
 
 
 def test_a_scene_knows_it_while_it_is_registered() -> None:
-    with pytest.raises(solver.SceneError, match=r"`law` must be one of coulomb, .*polynomial, got 'iwan'"):
+    with pytest.raises(
+        solver.SceneError, match=r"`law` must be one of coulomb, .*coulomb-tanh, got 'sliders'"
+    ):
         scene()
-    register(IwanContact)
+    register(SlidersContact)
     try:
-        assert scene().contacts[0].kernel == "iwan:iwan"
-        with pytest.raises(ValueError, match="iwan"):
-            register(IwanContact)
+        assert scene().contacts[0].kernel == "sliders:sliders"
+        with pytest.raises(ValueError, match="sliders"):
+            register(SlidersContact)
     finally:
-        unregister(IwanContact)
-    assert "iwan" not in laws()
+        unregister(SlidersContact)
+    assert "sliders" not in laws()
     with pytest.raises(solver.SceneError):
         scene()
 
 
 @pytest.mark.usefixtures("registered")
 def test_the_schema_of_scenes_describes_it() -> None:
-    found = scene_schema()["$defs"]["IwanContact"]["properties"]
+    found = scene_schema()["$defs"]["SlidersContact"]["properties"]
     assert found["limit"]["description"] == "Force at which all of it slips [N]."
-    assert found["law"]["description"].endswith("gap, polynomial or iwan.")
+    assert found["law"]["description"].endswith("dahl, coulomb-tanh or sliders.")
 
 
 @pytest.mark.usefixtures("registered")
 def test_the_table_of_laws_has_it() -> None:
-    (line,) = (line for line in TABLES["laws.md"]["laws"]().splitlines() if "iwan" in line)
-    assert line == f"| `iwan` | {IwanContact.FORCE} | `k`, `limit` |"
+    (line,) = (line for line in TABLES["laws.md"]["laws"]().splitlines() if "`sliders`" in line)
+    assert line == f"| `sliders` | {SlidersContact.FORCE} | `k`, `limit` |"
 
 
 def test_the_command_solves_and_describes_it(tmp_path: Path) -> None:
@@ -193,14 +195,14 @@ def test_the_command_solves_and_describes_it(tmp_path: Path) -> None:
     solved = command(
         "solve", "joined.json", "--frequency", str(HZ), "--harmonics", "5", "--json", cwd=tmp_path
     )
-    register(IwanContact)
+    register(SlidersContact)
     try:
         expected = solver.solve(scene(), frequency_hz=HZ, harmonics=5).max_abs
     finally:
-        unregister(IwanContact)
+        unregister(SlidersContact)
     assert json.loads(solved)["max_abs"] == pytest.approx(expected, rel=1e-9)
     described = json.loads(command("schema", "scene", cwd=tmp_path))
-    assert "IwanContact" in described["$defs"]
+    assert "SlidersContact" in described["$defs"]
 
 
 @pytest.fixture(scope="module")
@@ -221,7 +223,7 @@ def test_the_service_computes_and_plans_it(client: Client) -> None:
 
 
 def test_the_service_tells_its_parameters(client: Client) -> None:
-    (law,) = (law for law in client.laws() if law.name == "iwan")
+    (law,) = (law for law in client.laws() if law.name == "sliders")
     assert [(one.name, one.unit) for one in law.parameters] == [("k", "N/m"), ("limit", "N")]
     limit = law.parameters[1]
     assert limit.words == "Force at which all of it slips [N]."
@@ -234,11 +236,11 @@ def test_the_page_reads_and_previews_it(client: Client) -> None:
     shown = client.preview(
         {"kind": "point", "scene": SCENE, "frequency_hz": HZ, "harmonics": 5, "set": {"joint.limit": 0.4}}
     )
-    register(IwanContact)
+    register(SlidersContact)
     try:
         expected = solver.solve(scene(limit=0.4), frequency_hz=HZ, harmonics=5).max_abs
     finally:
-        unregister(IwanContact)
+        unregister(SlidersContact)
     assert shown["max_abs"] == pytest.approx(expected, rel=1e-9)
 
 

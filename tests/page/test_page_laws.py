@@ -45,7 +45,7 @@ IN_SPACE: dict[str, Any] = {
 def outside(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """A service that knows a law from outside the package, with scenes stored."""
     paths = os.pathsep.join((str(ROOT), str(ROOT / "tests" / "extensions")))
-    named = json.dumps(["iwan:IwanContact"])
+    named = json.dumps(["sliders:SlidersContact"])
     made = Site(tmp_path_factory.mktemp("laws"), STICKSLIP_EXTENSIONS=named, PYTHONPATH=paths)
     made.start()
     for scene in (JOINED, IN_SPACE):

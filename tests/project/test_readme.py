@@ -9,6 +9,7 @@ import shlex
 import shutil
 import subprocess
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,7 @@ from service.jobs.common.problem import arguments
 from service.jobs.kinds.design import DesignRequest, design_issues
 from service.jobs.validation import validated
 from service.settings.settings import Settings
+from solver.contacts.laws.registry import laws, unregister
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -126,6 +128,17 @@ def test_commands_run(
     assert {file.name for file in tmp_path.iterdir()} == given | written
 
 
+@pytest.fixture
+def laws_as_before() -> Iterator[None]:
+    """Takes back the laws that a page registers."""
+    before = set(laws())
+    yield
+    for word, law in laws().items():
+        if word not in before:
+            unregister(law)
+
+
+@pytest.mark.usefixtures("laws_as_before")
 @pytest.mark.parametrize("code", blocks("python"))
 def test_python_runs(
     code: str,
@@ -193,7 +206,7 @@ def test_parts_of_scenes_are_read() -> None:
     raw = solver.load_scene("bladed-disk").to_dict()
     raw["structure"] |= tomllib.loads(mistuning)["structure"]
     assert solver.sectors_needed(solver.Scene.from_dict(raw)).sectors == 8
-    (contacts,) = [text for text in blocks("toml") if text.startswith("[[contacts]]")]
+    contacts = "\n".join(text for text in blocks("toml") if text.startswith("[[contacts]]"))
     names = re.findall(r'"(\w+)(?:@next)?"', " ".join(re.findall(r"between.* = (\[.*?\])", contacts)))
     dofs = sorted({*names} - {"ground"})
     raw["structure"] = {
@@ -203,8 +216,11 @@ def test_parts_of_scenes_are_read() -> None:
     raw |= tomllib.loads(contacts)
     raw["excitation"] = {"dof": dofs[0], "amplitude": 1.0, "engine_order": 1}
     raw["observe"] = {"dof": dofs[0], "band": [10.0, 20.0]}
-    laws = [contact.law for contact in solver.Scene.from_dict(raw).contacts]
-    assert laws == ["elastic-normal", "coulomb-2d", "coulomb-3d", "gap", "polynomial"]
+    found = [contact.law for contact in solver.Scene.from_dict(raw).contacts]
+    assert found == [
+        "elastic-normal", "coulomb-2d", "coulomb-3d", "gap", "polynomial", "iwan", "bouc-wen", "dahl",
+        "coulomb-tanh",
+    ]  # fmt: skip
 
 
 def known(path: str) -> bool:

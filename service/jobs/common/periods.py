@@ -36,7 +36,9 @@ def period_of(solution: Solution, samples: int) -> dict[str, Any]:
 
     tau = np.linspace(0.0, 2.0 * math.pi, samples + 1)
     displacement = fourier.basis(tau, solution.highest_harmonic) @ solution.observed
-    pairs = zip(solution.scene.contacts, solution.contacts, strict=True)
+    omega = 2.0 * math.pi * solution.frequency_hz
+    given = [contact.at_frequency(omega) for contact in solution.scene.contacts]
+    pairs = zip(given, solution.contacts, strict=True)
     return {
         "time": (tau / (2.0 * math.pi * solution.frequency_hz)).tolist(),
         "displacement": displacement.tolist(),

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from solver.balance.kernels.gauge import find_gauge, let_hold
-from solver.contacts.kernels.columns import COLUMN_KIND, COLUMNS, KT, N0, N1, RATIO
+from solver.contacts.kernels.columns import COLUMN_KIND, COLUMNS, KT, N0, N1, OMEGA, RATIO
 from solver.contacts.kernels.laws import call_law
 from solver.contacts.kernels.normal_load import fill_load, tie
 from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED
@@ -31,6 +31,9 @@ def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, 
     copy_block(table, system.contacts)
     for c in range(nc):
         row, d = table[c], slope[c]
+        row[OMEGA] = system.omega
+        if system.kind == FREQUENCY:
+            row[OMEGA], d[OMEGA] = p, 1.0
         tied = not math.isnan(row[RATIO])
         if system.active[c] > 0.0 and system.kind >= COLUMN_KIND:
             column = system.kind - COLUMN_KIND

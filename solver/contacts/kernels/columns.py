@@ -7,7 +7,11 @@ from __future__ import annotations
 KT, MU, N0, N1, RATIO, PHASE = 0, 1, 2, 3, 4, 5
 # The first column a law may use as it likes, and how many there are.
 OWN, MOST_OWN = 6, 9
-COLUMNS = OWN + MOST_OWN
+# Of laws that follow the history of their motion: the frequency ω [rad/s], which the balance keeps up to
+# date, the nodes of a period, and what the law is to its kernel, see `solver.contacts.kernels.history`.
+OMEGA, NODES = OWN + MOST_OWN, OWN + MOST_OWN + 1
+HISTORY_LAW, HISTORY_STATES, HISTORY_FORM, HISTORY_WAY = NODES + 1, NODES + 2, NODES + 3, NODES + 4
+COLUMNS = HISTORY_WAY + 1
 # What λ is: COLUMN_KIND + j where it is the value in column j (less is in `solver.contacts.kernels.system`).
 COLUMN_KIND = 4
 # Elastic normal: stiffness [N/m], and 1.0 where the normal motion counts from the prestressed state.
@@ -35,6 +39,7 @@ KERNELS = (
     "solver.contacts.kernels.coulomb.ports:coulomb_sampled",
     "solver.contacts.kernels.circle.law:coulomb_circle",
     "solver.contacts.kernels.coulomb.box:coulomb_box",
+    "solver.contacts.kernels.history.law:history_law",
 )
 # Likewise those of second derivatives.
 SECOND_KERNELS = (

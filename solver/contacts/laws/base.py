@@ -149,6 +149,10 @@ class AnyContact(Element, InSpace):
 
     # Contact table and kernel
 
+    @classmethod
+    def prepare(cls) -> None:
+        """Compile what its kernel calls beside the kernels."""
+
     @property
     def kernel(self) -> str:
         """``module:NAME`` of the kernel for its settings."""
@@ -251,6 +255,11 @@ class AnyContact(Element, InSpace):
         return self.OPENS, may
 
     # A periodic motion
+
+    def at_frequency(self, omega: float) -> Self:
+        """The contact as it answers motions of an angular frequency [rad/s]: only rates make a difference."""
+        del omega
+        return self
 
     def force_at(self, motions: Real, load: Real, tau: Real) -> Real:
         """Return the force along the first motion [N] at the angles `tau`, evenly spaced from 0.

@@ -184,6 +184,7 @@ class Follows(Enum):
     POLYNOMIAL = 3
     CIRCLE = 4
     CIRCLE_SECOND = 5
+    HISTORY = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -207,6 +208,9 @@ class Row:
         Where a spring on one side begins [m].
     powers : tuple of float
         a1, a2, … of a polynomial spring [N/m^j]; `kt` is then the size of a1.
+    history, in_steps, states, damping, numbers : of a law given by functions
+        Its number (`solver.jit.law_functions`), whether it goes from sample to sample, how
+        many states it has, its damping at rest [N s/m], and its parameters.
     """
 
     name: str
@@ -223,6 +227,11 @@ class Row:
     presses: float = 1.0
     gap: float = 0.0
     powers: tuple[float, ...] = field(default=())
+    history: int = 0
+    in_steps: bool = False
+    states: int = 0
+    damping: float = 0.0
+    numbers: tuple[float, ...] = field(default=())
 
 
 class Motion(Enum):

@@ -21,6 +21,10 @@ SHIPPED = (
     "solver.contacts.laws.coulomb_3d",
     "solver.contacts.laws.gap",
     "solver.contacts.laws.polynomial",
+    "solver.contacts.laws.history.iwan",
+    "solver.contacts.laws.history.bouc_wen",
+    "solver.contacts.laws.history.dahl",
+    "solver.contacts.laws.history.coulomb_tanh",
 )
 _added: list[type[AnyContact]] = []
 _listeners: list[Callable[[], object]] = []

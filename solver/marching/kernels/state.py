@@ -20,6 +20,7 @@ ORDER = 8  # of the Taylor series; stable on the imaginary axis for h |lambda| <
 # Laws of the contacts.
 COULOMB, ELASTIC_NORMAL, GAP, POLYNOMIAL = 0, 1, 2, 3
 CIRCLE, CIRCLE_SECOND = 4, 5  # two rows, one after the other, of a contact with a circular limit
+HISTORY = 6  # given by functions, see `solver.marching.kernels.history`
 # What a contact does; a slipping one has its direction, +1 or -1. A gap is closed (STICK) or open.
 STICK, SEPARATED = 0, 2
 # How a run of periods ended.
@@ -33,7 +34,9 @@ class System(NamedTuple):
     `kt` is also the stiffness of a gap spring. Of the laws elastic-normal and circle: the normal motions,
     their stiffness, and the part of the normal force that is in equilibrium at rest; `presses` is 0 where
     another row has that force already. `powers` (n_contacts, degree) are the coefficients of polynomial
-    springs.
+    springs. Of laws given by functions: their numbers, whether they go from sample to sample, how many states
+    they have, their parameters (n_contacts, MOST_OWN), their damping at rest [N s/m], and the frequency
+    [rad/s].
     """
 
     A_start: Whole
@@ -66,21 +69,32 @@ class System(NamedTuple):
     presses: Real
     gap: Real
     powers: Real
+    history: Whole
+    in_steps: Whole
+    states: Whole
+    numbers: Real
+    damping: Real
+    omega: float
 
 
 class State(NamedTuple):
-    """Motion and contacts at one instant; changed in place. `mode`: STICK, SEPARATED, +1 or -1."""
+    """Motion and contacts at one instant; changed in place. `mode`: STICK, SEPARATED, +1 or -1.
+
+    `own` (n_contacts, most) are the states of laws given by functions.
+    """
 
     x: Real
     v: Real
     force: Real
     mode: Whole
+    own: Real
 
 
 class Series(NamedTuple):
     """Taylor coefficients over a step, row k belongs to s^k, s = 0..1; of u^j at [contact, j - 1, k].
 
-    `pull` is scratch, a force a DOF; `turn` that of slips in space, see `solver.marching.kernels.circle`.
+    `pull` is scratch, a force a DOF; `turn` that of slips in space, see `solver.marching.kernels.circle`, and
+    `given` (n_contacts, k) the force of laws given by functions.
     """
 
     x: Real
@@ -91,6 +105,7 @@ class Series(NamedTuple):
     normal: Real
     power: Real
     turn: Real
+    given: Real
 
 
 class Record(NamedTuple):
@@ -212,3 +227,21 @@ def motion_size(system: System, series: Series, c: int, normal: bool) -> float:
         x = series.x[k]
         total += abs(normal_slip(system, x, c) if normal else slip(system, x, c))
     return total
+
+
+@compiled
+def largest_change(now: Real, before: Real, scale: float) -> float:
+    """Return the largest change of a number, relative to `scale` if that is above 0."""
+    change = 0.0
+    for i in range(now.size):
+        change = max(change, abs(now[i] - before[i]))
+    return change / scale if scale > 0.0 else change
+
+
+@compiled
+def finite(state: State) -> bool:
+    """Return whether motion and velocity are finite numbers."""
+    total = 0.0
+    for i in range(state.x.size):
+        total += state.x[i] + state.v[i]
+    return math.isfinite(total)

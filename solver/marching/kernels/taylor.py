@@ -23,6 +23,14 @@ from solver.jit.decorators import compiled
 from solver.jit.separate import apart
 from solver.marching.kernels.circle import TURN_ROWS, circle_change, circle_series, close_circle, reach
 from solver.marching.kernels.event_roots import NONE, first_fall, value_at
+from solver.marching.kernels.history import (
+    advance_history,
+    agreed,
+    any_history,
+    begin_forces,
+    fit_forces,
+    reversal,
+)
 from solver.marching.kernels.state import (
     CHATTER,
     CIRCLE,
@@ -30,6 +38,7 @@ from solver.marching.kernels.state import (
     COULOMB,
     ELASTIC_NORMAL,
     GAP,
+    HISTORY,
     NOT_FINITE,
     ORDER,
     POLYNOMIAL,
@@ -42,6 +51,8 @@ from solver.marching.kernels.state import (
     Series,
     State,
     System,
+    finite,
+    largest_change,
     motion_size,
     new_record,
     new_series,
@@ -71,7 +82,9 @@ def _contact_series(system: System, state: State, series: Series, k: int) -> Non
     """Coefficient k of the contact forces from the motion's and the given load's."""
     for c in range(system.kt.size):
         mode, law = state.mode[c], system.law[c]
-        if law == CIRCLE_SECOND:
+        if law == HISTORY:
+            series.force[k, c] = series.given[c, k]
+        if law in (CIRCLE_SECOND, HISTORY):
             continue
         if law in (ELASTIC_NORMAL, CIRCLE):
             series.load[k, c] += system.kn[c] * normal_slip(system, series.x[k], c)
@@ -135,6 +148,21 @@ def _expand(system: System, state: State, tau: float, h: float, series: Series) 
         _contact_series(system, state, series, k + 1)
 
 
+@apart
+def _expand_all(system: System, state: State, tau: float, h: float, series: Series) -> None:
+    """As `_expand`, the forces of laws given by functions too."""
+    if not any_history(system):
+        _expand(system, state, tau, h, series)
+        return
+    begin_forces(system, state, series)
+    rounds, change = 0, np.inf
+    while not agreed(change, rounds):
+        _expand(system, state, tau, h, series)
+        change = fit_forces(system, state, series, h)
+        rounds += 1
+    _expand(system, state, tau, h, series)
+
+
 @compiled
 def _limit(system: System, series: Series, c: int, direction: int, q: Real) -> None:
     """Put the distance mu N - direction * f of contact c to its limit into q."""
@@ -171,6 +199,8 @@ def _next_change(
     when, target = NONE, mode
     if law in (POLYNOMIAL, CIRCLE_SECOND):
         return when, target
+    if law == HISTORY:
+        return reversal(system, state, series, c, q)
     if law == CIRCLE:
         return circle_change(system, state, series, c, q)
     if law == GAP:
@@ -273,7 +303,7 @@ def _step(
     sample = 0
     while True:
         rest = h - gone
-        _expand(system, state, start + gone, rest, series)
+        _expand_all(system, state, start + gone, rest, series)
         when, target, which = NONE, STICK, -1
         far = 1.0
         for c in range(system.kt.size):
@@ -288,6 +318,8 @@ def _step(
             place = max((sample / per_step * h - gone) / rest, 0.0)
             _sample(system, series, place, step * per_step + sample, dof, record)
             sample += 1
+        if any_history(system):
+            advance_history(system, state, series, rest, end)
         _advance(system, state, series, end)
         if which < 0 and end == 1.0:
             return True
@@ -299,22 +331,6 @@ def _step(
             return False
         if h - gone <= 0.0:
             return True
-
-
-@compiled
-def _largest_change(now: Real, before: Real, scale: float) -> float:
-    change = 0.0
-    for i in range(now.size):
-        change = max(change, abs(now[i] - before[i]))
-    return change / scale if scale > 0.0 else change
-
-
-@compiled
-def _finite(state: State) -> bool:
-    total = 0.0
-    for i in range(state.x.size):
-        total += state.x[i] + state.v[i]
-    return math.isfinite(total)
 
 
 @compiled
@@ -357,7 +373,7 @@ def _run_periods(
     series = new_series(
         np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, n_contacts)), np.empty((rows, n_contacts)),
         np.empty(n), np.empty((rows, n_contacts)), np.empty((n_contacts, system.powers.shape[1], rows)),
-        np.zeros((n_contacts, TURN_ROWS, rows)),
+        np.zeros((n_contacts, TURN_ROWS, rows)), np.zeros((n_contacts, rows)),
     )  # fmt: skip
     q = np.empty(rows)
     for period in range(change.size):
@@ -372,12 +388,10 @@ def _run_periods(
             for c in range(n_contacts):
                 top_force = max(top_force, abs(state.force[c]))
         change[period] = max(
-            _largest_change(state.x, x, top_x),
-            max(
-                _largest_change(state.v, v, max(top_x, top_v)), _largest_change(state.force, force, top_force)
-            ),
+            largest_change(state.x, x, top_x),
+            max(largest_change(state.v, v, max(top_x, top_v)), largest_change(state.force, force, top_force)),
         )
-        if not _finite(state):
+        if not finite(state):
             return NOT_FINITE, period + 1
         if change[period] < tolerance:
             return SETTLED, period + 1

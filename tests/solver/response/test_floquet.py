@@ -193,8 +193,9 @@ def trajectory(point: Point, damping: float, move: np.ndarray, periods: int) -> 
         mode, force = kernel.STICK, math.copysign(contact.mu * contact.N0, onset) + contact.kt * (x - onset)
         force += contact.kt * (move[0] - move[2])
     state = kernel.State(
-        np.array([x + move[0]]), np.array([v + move[1]]), np.array([force]), np.array([mode])
-    )
+        np.array([x + move[0]]), np.array([v + move[1]]), np.array([force]), np.array([mode]),
+        np.zeros((1, 1)),
+    )  # fmt: skip
     one, many = np.zeros(0), np.zeros((1, 0))
     record = kernel.Record(one, one, many, many, many)
     states = [(state.x[0], state.v[0])]

@@ -26,7 +26,7 @@ K, LIMIT = columns.OWN, columns.OWN + 1
 
 
 @apart
-def iwan(
+def sliders(
     U: Real, ks: Integer, load: Real, load_ks: Integer, row: Real, slope: Real, dload: Real,  # noqa: ARG001
     cos_table: Real, sin_table: Real, segments: Real, F: Real, dF_dU: Real, dF_dp: Real,
 ) -> tuple[int, int]:  # fmt: skip
@@ -57,7 +57,7 @@ def iwan(
     return (STUCK if stuck else SLIPPING), piece
 
 
-class IwanContact(AnyContact):
+class SlidersContact(AnyContact):
     """A joint that slips little by little, Iwan's element.
 
     Attributes
@@ -68,9 +68,9 @@ class IwanContact(AnyContact):
         Force at which all of it slips [N].
     """
 
-    LAW: ClassVar[str] = "iwan"
+    LAW: ClassVar[str] = "sliders"
     FORCE: ClassVar[str] = f"{SLIDERS} springs `k / {SLIDERS}`, each with a slider; all slip at `limit`"
-    KERNEL: ClassVar[str] = "iwan:iwan"
+    KERNEL: ClassVar[str] = "sliders:sliders"
     PARAMETERS: ClassVar[Mapping[str, Quantity]] = {
         "k": Quantity(column=K, unit="N/m", least=0.0, wanted="must be a number > 0 and <= 1e15 [N/m]"),
         "limit": Quantity(column=LIMIT, unit="N", least=0.0, wanted="must be a number > 0 and <= 1e15 [N]"),
@@ -78,7 +78,7 @@ class IwanContact(AnyContact):
     HELD: ClassVar[tuple[Held, ...]] = (Held(K),)
     RUBBING: ClassVar[tuple[int, ...]] = (0,)
 
-    law: Literal["iwan"]
+    law: Literal["sliders"]
     k: Positive
     limit: Positive
 
