@@ -23,7 +23,6 @@ from solver.scene.cyclic.annulus import check_in_annulus, written_out
 from solver.scene.harmonics import MOST_HARMONICS, forced_harmonics, kept_harmonics
 from solver.scene.parameter_paths import AMPLITUDE
 from solver.scene.scene import Scene
-from solver.scene.terms.speed import at_frequency
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,7 +132,7 @@ def build(
         if frequency_hz is None:
             raise SettingError("frequency_hz", None, f"is needed when the parameter is `{path}`")
         omega = 2.0 * math.pi * check_frequency("frequency_hz", frequency_hz)
-        scene = at_frequency(scene, frequency_hz)
+        scene = scene.at_frequency(frequency_hz)
     if parameter.kind is Kind.LEVEL:
         check_level(scene)
     if parameter.kind is Kind.LEVEL and scene.value("excitation.amplitude") == 0.0:
@@ -157,7 +156,7 @@ def for_parameter(balance: Balance, path: str, frequency_hz: float) -> Balance:
         Even harmonics were left out, but λ calls for them: build the first balance with them.
     """
     if balance.scene.speed_order is not None:
-        scene = at_frequency(balance.scene, frequency_hz)
+        scene = balance.scene.at_frequency(frequency_hz)
         effects = replace(balance.effects, even_harmonics=int(balance.system.ks[0]) == 0)
         return build(scene, path, harmonics=balance.n_harmonics, frequency_hz=frequency_hz, effects=effects)
     parameter = resolve(balance.scene, path)

@@ -8,28 +8,25 @@ to the stiffness given each solution is the guess of the next.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.balance.kernels.newton import from_stuck, newton
 from solver.contacts.kernels.columns import KT, KT_SECOND
-from solver.contacts.kernels.system import System, by_reference
+from solver.contacts.kernels.system import Evaluation, Receptance, System, by_reference
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
-
-if TYPE_CHECKING:
-    from solver.balance.workspace import Workspace
 
 SOFTEST = 1e-4  # share of the stiffness to begin with
 _FACTOR, _LARGEST, _LEAST = 10.0, 100.0, 1.1  # from one stiffness to the next
 _FEW = 8  # iterations up to which the next factor is larger
 
 
-def solve_softened(workspace: Workspace, u: Real, p: float) -> tuple[bool, int, float]:
+def solve_softened(
+    system: System, linear: Receptance, point: Evaluation, u: Real, p: float
+) -> tuple[bool, int, float]:
     """Raise the tangential stiffness of every contact to its own, the result in `u`; as `newton`."""
-    system, linear, point = workspace.balance.system, workspace.linear, workspace.point
-    contacts = system.contacts
+    contacts, own = system.contacts, by_reference(system)
 
     def softened(share: float) -> System:
         table = contacts.copy()
@@ -40,7 +37,7 @@ def solve_softened(workspace: Workspace, u: Real, p: float) -> tuple[bool, int, 
     good, spent, norm = from_stuck(softened(here), linear, u, p, point)
     while good and here < 1.0:
         ahead, trial = min(1.0, here * factor), u.copy()
-        receptance(workspace.system, p, linear)
+        receptance(own, p, linear)
         closer, more, norm = newton(softened(ahead), linear, trial, p, 0.0, point)
         spent += more
         if closer:

@@ -167,7 +167,8 @@ class Workspace:
         system, linear, point = self.system, self.linear, self.point
         stuck = partial(_in_place, from_stuck, system, linear, point)
         rungs = partial(_in_place, ladder, system, linear, point)
-        soft, at_rest = partial(solve_softened, self), partial(self._by_level, at_rest=True)
+        soft = partial(solve_softened, self.balance.system, linear, point)
+        at_rest = partial(self._by_level, at_rest=True)
         if self.balance.system.constant_mean:
             return stuck, soft, at_rest, self._from_fewer, rungs, self._by_level
         return stuck, self._from_fewer, soft, rungs, self._by_level

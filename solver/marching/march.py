@@ -26,7 +26,6 @@ from solver.marching.result import MarchResult, MarchStatus, describe
 from solver.marching.start import MarchStart, state_at
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import CyclicStructure, Excitation, Scene
-from solver.scene.terms.speed import at_frequency
 
 FloatArray = NDArray[np.float64]
 LEAST_STEPS = 64
@@ -124,7 +123,7 @@ def march(
     """
     begin = time.perf_counter()
     _check(frequency_hz, tolerance, max_periods)
-    scene = at_frequency(scene, frequency_hz)
+    scene = scene.at_frequency(frequency_hz)
     whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
     omega = 2.0 * math.pi * frequency_hz
     equations = equations_of_motion(whole, omega)

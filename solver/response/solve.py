@@ -28,7 +28,6 @@ from solver.response.contact_response import OPENS, ContactResponse, ContactStat
 from solver.response.history_dependence import has_another_solution, history_of
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
 from solver.scene.scene import Scene
-from solver.scene.terms.speed import at_frequency
 
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
@@ -62,7 +61,7 @@ def solve(
     """
     begun = time.perf_counter()
     check_frequency("frequency_hz", frequency_hz)
-    scene = at_frequency(scene, frequency_hz)
+    scene = scene.at_frequency(frequency_hz)
     omega = 2.0 * math.pi * frequency_hz
     good_enough = True
     if accuracy is None:
@@ -96,7 +95,7 @@ def describe(
     contacts = contact_responses(workspace, found.u, omega)
     observed = fourier.to_full(measures.observed, balance.system.ks, balance.highest_harmonic)
     solution = Solution(
-        scene=at_frequency(balance.scene, frequency_hz),
+        scene=balance.scene.at_frequency(frequency_hz),
         frequency_hz=frequency_hz,
         n_harmonics=balance.n_harmonics,
         status=SolutionStatus.CONVERGED,

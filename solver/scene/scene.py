@@ -281,6 +281,13 @@ class Scene(Part):
         """
         return scene_paths.with_values(self, values)
 
+    def at_frequency(self, frequency_hz: float) -> Scene:
+        """The scene at a frequency [Hz] of its engine-order line; itself where it is on none."""
+        if self.speed_order is None:
+            return self
+        there: Scene = at_speed(self, 60.0 * frequency_hz / self.speed_order)
+        return there
+
     def parameter_paths(self) -> tuple[str, ...]:
         """Every path `value` and `with_values` take (``frequency`` belongs to the run, not to the scene)."""
         return scene_paths.parameter_paths(self)

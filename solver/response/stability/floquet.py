@@ -23,7 +23,6 @@ from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import annulus
 from solver.scene.scene import CyclicStructure, Scene
-from solver.scene.terms.speed import at_frequency
 
 Motions = tuple[Real, ...]  # of every contact, (ports, 2H + 1) full coefficients [m]
 GROWS = 1e-9  # a multiplier's modulus beyond 1 that is more than rounding
@@ -128,7 +127,7 @@ def branch_stability(branch: Branch, points: Iterable[int] | None = None) -> tup
         every = fourier.to_full(branch.coefficients[i], balance.system.ks, balance.highest_harmonic)
         motions = tuple(np.split(every, balance.system.first_port[1:-1]))
         if branch.parameter == "frequency":
-            found.append(_stability(at_frequency(balance.scene, value), value, motions))
+            found.append(_stability(balance.scene.at_frequency(value), value, motions))
         else:
             scene = balance.scene.with_values({branch.parameter: value})
             found.append(_stability(scene, balance.system.omega / PERIOD, motions))

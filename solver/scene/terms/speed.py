@@ -1,20 +1,17 @@
 """What depends on the speed of rotation: normal loads and forces, and the speed along an engine-order line.
 
 Along a line the speed follows the frequency, speed [1/min] = 60 f / order, so that a sweep over the frequency
-is one over the speed. `at_frequency` is the scene at one point of it.
+is one over the speed. `Scene.at_frequency` is the scene at one point of it.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from solver.contacts.fields import NonNegative, Part, Signed
-
-if TYPE_CHECKING:
-    from solver.scene.scene import Scene
 
 Coefficients = Annotated[tuple[Signed, ...], Field(min_length=1, max_length=3)]
 Table = Annotated[tuple[tuple[NonNegative, Signed], ...], Field(min_length=2, max_length=3)]
@@ -75,11 +72,3 @@ def at_speed(scene: Any, speed: float) -> Any:
     there = scene.model_copy(update={"speed": float(speed), "speed_order": None, "with_speed": ()})
     values = there.with_values({each.path: each.at(speed) for each in scene.with_speed})
     return values.model_copy(update={"with_speed": scene.with_speed})
-
-
-def at_frequency(scene: Scene, frequency_hz: float) -> Scene:
-    """Return the scene at a frequency [Hz] of its engine-order line; itself where it is on none."""
-    if scene.speed_order is None:
-        return scene
-    there: Scene = at_speed(scene, 60.0 * frequency_hz / scene.speed_order)
-    return there
