@@ -253,8 +253,9 @@ class Branch(Drawn):
 
     @property
     def folds(self) -> int:
-        """How often the branch turned back in its parameter."""
-        return int(np.count_nonzero(np.diff(np.sign(np.diff(self.values)))))
+        """How often the branch turned back in its parameter; two points at one value are no turn."""
+        ahead = np.sign(np.diff(self.values))
+        return int(np.count_nonzero(np.diff(ahead[ahead != 0.0])))
 
     @property
     def bifurcations(self) -> Bifurcations:

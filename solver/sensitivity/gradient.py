@@ -30,7 +30,7 @@ from solver.balance.parameter_derivatives import (
 )
 from solver.balance.speed_line import check_no_line
 from solver.balance.workspace import Workspace
-from solver.contacts.kernels.columns import KT, MU, NODES
+from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.laws import law_force
 from solver.contacts.kernels.system import evaluation_by_value
 from solver.errors import SettingError
@@ -147,8 +147,7 @@ class Sensitivities:
         ne, nc, n = balance.system.laws.size, balance.n_ports, balance.n_coefficients
         acts = np.any(self._slopes != 0.0, axis=(0, 2))
         self._wanted = (acts & (balance.system.jenkins == 1)).astype(np.int64)
-        asks_for_velocities = balance.system.contacts[:, NODES] > 0.0
-        self._others = np.flatnonzero((acts | asks_for_velocities) & (balance.system.jenkins == 0))
+        self._others = np.flatnonzero(acts & (balance.system.jenkins == 0))
         self._x, self._tops = np.zeros(n), np.zeros((2, EXTREME_COLUMNS))
         self._weights, self._pulls = np.zeros((2, nc, n)), np.zeros((2, nc * n))
         self._by = np.zeros((2, ne * PER_ELEMENT + BESIDES))
@@ -295,7 +294,7 @@ class Sensitivities:
         slopes = self._rows @ by
         by_omega = float(by[self.balance.system.laws.size * PER_ELEMENT + BY_OMEGA])
         for e in self._others:
-            by_omega += self._add_other_law(int(e), u, omega, self._weights[top], slopes)
+            self._add_other_law(int(e), u, omega, self._weights[top], slopes)
         if self._matrices is not None or self._dampings:
             self._add_structure(u, omega, top, slopes)
         return by_omega, slopes
@@ -316,29 +315,19 @@ class Sensitivities:
                 row[ne * PER_ELEMENT + BY_PHASE] = 1.0
         return rows
 
-    def _add_other_law(self, e: int, u: Real, omega: float, weights: Real, slopes: Real) -> float:
-        """Add w·∂F/∂p of an element that follows another law: its force once for each path that acts.
-
-        Returns
-        -------
-        w·∂F/∂ω, of a law that asks for velocities.
-        """
+    def _add_other_law(self, e: int, u: Real, omega: float, weights: Real, slopes: Real) -> None:
+        """Add w·∂F/∂p of an element that follows another law: its force once for each path that acts."""
         system, n, point = self.balance.system, self.balance.n_coefficients, self._point
         begin, end = int(system.first_port[e]), int(system.first_port[e + 1])
         blocks = slice(int(system.first_block[e]), int(system.first_block[e + 1]))
-        table, load, by_omega, _ = contact_values(system, omega, 0.0)
-
-        def along(slope: Real, dload: Real) -> float:
+        table, load, _, _ = contact_values(system, omega, 0.0)
+        for i in np.flatnonzero(np.any(self._slopes[:, e] != 0.0, axis=1)):
             law_force(
                 system.laws[e], u[begin * n : end * n].reshape(-1, n), system.ks, load[e], system.load_ks,
-                table[e], slope, dload, system.cos_table, system.sin_table, point.segments,
-                point.F[begin:end], point.dF_dU[blocks], point.dF_dp[begin:end],
+                table[e], self._slopes[i, e], self._loads[i, e], system.cos_table, system.sin_table,
+                point.segments, point.F[begin:end], point.dF_dU[blocks], point.dF_dp[begin:end],
             )  # fmt: skip
-            return float(np.sum(weights[begin:end] * point.dF_dp[begin:end]))
-
-        for i in np.flatnonzero(np.any(self._slopes[:, e] != 0.0, axis=1)):
-            slopes[i] += along(self._slopes[i, e], self._loads[i, e])
-        return along(by_omega[e], np.zeros(load.shape[1])) if table[e, NODES] > 0.0 else 0.0
+            slopes[i] += float(np.sum(weights[begin:end] * point.dF_dp[begin:end]))
 
     def _add_structure(self, u: Real, omega: float, top: int, slopes: Real) -> None:
         """Add Re yᵀ (∂f/∂q − (∂L/∂q)ᴴ F − (∂Z/∂q) x) − Re λᵀ (∂L/∂q) x of every harmonic."""

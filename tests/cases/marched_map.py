@@ -61,7 +61,7 @@ class MarchedMap:
     """The map in the coordinates of `solver.response.stability.monodromy.Monodromy.matrix`."""
 
     def __init__(self, solution: Solution, steps: int = 1024) -> None:
-        self.system, _ = equations_of_motion(solution.scene, 2.0 * math.pi * solution.frequency_hz)
+        self.system = equations_of_motion(solution.scene, 2.0 * math.pi * solution.frequency_hz).system
         self.steps = steps
         amplitudes = all_coordinates(solution)
         orders = np.arange(amplitudes.shape[0])
@@ -75,7 +75,7 @@ class MarchedMap:
         for start in starts:
             place = slice(start.row, start.row + len(start.forces))
             force[place], mode[place] = start.forces, start.mode
-        self.state = kernel.State(x, v, force, mode)
+        self.state = kernel.State(x, v, force, mode, np.zeros((row, 1)))
         self.memory = [(s.row, len(s.forces)) for s in starts if self._remembers(s)]
         self._limits = {row: math.hypot(*force[row : row + 2]) for row, _ in self.memory}
 
@@ -120,7 +120,7 @@ class MarchedMap:
                 force[c] += kt[c] * (self._row(c) @ move[:n] - move[place])
                 place += 1
         x, v = self.state.x + move[:n], self.state.v + move[n : 2 * n]
-        return kernel.State(x, v, force, self.state.mode.copy())
+        return kernel.State(x, v, force, self.state.mode.copy(), self.state.own.copy())
 
     def march(self, state: kernel.State, periods: int = 1) -> kernel.State:
         """The state some periods later."""

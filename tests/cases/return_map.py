@@ -22,9 +22,10 @@ class Return:
 
     def __init__(self, scene: Scene, frequency_hz: float, steps: int = 1024) -> None:
         whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
-        self.system, _, index = equations_of_motion(whole, 2.0 * math.pi * frequency_hz)
+        equations = equations_of_motion(whole, 2.0 * math.pi * frequency_hz)
+        self.system = equations.system
         self.steps = steps
-        self.orbit = state_at(self.system, MarchStart(), index, (), 1.0)
+        self.orbit = state_at(equations, MarchStart(), (), 1.0)
         code, _ = self.march(self.orbit, 5000, 1e-13)
         assert code == kernel.SETTLED
         self.ports = linear_model(whole).contact_here

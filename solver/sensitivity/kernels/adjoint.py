@@ -75,7 +75,7 @@ def amplitude_slopes(
         step_back(system, point, pulls[top])
         _fill_pull(system, point, weights[top], pulls[top])
         _by_linear_part(system, linear, u, point, tops[top], pulls[top], by[top])
-        _by_loads(system, point, weights[top], by[top])
+        _by_forces(system, point, weights[top], by[top])
     _by_contacts(system, u, omega, point, wanted, count, weights, by)
     return count
 
@@ -168,8 +168,8 @@ def _by_linear_part(
 
 
 @compiled
-def _by_loads(system: System, point: Evaluation, weights: Real, by: Real) -> None:
-    """Add w·∂F/∂ω to the slope by ω: of normal loads that follow the frequency."""
+def _by_forces(system: System, point: Evaluation, weights: Real, by: Real) -> None:
+    """Add w·∂F/∂ω to the slope by ω: of normal loads that follow the frequency, and of forces of velocity."""
     for c in range(system.owner.size):
         for i in range(coefficient_count(system.ks)):
             by[system.laws.size * PER_ELEMENT + BY_OMEGA] += weights[c, i] * point.dF_dp[c, i]

@@ -179,7 +179,7 @@ def test_a_multiplier_goes_through_one_at_each_fold(damping: float):
 def trajectory(point: Point, damping: float, move: np.ndarray, periods: int) -> np.ndarray:
     """(x, v) at the ends of periods, from a point's motion moved by (x, v, place of the slider if held)."""
     omega, (contact,) = PERIOD * point.frequency_hz, UNSTABLE.contacts
-    system, _, _ = equations_of_motion(UNSTABLE, omega)
+    system = equations_of_motion(UNSTABLE, omega).system
     system = system._replace(B_value=np.full_like(system.B_value, damping / omega))
     orders = np.arange(1, point.slip.size // 2 + 1)
     x, v = point.slip[0] + point.slip[1::2].sum(), float(orders @ point.slip[2::2])
