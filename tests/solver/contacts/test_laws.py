@@ -58,7 +58,9 @@ def gap_spring(rng: Random, H: int) -> Element:
 
 def polynomial(rng: Random, H: int) -> Element:
     row = row_of()
-    row[columns.A_1 : columns.A_1 + columns.MOST_DEGREE] = rng.normal(size=columns.MOST_DEGREE) * (rng.uniform(size=columns.MOST_DEGREE) < 0.4)
+    row[columns.A_1 : columns.A_1 + columns.MOST_DEGREE] = rng.normal(size=columns.MOST_DEGREE) * (
+        rng.uniform(size=columns.MOST_DEGREE) < 0.4
+    )
     row[columns.A_1] += 0.1
     return Element(law=POLYNOMIAL, U=motion(rng, H, 0.5)[None], row=row)
 
