@@ -59,6 +59,44 @@ def test_a_sweep_is_the_solver_s_and_is_stored(shipped: httpx.Client) -> None:
     }  # fmt: skip
 
 
+DUFFING: dict[str, Any] = {
+    "name": "duffing",
+    "structure": {
+        "kind": "lumped",
+        "masses": {"x": 1.0},
+        "springs": [{"between": ["x", "ground"], "k": 1.0, "c": 0.2}],
+    },
+    "contacts": [{"name": "cubic", "law": "polynomial", "between": ["x", "ground"], "a3": 1.0}],
+    "excitation": {"dof": "x", "amplitude": 15.0},
+    "observe": {"dof": "x", "band": [0.23, 0.3]},
+}
+
+
+def test_all_solutions_of_a_spring_that_bends_are_a_job(shipped: httpx.Client) -> None:
+    """At 1.6 rad/s a march settles at 3.9161 and at its mirror image; 3.3130 between them is not stable."""
+    body = {"kind": "solve", "scene": DUFFING, "frequency_hz": 1.6 / (2.0 * np.pi), "all": True, "starts": 6}
+    job = finished(shipped, {**body, "harmonics": 9})
+    assert job["status"] == "successful", job["error"]
+    found = job["result"]
+    assert not found["complete"]
+    stable = [each["max_abs"] for each in found["solutions"] if each["stability"]["stable"]]
+    assert any(value == pytest.approx(3.9161, rel=1e-3) for value in stable)
+    lost = [each["max_abs"] for each in found["solutions"] if not each["stability"]["stable"]]
+    assert any(value == pytest.approx(3.3130, rel=1e-3) for value in lost)
+
+
+def test_a_sweep_follows_the_branches_that_leave_it(shipped: httpx.Client) -> None:
+    body = {"kind": "sweep", "scene": DUFFING, "harmonics": 7, "stability": True, "branches": True}
+    job = finished(shipped, body)
+    assert job["status"] == "successful", job["error"]
+    result = job["result"]
+    assert result["stability_known_by"] == "multipliers"
+    assert result["unstable"]
+    others = [branch for each in result["branches"] for branch in each["branches"]]
+    assert others
+    assert len(job["sweeps"]) == 1 + len(others)
+
+
 def test_what_is_swept_has_no_single_value(shipped: httpx.Client) -> None:
     body = {"kind": "sweep", "scene": "two-dof", "parameter": "damper.N0", "from": 20, "to": 200}
     job = finished(shipped, {**body, "frequency_hz": 1.0, "harmonics": 5})

@@ -18,7 +18,9 @@ OVER = {**TWO, "parameter": "damper.N0", "from": 60, "to": 90}
 MARCH = {"scene": "two-dof", "frequency_hz": 1.2}
 BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
     "solve": ("solve", {**TWO, "frequency_hz": 1.2}),
+    "solve for all": ("solve", {**TWO, "frequency_hz": 1.2, "all": True, "starts": 2}),
     "sweep": ("sweep", TWO),
+    "sweep with branches": ("sweep", {**TWO, "from": 1.0, "to": 1.02, "stability": True, "branches": True}),
     "map": ("map", {**OVER, "steps": 3, "frequencies": 5}),
     "map without a ridge": ("map", {**OVER, "steps": 3, "frequencies": 5, "ridge": False}),
     "peaks": ("peaks", {**OVER, "checks": 1}),
@@ -38,7 +40,17 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
     "march": ("march", {**MARCH, "history": True}),
     "a march that does not settle": ("march", {**MARCH, "max_periods": 1}),
 }
-SOMETIMES = {"mean_range", "history"}
+SOMETIMES = {
+    "mean_range",
+    "history",
+    "solutions",
+    "complete",
+    "missing_by_signs",
+    "starts",
+    "stopped",
+    "note",
+    "branches",
+}
 
 
 class Shipped:

@@ -1,4 +1,4 @@
-"""The kind `solve`: the periodic response at one frequency."""
+"""The kind `solve`: the periodic response at one frequency, or all that are found."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from service.jobs.kind_view import Json, KindView, ReadSweep, StoredSweep
 from service.jobs.kinds.registry.results import Amplitude, KindResult
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
+from solver.response.stability import MOST_STARTS
 from solver.scene.examples import DAMPER_LOAD
 from solver.scene.scene import Scene
 
@@ -22,18 +23,37 @@ if TYPE_CHECKING:
 
 
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.2, "set": {DAMPER_LOAD: 80}}
+_EVERY: dict[str, Any] = {"scene": "two-dof", "frequency_hz": 1.05, "all": True, "starts": 8}
+_STOPPED = "The search was stopped: these are the solutions found until then."
 
 
 class SolveRequest(HarmonicRequest):
-    """One response; `frequency_hz` is the excitation frequency [Hz]."""
+    """One response, or all that a search finds.
 
-    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE]})
+    Attributes
+    ----------
+    frequency_hz : float
+        Excitation frequency [Hz].
+    every : bool
+        Look for all solutions (`all` in the body).
+    starts : int
+        Random starts of that search.
+    seed : int
+        Of their random numbers.
+    """
+
+    model_config = ConfigDict(validate_by_alias=True, json_schema_extra={"examples": [_EXAMPLE, _EVERY]})
 
     frequency_hz: FrequencyHz = Field(description="Excitation frequency [Hz].")
+    every: bool = Field(
+        default=False, alias="all", strict=True, description="Look for all solutions, with their stability."
+    )
+    starts: int = Field(default=40, strict=True, ge=0, le=MOST_STARTS, description="Random starts of `all`.")
+    seed: int = Field(default=0, strict=True, ge=0, lt=2**63, description="Of the random starts of `all`.")
 
 
 class SolveResult(KindResult):
-    """One periodic response."""
+    """One periodic response: of a search for all, the largest."""
 
     scene: str
     frequency_hz: float
@@ -57,23 +77,45 @@ class SolveResult(KindResult):
     mean_range: list[float | None] | None = Field(
         default=None, description="Means that any history can leave [m], if the mean depends on it."
     )
+    solutions: list[dict[str, Any]] | None = Field(
+        default=None, description="Of a search for all: each solution with its stability, largest first."
+    )
+    complete: bool | None = Field(default=None, description="Whether these are proven to be all.")
+    missing_by_signs: int | None = Field(
+        default=None, description="How many are missing at least, by the signs of the determinants."
+    )
+    starts: int | None = Field(default=None, description="Random starts that were made.")
+    stopped: bool | None = Field(default=None, description="Whether the search was ended before its end.")
+    note: str | None = Field(default=None, description="What is known of the list.")
 
 
 def resolve(request: SolveRequest, source: SceneSource) -> Resolved:
     """Look up the scene, check the size."""
     scene = resolve_scene(request, source)
     require(balance_issues("/harmonics", scene, request.harmonics))
-    return resolved(scene, frequency_hz=request.frequency_hz, harmonics=request.harmonics)
+    search = {"all": True, "starts": request.starts, "seed": request.seed} if request.every else {}
+    return resolved(scene, frequency_hz=request.frequency_hz, harmonics=request.harmonics, **search)
 
 
-def run(spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
-    """Solve the balance."""
-    solution = solver.solve(
-        Scene.from_dict(spec["scene"]), frequency_hz=spec["frequency_hz"], harmonics=spec["harmonics"]
+def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
+    """Solve the balance, once or from many starts."""
+    scene, at = Scene.from_dict(spec["scene"]), spec["frequency_hz"]
+    if not spec.get("all"):
+        solution = solver.solve(scene, frequency_hz=at, harmonics=spec["harmonics"])
+        return JobOutput.of(solution, reached=solution.converged)
+    found = solver.solve_all(
+        scene, frequency_hz=at, harmonics=spec["harmonics"], starts=spec["starts"], seed=spec["seed"],
+        on_progress=progress, should_stop=should_stop,
+    )  # fmt: skip
+    largest = (
+        found.solutions[0].solution
+        if found.solutions
+        else solver.solve(scene, frequency_hz=at, harmonics=spec["harmonics"])
     )
-    return JobOutput.of(
-        solution,
-        reached=solution.converged,
+    seconds = {"seconds": found.seconds}
+    return JobOutput(
+        result=largest.to_json() | found.to_json() | seconds,
+        shortfall=_STOPPED if found.stopped else None if found.solutions else largest.status.value,
     )
 
 
@@ -93,7 +135,7 @@ SOLVE = JobKind(
     result=SolveResult,
     view=KindView(
         result="the response at one frequency",
-        flags={"frequency_hz": "--frequency"},
+        flags={"frequency_hz": "--frequency", "every": "--all"},
         draw=draw,
     ),
 )

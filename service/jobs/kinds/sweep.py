@@ -64,6 +64,10 @@ class SweepRequest(HarmonicRequest):
         Excitation frequency [Hz] of a sweep of another parameter.
     limit : float or None
         Amplitude [m] above which the resonance band is measured.
+    multipliers : bool
+        Floquet multipliers at every point (`stability` in the body).
+    switched : bool
+        Follow the branches that leave at branch points too (`branches` in the body).
     """
 
     model_config = ConfigDict(
@@ -79,6 +83,13 @@ class SweepRequest(HarmonicRequest):
     limit: PositiveNumber | None = Field(
         default=None, description="Amplitude [m] above which the resonance band is measured."
     )
+    multipliers: bool = Field(
+        default=False, alias="stability", strict=True, description="Floquet multipliers at every point."
+    )
+    switched: bool = Field(
+        default=False, alias="branches", strict=True,
+        description="Follow the branches that leave at branch points too.",
+    )  # fmt: skip
 
 
 class SweepResult(EndedResult):
@@ -114,6 +125,9 @@ class SweepResult(EndedResult):
     stability_known_by: str = Field(
         default="", description="uniqueness, determinant (real perturbations of the same period) or nothing."
     )
+    branches: list[dict[str, Any]] | None = Field(
+        default=None, description="At each branch point its tangents and the branches that leave there."
+    )
     mean_undetermined: bool
     largest_residual: float | None
     seconds: float
@@ -142,6 +156,8 @@ def resolve(request: SweepRequest, source: SceneSource) -> Resolved:
         frequency_hz=request.frequency_hz,
         harmonics=request.harmonics,
         limit=request.limit,
+        **({"stability": True} if request.multipliers else {}),
+        **({"branches": True} if request.switched else {}),
     )
 
 
@@ -185,10 +201,20 @@ def run_on(
             raise
         checkpoints.begin_anew(str(error))
         branch = _follow(spec, progress, should_stop, checkpoints)
-    return JobOutput.of(
-        branch,
-        reached=branch.completed,
-        sweeps=(sweep_record(branch, spec["frequency_hz"]),) if len(branch.values) else (),
+    found = branch.to_json()
+    others: tuple[Branch, ...] = ()
+    if spec.get("stability"):
+        found |= solver.bifurcations(branch, multipliers=True).of_a_branch()
+    if spec.get("branches"):
+        switched = solver.switch_branches(branch)
+        found["branches"] = [each.to_json() for each in switched]
+        others = tuple(other for each in switched for other in each.branches)
+    return JobOutput(
+        result=found,
+        sweeps=tuple(
+            sweep_record(each, spec["frequency_hz"]) for each in (branch, *others) if len(each.values)
+        ),
+        shortfall=None if branch.completed else branch.status.value,
     )
 
 
@@ -251,6 +277,6 @@ SWEEP = JobKind(
     view=KindView(
         result="peaks, band, folds",
         sweeps="the branch",
-        flags={"frequency_hz": "--frequency"},
+        flags={"frequency_hz": "--frequency", "multipliers": "--stability", "switched": "--branches"},
     ),
 )

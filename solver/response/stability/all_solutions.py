@@ -19,6 +19,7 @@ from solver.balance.simplifications import Effects
 from solver.errors import SettingError
 from solver.response.solution import Solution
 from solver.response.solve import describe
+from solver.response.stability import MOST_STARTS
 from solver.response.stability.floquet import Stability, stability
 from solver.response.stability.residual_forces import AmplitudeRange, amplitude_range
 from solver.response.stability.search import Search
@@ -26,7 +27,6 @@ from solver.response.stability.uniqueness import Uniqueness, uniqueness
 from solver.results.told import Piece
 from solver.scene.scene import Scene
 
-MOST_STARTS = 10_000
 INCOMPLETE = "The list may be incomplete: no search finds every solution for certain."
 MISSING = (
     "By the signs of the determinants at least {} more should exist: more starts may find them. " + INCOMPLETE
