@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ from sqlalchemy import func, select, text, update
 
 from service.cli import main
 from service.client.embedded import EmbeddedService
+from service.db import revisions
 from service.db.clock import utc_now
 from service.db.engine import Database
 from service.db.integrity import check
@@ -57,6 +60,15 @@ def ended(database: Database, days: float, output: JobOutput, **values: Any) -> 
     with database.writing() as connection:
         connection.execute(update(Job).where(Job.id == row.id).values(finished=utc_now() - days * DAY))
     return row.id
+
+
+@contextmanager
+def before_a_service(url: str) -> Iterator[Database]:
+    """A database with its tables while no service runs on it, whose dispatcher would take the jobs."""
+    revisions.upgrade(url)
+    database = Database(url)
+    yield database
+    database.close()
 
 
 def left(database: Database) -> dict[str, int]:
@@ -135,8 +147,7 @@ def test_no_transaction_takes_long(database: Database) -> None:
 
 
 def test_a_service_deletes_what_is_old(make_settings: MakeSettings) -> None:
-    with EmbeddedService(make_settings()) as service:
-        database = service._service.database
+    with before_a_service(make_settings().database) as database:
         ended(database, 40.0, JobOutput(result={}, sweeps=(sweep(),)))
         young = ended(database, 1.0, JobOutput(result={}, sweeps=(sweep(),)))
     with EmbeddedService(make_settings(retention_days=30.0)) as service:
@@ -181,8 +192,7 @@ def test_uploads_that_nobody_uses_go(database: Database) -> None:
 
 
 def test_a_service_deletes_old_uploads_alone(make_settings: MakeSettings) -> None:
-    with EmbeddedService(make_settings()) as service:
-        database = service._service.database
+    with before_a_service(make_settings().database) as database:
         job = ended(database, 40.0, JobOutput(result={}))
         old, young = uploaded(database, 40.0, "a"), uploaded(database, 1.0, "b")
     with EmbeddedService(make_settings(retention_upload_days=30.0)) as service:
@@ -195,10 +205,10 @@ def test_a_service_deletes_old_uploads_alone(make_settings: MakeSettings) -> Non
 def test_the_command(tmp_path: Path, make_settings: MakeSettings, capsys: pytest.CaptureFixture[str]) -> None:
     url = make_settings().database
     assert main(["db", "prune", "--older-than", "30d", "--database", url]) == 2
-    with EmbeddedService(make_settings()) as service:
+    with before_a_service(url) as database:
         for index in range(30):
-            ended(service._service.database, 40.0, JobOutput(result={}, sweeps=(sweep(4000),)),
-                  spec_hash=f"{index:064}")  # fmt: skip
+            ended(database, 40.0, JobOutput(result={}, sweeps=(sweep(4000),)), spec_hash=f"{index:064}")
+    with EmbeddedService(make_settings()) as service:
         assert main(["db", "prune", "--older-than", "30d", "--dry-run", "--database", url]) == 0
         assert "30 jobs, 30 sweeps and 0 uploads would be deleted" in capsys.readouterr().out
         old = uploaded(service._service.database, 40.0, "a")
