@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 Profile = tuple["BrowserContext", Watch]
 AWAY = ("ERR_CONNECTION_REFUSED", "ERR_EMPTY_RESPONSE", "ERR_INCOMPLETE_CHUNKED_ENCODING",
         "ERR_CONNECTION_RESET", "ERR_SOCKET_NOT_CONNECTED", "status of 503")  # fmt: skip
-# Seconds of work that end by themselves.
 LONG_MAP: dict[str, Any] = {
     "kind": "map", "scene": "two-dof", "parameter": "damper.N0", "from": 20, "to": 1000, "steps": 200,
     "frequencies": 2000, "harmonics": 15, "ridge": False, "fresh": True,
@@ -38,11 +37,19 @@ def submit(site: Site, **changes: object) -> str:
     return job
 
 
+@pytest.fixture
+def endless(site: Site) -> Iterator[str]:
+    """A map that takes a quarter of an hour and more: it ends because it is stopped."""
+    job = submit(site, to=60, steps=4000, frequencies=120, harmonics=200)
+    yield job
+    httpx.delete(f"{site.url}/v1/jobs/{job}")
+
+
 def test_a_reload_goes_on_watching_and_two_tabs_do_not_disturb_each_other(
-    profile: Profile, site: Site
+    profile: Profile, site: Site, endless: str
 ) -> None:
     context, _ = profile
-    job = submit(site)
+    job = endless
     page = visit(context, site, f"?scene=two-dof&map={job}")
     expect(page.locator("#jobs-list")).to_contain_text("map of two-dof")
     expect(page.locator("#map-status")).to_contain_text("%")
