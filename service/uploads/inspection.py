@@ -82,7 +82,7 @@ def _ask(task: str, folder: Path, argument: Any, seconds: float, most_bytes: int
             answer = json.loads(ours.recv_bytes(most_bytes))
         except EOFError as error:
             process.join(1.0)
-            raise UnreadableUploadError(_end(process.exitcode)) from error
+            raise UnreadableUploadError(_end(process.status())) from error
         except OSError as error:
             message = f"what it holds takes more than {most_bytes} bytes as text"
             raise UnreadableUploadError(message) from error

@@ -8,29 +8,35 @@ import signal
 from collections.abc import Mapping
 from ctypes import Array
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 
 from service.jobs.outputs import Pace
 from service.jobs.registry import RunOn, WarmUp
 from service.workers.process_limits import ProcessLimits
-from service.workers.processes import start
+from service.workers.processes import Process, start
 from service.workers.worker import Orders, main
 
 
-def death(process: BaseProcess) -> str:
-    """How a process ended, as a sentence."""
+def death(process: Process) -> str:
+    """How a process that closed its pipe ended, as a sentence; it has ended then."""
     process.join(5.0)
-    code = process.exitcode
-    if code is not None and code < 0:
+    if process.is_alive():
+        process.kill()
+        process.join()
+        return f"worker process {process.pid} closed its pipe and did not end"
+    code = process.status()
+    if code is None:
+        return f"worker process {process.pid} ended, and so did what it was forked off"
+    if code < 0:
         name = signal.Signals(-code).name if -code in set(signal.Signals) else "unknown"
         hint = ", perhaps for want of memory" if name == "SIGKILL" else ""
         return f"worker process {process.pid} was killed by signal {-code} ({name}{hint})"
     return f"worker process {process.pid} ended with status {code}"
 
 
-def ending_signal(process: BaseProcess) -> int | None:
+def ending_signal(process: Process) -> int | None:
     """The signal that ended a process, if one did."""
-    return None if process.exitcode is None or process.exitcode >= 0 else -process.exitcode
+    code = process.status()
+    return None if code is None or code >= 0 else -code
 
 
 class Child:

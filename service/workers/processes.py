@@ -4,16 +4,24 @@ A process that begins from nothing spends seconds of processor time on loading p
 one process of the service does it once, without threads and without connections of the service, and every
 other is forked off it: it begins at once and shares the memory of what was loaded. Elsewhere each begins
 from nothing.
+
+That one process, the fork server, is the parent of the others, and the standard library hears of their ends
+from it alone: when it is killed, all of them read as ended with status 255 while they compute on, and are not
+killed any more. So each is watched and killed by a file descriptor of its own (pidfd), whoever its parent is;
+the next start makes another fork server.
 """
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing as mp
 import os
+import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from multiprocessing.connection import wait
 from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
 from typing import Any
@@ -23,19 +31,117 @@ from service.workers.worker import THREAD_LIMITS
 PRELOADED = "service.workers.preloaded"
 _OURS = "STICKSLIP_"
 
+_STATUS_LOST = 255
+"""What the standard library says of a process whose fork server is gone."""
+_STATUS_SECONDS = 5.0
+"""How long the fork server has to tell the status of a process that ended [s]."""
+
 _lock = threading.Lock()
 _settings_of_the_first: dict[str, str] | None = None
 
 
-def start(target: Callable[..., None], args: tuple[Any, ...], name: str) -> BaseProcess:
-    """Start a process that ends with this one; it has one BLAS and one Numba thread."""
+class Process:
+    """A process that was started; where the system has no pidfd, as the standard library sees it.
+
+    Attributes
+    ----------
+    pid : int
+        Its number.
+    """
+
+    def __init__(self, made: BaseProcess) -> None:
+        if made.pid is None:
+            raise ValueError("the process was not started")
+        self._made = made
+        self.pid: int = made.pid
+        self._pidfd = _pidfd(made.pid, made.sentinel)
+
+    @property
+    def sentinel(self) -> int:
+        """What `multiprocessing.connection.wait` finds ready when the process has ended."""
+        return self._made.sentinel if self._pidfd is None else self._pidfd
+
+    def is_alive(self) -> bool:
+        """Whether it runs."""
+        return not wait([self.sentinel], 0.0)
+
+    def join(self, seconds: float | None = None) -> None:
+        """Wait for its end."""
+        wait([self.sentinel], seconds)
+
+    def kill(self) -> None:
+        """End it at once, if it runs."""
+        if self._pidfd is None:
+            self._made.kill()
+            return
+        with contextlib.suppress(ProcessLookupError):
+            signal.pidfd_send_signal(self._pidfd, signal.SIGKILL)
+
+    def status(self) -> int | None:
+        """The exit status, below zero if a signal ended it; None if it runs, or the status was lost."""
+        if self.is_alive() or not self._told():
+            return None
+        return None if self._made.exitcode == _STATUS_LOST else self._made.exitcode
+
+    def close(self) -> None:
+        """Let go of it after its end."""
+        # Of one whose fork server hangs and does not tell, the standard library lets go at a later start.
+        if self._told():
+            self._made.close()
+        opened, self._pidfd = self._pidfd, None
+        if opened is not None:
+            os.close(opened)
+
+    def _told(self) -> bool:
+        """Whether the standard library has heard of the end, which the fork server tells it."""
+        if not wait([self._made.sentinel], _STATUS_SECONDS):
+            return False
+        # A start looks at all processes too, and the status can be read only once.
+        with _lock:
+            self._made.join()
+        return True
+
+
+def _pidfd(pid: int, sentinel: int) -> int | None:
+    """A file descriptor of a process that has just started; None if there is none or it has ended."""
+    if sys.platform != "linux":
+        return None
+    try:
+        opened = os.pidfd_open(pid)
+    except OSError:  # it ended already, or the kernel has no such descriptors
+        return None
+    if not wait([sentinel], 0.0):
+        return opened
+    # It ended, or its fork server did: its number may be another's by now.
+    os.close(opened)
+    return None
+
+
+def start(target: Callable[..., None], args: tuple[Any, ...], name: str) -> Process:
+    """Start a process that ends with this one; it has one BLAS and one Numba thread.
+
+    Raises
+    ------
+    OSError
+        If it cannot be started, or the fork server ended meanwhile.
+    """
     with _lock, _one_thread_each():
-        # mypy: the contexts that exist all have a class `Process`; their base does not say so.
-        made: BaseProcess = _context().Process(  # type: ignore[attr-defined]
-            target=target, args=args, name=name, daemon=True
-        )
-        made.start()
-    return made
+        try:
+            return _started(target, args, name)
+        except (EOFError, ConnectionError):  # the fork server ended at this moment: there will be another
+            try:
+                return _started(target, args, name)
+            except EOFError as error:
+                raise ConnectionAbortedError("what processes are forked off ended twice") from error
+
+
+def _started(target: Callable[..., None], args: tuple[Any, ...], name: str) -> Process:
+    # mypy: the contexts that exist all have a class `Process`; their base does not say so.
+    made: BaseProcess = _context().Process(  # type: ignore[attr-defined]
+        target=target, args=args, name=name, daemon=True
+    )
+    made.start()
+    return Process(made)
 
 
 def _context() -> BaseContext:

@@ -11,7 +11,6 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import wait
-from multiprocessing.process import BaseProcess
 from multiprocessing.reduction import ForkingPickler
 from typing import Protocol
 
@@ -22,6 +21,7 @@ from service.jobs.registry import RunOn, WarmUp
 from service.workers.base import Failed, Finished, Lost, Outcome, Sink, Stopped
 from service.workers.child import Child, death, ending_signal
 from service.workers.process_limits import ProcessLimits
+from service.workers.processes import Process
 from service.workers.worker import Done, Ready, Reply, Task
 
 log = logging.getLogger("stickslip.executor")
@@ -217,7 +217,7 @@ class Slot(threading.Thread):
         timer.daemon = True
         timer.start()
 
-    def _kill(self, process: BaseProcess, token: int) -> None:
+    def _kill(self, process: Process, token: int) -> None:
         """End the process by force if it still computes the task that was to stop."""
         with self._lock:
             computes = bool(self._held) and self._held[0].token == token
@@ -272,6 +272,8 @@ class Slot(threading.Thread):
             except Exception as error:
                 log.exception("the answer of worker process %s cannot be read", child.process.pid)
                 reason = f"the answer of worker process {child.process.pid} could not be read: {error}"
+                child.process.kill()
+                child.process.join()  # before its attempt is made again
                 self._lose_all(reason)
                 return
             if isinstance(message, Reply):

@@ -91,7 +91,7 @@ class Site:
             except subprocess.TimeoutExpired:
                 program.process.kill()
                 program.process.wait()
-                self.wrong.append("a program did not end within 20 s of SIGTERM")
+                self.wrong.append("a program did not end within 60 s of SIGTERM")
 
     def _start(self, port: int | None) -> subprocess.Popen[bytes]:
         what = "dispatch" if port is None else str(port)

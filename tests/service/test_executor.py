@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
+import psutil
 import pytest
 from private_kinds import PRIVATE, IterationRequest, as_it_is
-from service_helpers import pids, until
+from service_helpers import PATIENCE, pids, until
 
 from service.db.repositories import Attempt
 from service.jobs.outputs import Piece, Point
 from service.settings.settings import load_settings
+from service.workers import processes
 from service.workers.base import Finished, Lost, Outcome, Stopped
 from service.workers.local import LocalExecutor
 from service.workers.slot import MOST_AHEAD
@@ -154,3 +158,92 @@ def test_closing_gives_back_what_waits(executor: LocalExecutor, heard: Heard) ->
     executor.close()
     assert time.monotonic() - begun < 60.0, "the first alone would take 600 s"
     assert [heard.of(f"job {number}") for number in range(4)] == [Stopped()] * 4
+
+
+def fork_servers() -> list[psutil.Process]:
+    """What the processes of this one are forked off."""
+    return [
+        child
+        for child in psutil.Process().children()
+        if child.status() != psutil.STATUS_ZOMBIE and "forkserver" in " ".join(child.cmdline())
+    ]
+
+
+def runs(pid: int) -> bool:
+    """Whether a process runs; one that ended and was not collected yet does not."""
+    try:
+        return bool(psutil.Process(pid).status() != psutil.STATUS_ZOMBIE)
+    except psutil.NoSuchProcess:
+        return False
+
+
+@pytest.fixture
+def forked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes are forked off one, whatever settings earlier tests started the first with."""
+    if sys.platform != "linux":
+        pytest.skip("processes are forked off one on Linux only")
+    monkeypatch.setattr(processes, "_settings_of_the_first", None)
+
+
+@pytest.mark.usefixtures("forked")
+def test_workers_whose_fork_server_is_killed_compute_on_and_are_ended(heard: Heard, tmp_path: Path) -> None:
+    """Another start, which makes a new fork server, looks at all of them: they are not taken for dead."""
+    pace = load_settings().pace
+    busy, idle, later = (
+        LocalExecutor(PRIVATE.runs(), PRIVATE.warm_up, workers=1, grace_seconds=0.1, pace=pace)
+        for _ in range(3)
+    )
+    ours = {child.pid for child in psutil.Process().children(recursive=True)}
+    with ExitStack() as stack:
+        for one in (busy, idle):
+            one.start(heard)
+            stack.callback(one.close)
+        until(lambda: busy.status().ready and idle.status().ready)
+        (source,) = fork_servers()
+        workers = {child.pid for child in source.children()} - ours
+        assert len(workers) == 2
+        long = attempt("long", 600.0, "deaf", pid_file=str(tmp_path / "long"))
+        busy.submit(long)
+        idle.submit(attempt("short", 1.0, pid_file=str(tmp_path / "short")))
+        until(lambda: pids(tmp_path / "long") and pids(tmp_path / "short"))
+        source.kill()
+        until(lambda: source not in fork_servers())
+        later.start(heard)
+        stack.callback(later.close)
+        until(lambda: later.status().ready)
+        assert source not in fork_servers(), "there is a new one"
+        until(lambda: heard.of("short"))
+        assert isinstance(heard.of("short"), Finished), "it went on"
+        assert heard.of("long") is None
+        assert busy.status().busy == 1
+        busy.stop_attempt(long)
+        until(lambda: heard.of("long"))
+        assert isinstance(heard.of("long"), Lost)
+        assert not any(runs(pid) for pid in pids(tmp_path / "long")), "lost means that nobody computes it"
+        until(lambda: busy.status().ready)
+        busy.submit(attempt("again"))
+        until(lambda: heard.of("again"))
+    assert not any(runs(pid) for pid in workers), "closing ends those too that an older one was the parent of"
+
+
+@pytest.mark.usefixtures("forked")
+def test_a_process_is_started_though_the_fork_server_dies_at_it(tmp_path: Path) -> None:
+    processes.start(os.getpid, (), "first").join()
+    (source,) = fork_servers()
+    source.suspend()
+    done = threading.Event()
+
+    def begin() -> None:
+        process = processes.start((tmp_path / "made").touch, (), "second")
+        process.join()
+        assert process.status() == 0
+        process.close()
+        done.set()
+
+    thread = threading.Thread(target=begin)
+    thread.start()
+    time.sleep(0.2)  # it waits for the number of its process, which nobody will tell it
+    source.kill()
+    thread.join(PATIENCE)
+    assert done.is_set()
+    assert (tmp_path / "made").exists()

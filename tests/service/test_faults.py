@@ -38,9 +38,9 @@ from service.db.engine import Database
 from service.db.integrity import check
 from service.db.models import Job, JobResult, JobState, Sweep
 
-MANY: dict[str, Fault] = {"what workers are forked off killed": source_killed}  # in the long tests
 COMMON: dict[str, Fault] = {
     "worker killed": child_killed,
+    "what workers are forked off killed": source_killed,
     "worker paused past the lease": child_paused,
     "service killed": program_killed,
     "service stopped": program_stopped,
@@ -51,7 +51,6 @@ COMMON: dict[str, Fault] = {
 
 def undergo(site: Site, faults: Mapping[str, Fault], number: int, seed: int) -> None:
     """Let faults happen while clients submit; then wait for the end of every accepted job, and check."""
-    faults = {**faults, **(MANY if number >= 10 else {})}
     generator, names = random.Random(seed), list(faults)
     began = time.monotonic()
     with site:
@@ -105,7 +104,7 @@ def check_rows(site: Site) -> Counter[str]:
     return Counter(state.value for state in states.values())
 
 
-@pytest.mark.parametrize("number", [6, pytest.param(90, marks=pytest.mark.long)])
+@pytest.mark.parametrize("number", [7, pytest.param(90, marks=pytest.mark.long)])
 def test_one_service_on_sqlite(tmp_path: Path, number: int) -> None:
     site = Site(f"sqlite:///{tmp_path}/jobs.db", tmp_path, [free_port()])
     undergo(site, COMMON, number, seed=number)
@@ -117,7 +116,7 @@ def test_a_disk_that_is_full_for_a_while(tmp_path: Path, small_disk: Path, numbe
     undergo(site, {"disk full": disk_full(small_disk)}, number, seed=number)
 
 
-@pytest.mark.parametrize("number", [5, pytest.param(100, marks=pytest.mark.long)])
+@pytest.mark.parametrize("number", [6, pytest.param(100, marks=pytest.mark.long)])
 def test_services_and_a_dispatcher_on_postgresql(cluster: Cluster, tmp_path: Path, number: int) -> None:
     with cluster.database(empty=False) as url:
         site = Site(url, tmp_path, [free_port(), free_port(), None])
