@@ -135,7 +135,7 @@ def _with_values(scene: Scene, where: Place, values: Mapping[str, float]) -> Sce
 def _engine_order(scene: Scene, where: Place, wanted: object) -> Scene:
     if wanted is None:
         return scene
-    if scene.structure.kind != "cyclic":
+    if not scene.structure.has_sectors:
         raise DesignError((*where, "engine_order"), wanted, "needs a cyclic structure; `order` fits any")
     with at(*where, "engine_order"):
         return with_engine_order(scene, whole((*where, "engine_order"), wanted, least=0))

@@ -168,7 +168,7 @@ def _of_all_blades(
     """Return the rows of a mistuned disk: those of the observed DOF in every sector, from one response."""
     here = case.scene.with_values(values)
     effects = effects_of(problem, here)
-    sectors, dof = here.structure.sectors, here.observe.dof  # type: ignore[union-attr]
+    sectors, dof = here.structure.sector_count, here.observe.dof
     ranges = ranges_of(problem, case)
     rows: list[Row] = []
     for over in ranges:

@@ -25,7 +25,7 @@ from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.linear.model import LinearModel
 from solver.matrices.normal_modes import undamped_modes
-from solver.response.time_history import matrices
+from solver.response.time_history import mass, matrices
 from solver.results.watch import OnProgress, ShouldStop, part_of
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.scene import Scene
@@ -67,7 +67,7 @@ def campbell_diagram(
     begun = time.perf_counter()
     speeds, chosen = _speeds(speeds_rpm), _orders(scene, orders)
     looked_at = None if band_hz is None else _positive_pair("band_hz", band_hz, "Hz")
-    cyclic = scene.structure.kind == "cyclic"
+    cyclic = scene.structure.has_sectors
     alone = cyclic or scene.speed_order is not None  # each order has a response of its own
     groups = [(order,) for order in chosen] if alone else [chosen]
     found: list[OrderResponse] = []
@@ -126,17 +126,18 @@ def natural_frequencies(scene: Scene, *, stuck: bool) -> Real:
     """
     scene = written_out(scene)
     model = linear_model(scene)
-    K, _, L = matrices(model, 1)
+    (K, _, L), M = matrices(model, 1), mass(model, 1)
     if stuck:
         stiffness = np.array([k for contact in scene.contacts for k in contact.stiffnesses])
         K = K + L.conj().T @ (stiffness[:, None] * L)
     if model.line is not None:
         return _along_line(K, model)
     if model.extra is not None:
-        C = model.extra.at(model.turns(np.ones(1, np.int64)), np.ones(1, np.bool_))[1][0]
+        n = model.diameters(np.ones(1, np.int64))
+        C = model.extra.at(model.turns(n), np.ones(1, np.bool_), model.plain(n)[0])[1][0]
         free = model.free
-        return _of_poles(K[free][:, free], C[free][:, free], model.M[free][:, free])
-    modes = undamped_modes(K if np.any(K.imag) else K.real, model.M)
+        return _of_poles(K[free][:, free], C[free][:, free], M[free][:, free])
+    modes = undamped_modes(K if np.any(K.imag) or np.any(M.imag) else K.real, M)
     return np.sort(np.sqrt(np.maximum(modes.omega2, 0.0))) / (2.0 * math.pi)
 
 
@@ -147,13 +148,13 @@ def _along_line(K: Complex, model: LinearModel) -> Real:
     problem that are positive: an order of a stiffening rotor may meet none.
     """
     one = np.ones(1, np.int64)
-    inertia, free = model.inertia(model.turns(one), one)[0], model.free
+    inertia, free = model.inertia(model.diameters(one), one)[0], model.free
     even = 0.5 * (K + K.conj().T)[free][:, free]
     mu = np.linalg.eigvals(np.linalg.solve(even, inertia[free][:, free])).real
     return np.sort(1.0 / np.sqrt(mu[mu > 0.0])) / (2.0 * math.pi)
 
 
-def _of_poles(K: Complex, C: Complex, M: Real) -> Real:
+def _of_poles(K: Complex, C: Complex, M: Complex) -> Real:
     """Return the frequencies [Hz] of M x'' + G x' + K x = 0, ascending: G and K without what damps or feeds.
 
     Forward and backward whirl are two of them. Of conjugate poles one counts.

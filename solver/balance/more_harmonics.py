@@ -15,7 +15,6 @@ from solver.jit.fourier import Complex, Integer, Real
 from solver.jit.trig_polynomial import grid_size, grid_tables
 from solver.linear.contact_table import contact_table
 from solver.scene.harmonics import MULTIPLES, kept_harmonics, spread
-from solver.scene.parts import CyclicStructure
 
 
 def more_harmonics(balance: Balance, top: int, *, multiples: int = MULTIPLES) -> Balance:
@@ -83,7 +82,7 @@ def _extended(balance: Balance, ks: Integer) -> System | None:
     scene, system = balance.scene, balance.system
     if any(force.harmonic in ks and force.harmonic not in system.ks for force in scene.forces):
         return None
-    sectors = scene.structure.sectors if isinstance(scene.structure, CyclicStructure) else 1
+    sectors = scene.structure.sector_count
     known, wanted = ((each * scene.engine_order) % sectors for each in (system.ks, ks))
     structures = {int(d): int(s) for d, s in zip(known, system.which, strict=True)}
     if any(int(d) not in structures for d in wanted):

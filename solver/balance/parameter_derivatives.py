@@ -122,13 +122,13 @@ def matrices_of_paths(balance: Balance, parameters: Sequence[Parameter]) -> Matr
     scene, ks = balance.scene, balance.system.ks
     model = linear_model(scene)
     dense = reduce_model(model, ks, port_stiffnesses(scene, model), whole_matrices=True)
-    turns, moving, which = model.turns(ks), ks > 0, dense.which
-    moves, turn = moving[:, None, None], turns[:, None, None]
+    diameters, moving, which = model.diameters(ks), ks > 0, dense.which
+    moves, turn = moving[:, None, None], model.turns(diameters)[:, None, None]
     L, shift = dense.L[which], balance.system.shift
     by, forces_by, motions_by = {}, {}, {}
     for i, name in structural.items():
         d = structure_derivative(scene, name)
-        dK, dC, dM = d.at(turns, moving)
+        dK, dC, dM = d.at(model, diameters, moving)
         if d.contact_here is not None and d.contact_next is not None:
             dL = motions_by[i] = d.contact_here + d.contact_next * turn
             dK = dK + _stiffness(dL, shift, L) + _stiffness(L, shift, dL)
@@ -150,7 +150,8 @@ def check_smooth_structure(scene: Scene, parameters: Sequence[Parameter]) -> Non
     """
     structural = [p for p in parameters if p.kind is Kind.STRUCTURE]
     bent = [p.path for p in structural if _is_bent(scene, p.name)]
-    lossy = [p.path for p in structural if structure_derivative(scene, p.name).extra is not None]
+    by = {p.path: structure_derivative(scene, p.name) for p in structural}
+    lossy = [path for path, d in by.items() if d.extra is not None or d.by_loss_factor]
     if len(lossy) > 1 and any(is_loss(scene.structure, p.name) for p in structural):
         wanted = "must not have the loss factor beside a stiffness, whose product it is in: only gradients"
         raise SettingError("paths", lossy, wanted)

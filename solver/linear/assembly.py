@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -12,14 +13,14 @@ from numpy.typing import NDArray
 from solver.errors import SettingError
 from solver.linear.body_matrices import mass_derivative, matrices_with_bodies
 from solver.linear.extra_terms import (
+    Coordinates,
     ExtraTerms,
-    Symmetric,
     depends_on_speed,
     extra_terms,
+    hysteretic,
+    own_terms,
     terms_by_gas,
-    terms_by_loss,
     terms_by_speed,
-    terms_by_stiffness,
     terms_of_line,
 )
 from solver.linear.lumped_matrices import (
@@ -31,6 +32,7 @@ from solver.linear.lumped_matrices import (
 )
 from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
 from solver.linear.moving_base import base_of, derivative_with_base, with_base
+from solver.linear.sector_matrices import ProportionalDamping, sector_matrices
 from solver.scene.bodies.body import MOMENTS, Body
 from solver.scene.bodies.kinematics import Form, force_derivatives
 from solver.scene.bodies.paths import is_body_path
@@ -47,6 +49,7 @@ from solver.scene.scene import (
     MatricesStructure,
     Scene,
     Spring,
+    Structure,
 )
 from solver.scene.validation import listing, nearest
 
@@ -82,11 +85,13 @@ def structure_derivative(scene: Scene, name: str) -> LinearModelDerivative:
 def _without_base(scene: Scene) -> LinearModel:
     """The same with forces alone."""
     structure = scene.structure
+    if isinstance(structure, MatricesStructure) and structure.has_sectors:
+        sector = sector_matrices(structure, scene.bodies)
+        return replace(_model(scene, Matrices(*(_nothing(0),) * 5), sector.shapes), sector=sector)
     if isinstance(structure, MatricesStructure):
         found = matrices_with_bodies(structure, scene.bodies)
         nothing = _nothing(found.M.shape[0])
-        matrices = Matrices(found.M, found.C, nothing, found.K, nothing)
-        return _model(scene, matrices, found.shapes, found.skew)
+        return _model(scene, Matrices(found.M, found.C, nothing, found.K, nothing), found.shapes)
     topology = topology_of(structure, scene.bodies)
     numbers = numbers_of(structure, scene.bodies)
     matrices = matrices_of_numbers(topology, numbers, scene.bodies, _modal_ratios(structure))
@@ -97,18 +102,13 @@ def _modal_ratios(structure: LumpedStructure | CyclicStructure) -> Ratios | None
     return structure.damping_ratio if isinstance(structure, LumpedStructure) else None
 
 
-def _model(
-    scene: Scene,
-    matrices: Matrices,
-    shapes: FloatArray,
-    skew: tuple[FloatArray, FloatArray] | None = None,
-) -> LinearModel:
+def _model(scene: Scene, matrices: Matrices, shapes: FloatArray) -> LinearModel:
     """Add contacts and forces to the matrices."""
     structure = scene.structure
     dofs = scene.dofs
     here, beyond = _contact_selection(dofs, tuple(form for forms in scene.forms for form in forms))
     whole = isinstance(structure, MatricesStructure)
-    symmetric = Symmetric(K0=matrices.K0, Kp=matrices.Kp, shapes=shapes, skew=skew)
+    coordinates = _coordinates(structure, shapes)
 
     def rows(selected: FloatArray) -> FloatArray:
         return _frozen(selected @ shapes) if whole else selected
@@ -126,9 +126,9 @@ def _model(
         forces=_terms(scene.forces, dofs, shapes if whole else None),
         observe=rows(row_of(scene, scene.observe.dof)),
         engine_order=scene.engine_order,
-        sectors=structure.sectors if isinstance(structure, CyclicStructure) else 1,
-        extra=extra_terms(scene, symmetric),
-        line=None if scene.speed_order is None else terms_of_line(scene, symmetric),
+        sectors=structure.sector_count,
+        extra=extra_terms(scene, coordinates),
+        line=None if scene.speed_order is None else terms_of_line(scene, coordinates),
         line_order=scene.speed_order or 1.0,
     )
 
@@ -204,9 +204,10 @@ def _derivative_by(scene: Scene, name: str) -> LinearModelDerivative:
     if is_body_path(scene, name):
         return _of_bodies(scene, name)
     if is_gas_path(scene, name):
-        return _of_extra(terms_by_gas(scene, name.rpartition(".")[0], _symmetric_of(scene)))
+        gas = terms_by_gas(scene, name.rpartition(".")[0], _coordinates_of(scene))
+        return replace(_of_nothing(gas.K.shape[1]), extra=gas)
     if is_loss(structure, name):
-        return _of_extra(terms_by_loss(_symmetric_of(scene)))
+        return replace(_of_nothing(_coordinates_of(scene).shapes.shape[1]), by_loss_factor=True)
     if isinstance(structure, MatricesStructure):
         return _proportional(structure, scene.bodies, name)
     parts: tuple[Mass | Spring | Damper, ...] = (*structure.masses, *structure.springs, *structure.dampers)
@@ -227,29 +228,29 @@ def _derivative_by(scene: Scene, name: str) -> LinearModelDerivative:
         )
 
     dK0, dKp = total("dK0"), total("dKp")
+    lossy = structure.loss_factor and (np.any(dK0) or np.any(dKp))
     return LinearModelDerivative(
         dM=total("dM"), dC0=total("dC0"), dCp=total("dCp"), dK0=dK0, dKp=dKp,
-        affine=all(d.affine for d, _ in members), extra=terms_by_stiffness(scene, dK0, dKp),
+        affine=all(d.affine for d, _ in members),
+        extra=hysteretic(len(dK0), structure.loss_factor) if lossy else None,
     )  # fmt: skip
 
 
-def _symmetric_of(scene: Scene) -> Symmetric:
-    """The symmetric matrices that extra terms go with."""
-    structure, bodies = scene.structure, scene.bodies
-    if isinstance(structure, MatricesStructure):
-        found = matrices_with_bodies(structure, bodies)
-        return Symmetric(K0=found.K, Kp=_nothing(found.K.shape[0]), shapes=found.shapes, skew=found.skew)
-    topology = topology_of(structure, bodies)
-    matrices = matrices_of_numbers(topology, numbers_of(structure, bodies), bodies, _modal_ratios(structure))
-    return Symmetric(K0=matrices.K0, Kp=matrices.Kp, shapes=_identity(len(topology.dofs)))
+def _coordinates_of(scene: Scene) -> Coordinates:
+    """What the extra terms of a scene are written in."""
+    shapes = _shapes(scene)
+    return _coordinates(scene.structure, _identity(len(scene.dofs)) if shapes is None else shapes)
 
 
-def _of_extra(extra: ExtraTerms) -> LinearModelDerivative:
-    """Derivatives of the extra terms alone."""
-    nothing = _nothing(extra.K.shape[1])
-    return LinearModelDerivative(
-        dM=nothing, dC0=nothing, dCp=nothing, dK0=nothing, dKp=nothing, affine=True, extra=extra
-    )
+def _coordinates(structure: Structure, shapes: FloatArray) -> Coordinates:
+    own = own_terms(structure) if isinstance(structure, MatricesStructure) else None
+    return Coordinates(shapes=shapes, own=own)
+
+
+def _of_nothing(n: int) -> LinearModelDerivative:
+    """Derivatives of 0, of n coordinates."""
+    nothing = _nothing(n)
+    return LinearModelDerivative(dM=nothing, dC0=nothing, dCp=nothing, dK0=nothing, dKp=nothing, affine=True)
 
 
 def _of_motions(scene: Scene, slopes: Mapping[str, tuple[Form, ...]]) -> LinearModelDerivative:
@@ -259,17 +260,15 @@ def _of_motions(scene: Scene, slopes: Mapping[str, tuple[Form, ...]]) -> LinearM
     here, beyond = _contact_selection(dofs, tuple(form for each in forms for form in each))
     if shapes is not None:
         here, beyond = _frozen(here @ shapes), _frozen(beyond @ shapes)
-    nothing = _nothing(here.shape[1])
-    return LinearModelDerivative(
-        dM=nothing, dC0=nothing, dCp=nothing, dK0=nothing, dKp=nothing, affine=False,
-        contact_here=here, contact_next=beyond,
-    )  # fmt: skip
+    return replace(_of_nothing(here.shape[1]), affine=False, contact_here=here, contact_next=beyond)
 
 
 def _shapes(scene: Scene) -> FloatArray | None:
     """The DOFs in the coordinates of the matrices; None where they are the coordinates."""
     if not isinstance(scene.structure, MatricesStructure):
         return None
+    if scene.structure.has_sectors:
+        return sector_matrices(scene.structure, scene.bodies).shapes
     return matrices_with_bodies(scene.structure, scene.bodies).shapes
 
 
@@ -280,14 +279,13 @@ def _of_bodies(scene: Scene, path: str) -> LinearModelDerivative:
     owner, _, key = path.rpartition(".")
     behind = sum(len(body.dofs) for body in scene.bodies)
     massive = key == "mass" or key in MOMENTS
-    nothing = _nothing(n)
     first, second = force_derivatives(scene, path)
     extra: tuple[ExtraTerms | None, ExtraTerms | None] = (None, None)
     if not owner and depends_on_speed(scene):
-        extra = terms_by_speed(scene, _symmetric_of(scene))
-    return LinearModelDerivative(
-        dM=mass_derivative(n - behind, scene.bodies, owner, key) if massive else nothing,
-        dC0=nothing, dCp=nothing, dK0=nothing, dKp=nothing, affine=True,
+        extra = terms_by_speed(scene, _coordinates_of(scene))
+    return replace(
+        _of_nothing(n),
+        dM=mass_derivative(n - behind, scene.bodies, owner, key) if massive else _nothing(n),
         forces=_terms(first, dofs, shapes), second_forces=_terms(second, dofs, shapes),
         extra=extra[0], second_extra=extra[1] if extra[1] is not None and np.any(extra[1].K) else None,
     )  # fmt: skip
@@ -297,14 +295,17 @@ def _proportional(structure: MatricesStructure, bodies: tuple[Body, ...], name: 
     """Derivatives by the proportional damping, the only parameter of a structure given by its matrices."""
     if name not in PROPORTIONAL:
         raise _unknown(name, PROPORTIONAL)
+    if structure.has_sectors:
+        sector = sector_matrices(structure, bodies)
+        damping = ProportionalDamping(sector=sector, which="K" if name == PROPORTIONAL[0] else "M")
+        return replace(_of_nothing(sector.shapes.shape[1]), damping=damping)
     found = matrices_with_bodies(structure, bodies)
-    nothing = _nothing(found.M.shape[0])
     dC = found.K if name == PROPORTIONAL[0] else found.M  # the symmetric part of K
     if bodies:  # which have no such damping
         dC = dC.copy()
         dC[-sum(len(body.dofs) for body in bodies) :] = 0.0
         dC = _frozen(dC)
-    return LinearModelDerivative(dM=nothing, dC0=dC, dCp=nothing, dK0=nothing, dKp=nothing, affine=True)
+    return replace(_of_nothing(len(dC)), dC0=dC)
 
 
 def _unknown(name: str, known: Sequence[str]) -> SettingError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,14 +44,13 @@ def _with_bodies(structure: MatricesStructure, bodies: tuple[Body, ...]) -> Matr
     return MatrixModel(
         M=_frozen(block_diag(own.M, mass)), C=_frozen(block_diag(own.C, nothing)),
         K=_frozen(block_diag(own.K, nothing)), shapes=_frozen(block_diag(own.shapes, np.eye(n))),
-        skew=own.skew,
     )  # fmt: skip
 
 
-def block_diag(*blocks: FloatArray) -> FloatArray:
+def block_diag(*blocks: NDArray[Any]) -> NDArray[Any]:
     """Return the matrix with these blocks on its diagonal: `scipy.linalg` takes longer to load than this."""
     rows, columns = (sum(block.shape[axis] for block in blocks) for axis in (0, 1))
-    out, row, column = np.zeros((rows, columns)), 0, 0
+    out, row, column = np.zeros((rows, columns), np.result_type(*blocks, np.float64)), 0, 0
     for block in blocks:
         out[row : row + block.shape[0], column : column + block.shape[1]] = block
         row, column = row + block.shape[0], column + block.shape[1]

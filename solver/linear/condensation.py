@@ -81,10 +81,10 @@ def reduce_model(
     """
     dense_asked = whole_matrices or derivative is not None or model.prescribed or model.line is not None
     apart = dense_asked or (model.extra is not None and not model.extra.is_real)
-    which, theta, moving = _structures(model, ks, apart=apart)
+    which, diameters, moving = _structures(model, ks, apart=apart)
     forces = force_amplitudes(model, ks)
-    L = model.ports_at(np.exp(1j * theta))
-    held = matrices_of(model, theta, moving)
+    L = model.ports_at(diameters)
+    held = matrices_of(model, diameters, moving)
     shift, loose = np.zeros(kt.size), np.zeros((0, kt.size))
     if 0 in ks:
         loose = _loose(model, held.K[which[0]], L[which[0]], kt)
@@ -96,14 +96,14 @@ def reduce_model(
         shift, held = kt.copy(), held_by(held, L, kt)
         found = decompose(held)
     if found is None and not apart:
-        which, theta, moving = _structures(model, ks, apart=True)
-        L = model.ports_at(np.exp(1j * theta))
-        held = matrices_of(model, theta, moving)
+        which, diameters, moving = _structures(model, ks, apart=True)
+        L = model.ports_at(diameters)
+        held = matrices_of(model, diameters, moving)
         held = held_by(held, L, kt) if np.any(shift) else held
     if found is None:
-        modes: dict[str, Any] = _no_modes(theta.size, ks.size, kt.size)
-        inertia = model.inertia(np.exp(1j * theta), _first_of(ks, which))
-        dense: dict[str, Any] = _dense(held, theta, moving, L, model, forces, derivative) | {
+        modes: dict[str, Any] = _no_modes(diameters.size, ks.size, kt.size)
+        inertia = model.inertia(diameters, _first_of(ks, which))
+        dense: dict[str, Any] = _dense(held, diameters, moving, L, model, forces, derivative) | {
             "M": _contiguous(inertia * (1.0 if model.line is not None else moving[:, None, None]))
         }
         given = ((), ()) if derivative is None else (derivative.forces, derivative.second_forces)
@@ -115,17 +115,17 @@ def reduce_model(
     return Reduced(which=which.astype(np.int64), shift=shift, loose=loose, least_size=least, **modes, **dense)
 
 
-def _structures(model: LinearModel, ks: Integer, *, apart: bool) -> tuple[Integer, Real, Flags]:
-    """Return the structure of each harmonic, and the interblade phase of each; (False) the one of the mean.
+def _structures(model: LinearModel, ks: Integer, *, apart: bool) -> tuple[Integer, Integer, Flags]:
+    """Return the structure of each harmonic, and the nodal diameter of each; (False) the one of the mean.
 
     There is one for each nodal diameter in play; the mean has its own where `apart`.
     """
-    diameters = (ks * model.engine_order) % model.sectors
+    diameters = model.diameters(ks)
     still = (ks == 0) & apart
     if model.line is not None:  # each harmonic has an inertia of its own
-        return np.arange(ks.size), 2.0 * np.pi * diameters / model.sectors, ks > 0
+        return np.arange(ks.size), diameters, ks > 0
     found, which = np.unique(np.where(still, -1, diameters), return_inverse=True)
-    return which, 2.0 * np.pi * np.maximum(found, 0) / model.sectors, found >= 0
+    return which, np.maximum(found, 0), found >= 0
 
 
 def _first_of(ks: Integer, which: Integer) -> Integer:
@@ -158,7 +158,7 @@ def loose_ports(scene: Scene) -> tuple[Real, Real]:
     """
     model = linear_model(scene)
     kt = port_stiffnesses(scene, model)
-    static = matrices_of(model, np.zeros(1), np.zeros(1, np.bool_))
+    static = matrices_of(model, np.zeros(1, np.int64), np.zeros(1, np.bool_))
     return _loose(model, static.K[0], model.contact_here + model.contact_next, kt), kt
 
 
@@ -234,7 +234,7 @@ _DENSE_AXES = {
 
 def _dense(
     held: Held,
-    theta: Real,
+    diameters: Integer,
     moving: Flags,
     L: Complex,
     model: LinearModel,
@@ -248,9 +248,9 @@ def _dense(
     dK = dC = dM = np.zeros(held.K.shape, np.complex128)
     ddK = np.zeros((0, 0, 0), np.complex128)
     if derivative is not None:
-        dK, dC, dM = derivative.at(np.exp(1j * theta), moving)
+        dK, dC, dM = derivative.at(model, diameters, moving)
         if derivative.second_extra is not None:
-            ddK = _contiguous(derivative.second_extra.at(np.exp(1j * theta), moving)[0])
+            ddK = _contiguous(derivative.second_extra.at(model.turns(diameters), moving, ddK)[0])
     moves = moving[:, None, None]
     return {
         "K": _contiguous(held.K), "C": _contiguous(moves * held.C), "M": _contiguous(moves * held.M),

@@ -77,5 +77,6 @@ def contact_table(scene: Scene, highest: int) -> Real:
 def port_stiffnesses(scene: Scene, model: LinearModel) -> Real:
     """Return a stiffness > 0 of every port [N/m]: its own, or one of the size of the structure's."""
     own = np.array([k for contact in scene.contacts for k in contact.stiffnesses], dtype=np.float64)
-    largest = float(np.abs(model.K0).max(initial=0.0))
+    K = model.K0 if model.sector is None else model.sector.at(model.engine_order)[0]
+    largest = float(np.abs(K).max(initial=0.0))
     return np.where(own > 0.0, own, largest if largest > 0.0 else 1.0)

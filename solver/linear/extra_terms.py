@@ -3,23 +3,29 @@
 Kept apart from the symmetric matrices of `solver.linear.model.LinearModel` as Σ_m X_m e^{jmθ} over offsets m
 between sectors, complex where a term is one of the frequency domain. A hysteretic term (structural damping
 K (1 + iη), an imaginary coefficient) is of a motion e^{iωt} with ω > 0 and has no share in the mean.
+
+A sector given by its matrices has G, K_omega2 and what is unsymmetric as blocks at the offsets 0, 1 and −1,
+as its high boundary is eliminated; structural damping goes with its stiffness at each nodal diameter, however
+that is known.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.matrices.values import Matrix
+from solver.matrices.sectors.blocks import full_elimination
 from solver.scene.bodies.body import REVOLUTIONS
-from solver.scene.scene import CyclicStructure, MatricesStructure, Scene, Structure
+from solver.scene.scene import MatricesStructure, Scene
 from solver.scene.terms.linear_terms import Entry
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Blocks = tuple[tuple[int, Real], ...]  # offsets between sectors, and a matrix for each
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,22 +40,25 @@ class ExtraTerms:
         Complex stiffness [N/m] and damping [N s/m].
     still : (n, n) array or None
         Stiffness of the mean alone [N/m].
+    loss_factor : float
+        The symmetric stiffness times i and this belongs to it too.
     """
 
     offsets: tuple[int, ...]
     K: Complex
     C: Complex
     still: Real | None = None
+    loss_factor: float = 0.0
 
     @property
     def is_real(self) -> bool:
         """Whether all of it is a term of equations in time."""
-        return not (np.any(self.K.imag) or np.any(self.C.imag))
+        return not (self.loss_factor or np.any(self.K.imag) or np.any(self.C.imag))
 
     @property
     def keeps_energy(self) -> bool:
         """Whether it is gyroscopic alone: no stiffness, and antisymmetric damping, which does no work."""
-        if np.any(self.K) or np.any(self.C.imag):
+        if self.loss_factor or np.any(self.K) or np.any(self.C.imag):
             return False
         by = dict(zip(self.offsets, self.C, strict=True))
         return all(
@@ -57,8 +66,13 @@ class ExtraTerms:
             for offset, C in by.items()
         )
 
-    def at(self, turns: Complex, moving: NDArray[np.bool_]) -> tuple[Complex, Complex]:
-        """Return what it adds to K and C, (ns, n, n), at e^{jθ} of structures that move or are at rest."""
+    def at(
+        self, turns: Complex, moving: NDArray[np.bool_], stiffness: NDArray[Any]
+    ) -> tuple[Complex, Complex]:
+        """Return what it adds to K and C, (ns, n, n), at e^{jθ} of structures that move or are at rest.
+
+        `stiffness` (ns, n, n) is the symmetric one, with which structural damping goes.
+        """
         powers = turns[:, None] ** np.array(self.offsets)
         K = np.einsum("sm,mij->sij", powers, self.K)
         if not np.all(moving) and np.any(self.K.imag):
@@ -66,130 +80,152 @@ class ExtraTerms:
             K = np.where(moving[:, None, None], K, still)
         if self.still is not None:
             K = K + np.where(moving, 0.0, 1.0)[:, None, None] * self.still
+        if self.loss_factor:
+            K = K + np.where(moving, 1j * self.loss_factor, 0.0)[:, None, None] * stiffness
         return K, np.einsum("sm,mij->sij", powers, self.C)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Symmetric:
-    """The symmetric stiffness that structural damping goes with, and what a matrix of a file has beside it.
+class OwnTerms:
+    """What a structure given by matrices has beside the symmetric ones, as blocks by offsets between sectors.
 
     Attributes
     ----------
-    K0, Kp : (n, n) array
-        Stiffness [N/m] of a sector, and to the next one.
-    shapes : (n_dofs, n) array
-        The DOFs in the coordinates of the matrices.
-    skew : tuple of arrays or None
+    skew : Blocks, Blocks
         Antisymmetric parts of K and C.
+    G, K_omega2 : Blocks
+        Damping per speed and stiffness per squared speed.
     """
 
-    K0: Real
-    Kp: Real
+    skew: tuple[Blocks, Blocks]
+    G: Blocks
+    K_omega2: Blocks
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Coordinates:
+    """What extra terms are written in.
+
+    Attributes
+    ----------
+    shapes : (n_dofs, n) array
+        The DOFs in the coordinates of the matrices.
+    own : OwnTerms or None
+        What the structure's own coordinates, in front of those of bodies, have beside symmetric matrices.
+    """
+
     shapes: Real
-    skew: tuple[Real, Real] | None = None
+    own: OwnTerms | None = None
 
     @property
-    def key(self) -> tuple[int, ...]:
-        """Tells equal ones apart from others: the arrays are the same as long as the structure is."""
-        return tuple(map(id, (self.K0, self.Kp, self.shapes, *(self.skew or ()))))
+    def key(self) -> tuple[int, int]:
+        """Tells equal ones apart from others: the objects are the same as long as the structure is."""
+        return id(self.shapes), id(self.own)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Symmetric) and self.key == other.key
+        return isinstance(other, Coordinates) and self.key == other.key
 
     def __hash__(self) -> int:
         return hash(self.key)
 
 
-def extra_terms(scene: Scene, symmetric: Symmetric) -> ExtraTerms | None:
+@lru_cache(maxsize=16)
+def own_terms(structure: MatricesStructure) -> OwnTerms | None:
+    """Return the terms of a structure beside its symmetric matrices; None where there are none."""
+    K, C = (
+        None if structure.symmetric or matrix is None else 0.5 * (matrix.array - matrix.array.T)
+        for matrix in (structure.K, structure.C)
+    )
+    G, K_omega2 = (None if matrix is None else matrix.array for matrix in (structure.G, structure.K_omega2))
+    found = OwnTerms(
+        skew=(_blocks(structure, K), _blocks(structure, C)),
+        G=_blocks(structure, G), K_omega2=_blocks(structure, K_omega2),
+    )  # fmt: skip
+    return found if any((*found.skew, found.G, found.K_omega2)) else None
+
+
+def _blocks(structure: MatricesStructure, matrix: Real | None) -> Blocks:
+    """A matrix of the structure in its coordinates."""
+    if matrix is None or not np.any(matrix):
+        return ()
+    if not structure.has_sectors:
+        return ((0, matrix),)
+    left = full_elimination(structure).of(matrix)
+    return (0, left.own), (1, left.next), (-1, left.last)
+
+
+def extra_terms(scene: Scene, coordinates: Coordinates) -> ExtraTerms | None:
     """Return the extra terms of a scene; None if it has none.
 
     The same object each time for the same parts, so that what follows from it can be kept.
     """
-    structure = scene.structure
-    spinning = _spinning(structure)
-    own = structure.loss_factor or any(spinning) or symmetric.skew
-    if not (scene.couplings or scene.aerodynamics or own):
+    loss = scene.structure.loss_factor
+    if not (scene.couplings or scene.aerodynamics or loss or coordinates.own):
         return None
     spin = (scene.speed or 0.0) * REVOLUTIONS
-    return _terms(_entries(scene), scene.dofs, structure.loss_factor, spin, spinning, symmetric)
+    return _terms(_entries(scene), scene.dofs, loss, spin, coordinates)
 
 
 @lru_cache(maxsize=64)
 def _terms(
-    entries: tuple[Entry, ...],
-    dofs: tuple[str, ...],
-    loss: float,
-    spin: float,
-    spinning: tuple[Matrix | None, Matrix | None],
-    symmetric: Symmetric,
+    entries: tuple[Entry, ...], dofs: tuple[str, ...], loss: float, spin: float, coordinates: Coordinates
 ) -> ExtraTerms:
-    total = _Sum(symmetric.shapes, dofs)
+    total = _Sum(coordinates.shapes, dofs)
     for entry in entries:
         total.add(entry, entry.k + spin**2 * entry.k_omega2, entry.c + spin * entry.g)
-    if symmetric.skew is not None:
-        total.add_own(*symmetric.skew)
-    G, K_omega2 = (0.0 if matrix is None else matrix.array for matrix in spinning)
-    if any(spinning):
-        total.add_own(spin**2 * K_omega2, spin * G)
-    if loss:
-        total.add_stiffness(1j * loss, symmetric.K0, symmetric.Kp)
-    return total.terms()
+    own = coordinates.own
+    if own is not None:
+        total.add_own(*own.skew)
+        total.add_own(own.K_omega2, own.G, spin**2, spin)
+    return total.terms(loss)
 
 
-def terms_by_stiffness(scene: Scene, dK0: Real, dKp: Real) -> ExtraTerms | None:
-    """Return the derivative of the extra terms by a parameter that changes K0 and Kp: structural damping."""
-    if not scene.structure.loss_factor or not (np.any(dK0) or np.any(dKp)):
-        return None
-    total = _Sum(np.eye(dK0.shape[0]), ())
-    total.add_stiffness(1j * scene.structure.loss_factor, dK0, dKp)
-    return total.terms()
+def hysteretic(n: int, loss_factor: float) -> ExtraTerms:
+    """Return structural damping alone, of n coordinates."""
+    return _Sum(np.eye(n), ()).terms(loss_factor)
 
 
-def terms_by_loss(symmetric: Symmetric) -> ExtraTerms:
-    """Return their derivative by the loss factor."""
-    total = _Sum(symmetric.shapes, ())
-    total.add_stiffness(1j, symmetric.K0, symmetric.Kp)
-    return total.terms()
-
-
-def terms_by_gas(scene: Scene, name: str, symmetric: Symmetric) -> ExtraTerms:
+def terms_by_gas(scene: Scene, name: str, coordinates: Coordinates) -> ExtraTerms:
     """Return their derivative by the factor of aerodynamic influence of that name."""
-    total = _Sum(symmetric.shapes, scene.dofs)
+    total = _Sum(coordinates.shapes, scene.dofs)
     for gas in scene.aerodynamics:
-        if gas.name == name and isinstance(scene.structure, CyclicStructure):
-            for entry in gas.model_copy(update={"factor": 1.0}).entries(scene.structure.sectors):
+        if gas.name == name:
+            for entry in gas.model_copy(update={"factor": 1.0}).entries(scene.structure.sector_count):
                 total.add(entry, entry.k, entry.c)
     return total.terms()
 
 
-def terms_of_line(scene: Scene, symmetric: Symmetric) -> ExtraTerms | None:
+def terms_of_line(scene: Scene, coordinates: Coordinates) -> ExtraTerms | None:
     """Return what K gains per squared speed and C per speed [rad/s]; None where nothing depends on it."""
     if not depends_on_speed(scene):
         return None
-    G, K_omega2 = (0.0 if m is None else m.array for m in _spinning(scene.structure))
-    total = _Sum(symmetric.shapes, scene.dofs)
+    total = _Sum(coordinates.shapes, scene.dofs)
     for entry in _entries(scene):
         total.add(entry, entry.k_omega2, entry.g)
-    total.add_own(K_omega2, G)
+    if coordinates.own is not None:
+        total.add_own(coordinates.own.K_omega2, coordinates.own.G)
     return total.terms()
 
 
-def terms_by_speed(scene: Scene, symmetric: Symmetric) -> tuple[ExtraTerms, ExtraTerms]:
+def terms_by_speed(scene: Scene, coordinates: Coordinates) -> tuple[ExtraTerms, ExtraTerms]:
     """Return their first and second derivative by the speed in 1/min."""
-    G, K_omega2 = (0.0 if m is None else m.array for m in _spinning(scene.structure))
     spin = (scene.speed or 0.0) * REVOLUTIONS
-    first, second = (_Sum(symmetric.shapes, scene.dofs) for _ in range(2))
+    first, second = (_Sum(coordinates.shapes, scene.dofs) for _ in range(2))
     for entry in _entries(scene):
         first.add(entry, 2.0 * spin * REVOLUTIONS * entry.k_omega2, REVOLUTIONS * entry.g)
         second.add(entry, 2.0 * REVOLUTIONS**2 * entry.k_omega2, 0.0)
-    first.add_own(2.0 * spin * REVOLUTIONS * K_omega2, REVOLUTIONS * G)
-    second.add_own(2.0 * REVOLUTIONS**2 * K_omega2, 0.0)
+    own = coordinates.own
+    if own is not None:
+        first.add_own(own.K_omega2, own.G, 2.0 * spin * REVOLUTIONS, REVOLUTIONS)
+        second.add_own(own.K_omega2, (), 2.0 * REVOLUTIONS**2)
     return first.terms(), second.terms()
 
 
 def depends_on_speed(scene: Scene) -> bool:
     """Whether matrices of a scene depend on the speed of rotation."""
-    return any(coupling.turns for coupling in scene.couplings) or any(_spinning(scene.structure))
+    given = scene.structure
+    spinning = isinstance(given, MatricesStructure) and not (given.G is None and given.K_omega2 is None)
+    return spinning or any(coupling.turns for coupling in scene.couplings)
 
 
 class _Sum:
@@ -207,40 +243,27 @@ class _Sum:
         self._at(self._K, entry.offset)[:] += k * np.outer(on, of)
         self._at(self._C, entry.offset)[:] += c * np.outer(on, of)
 
-    def add_own(self, K: Real | float, C: Real | float) -> None:
-        """Add matrices of the structure's own coordinates, in front of those of bodies."""
-        for to, matrix in ((self._K, K), (self._C, C)):
-            size = np.shape(matrix)[0] if np.ndim(matrix) else 0
-            self._at(to, 0)[:size, :size] += matrix
+    def add_own(self, K: Blocks, C: Blocks, by: float = 1.0, by_c: float = 1.0) -> None:
+        """Add multiples of the structure's own matrices, in front of the coordinates of bodies."""
+        for to, blocks, factor in ((self._K, K, by), (self._C, C, by_c)):
+            for offset, matrix in blocks:
+                size = len(matrix)
+                self._at(to, offset)[:size, :size] += factor * matrix
 
-    def add_stiffness(self, factor: complex, K0: Real, Kp: Real) -> None:
-        """Add a multiple of the stiffness of a sector."""
-        for offset, matrix in ((0, K0), (1, Kp), (-1, Kp.T)):
-            if offset == 0 or np.any(Kp):
-                self._at(self._K, offset)[:] += factor * matrix
-
-    def terms(self) -> ExtraTerms:
-        """Return what was added."""
+    def terms(self, loss_factor: float = 0.0) -> ExtraTerms:
+        """Return what was added, with structural damping."""
         offsets = tuple(sorted({0, *self._K, *self._C}))
         K, C = (np.array([self._at(part, m) for m in offsets]) for part in (self._K, self._C))
         for array in (K, C):
             array.setflags(write=False)
-        return ExtraTerms(offsets=offsets, K=K, C=C)
+        return ExtraTerms(offsets=offsets, K=K, C=C, loss_factor=loss_factor)
 
     def _at(self, part: dict[int, Complex], offset: int) -> Complex:
         return part.setdefault(offset, np.zeros((self._n, self._n), np.complex128))
 
 
-def _spinning(structure: Structure) -> tuple[Matrix | None, Matrix | None]:
-    """G and K_omega2 of a structure given by matrices."""
-    if not isinstance(structure, MatricesStructure):
-        return None, None
-    return structure.G, structure.K_omega2
-
-
 def _entries(scene: Scene) -> tuple[Entry, ...]:
     """Every entry that couplings and gas add."""
     own = [entry for coupling in scene.couplings for entry in coupling.entries()]
-    if isinstance(scene.structure, CyclicStructure):
-        own += [entry for gas in scene.aerodynamics for entry in gas.entries(scene.structure.sectors)]
+    own += [entry for gas in scene.aerodynamics for entry in gas.entries(scene.structure.sector_count)]
     return tuple(own)

@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatrixModel:
-    """M q'' + C q' + K q = shapesᵀ f, x = shapes q; all arrays read-only.
+    """M q'' + C q' + K q = shapesᵀ f, x = shapes q, of the symmetric parts; all arrays read-only.
 
     Attributes
     ----------
@@ -25,29 +25,26 @@ class MatrixModel:
         In physical coordinates, or in modal ones if the structure is given by its modes.
     shapes : (n_dofs, n) array
         The DOFs in use.
-    skew : tuple of (n, n) arrays or None
-        What K and C have beside these symmetric ones: their antisymmetric parts.
     """
 
     M: FloatArray
     C: FloatArray
     K: FloatArray
     shapes: FloatArray
-    skew: tuple[FloatArray, FloatArray] | None = None
 
 
 @lru_cache(maxsize=16)
 def matrix_model(structure: MatricesStructure) -> MatrixModel:
     """The matrices of a structure; the same arrays each time, so that what follows from them can be kept."""
-    M, K, own, shapes = _base(structure.model_copy(update=_NO_PROPORTIONAL))
+    M, K, own, shapes = _base(structure.model_copy(update=NO_PROPORTIONAL))
     C = own
     if structure.stiffness_proportional_damping or structure.mass_proportional_damping:
         C = own + structure.stiffness_proportional_damping * K + structure.mass_proportional_damping * M
         C.setflags(write=False)
-    return MatrixModel(M=M, C=C, K=K, shapes=shapes, skew=_skew(structure))
+    return MatrixModel(M=M, C=C, K=K, shapes=shapes)
 
 
-_NO_PROPORTIONAL = {"stiffness_proportional_damping": 0.0, "mass_proportional_damping": 0.0}
+NO_PROPORTIONAL = {"stiffness_proportional_damping": 0.0, "mass_proportional_damping": 0.0}
 
 
 @lru_cache(maxsize=16)
@@ -73,19 +70,3 @@ def _base(structure: MatricesStructure) -> tuple[FloatArray, FloatArray, FloatAr
     for array in (M, K, C, shapes):
         array.setflags(write=False)
     return M, K, C, shapes
-
-
-@lru_cache(maxsize=16)
-def _skew(structure: MatricesStructure) -> tuple[FloatArray, FloatArray] | None:
-    """The antisymmetric parts of K and C; None where there are none."""
-    if structure.K is None or structure.symmetric:
-        return None
-    parts = (structure.K.array, np.zeros(1) if structure.C is None else structure.C.array)
-    K, C = (0.5 * (part - part.T) for part in parts)
-    if C.ndim == 1:
-        C = np.zeros_like(K)
-    if not (np.any(K) or np.any(C)):
-        return None
-    K.setflags(write=False)
-    C.setflags(write=False)
-    return K, C

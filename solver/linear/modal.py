@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from solver.contacts.kernels.system import MODES, POLES
 from solver.jit import eigen
-from solver.jit.fourier import Complex, Flags, Real
-from solver.linear.extra_terms import ExtraTerms
+from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.model import LinearModel
 from solver.matrices.normal_modes import (
     UndampedModes,
@@ -48,7 +47,7 @@ class _Identity:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Held:
-    """Matrices at each interblade phase, (ns, n, n) each, real where all phases are 0.
+    """Matrices at each nodal diameter, (ns, n, n) each, real where all phases are.
 
     Attributes
     ----------
@@ -87,41 +86,40 @@ class Decomposition:
     left: NDArray[Any]
 
 
-def matrices_of(model: LinearModel, theta: Real, moving: Flags) -> Held:
-    """Return the matrices at each interblade phase, of motions or (False) of what is at rest."""
-    parts = tuple(_Identity(a) for a in (model.K0, model.Kp, model.C0, model.Cp, model.M))
-    if model.extra is None:
-        return _matrices(parts, tuple(theta.tolist()))
-    return _with_extra(parts, tuple(theta.tolist()), tuple(moving.tolist()), model.extra)
+def matrices_of(model: LinearModel, diameters: Integer, moving: Flags) -> Held:
+    """Return the matrices at each nodal diameter, of motions or (False) of what is at rest.
+
+    Raises
+    ------
+    SettingError
+        A reduced sector was not built for one of them.
+    """
+    arrays = (model.K0, model.Kp, model.C0, model.Cp, model.M)
+    parts: tuple[object, ...] = (model.sector,) if model.sector else tuple(_Identity(a) for a in arrays)
+    # Without extra terms what is at rest has the matrices of what moves.
+    still = () if model.extra is None else tuple(moving.tolist())
+    return _matrices(_ByParts(model, (*parts, model.sectors, model.extra)), tuple(diameters.tolist()), still)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _ByParts:
+    """A model as a key: equal to another with the same matrices, whatever its contacts and forces are."""
+
+    model: LinearModel = field(repr=False)
+    parts: tuple[object, ...]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _ByParts) and self.parts == other.parts
+
+    def __hash__(self) -> int:
+        return hash(self.parts)
 
 
 @lru_cache(maxsize=32)
-def _with_extra(
-    parts: tuple[_Identity, ...], theta: tuple[float, ...], moving: tuple[bool, ...], extra: ExtraTerms
-) -> Held:
-    """The matrices with terms that may be neither symmetric nor real."""
-    plain = _matrices(parts, theta)
-    turns = np.exp(1j * np.array(theta))
-    K, C = extra.at(turns, np.array(moving, np.bool_))
-    stiffness: NDArray[Any] = plain.K + K
-    damping: NDArray[Any] = plain.C + C
-    if not (np.any(stiffness.imag) or np.any(damping.imag)):
-        stiffness, damping = stiffness.real, damping.real
-    return Held(stiffness, damping, plain.M, (plain.key, extra, moving))
-
-
-@lru_cache(maxsize=32)
-def _matrices(parts: tuple[_Identity, ...], theta: tuple[float, ...]) -> Held:
-    K0, Kp, C0, Cp, M = (part.array for part in parts)
-    turn = np.exp(1j * np.array(theta))[:, None, None]
-
-    def at(zero: Real, plus: Real) -> NDArray[Any]:
-        if not np.any(plus):
-            return np.broadcast_to(zero, (len(theta), *zero.shape))
-        return np.asarray(zero + plus * turn + plus.T * turn.conj())
-
-    held = np.broadcast_to(M, (len(theta), *M.shape))
-    return Held(at(K0, Kp), at(C0, Cp), held, (parts, theta))
+def _matrices(of: _ByParts, diameters: tuple[int, ...], moving: tuple[bool, ...]) -> Held:
+    given = np.array(diameters, dtype=np.int64)
+    moves = np.array(moving, np.bool_) if moving else np.ones(given.size, np.bool_)
+    return Held(*of.model.at(given, moves), (of.parts, diameters, moving))
 
 
 @lru_cache(maxsize=32)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,13 +21,16 @@ def ratio_of_modes(ratios: Ratios, count: int) -> FloatArray:
     return np.asarray(given[np.minimum(np.arange(count), given.size - 1)])
 
 
-def modal_damping(M: FloatArray, K: FloatArray, ratios: Ratios) -> FloatArray:
-    """Return C with damping ratios in the modes, Σ 2 ζ ω (Mφ)(Mφ)ᵀ; a rigid body has none."""
+def modal_damping(M: NDArray[Any], K: NDArray[Any], ratios: Ratios) -> NDArray[Any]:
+    """Return C with damping ratios in the modes, Σ 2 ζ ω (Mφ)(Mφ)ᴴ, of Hermitian M and K.
+
+    A rigid body has none.
+    """
     found = undamped_modes(K, M)
     momenta = M @ found.phi
     omega = np.sqrt(np.maximum(found.omega2, 0.0))
     zeta = ratio_of_modes(ratios, omega.size)
-    return np.asarray((momenta * (2.0 * zeta * omega)) @ momenta.T)
+    return np.asarray((momenta * (2.0 * zeta * omega)) @ momenta.conj().T)
 
 
 def modal_damping_derivative(

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.linear.extra_terms import ExtraTerms
+from solver.linear.sector_matrices import ProportionalDamping, SectorMatrices
 
 FloatArray = NDArray[np.float64]
+Integer = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 Complex = NDArray[np.complex128]
 
 
@@ -40,9 +44,9 @@ class ForceTerm:
 class LinearModel:
     """The structure without its contacts: one sector of a tuned disk, or the whole structure.
 
-    A matrix at interblade phase theta is X(theta) = X0 + Xp e^{j theta} + Xp^T e^{-j theta}; the neighbour
-    x of the next sector is X e^{j k i phi} for harmonic k, engine order i and phi = 2 pi / sectors. All
-    arrays are read-only.
+    Harmonic k of engine order i sees the nodal diameter n = k i: the neighbour of x in the next sector is
+    x e^{j theta} with theta = 2 pi n / sectors. There a matrix is X0 + Xp e^{j theta} + Xp^T e^{-j theta}, or
+    what `sector` gives; `at` says it for all of them, with the extra terms. All arrays are read-only.
 
     Attributes
     ----------
@@ -67,6 +71,9 @@ class LinearModel:
         Engine order of the excitation, 0 if lumped.
     sectors : int
         Number of sectors, 1 if lumped.
+    sector : SectorMatrices or None
+        What the matrices of a sector given by them are at each nodal diameter; M, C0, Cp, K0 and Kp are then
+        empty, (0, 0).
     extra : ExtraTerms or None
         Terms that are not symmetric, not real or not of springs and dashpots; see `at`.
     prescribed : bool
@@ -90,10 +97,16 @@ class LinearModel:
     observe: FloatArray
     engine_order: int
     sectors: int
+    sector: SectorMatrices | None = None
     extra: ExtraTerms | None = None
     prescribed: bool = False
     line: ExtraTerms | None = None
     line_order: float = 1.0
+
+    @property
+    def n_coordinates(self) -> int:
+        """Number of coordinates of the matrices."""
+        return int(self.shapes.shape[1])
 
     @property
     def interblade_phase(self) -> float:
@@ -101,10 +114,12 @@ class LinearModel:
         return 2.0 * math.pi * self.engine_order / self.sectors
 
     @property
-    def free(self) -> NDArray[np.bool_]:
+    def free(self) -> Flags:
         """The coordinates that move freely, (n,): not the base nor what it drives, which have no inertia."""
-        moves: NDArray[np.bool_] = np.any(self.M, axis=1)
-        moves[-1] &= not self.prescribed
+        if not self.prescribed:
+            return np.ones(self.n_coordinates, np.bool_)
+        moves: Flags = np.any(self.M, axis=1)
+        moves[-1] = False
         return moves
 
     @property
@@ -112,37 +127,81 @@ class LinearModel:
         """Whether energy is kept but for dashpots: nothing beside springs, dashpots and gyroscopic terms."""
         return not self.prescribed and (self.extra is None or self.extra.keeps_energy)
 
-    def at(self, turns: Complex, moving: NDArray[np.bool_]) -> tuple[Complex, Complex]:
-        """Return K and C, (ns, n, n), at e^{j theta} (ns,), of motions or (False) of what is at rest."""
-        turn = turns[:, None, None]
-        K = self.K0 + self.Kp * turn + self.Kp.T * turn.conj()
-        C = self.C0 + self.Cp * turn + self.Cp.T * turn.conj()
-        if self.extra is not None:
-            more, further = self.extra.at(turns, moving)
-            K, C = K + more, C + further
-        return K, C
+    @property
+    def every_diameter(self) -> bool:
+        """Whether the matrices of all nodal diameters are known."""
+        return self.sector is None or self.sector.every_diameter
 
-    def inertia(self, turns: Complex, ks: NDArray[np.int64]) -> FloatArray | Complex:
-        """Return M of harmonics ks (ns,) at e^{j theta} (ns,), (ns, n, n), with what follows the speed.
+    def diameters(self, ks: Integer) -> Integer:
+        """Return the nodal diameters that harmonics see, from 0 to sectors - 1."""
+        return (ks * self.engine_order) % self.sectors
+
+    def turns(self, diameters: Integer) -> Complex:
+        """Return e^{j theta} at nodal diameters, (nd,); without rounding where it is real."""
+        angles = 2.0 * np.pi * diameters / self.sectors
+        real = 2 * diameters % self.sectors == 0
+        return np.asarray(np.where(real, np.round(np.cos(angles)), np.exp(1j * angles)))
+
+    def plain(self, diameters: Integer) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """Return K, C and M without extra terms, Hermitian, (nd, n, n) each, at nodal diameters.
+
+        They are real where all phases are, or all blocks that join sectors are 0.
+
+        Raises
+        ------
+        SettingError
+            A reduced sector was not built for one of them.
+        """
+        if self.sector is not None:
+            found = [self.sector.at(int(n)) for n in diameters]
+            K, C, M = (np.array(each) for each in zip(*found, strict=True))
+            return K, C, M
+        turn = self.turns(diameters)[:, None, None]
+
+        def turned(zero: FloatArray, plus: FloatArray) -> NDArray[Any]:
+            if not np.any(plus):
+                return np.broadcast_to(zero, (len(turn), *zero.shape))
+            ahead = plus * turn
+            return np.asarray(zero + (ahead + np.swapaxes(ahead.conj(), 1, 2)))  # Hermitian to the last digit
+
+        M = np.broadcast_to(self.M, (len(turn), *self.M.shape))
+        return turned(self.K0, self.Kp), turned(self.C0, self.Cp), M
+
+    def at(self, diameters: Integer, moving: Flags) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """Return K, C and M, (nd, n, n) each, at nodal diameters, of motions or (False) of what is at rest.
+
+        K and C are real where both are.
+
+        Raises
+        ------
+        SettingError
+            A reduced sector was not built for one of them.
+        """
+        K, C, M = self.plain(diameters)
+        if self.extra is not None:
+            more, further = self.extra.at(self.turns(diameters), moving, K)
+            K, C = K + more, C + further
+            if not (np.any(K.imag) or np.any(C.imag)):
+                K, C = K.real, C.real
+        return K, C, M
+
+    def inertia(self, diameters: Integer, ks: Integer) -> NDArray[Any]:
+        """Return M of harmonics ks at their nodal diameters, (ns, n, n), with what follows the speed.
 
         Along a line K + (ω/e)² K₂ + ikω (C + (ω/e) G) − k²ω² M has the shape of a fixed speed, with the
         inertia M − K₂/(ke)² − i G/(ke). The mean is written with k = 1 and has −K₂/e² alone.
         """
-        whole = np.broadcast_to(self.M, (len(ks), *self.M.shape))
+        K, _, whole = self.plain(diameters)
         if self.line is None:
             return whole
-        K2, G = self.line.at(turns, np.ones(len(ks), np.bool_))
+        K2, G = self.line.at(self.turns(diameters), np.ones(len(ks), np.bool_), K)
         moving, k = (ks > 0)[:, None, None], np.maximum(ks, 1)[:, None, None]
         per = 1.0 / (k * self.line_order)
         return np.asarray(np.where(moving, whole - 1j * per * G, 0.0) - per**2 * K2)
 
-    def ports_at(self, turns: Complex) -> Complex:
-        """Return the relative motions L of the contacts, (ns, n_ports, n), at e^{j theta} (ns,)."""
-        return np.asarray(self.contact_here + self.contact_next * turns[:, None, None])
-
-    def turns(self, ks: NDArray[np.int64]) -> Complex:
-        """Return e^{j theta} of harmonics."""
-        return np.asarray(np.exp(1j * ks * self.interblade_phase))
+    def ports_at(self, diameters: Integer) -> Complex:
+        """Return the relative motions L of the contacts, (nd, n_ports, n), at nodal diameters."""
+        return np.asarray(self.contact_here + self.contact_next * self.turns(diameters)[:, None, None])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,6 +212,10 @@ class LinearModelDerivative:
     ----------
     dM, dC0, dCp, dK0, dKp : (n, n) array
         Derivatives of the matrices; read-only.
+    damping : ProportionalDamping or None
+        Of a sector given by its matrices: what dC has beside dC0 and dCp at each nodal diameter.
+    by_loss_factor : bool
+        The parameter is the loss factor: dK is i times the stiffness of the model.
     affine : bool
         The matrices are affine in this parameter, so these derivatives are constant.
     contact_here, contact_next : (n_ports, n) array or None
@@ -175,13 +238,20 @@ class LinearModelDerivative:
     second_forces: tuple[ForceTerm, ...] = ()
     extra: ExtraTerms | None = None
     second_extra: ExtraTerms | None = None
+    damping: ProportionalDamping | None = None
+    by_loss_factor: bool = False
 
-    def at(self, turns: Complex, moving: NDArray[np.bool_]) -> tuple[Complex, Complex, Complex]:
-        """Return the derivatives of K, C and M, (ns, n, n), at e^{j theta} (ns,), as `LinearModel.at`."""
+    def at(self, model: LinearModel, diameters: Integer, moving: Flags) -> tuple[Complex, Complex, Complex]:
+        """Return the derivatives of K, C and M of `model`, (nd, n, n) each, as `LinearModel.at`."""
+        turns = model.turns(diameters)
         turn = turns[:, None, None]
         dK = self.dK0 + self.dKp * turn + self.dKp.T * turn.conj()
         dC = self.dC0 + self.dCp * turn + self.dCp.T * turn.conj()
+        if self.damping is not None:
+            dC = dC + np.array([self.damping.at(int(n)) for n in diameters])
         if self.extra is not None:
-            more, further = self.extra.at(turns, moving)
+            more, further = self.extra.at(turns, moving, dK)
             dK, dC = dK + more, dC + further
+        if self.by_loss_factor:
+            dK = dK + np.where(moving[:, None, None], 1j * model.plain(diameters)[0], 0.0)
         return dK, dC, self.dM + 0.0 * turn

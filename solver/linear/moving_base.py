@@ -22,6 +22,7 @@ from solver.scene.terms.excitation import Base
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+_WHOLE, _MOVING = np.zeros(1, np.int64), np.ones(1, np.bool_)  # a structure without sectors, in motion
 _RIGID = 1e20  # stiffness of what drives a DOF, relative to the largest of the structure
 
 
@@ -46,8 +47,7 @@ def with_base(model: LinearModel, scene: Scene, base: Base) -> LinearModel:
         np.zeros((n + 1, n + 1), np.complex128),
     )
     if model.extra is not None:
-        turns, moving = np.ones(1, np.complex128), np.ones(1, np.bool_)
-        (K[:n, :n],), (C[:n, :n],) = model.extra.at(turns, moving)
+        (K[:n, :n],), (C[:n, :n],) = model.extra.at(model.turns(_WHOLE), _MOVING, model.K0[None])
     K0, C0 = _padded(model.K0), _padded(model.C0)
     still = np.zeros((n + 1, n + 1))
     if base.ground:
@@ -89,18 +89,17 @@ def derivative_with_base(d: LinearModelDerivative, model: LinearModel, base: Bas
     dM = wide(d.dM)
     if base.ground:
         dM[:-1, -1] = d.dM @ shares
-    extra, second = (
-        None if terms is None else replace(terms, K=np.array([wide(K) for K in terms.K]),
-                                           C=np.array([wide(C) for C in terms.C]))
-        for terms in (d.extra, d.second_extra)
-    )  # fmt: skip
     # Rows of driven DOFs are of no symmetric part: the whole derivative stands with the extra terms.
-    own = ExtraTerms(offsets=(0,), K=wide(d.dK0)[None] + 0.0j, C=wide(d.dC0)[None] + 0.0j)
-    if extra is not None:
-        own = replace(own, K=own.K + extra.K.sum(axis=0), C=own.C + extra.C.sum(axis=0))
+    (dK,), (dC,), _ = d.at(model, _WHOLE, _MOVING)
+    own = ExtraTerms(offsets=(0,), K=wide(dK)[None], C=wide(dC)[None])
+    second = d.second_extra
+    if second is not None:
+        K, C = (np.array([wide(each) for each in part]) for part in (second.K, second.C))
+        second = replace(second, K=K, C=C)
     nothing = _zeros(shares.size + 1)
     return replace(
-        d, dM=dM, dK0=nothing, dKp=nothing, dC0=nothing, dCp=nothing, extra=own, second_extra=second,
+        d, dM=dM, dK0=nothing, dKp=nothing, dC0=nothing, dCp=nothing, by_loss_factor=False,
+        extra=own, second_extra=second,
         contact_here=None if d.contact_here is None else _widened(d.contact_here),
         contact_next=None if d.contact_next is None else _widened(d.contact_next),
         forces=tuple(map(_wider, d.forces)), second_forces=tuple(map(_wider, d.second_forces)),

@@ -25,7 +25,7 @@ from solver.marching.kernels import taylor as stepping
 from solver.marching.result import MarchResult, MarchStatus, describe
 from solver.marching.start import MarchStart, state_at
 from solver.scene.cyclic.annulus import annulus
-from solver.scene.scene import CyclicStructure, Excitation, Scene
+from solver.scene.scene import Excitation, Scene
 
 FloatArray = NDArray[np.float64]
 LEAST_STEPS = 64
@@ -124,7 +124,7 @@ def march(
     begin = time.perf_counter()
     _check(frequency_hz, tolerance, max_periods)
     scene = scene.at_frequency(frequency_hz)
-    whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
+    whole = annulus(scene) if scene.structure.has_sectors else scene
     omega = 2.0 * math.pi * frequency_hz
     equations = equations_of_motion(whole, omega)
     steps = _steps(equations.system, scene.forces, steps_per_period)

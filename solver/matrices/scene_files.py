@@ -14,6 +14,7 @@ from solver.matrices.files import MatrixFileError, read_labelled, read_modes
 from solver.matrices.labels import label
 from solver.matrices.load_set import UNITS, MatrixSet, in_si, put_together
 from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton
+from solver.matrices.sectors.loading import as_sector
 from solver.matrices.validation import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix, Modes
 
@@ -45,9 +46,19 @@ def with_files(raw: Mapping[str, object], folder: Path) -> dict[str, object]:
     except MatrixFileError as error:
         raise SceneError([_issue("modes", f"`modes`: {error}")]) from error
     found = read_matrices(tables, folder)
+    if tables.get("sectors") is not None:
+        return {**raw, "structure": as_sector(tables, found, folder, _orders(raw))}
     if isinstance(tables.get("modes"), Modes):
         tables = _rows_in_use(tables)
     return {**raw, "structure": as_kept(tables, found.matrices)[0]}
+
+
+def _orders(raw: Mapping[str, object]) -> list[int]:
+    """Engine orders of the excitation of a scene."""
+    given = raw.get("excitation")
+    rows = given if isinstance(given, list) else [given]
+    found = [row.get("engine_order", 0) for row in rows if isinstance(row, dict)]
+    return [order for order in found if type(order) is int] or [0]
 
 
 def read_matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:

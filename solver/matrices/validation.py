@@ -40,6 +40,9 @@ class DofTable(tuple[str, ...]):
     def __hash__(self) -> int:
         return hash((tuple(self), self.rows))
 
+    def __reduce__(self) -> tuple[type[DofTable], tuple[dict[str, int]]]:
+        return DofTable, (self.write(),)
+
     @classmethod
     def read(cls, data: object) -> DofTable:
         """Read a table ``{name: row}``, or a list of names for the rows 0, 1, 2, …"""

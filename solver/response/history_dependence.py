@@ -28,6 +28,7 @@ more from no motion, and says so if it finds one, but no more than that.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -41,7 +42,7 @@ from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts, port_stiffnesses
 from solver.linear.model import LinearModel
 from solver.linear.rigid_body_modes import CANCELLED
-from solver.matrices.normal_modes import least_stiffness
+from solver.matrices.normal_modes import hermitian, least_stiffness
 from solver.response.contact_response import ContactResponse, ContactState
 from solver.response.solution import Solution
 from solver.response.start_from_rest import Start, keeps_sticking
@@ -243,32 +244,27 @@ class _Fits:
         return not bool(np.any(given.size(forces + change) + between >= limit))
 
 
-def _sector_turns(model: LinearModel) -> Complex:
-    """Return e^{jθ} of every nodal diameter, (sectors,)."""
-    return np.asarray(np.exp(2j * np.pi * np.arange(model.sectors) / model.sectors))
-
-
-def _at_turn(model: LinearModel, turn: complex) -> tuple[Complex, Complex]:
-    """Return K and L at the interblade phase factor `turn`."""
-    turns = np.array([turn])
-    return model.at(turns, np.zeros(1, np.bool_))[0][0], model.ports_at(turns)[0]
+def _of_diameters(model: LinearModel) -> Iterator[tuple[Complex, Complex, Complex]]:
+    """Yield K, C and L at rest at every nodal diameter."""
+    for n in np.arange(model.sectors)[:, None]:
+        K, C, _ = model.at(n, np.zeros(1, np.bool_))
+        yield K[0], C[0], model.ports_at(n)[0]
 
 
 def _compliances(model: LinearModel, stiffness: Real, ports: list[slice]) -> list[tuple[float, float]] | None:
     """Return L K_s⁻¹ Lᵀ of slip and approach of each contact [m/N].
 
-    None where nothing holds a part, or where damping or a stiffness that is not symmetric may give power, so
-    that distances may grow.
+    None where nothing holds a part, a nodal diameter is not known, or where damping or a stiffness that is
+    not symmetric may give power, so that distances may grow.
 
     Of two directions the larger one stands for both: it is the largest eigenvalue. In an annulus it is the
     average over its nodal diameters.
     """
     total = np.zeros((stiffness.size, stiffness.size), dtype=np.complex128)
-    if not model.is_symmetric:
+    if not (model.is_symmetric and model.every_diameter):
         return None
-    for turn in _sector_turns(model):
-        K, L = _at_turn(model, turn)
-        C = model.C0 + model.Cp * turn + model.Cp.T / turn  # gyroscopic terms do no work
+    for K, damping, L in _of_diameters(model):
+        C = hermitian(damping)  # gyroscopic terms do no work
         if np.linalg.eigvalsh(C)[0] < -_ROUNDING * np.abs(C).max():
             return None
         held = K + L.conj().T @ (stiffness[:, None] * L)
@@ -343,13 +339,15 @@ def _mean_range(solution: Solution, sticking: tuple[_Contact, ...]) -> tuple[flo
 
 
 def _mean_gains(model: LinearModel) -> Real | None:
-    """Return observe K⁻¹ Lᵀ of contacts of each sector [m/N], (sectors, n_ports); None if it is singular.
+    """Return observe K⁻¹ Lᵀ of contacts of each sector [m/N], (sectors, n_ports); None if it is singular or
+    not known at every nodal diameter.
 
     What rounding leaves of the stiffness against a rigid-body motion is none.
     """
     rows = []
-    for turn in _sector_turns(model):
-        K, L = _at_turn(model, turn)
+    if not model.every_diameter:
+        return None
+    for K, _, L in _of_diameters(model):
         if least_stiffness(K) <= CANCELLED:
             return None
         rows.append(model.observe @ np.linalg.solve(K, L.conj().T))

@@ -57,8 +57,10 @@ class Start:
         """Return the energy of displacements and velocities (sectors, n) [J]."""
         beyond = np.roll(x, -1, axis=0)
         u = x @ self.model.contact_here.T + beyond @ self.model.contact_next.T
-        kinetic = np.sum(v * (v @ self.model.M))
-        elastic = np.sum(x * (x @ self.model.K0)) + 2.0 * np.sum(x * (beyond @ self.model.Kp.T))
+        K, _, M = self.model.at(np.arange(len(x)), np.zeros(len(x), np.bool_))
+        xs, vs = np.fft.fft(x, axis=0), np.fft.fft(v, axis=0)
+        kinetic = np.einsum("si,sij,sj->", vs.conj(), M, vs).real / len(x)
+        elastic = np.einsum("si,sij,sj->", xs.conj(), K, xs).real / len(x)
         return 0.5 * float(kinetic + elastic + np.sum(self.stiffness * u**2))
 
 
@@ -83,18 +85,18 @@ class _Transient:
     @classmethod
     def of(cls, start: Start) -> _Transient | None:
         """Return the transient at its beginning; None if its modes do not span it, or one of them grows."""
-        turns = np.exp(2j * np.pi * np.arange(len(start.x)) / len(start.x))[:, None, None]
+        ns = np.arange(len(start.x))
         model, omega = start.model, start.omega
-        L = model.contact_here + model.contact_next * turns
-        K, C = model.at(turns[:, 0, 0], np.zeros(len(turns), np.bool_))
+        L = model.ports_at(ns)
+        K, C, M = model.at(ns, np.zeros(ns.size, np.bool_))
         K = K + np.swapaxes(L.conj(), 1, 2) @ (start.stiffness[:, None] * L)
-        inverse, n = np.linalg.inv(model.M), start.x.shape[1]
-        generator = np.zeros((len(turns), 2 * n, 2 * n), np.complex128)
+        inverse, n = np.linalg.inv(M), start.x.shape[1]
+        generator = np.zeros((ns.size, 2 * n, 2 * n), np.complex128)
         generator[:, :n, n:] = np.eye(n)
         generator[:, n:, :n], generator[:, n:, n:] = -inverse @ K / omega**2, -inverse @ C / omega
-        state = -np.fft.fft(np.hstack([start.x, start.v / omega]), axis=0) / len(turns)
+        state = -np.fft.fft(np.hstack([start.x, start.v / omega]), axis=0) / ns.size
         try:
-            rates, modes = np.linalg.eig(generator.real if len(turns) == 1 else generator)
+            rates, modes = np.linalg.eig(generator.real if ns.size == 1 else generator)
             duals = np.linalg.inv(modes)
         except np.linalg.LinAlgError:
             return None

@@ -88,6 +88,7 @@ def coordinates(solution: Solution, k: int) -> Complex:
     _check_converged(solution)
     model = linear_model(solution.scene)
     K, C, L = matrices(model, k)
+    M = mass(model, k)
     force = force_amplitudes(model, np.array([k], dtype=np.int64))[0]
     forces = [fourier.to_complex(force)[k] for c in solution.contacts for force in c.forces]
     friction = np.array(forces, dtype=np.complex128)
@@ -96,7 +97,7 @@ def coordinates(solution: Solution, k: int) -> Complex:
         friction = friction - kt * np.array([motion[0] for c in solution.contacts for motion in c.motions])
         K = K + L.conj().T @ (kt[:, None] * L)
     speed = 2.0 * math.pi * solution.frequency_hz * k
-    dynamic = K - speed**2 * model.M + 1j * speed * C
+    dynamic = K - speed**2 * M + 1j * speed * C
     return np.asarray(np.linalg.solve(dynamic, force - L.conj().T @ friction), dtype=np.complex128)
 
 
@@ -105,8 +106,9 @@ def all_coordinates(solution: Solution) -> Complex:
     _check_converged(solution)
     model = linear_model(solution.scene)
     ks = np.arange(solution.highest_harmonic + 1)
-    K, C = model.at(model.turns(ks), ks > 0)
-    L = model.ports_at(model.turns(ks))
+    diameters = model.diameters(ks)
+    K, C, M = model.at(diameters, ks > 0)
+    K, L = K.astype(np.complex128), model.ports_at(diameters)
     forces = [fourier.to_complex(force) for c in solution.contacts for force in c.forces]
     friction = np.array(forces, dtype=np.complex128).reshape(-1, ks.size).T
     if solution.contacts:
@@ -115,14 +117,19 @@ def all_coordinates(solution: Solution) -> Complex:
         K[0] += L[0].conj().T @ (kt[:, None] * L[0])
     speed = (2.0 * math.pi * solution.frequency_hz * ks)[:, None, None]
     pushes = force_amplitudes(model, ks) - np.einsum("kpn,kp->kn", L.conj(), friction)
-    return np.asarray(np.linalg.solve(K - speed**2 * model.M + 1j * speed * C, pushes[:, :, None])[:, :, 0])
+    return np.asarray(np.linalg.solve(K - speed**2 * M + 1j * speed * C, pushes[:, :, None])[:, :, 0])
 
 
 def matrices(model: LinearModel, k: int) -> tuple[Complex, Complex, Complex]:
     """Return K [N/m], C [N s/m] and the contact rows L as harmonic k sees them (its interblade phase)."""
-    ks = np.array([k], dtype=np.int64)
-    (K,), (C,) = model.at(model.turns(ks), ks > 0)
-    return K, C, model.ports_at(model.turns(ks))[0]
+    n = model.diameters(np.array([k], dtype=np.int64))
+    (K,), (C,), _ = model.at(n, np.array([k > 0]))
+    return K, C, model.ports_at(n)[0]
+
+
+def mass(model: LinearModel, k: int) -> Complex:
+    """Return M [kg] as harmonic k sees it."""
+    return np.asarray(model.plain(model.diameters(np.array([k], dtype=np.int64)))[2][0])
 
 
 def _check_converged(solution: Solution) -> None:

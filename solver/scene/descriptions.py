@@ -55,6 +55,16 @@ WORDS: dict[str, dict[str, str]] = {
         "damping_ratio": "Damping ratio of every mode, or a list of those of each, added to the rest.",
         "mass_proportional_damping": "C gains this many times M [1/s].",
         "reduction": "What a model was before it was reduced; set when it is.",
+        "diameters": "A reduced sector, in place of M, K and C: the file that `stickslip import` wrote.",
+        "cyclic": "How the matrices of a sector are joined to the next one.",
+    },
+    "CyclicBoundary": {
+        "low": "Nodes of the boundary to the sector before: a set of the deck, or a list.",
+        "high": "Nodes of the boundary to the next sector, where the low one comes when turned.",
+        "nodes": "The input deck with the positions of nodes and their sets.",
+        "pair_by": "Nodes of both boundaries are paired by position, or in their order.",
+        "tolerance": "Distance within which two nodes are one place, in the units of the deck.",
+        "keep_modes": "Reduce the sector at each nodal diameter, with so many modes beside its DOFs.",
     },
 }  # fmt: skip
 

@@ -20,10 +20,10 @@ def shipped_scenes() -> tuple[str, ...]:
 
 
 def scene_folder(name_or_path: object) -> Path:
-    """Where relative names of files in a scene begin: the folder of its file, the current one if shipped."""
+    """Where relative names of files in a scene begin: the folder of its file."""
     if isinstance(name_or_path, str | Path) and name_or_path not in shipped_scenes():
         return Path(name_or_path).parent
-    return Path()
+    return Path(str(resources.files("solver.scene") / "shipped"))
 
 
 def load_raw(name_or_path: object) -> dict[str, object]:

@@ -51,6 +51,7 @@ def scene_schema() -> dict[str, Any]:
         _describe(definition, _model(name), name)
     _describe(found, Scene, "Scene")
     _matrices(definitions["MatricesStructure"]["properties"])
+    _boundaries(definitions["CyclicBoundary"]["properties"])
     number = {"type": "number", "exclusiveMinimum": 0.0, "description": "Mass [kg]."}
     for name in ("LumpedStructure", "CyclicStructure"):
         masses = definitions[name]["properties"]["masses"]
@@ -146,5 +147,19 @@ def _matrices(properties: dict[str, Any]) -> None:
     properties["keep_modes"] = {"type": "integer", "minimum": 0}
     properties["units"] = {"enum": list(UNITS), "default": "SI"}
     properties["mapping"] = {"type": "string"}
+    properties["diameters"] |= {"anyOf": [{"type": "string"}, {"type": "object"}]}
     for key, text in WORDS["MatricesStructure"].items():
+        properties[key]["description"] = text
+
+
+def _boundaries(properties: dict[str, Any]) -> None:
+    """The keys of [structure.cyclic] that name nodes, as a file gives them."""
+    nodes = {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "integer"}, "minItems": 1}]}
+    properties |= {
+        "low": dict(nodes), "high": dict(nodes), "nodes": {"type": "string"},
+        "pair_by": {"enum": ["position", "order"], "default": "position"},
+        "tolerance": {"type": "number", "exclusiveMinimum": 0.0},
+        "keep_modes": {"type": "integer", "minimum": 0},
+    }  # fmt: skip
+    for key, text in WORDS["CyclicBoundary"].items():
         properties[key]["description"] = text

@@ -6,9 +6,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
-from solver.contacts.fields import NonNegative, Part
+from solver.contacts.fields import NonNegative, Part, Vector
+from solver.matrices.sectors.diameters import DiameterMatrices
+from solver.matrices.sectors.validation import check_sector
 from solver.matrices.validation import DofTable, antisymmetric, check_matrices, symmetric
 from solver.matrices.values import MOST_MODES, Matrix, Modes
+from solver.scene.cyclic.boundary import CyclicBoundary, Sectors
 
 Ratio = Annotated[float, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=False)]
 
@@ -52,7 +55,7 @@ class Reduction(Part):
 
 
 class MatricesStructure(Part):
-    """A structure given by its matrices, or by its modes.
+    """A structure given by its matrices, or by its modes; with `sectors` one sector of a disk.
 
     Attributes
     ----------
@@ -79,6 +82,12 @@ class MatricesStructure(Part):
         C gains this many K [s] and M [1/s].
     reduction : Reduction or None
         Set when the model was reduced on loading.
+    sectors : int or None
+        Number of sectors of the disk of which the matrices are one.
+    cyclic : CyclicBoundary or None
+        How the sectors are joined.
+    diameters : DiameterMatrices or None
+        In place of M, K and C: a reduced sector, its matrices at each nodal diameter that was built.
     """
 
     kind: Literal["matrices"]
@@ -95,13 +104,35 @@ class MatricesStructure(Part):
     stiffness_proportional_damping: NonNegative = 0.0
     mass_proportional_damping: NonNegative = 0.0
     reduction: Reduction | None = None
+    sectors: Sectors | None = None
+    cyclic: CyclicBoundary | None = None
+    diameters: DiameterMatrices | None = None
 
     @property
     def n_coordinates(self) -> int:
-        """Number of coordinates the matrices, or the modes, have."""
+        """Number of coordinates the matrices, or the modes, have; of a sector, without its high boundary."""
         if self.modes is not None:
             return int(self.modes.omega2.size)
-        return 0 if self.M is None else self.M.size
+        if self.diameters is not None:
+            return self.diameters.size
+        high = self.cyclic.high_rows if self.cyclic is not None and self.cyclic.high_rows else ()
+        away = sum(row >= 0 for group in high for row in group)
+        return 0 if self.M is None else self.M.size - away
+
+    @property
+    def sector_count(self) -> int:
+        """Number of sectors; 1 where it is no disk."""
+        return 1 if self.sectors is None else self.sectors
+
+    @property
+    def has_sectors(self) -> bool:
+        """Whether it is one sector of a disk."""
+        return self.sectors is not None
+
+    @property
+    def axis(self) -> Vector | None:
+        """Direction of the axis of the disk."""
+        return None if self.cyclic is None else self.cyclic.axis
 
     @field_validator("M", "K", "C", "K_omega2")
     @classmethod
@@ -116,8 +147,16 @@ class MatricesStructure(Part):
 
     @model_validator(mode="after")
     def _fit(self) -> MatricesStructure:
+        if self.sectors is None and (self.cyclic is not None or self.diameters is not None):
+            key = "cyclic" if self.cyclic is not None else "diameters"
+            raise ValueError(
+                f"`sectors` is missing: `{key}` is of one sector of a disk, of which there are so many"
+            )
         spinning = {key: value for key in ("G", "K_omega2") if (value := getattr(self, key)) is not None}
-        check_matrices(self.M, self.K, self.C, self.modes, self.dofs, spinning)
+        if self.sectors is not None:
+            check_sector(self, spinning)
+        if self.diameters is None:
+            check_matrices(self.M, self.K, self.C, self.modes, self.dofs, spinning)
         if self.damping_ratio is not None and self.modes is not None and self.modes.damping_ratio is not None:
             raise ValueError(
                 f"`damping_ratio` = {self.damping_ratio!r} is given beside that of `modes`: keep one of them"

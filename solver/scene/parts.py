@@ -24,12 +24,13 @@ from solver.contacts.fields import (
     Positive,
     Vector,
 )
+from solver.scene.cyclic.boundary import CyclicBoundary as CyclicBoundary
+from solver.scene.cyclic.boundary import Sectors
 from solver.scene.matrices_structure import LossFactor, Ratios
 from solver.scene.matrices_structure import MatricesStructure as MatricesStructure
 from solver.scene.matrices_structure import Reduction as Reduction
 from solver.scene.terms.excitation import Excitation as Excitation
 
-Sectors = Annotated[int, Field(strict=True, ge=1, le=10_000)]
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**63 - 1)]
 
 
@@ -157,6 +158,16 @@ class LumpedStructure(_Structure):
     kind: Literal["lumped"]
     damping_ratio: Ratios | None = None
 
+    @property
+    def sector_count(self) -> int:
+        """1: it is no disk."""
+        return 1
+
+    @property
+    def has_sectors(self) -> bool:
+        """False: it is no disk."""
+        return False
+
 
 class Mistuning(Part):
     """Blades that are not quite equal: one factor for each sector, on the parts `of` names.
@@ -214,6 +225,16 @@ class CyclicStructure(_Structure):
     sectors: Sectors
     mistuning: Mistuning | None = None
     axis: Vector | None = None
+
+    @property
+    def sector_count(self) -> int:
+        """Number of sectors."""
+        return self.sectors
+
+    @property
+    def has_sectors(self) -> bool:
+        """True: it is one sector of a disk."""
+        return True
 
 
 Structure = LumpedStructure | CyclicStructure | MatricesStructure

@@ -21,8 +21,10 @@ from solver.errors import pointer as json_pointer
 from solver.scene.bodies.body import Body, Load, Node, body_dofs
 from solver.scene.bodies.shapes import SHAPES, WITH_BODY
 from solver.scene.contacts import LAW_TAG
+from solver.scene.cyclic.boundary import is_cyclic
 from solver.scene.parts import (
     KINDS,
+    CyclicBoundary,
     CyclicStructure,
     Damper,
     Excitation,
@@ -47,6 +49,7 @@ _KEYS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
     ("structure", "cyclic"): ("a cyclic structure", tuple(CyclicStructure.model_fields)),
     ("structure", "matrices"): ("a matrices structure", tuple(MatricesStructure.model_fields)),
     ("structure", "matrices", "reduction"): ("reduction", tuple(Reduction.model_fields)),
+    ("structure", "matrices", "cyclic"): ("structure.cyclic", tuple(CyclicBoundary.model_fields)),
     ("structure", "masses"): ("a mass", ("m", "name", "group", "factor")),
     ("structure", "springs"): ("a spring", tuple(Spring.model_fields)),
     ("structure", "dampers"): ("a damper", tuple(Damper.model_fields)),
@@ -213,14 +216,14 @@ def cross_issues(raw: dict[str, Any]) -> list[Issue]:
     structure = structure if isinstance(structure, dict) else {}
     table = "dofs" if structure.get("kind") == "matrices" else "masses"
     dofs = dofs_of(raw)
-    cyclic = structure.get("kind") == "cyclic"
+    cyclic = is_cyclic(structure)
     found = chain(
         _reserved_dofs(dofs or (), table, cyclic),
         _end_issues(raw, structure, dofs, cyclic),
         _dof_issues(raw, dofs, structure.get("sectors") if cyclic else 0),
         duplicates(_structure_names(structure), "structure"),
         _contact_name_issues(raw, cyclic),
-        _engine_order_issues(raw, structure.get("kind")),
+        _engine_order_issues(raw, structure),
     )
     return list(islice(found, MOST_ISSUES))
 
@@ -380,14 +383,15 @@ def _contact_name_issues(raw: dict[str, Any], cyclic: bool) -> Iterator[Issue]:
             yield Issue(pointer=pointer_of(steps), message=f"`{key}` = {name!r}: no '@' in a cyclic scene")
 
 
-def _engine_order_issues(raw: dict[str, Any], kind: object) -> Iterator[Issue]:
+def _engine_order_issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
+    kind = structure.get("kind")
     first: object = None
     for steps, row in rows_of(raw, "excitation"):
         order = row.get("engine_order")
         if order is None:
             continue
         pointer = pointer_of([*steps, "engine_order"])
-        if kind in ("lumped", "matrices"):
+        if kind in ("lumped", "matrices") and not is_cyclic(structure):
             message = (
                 f"`engine_order` = {quoted(order)} needs a cyclic structure; remove it from a {kind} one"
             )

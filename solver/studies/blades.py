@@ -134,10 +134,10 @@ def blade_peaks(
     name = scene.observe.dof.partition("@")[0] if dof is None else dof
     structure = scene.structure
     names, repeats = [scene.dofs[i] for i in _rows(scene, name)], 1
-    if isinstance(structure, CyclicStructure):
-        names, repeats = [name], structure.sectors
+    if structure.has_sectors:
+        names, repeats = [name], structure.sector_count
         if sectors_needed(_observing(scene, name)).sectors > 1:
-            names, repeats = [f"{name}@{j}" for j in range(structure.sectors)], 1
+            names, repeats = [f"{name}@{j}" for j in range(structure.sector_count)], 1
 
     def progress(share: float, _points: int) -> None:
         if on_progress is not None:
@@ -250,8 +250,8 @@ def blade_amplitudes(solution: Solution, dof: str | None = None) -> BladeAmplitu
 def _rows(scene: Scene, name: str) -> list[int]:
     """Index of a DOF in each sector; in a cyclic scene the same one again and again."""
     dofs, structure = scene.dofs, scene.structure
-    if isinstance(structure, CyclicStructure):
-        rows = [dofs.index(name)] * structure.sectors if name in dofs else []
+    if structure.has_sectors:
+        rows = [dofs.index(name)] * structure.sector_count if name in dofs else []
     else:
         rows = [i for i, each in enumerate(dofs) if name != each and name == each.partition("@")[0]]
     if not rows:

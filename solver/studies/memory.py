@@ -10,7 +10,7 @@ from solver.balance.simplifications import even_harmonics_reason
 from solver.linear.contact_table import port_counts
 from solver.scene.cyclic.annulus import sectors_needed
 from solver.scene.harmonics import MULTIPLES, kept_harmonics
-from solver.scene.parts import CyclicStructure, MatricesStructure
+from solver.scene.parts import MatricesStructure
 from solver.scene.scene import Scene
 
 _REAL, _COMPLEX = 8, 16
@@ -73,9 +73,9 @@ def dense_bytes(scene: Scene, harmonics: int, *, every_sector: bool = False) -> 
     kept = kept_harmonics(scene, (), harmonics, odd=odd)
     more = kept_harmonics(scene, (), beyond, odd=odd, multiples=2 * MULTIPLES)
     structures, number = 1, _REAL
-    if isinstance(scene.structure, CyclicStructure) and sectors == 1:
+    if scene.structure.has_sectors and sectors == 1:
         # One for each nodal diameter that is met.
-        structures = np.unique((kept * scene.engine_order) % scene.structure.sectors).size
+        structures = np.unique((kept * scene.engine_order) % scene.structure.sector_count).size
         number = _COMPLEX
     modes = min(n, _MODES_LOOKED_AT)
     resonances = min(_LOOKED_AT, _POINTS_LOOKED_AT * kept.size * modes**2)
@@ -96,9 +96,9 @@ def march_bytes(scene: Scene) -> int:
 
 def _sectors(scene: Scene, every_sector: bool) -> int:
     structure = scene.structure
-    if not isinstance(structure, CyclicStructure):
+    if not structure.has_sectors:
         return 1
-    return structure.sectors if every_sector else sectors_needed(scene).sectors
+    return structure.sector_count if every_sector else sectors_needed(scene).sectors
 
 
 def _dofs(scene: Scene) -> int:
@@ -109,8 +109,12 @@ def _dofs(scene: Scene) -> int:
 def _is_diagonal(scene: Scene) -> bool:
     """Return whether it is sure, without looking at modes, that the damping does not couple them."""
     structure = scene.structure
+    if scene.couplings or scene.aerodynamics or structure.loss_factor:
+        return False
     if isinstance(structure, MatricesStructure):
-        return structure.C is None
+        if structure.G is not None or structure.K_omega2 is not None:
+            return False
+        return structure.C is None and (structure.diameters is None or structure.diameters.C is None)
     ratios = {spring.c / spring.k if spring.k else np.inf for spring in structure.springs if spring.c}
     undamped = not all(spring.c for spring in structure.springs)
     return not structure.dampers and (not ratios or (len(ratios) == 1 and not undamped))

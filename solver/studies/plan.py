@@ -22,7 +22,7 @@ from solver.linear.kernels.receptance import receptance
 from solver.results.base import Shown
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import sectors_needed
-from solver.scene.parts import CyclicStructure, MatricesStructure
+from solver.scene.parts import MatricesStructure
 from solver.scene.scene import (
     AnyContact,
     Scene,
@@ -34,6 +34,7 @@ from solver.studies.memory import dense_bytes
 _SECONDS_AN_ITERATION = 5e-6
 _SECONDS_A_CONTACT = 2e-8
 _SECONDS_A_SOLVE = 1.5e-10
+_SECONDS_A_DIAMETER = 1e-8  # of the modes of a Hermitian structure of n coordinates, times n³
 _ITERATIONS_A_POINT = 4.0
 _FREQUENCIES = 101  # of the band at which the stuck response is looked at
 
@@ -141,6 +142,7 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
             *(_separation(contact) for contact in balance.scene.contacts),
             *slips,
             _even_harmonics(balance),
+            *_nodal_diameters(balance),
             *_reduction(scene),
             Effect(name="linear part", used=True, reason=_linear_part(balance)),
             _stiffness_shift(balance.system.shift),
@@ -187,9 +189,24 @@ def _reduction(scene: Scene) -> tuple[Effect, ...]:
     return (Effect(name="reduction of the model", used=True, reason=reason),)
 
 
+def _nodal_diameters(balance: Balance) -> tuple[Effect, ...]:
+    """Which nodal diameters of a sector given by matrices are built, and what each costs."""
+    structure, order, ks = balance.scene.structure, balance.scene.engine_order, balance.system.ks
+    if not isinstance(structure, MatricesStructure) or not structure.has_sectors:
+        return ()
+    count, n = structure.sector_count, _linear_dofs(balance.scene)
+    met = np.unique(np.minimum(ks * order % count, -ks * order % count))
+    cost = 1e3 * _SECONDS_A_DIAMETER * n**3
+    reason = (
+        f"the harmonics kept of engine order {order} meet {', '.join(map(str, met))} of 0 to {count // 2}: "
+        f"each is a Hermitian structure of {n} coordinates, decomposed once in about {cost:.2g} ms"
+    )
+    return (Effect(name="nodal diameters", used=True, reason=reason),)
+
+
 def _one_sector(scene: Scene, asked: Effects) -> Effect:
     extent = sectors_needed(scene)
-    cyclic = isinstance(scene.structure, CyclicStructure)
+    cyclic = scene.structure.has_sectors
     forced = cyclic and extent.sectors == 1 and asked.every_sector
     return Effect(
         name="one sector for the annulus",

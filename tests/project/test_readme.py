@@ -34,6 +34,7 @@ ADDRESS = "http://127.0.0.1:8000"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 # Pages whose lines need each other, or draw pictures: tests that run them.
 ELSEWHERE = {
+    "fe-disk.md": "project/test_fe_disk.py",
     "fe-example.md": "project/test_fe_example.py",
     "paper.md": "solver/published/test_paper_figures.py",
 }
@@ -71,7 +72,7 @@ def test_json_and_toml_are_read() -> None:
     assert all(json.loads(text) for text in blocks("json"))
     assert all(tomllib.loads(text) for text in blocks("toml"))
     starts = {next(line for line in text.splitlines() if not line.startswith("#")) for text in blocks("toml")}
-    known = ("name = ", "scene = ", "[structure.mistuning]", "[[contacts]]", "[[dampers]]")
+    known = ("name = ", "scene = ", "[structure]", "[structure.mistuning]", "[[contacts]]", "[[dampers]]")
     assert [start for start in starts if not start.startswith(known)] == []
 
 

@@ -15,6 +15,15 @@ import typer
 from service.cli.importing.files import Sources, dof_table, read_sources, rows_of, sources
 from service.cli.importing.reduction import Written, reduce, reduced_file
 from service.cli.importing.scene import band, toml
+from service.cli.importing.sector import (
+    Disk,
+    WrittenSector,
+    checked_boundaries,
+    disk,
+    found_by_position,
+    reduce_disk,
+    sector_file,
+)
 from service.cli.options.inputs import output_path
 from service.cli.options.numeric import amount, count
 from service.errors import InputError
@@ -85,6 +94,48 @@ Mapping = Annotated[
 ]
 
 
+SectorCount = Annotated[
+    int | None,
+    count("--sectors", "N", "The files are one of so many sectors of a disk."),
+]
+Low = Annotated[
+    str | None,
+    typer.Option(
+        "--low", metavar="SET",
+        help="Nodes of the boundary to the sector before: a set of the deck, or numbers with commas.",
+    ),
+]  # fmt: skip
+High = Annotated[
+    str | None,
+    typer.Option(
+        "--high", metavar="SET",
+        help="Those of the boundary to the next sector: where the low one comes by the right-hand turn about "
+        "the axis. Both left out: found by position.",
+    ),
+]  # fmt: skip
+Deck = Annotated[
+    str | None,
+    typer.Option("--nodes", metavar="DECK", help="The input deck with the nodes and their sets."),
+]
+Axis = Annotated[
+    str | None, typer.Option("--axis", metavar="A", help="Axis of the disk: x, y, z or 0,0,1; z if left out.")
+]
+PairBy = Annotated[
+    str, typer.Option("--pair-by", metavar="HOW", help="Nodes are paired by position, or by their order.")
+]
+Tolerance = Annotated[
+    float | None,
+    amount("--tolerance", "D", "Nodes this near are one place, in units of the deck."),
+]
+EngineOrder = Annotated[
+    int | None,
+    count(
+        "--engine-order", "E",
+        "Of the force; 1 if left out. --reduce builds the nodal diameters that its harmonics meet.",
+    ),
+]  # fmt: skip
+
+
 def _print_formats(wanted: bool) -> None:
     if wanted:
         from solver.matrices.readers.registry import readers
@@ -116,13 +167,22 @@ def import_scene(
     reduced: ReducedFile = None,
     units: Units = "SI",
     mapping: Mapping = None,
+    sectors: SectorCount = None,
+    low: Low = None,
+    high: High = None,
+    nodes: Deck = None,
+    axis: Axis = None,
+    pair_by: PairBy = "position",
+    tolerance: Tolerance = None,
+    engine_order: EngineOrder = None,
     _formats: Formats = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Make a scene of matrices or modes in files.
 
     The files are read and checked first. The scene refers to them or, with --reduce, to the reduced model,
-    which is written beside it. Contacts are then added by hand: a template stands in the scene.
+    which is written beside it. Contacts are then added by hand: a template stands in the scene. With
+    --sectors the matrices are of one sector of a disk, reduced at every nodal diameter that is met.
     """
     target = output_path("--out", out, (".toml",))
     if target is None or target.exists():
@@ -131,30 +191,34 @@ def import_scene(
         raise InputError("`--modes`, `--up-to` and `--reduced` go with --reduce")
     if reduce_once and keep_modes is not None:
         raise InputError("`--keep-modes` reduces on every load, --reduce once: keep one of them")
+    of = disk(sectors, low, high, nodes, axis, pair_by, tolerance, engine_order)
     found = sources(files, mapping, units)
     given = read_sources(found)
     table = dof_table(dofs, found, given)
     with ExitStack() as undo:
         structure, written = found.table(target), None
         if reduce_once:
-            path = reduced_file(reduced, target)
+            path = reduced_file(reduced, target) if of is None else sector_file(reduced, target)
             undo.callback(path.unlink, missing_ok=True)
-            written = _reduced(given, table, modes, up_to, path)
+            written = _reduced(given, table, modes, up_to, path, of)
             structure = written.table(target)
             table = dict(written.rows)
         else:
             _checked(given, reduced=keep_modes is not None)
-            if keep_modes is not None:
-                structure["keep_modes"] = keep_modes
+            kept = {} if keep_modes is None else {"keep_modes": keep_modes}
+            structure |= kept if of is None else _joined(given, of, target, kept)
         force = excite or next(iter(table))
         raw = _Parts(
-            target=target, structure={**structure, "dofs": table}, force=force, observe=observe or force
-        )
+            target=target, structure={**structure, "dofs": table}, force=force, observe=observe or force,
+            engine_order=None if of is None else of.engine_order,
+        )  # fmt: skip
         omega2 = _omega2(_load(raw.table([1.0, 2.0]), target.parent))
         frequencies = [math.sqrt(max(float(value), 0.0)) / (2.0 * math.pi) for value in omega2]
         scene = _write(target, raw.table(band(start, stop, frequencies)), found, written)
         undo.pop_all()
-    _report(scene, target, frequencies, written, given, _notes(given, omega2), as_json)
+    _report(
+        scene, target, frequencies, written, given, [*_notes(given, omega2), *found_by_position(of)], as_json
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -165,22 +229,37 @@ class _Parts:
     structure: dict[str, object]
     force: str
     observe: str
+    engine_order: int | None = None
 
     def table(self, between: list[float]) -> dict[str, Any]:
         return {
             "name": re.sub(r"[^A-Za-z0-9_-]", "-", self.target.stem)[:100],
             "structure": self.structure,
-            "excitation": {"dof": self.force, "amplitude": 1.0},
+            "excitation": {"dof": self.force, "amplitude": 1.0}
+            | ({} if self.engine_order is None else {"engine_order": self.engine_order}),
             "observe": {"dof": self.observe, "band": between},
         }
 
 
 def _reduced(
-    given: MatrixSet | None, table: dict[str, int | str], modes: int | None, up_to: float | None, path: Path
-) -> Written:
+    given: MatrixSet | None, table: dict[str, int | str], modes: int | None, up_to: float | None, path: Path,
+    of: Disk | None,
+) -> Written | WrittenSector:  # fmt: skip
     if given is None:
         raise InputError("`--reduce` is for matrices; modes are reduced already")
+    if of is not None and up_to is not None:
+        raise InputError("`--up-to` is not for a sector: give --modes N, as many at each nodal diameter")
+    if of is not None:
+        return reduce_disk(given, rows_of(table, given), modes, of, path)
     return reduce(given, rows_of(table, given), modes, up_to, path)
+
+
+def _joined(given: MatrixSet | None, of: Disk, target: Path, kept: dict[str, int]) -> dict[str, object]:
+    """The keys of a sector whose files the scene refers to."""
+    if given is None:
+        raise InputError("`--sectors` is for matrices, not for modes")
+    checked_boundaries(given, of)
+    return {"sectors": of.sectors, "cyclic": of.joined(target) | kept}
 
 
 def _checked(given: MatrixSet | None, *, reduced: bool) -> None:
@@ -217,10 +296,13 @@ def _omega2(scene: Scene) -> NDArray[Any]:
     from solver.matrices.normal_modes import undamped_modes
 
     model = linear_model(scene)
-    return np.sort(undamped_modes(model.K0, model.M).omega2)
+    K, _, M = (each[0] for each in model.plain(model.diameters(np.ones(1, np.int64))))
+    return np.sort(undamped_modes(K, M).omega2)
 
 
-def _write(target: Path, raw: dict[str, Any], found: Sources, written: Written | None) -> Scene:
+def _write(
+    target: Path, raw: dict[str, Any], found: Sources, written: Written | WrittenSector | None
+) -> Scene:
     """Write the scene, whole or not at all, and read it as anyone would."""
     import solver
 
@@ -229,7 +311,7 @@ def _write(target: Path, raw: dict[str, Any], found: Sources, written: Written |
         made = ", ".join(path.name for path in dict.fromkeys(found.roles.values()))
         remarks.append(
             f"Reduced from {written.full} rows of {made}; good to "
-            f"{written.reduced.quality.good_to_hz:.5g} Hz (frequencies exact to 0.1 %)."
+            f"{written.good_to_hz:.5g} Hz (frequencies exact to 0.1 %)."
         )
     with whole(target) as temporary:
         temporary.write_text(toml(raw, remarks), encoding="utf-8")
@@ -237,7 +319,7 @@ def _write(target: Path, raw: dict[str, Any], found: Sources, written: Written |
 
 
 def _report(
-    scene: Scene, target: Path, frequencies: Sequence[float], written: Written | None,
+    scene: Scene, target: Path, frequencies: Sequence[float], written: Written | WrittenSector | None,
     given: MatrixSet | None, notes: list[str], as_json: bool,
 ) -> None:  # fmt: skip
     from solver.matrices.diagnostics import total_mass

@@ -28,6 +28,11 @@ class Written:
     full: int
     seconds: float
 
+    @property
+    def good_to_hz(self) -> float:
+        """Frequency up to which every frequency is exact to 0.1 % [Hz]."""
+        return self.reduced.quality.good_to_hz
+
     def table(self, target: Path) -> dict[str, object]:
         """The table [structure] of a scene at `target`."""
         name = relative(self.path, target)

@@ -37,16 +37,22 @@ def toml(raw: Mapping[str, Any], remarks: Sequence[str] = ()) -> str:
     structure, observe, force = raw["structure"], raw["observe"], raw["excitation"]
     lines = [f"name = {json.dumps(raw['name'])}", "", *(f"# {remark}" for remark in remarks), "[structure]"]
     for key, value in structure.items():
-        if key != "dofs":
+        if key not in ("dofs", "cyclic"):
             lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
     lines += [
         "# stiffness_proportional_damping = 1e-6   # s; see also mass_proportional_damping, damping_ratio"
     ]
+    if "cyclic" in structure:
+        lines += ["", "[structure.cyclic]"]
+        lines += [f"{key} = {json.dumps(value)}" for key, value in structure["cyclic"].items()]
     lines += ["", "[structure.dofs] # rows of the matrices, zero-based, or node and component"]
     lines += [f"{json.dumps(name)} = {json.dumps(row)}" for name, row in structure["dofs"].items()]
     used = (force["dof"], observe["dof"])
     rubbing = next((name for name in structure["dofs"] if name not in used), force["dof"])
     lines += [_CONTACT.format(dof=rubbing).rstrip("\n"), "", "[excitation]"]
-    lines += [f"dof = {json.dumps(force['dof'])}", "amplitude = 1.0 # N", "", "[observe]"]
+    lines += [f"dof = {json.dumps(force['dof'])}", "amplitude = 1.0 # N"]
+    if "engine_order" in force:
+        lines.append(f"engine_order = {force['engine_order']}")
+    lines += ["", "[observe]"]
     lines += [f"dof = {json.dumps(observe['dof'])}", f"band = {json.dumps(observe['band'])} # Hz", ""]
     return "\n".join(lines)

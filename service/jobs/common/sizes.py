@@ -8,7 +8,7 @@ from contextvars import ContextVar
 
 from service.jobs.common.scenes import refusal
 from solver.errors import Issue
-from solver.scene.scene import CyclicStructure, Scene
+from solver.scene.scene import Scene
 
 MOST_POINTS = 500_000
 """Of a map: its result is text, some 40 bytes a point."""
@@ -116,7 +116,7 @@ def balance_issues(
 def annulus_issues(scene: Scene, harmonics: int) -> list[Issue]:
     """Refuse a balance of all sectors that is too large."""
     structure = scene.structure
-    sectors = structure.sectors if isinstance(structure, CyclicStructure) else 1
+    sectors = structure.sector_count
     return _unknown_issues(scene, harmonics, sectors) or memory_issues(scene, harmonics, every_sector=True)
 
 
@@ -184,5 +184,4 @@ def dofs_solved(scene: Scene) -> int:
 
 def whole_disk_dofs(scene: Scene) -> int:
     """The DOFs of all sectors."""
-    structure = scene.structure
-    return len(scene.dofs) * (structure.sectors if isinstance(structure, CyclicStructure) else 1)
+    return len(scene.dofs) * scene.structure.sector_count

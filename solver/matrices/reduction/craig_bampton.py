@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from solver.matrices.reduction.reduction_error import Quality, measured
 from solver.matrices.validation import ASYMMETRY, DofTable, one_triangle
 from solver.matrices.values import MOST_DOFS
 
-FloatArray = NDArray[np.float64]
+Array = NDArray[Any]  # real, or complex where the matrices are Hermitian: a nodal diameter of a disk
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +33,7 @@ class Reduced:
     Attributes
     ----------
     matrices : dict
-        M, K and, if there was one, C, each (n, n).
+        M, K and, if there was one, C, each (n, n), Hermitian.
     modes : int
         Modes kept.
     highest_hz : float
@@ -41,25 +42,30 @@ class Reduced:
         What the reduction is good for.
     """
 
-    matrices: dict[str, FloatArray]
+    matrices: dict[str, Array]
     modes: int
     highest_hz: float
     quality: Quality
 
 
 def craig_bampton(
-    M: coo_array,
-    K: coo_array,
-    C: coo_array | None,
+    M: Any,
+    K: Any,
+    C: Any | None,
     dofs: DofTable,
     keep_modes: int | None,
     *,
     up_to_hz: float | None = None,
     others: Mapping[str, coo_array] | None = None,
+    weigh: bool = True,
 ) -> Reduced:
     """Reduce a model onto the DOFs named and `keep_modes` modes of the rest, or all up to `up_to_hz` [Hz].
 
-    `others` are projected beside them, symmetric or not.
+    Parameters
+    ----------
+    M, K, C : sparse (n, n), symmetric or Hermitian.
+    others : matrices projected beside them, symmetric or not.
+    weigh : whether to find the effective masses too, which takes solutions with M.
 
     Raises
     ------
@@ -79,23 +85,23 @@ def craig_bampton(
         raise ValueError(
             f"{values.size} modes up to {up_to_hz:g} Hz are more than {MOST_DOFS}: ask for fewer"
         )
-    basis = np.zeros((n, kept.size + values.size))
+    basis = np.zeros((n, kept.size + values.size), np.result_type(held.follow, modes))
     basis[kept, np.arange(kept.size)] = 1.0
     basis[rest, : kept.size] = held.follow
     basis[rest, kept.size :] = modes
-    reduced = {key: basis.T @ (matrix @ basis) for key, matrix in sparse.items()}
-    matrices = {key: 0.5 * (value + value.T) for key, value in reduced.items()}
-    matrices |= {key: basis.T @ (csc_array(matrix) @ basis) for key, matrix in (others or {}).items()}
+    reduced = {key: basis.conj().T @ (matrix @ basis) for key, matrix in sparse.items()}
+    matrices = {key: 0.5 * (value + value.conj().T) for key, value in reduced.items()}
+    matrices |= {key: basis.conj().T @ (csc_array(matrix) @ basis) for key, matrix in (others or {}).items()}
     highest = math.sqrt(max(float(values[-1]), 0.0)) / (2.0 * math.pi) if values.size else 0.0
     return Reduced(
         matrices=matrices,
         modes=values.size,
         highest_hz=highest,
-        quality=measured(held, values, modes, matrices),
+        quality=measured(held, values, modes, matrices, weigh=weigh),
     )
 
 
-def _check(given: dict[str, coo_array], dofs: DofTable, n: int, keep_modes: int) -> None:
+def _check(given: dict[str, Any], dofs: DofTable, n: int, keep_modes: int) -> None:
     for name, row in dofs.write().items():
         if row >= n:
             raise ValueError(f"`dofs`: {name!r} must have a row from 0 to {n - 1}, got {row}")
@@ -105,7 +111,7 @@ def _check(given: dict[str, coo_array], dofs: DofTable, n: int, keep_modes: int)
             "name those that contacts, forces and the observed amplitude need"
         )
     for key, matrix in given.items():
-        difference = abs(csc_array(matrix) - csc_array(matrix).T)
+        difference = abs(csc_array(matrix) - csc_array(matrix).conj().T)
         worst, largest = float(difference.max()), float(abs(matrix).max())
         if worst > ASYMMETRY * largest:
             triangle = one_triangle(coo_array(matrix))

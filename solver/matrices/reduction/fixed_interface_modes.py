@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,9 +13,13 @@ from scipy import linalg
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
+from solver.matrices.reduction.block_lanczos import lowest_modes
+from solver.matrices.reduction.ordering import nested_dissection
 from solver.matrices.values import MOST_MODES
 
 FloatArray = NDArray[np.float64]
+Array = NDArray[Any]  # real, or complex where the matrices are Hermitian
+LARGE = 20_000  # rows above which an order by nested dissection and solutions in blocks cost less
 DENSE = 600  # rows below which all modes are found at once
 FREE = (
     "with the DOFs named in `dofs` held, the rest of the structure can still move freely {how}: name DOFs "
@@ -47,10 +52,10 @@ class Interior:
 
     K: Any
     M: Any
-    couplings: dict[str, FloatArray]
+    couplings: dict[str, Array]
     shift: float
     solve: Any
-    follow: FloatArray
+    follow: Array
     residual: float
 
 
@@ -64,7 +69,7 @@ def interior(K: Any, M: Any, rest: NDArray[np.int64], kept: NDArray[np.int64]) -
     """
     inner, mass = _block(K, rest, rest), _block(M, rest, rest)
     couplings = {"K": _block(K, rest, kept).toarray(), "M": _block(M, rest, kept).toarray()}
-    stiffness, inertia = inner.diagonal(), mass.diagonal()
+    stiffness, inertia = inner.diagonal().real, mass.diagonal().real
     empty = np.flatnonzero((stiffness == 0.0) & (np.diff(inner.indptr) == 0))
     if empty.size:
         how = f"in {empty.size} rows without any stiffness, the first of them row {rest[empty[0]]}"
@@ -83,38 +88,45 @@ def _block(matrix: Any, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> 
     return csc_array(matrix[rows][:, columns])
 
 
-def _factorised(K: Any, M: Any, couplings: dict[str, FloatArray], shift: float) -> Interior | None:
+def _factorised(K: Any, M: Any, couplings: dict[str, Array], shift: float) -> Interior | None:
     """K − σ M factorised; None if it is singular to working accuracy."""
     matrix = csc_array(K - shift * M) if shift else K
     try:
-        # Symmetric matrices: pivots from the diagonal, ordered for little fill.
-        factor = splu(
-            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=1e-3, options={"SymmetricMode": True}
-        )
+        solve = factor(matrix)
     except RuntimeError:
         return None
     force = couplings["K"] - shift * couplings["M"]
-    follow = -factor.solve(force)
+    follow = -solve(force)
     size = np.abs(force).max(initial=0.0)
     residual = float(np.abs(matrix @ follow + force).max(initial=0.0) / size) if size else 0.0
     if not np.isfinite(follow).all() or np.abs(follow).max(initial=0.0) > _FAR:
         return None
-    return Interior(
-        K=K, M=M, couplings=couplings, shift=shift, solve=factor.solve, follow=follow, residual=residual
-    )
+    return Interior(K=K, M=M, couplings=couplings, shift=shift, solve=solve, follow=follow, residual=residual)
+
+
+def factor(matrix: Any) -> Callable[[Array], Array]:
+    """The inverse of a symmetric or Hermitian matrix: pivots from the diagonal, ordered for little fill."""
+    symmetric = {"diag_pivot_thresh": 1e-3, "options": {"SymmetricMode": True}}
+    if matrix.shape[0] < LARGE:
+        direct: Callable[[Array], Array] = splu(matrix, permc_spec="MMD_AT_PLUS_A", **symmetric).solve
+        return direct
+    order = nested_dissection(matrix)
+    back = np.argsort(order)
+    factor = splu(csc_array(matrix[order][:, order]), permc_spec="NATURAL", **symmetric)
+    return lambda forces: factor.solve(forces[order])[back]
 
 
 def _lowest_estimate(rest: Interior) -> float:
     """About the lowest ω² of the rest, by two steps of inverse iteration."""
-    shape = np.linspace(1.0, 2.0, rest.K.shape[0])
+    shape = np.linspace(1.0, 2.0, rest.K.shape[0]).astype(rest.K.dtype)
     for _ in range(2):
         shape = rest.solve(rest.M @ shape)
         shape /= np.abs(shape).max(initial=1e-300)
-    inertia = float(shape @ (rest.M @ shape))
-    return float(shape @ (rest.K @ shape)) / inertia if inertia > 0.0 else np.inf
+    inertia = float(np.vdot(shape, rest.M @ shape).real)
+    return float(np.vdot(shape, rest.K @ shape).real) / inertia if inertia > 0.0 else np.inf
 
 
-def held_modes(rest: Interior, count: int | None, up_to_hz: float | None) -> tuple[FloatArray, FloatArray]:
+def held_modes(rest: Interior, count: int | None, up_to_hz: float | None) -> tuple[FloatArray, Array]:
     """The lowest modes of the rest with the DOFs in use held.
 
     Parameters
@@ -153,15 +165,17 @@ def held_modes(rest: Interior, count: int | None, up_to_hz: float | None) -> tup
     return values[:kept], modes[:, :kept]
 
 
-def _lowest(rest: Interior, count: int) -> tuple[FloatArray, FloatArray]:
+def _lowest(rest: Interior, count: int) -> tuple[FloatArray, Array]:
     n = rest.K.shape[0]
     if not count:
         return np.zeros(0), np.zeros((n, 0))
     if n <= DENSE or count > n // 2:
         values, modes = linalg.eigh(rest.K.toarray(), rest.M.toarray(), subset_by_index=(0, count - 1))
         return values, modes
-    inverse = LinearOperator((n, n), matvec=rest.solve, dtype=np.float64)
-    start = np.linspace(1.0, 2.0, n)  # fixed, so that the same files give the same scene
+    if np.iscomplexobj(rest.K) or n >= LARGE:
+        return lowest_modes(rest.M, rest.solve, rest.shift, count, np.result_type(rest.K.dtype, np.float64))
+    inverse = LinearOperator((n, n), matvec=rest.solve, dtype=rest.K.dtype)
+    start = np.linspace(1.0, 2.0, n).astype(rest.K.dtype)  # fixed, so that the same files give the same scene
     try:
         values, modes = eigsh(rest.K, k=count, M=rest.M, sigma=rest.shift, OPinv=inverse, v0=start)
     except (ArpackError, RuntimeError) as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from solver.matrices.diagnostics import rigid_body_modes
 from solver.matrices.reduction.fixed_interface_modes import Interior
 
 FloatArray = NDArray[np.float64]
+Array = NDArray[Any]  # real, or complex where the matrices are Hermitian
 GOOD = 1e-3  # relative error of a frequency that is still called good
 
 
@@ -26,7 +28,8 @@ class Quality:
     held_hz : (m,) array
         Frequencies of the modes kept, the DOFs in use held [Hz].
     effective_mass : (m, n_kept) array
-        Share of the inertia of the rest, when one DOF in use is moved, that each mode carries.
+        Share of the inertia of the rest, when one DOF in use is moved, that each mode carries; (m, 0) where
+        it was not asked for.
     system_hz : (n,) array
         Frequencies of the reduced model without contacts [Hz].
     system_error : (n,) array
@@ -57,12 +60,12 @@ class Quality:
 
 
 def measured(
-    held: Interior, values: FloatArray, modes: FloatArray, matrices: dict[str, FloatArray]
+    held: Interior, values: FloatArray, modes: Array, matrices: dict[str, Array], *, weigh: bool = True
 ) -> Quality:
     """Measure a reduction.
 
     A mode (λ, y) of the reduced model, ψ = T y in the full one, leaves the forces r = K ψ − λ M ψ on the
-    rest, which the modes left out would balance: its λ is too high by rᵀ (K − λ M)⁻¹ r, and (K − λ M)⁻¹ is
+    rest, which the modes left out would balance: its λ is too high by rᴴ (K − λ M)⁻¹ r, and (K − λ M)⁻¹ is
     at most K⁻¹ / (1 − λ / ω_m²) for what is orthogonal to the modes kept, ω_m the highest of them.
     """
     lambdas, shapes = _modes(matrices)
@@ -74,7 +77,7 @@ def measured(
     last = int(bad[0]) - 1 if bad.size else errors.size - 1
     return Quality(
         held_hz=np.sqrt(np.maximum(values, 0.0)) / (2.0 * math.pi),
-        effective_mass=_effective_mass(held, modes),
+        effective_mass=_effective_mass(held, modes) if weigh else np.zeros((modes.shape[1], 0)),
         system_hz=hertz,
         system_error=errors,
         good_to_hz=float(hertz[last]) if last >= 0 else 0.0,
@@ -84,7 +87,7 @@ def measured(
     )
 
 
-def _modes(matrices: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+def _modes(matrices: dict[str, Array]) -> tuple[FloatArray, Array]:
     """λ, ascending, and mass-normalised shapes of the reduced model."""
     try:
         lambdas, shapes = linalg.eigh(matrices["K"], matrices["M"])
@@ -97,7 +100,7 @@ def _modes(matrices: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
 
 
 def _errors(
-    held: Interior, values: FloatArray, modes: FloatArray, lambdas: FloatArray, shapes: FloatArray
+    held: Interior, values: FloatArray, modes: Array, lambdas: FloatArray, shapes: Array
 ) -> FloatArray:
     kept = held.follow.shape[1]
     errors = np.full(lambdas.size, math.inf)
@@ -111,21 +114,21 @@ def _errors(
     forces = held.K @ inside + held.couplings["K"] @ top
     forces -= lambdas[low] * (held.M @ inside + held.couplings["M"] @ top)
     # Rounding leaves a share of the modes kept, which the inverse would enlarge where one is near zero.
-    forces -= held.M @ (modes @ (modes.T @ forces))
-    raised = np.einsum("ij,ij->j", forces, held.solve(forces)) / (1.0 - lambdas[low] / values[-1])
+    forces -= held.M @ (modes @ (modes.conj().T @ forces))
+    raised = np.einsum("ij,ij->j", forces.conj(), held.solve(forces)).real / (1.0 - lambdas[low] / values[-1])
     errors[low] = np.abs(raised) / (2.0 * lambdas[low])
     errors[lambdas <= 0.0] = 0.0
     return errors
 
 
-def _effective_mass(held: Interior, modes: FloatArray) -> FloatArray:
+def _effective_mass(held: Interior, modes: Array) -> FloatArray:
     pushed = held.M @ held.follow + held.couplings["M"]
-    carried = (modes.T @ pushed) ** 2
-    diagonal = held.M.diagonal()
+    carried = np.abs(modes.conj().T @ pushed) ** 2
+    diagonal = held.M.diagonal().real
     scale = np.where(diagonal > 0.0, diagonal, 1.0)
-    scaled = LinearOperator(held.M.shape, matvec=lambda x: x.ravel() / scale, dtype=np.float64)
+    scaled = LinearOperator(held.M.shape, matvec=lambda x: x.ravel() / scale, dtype=held.M.dtype)
     totals = np.empty(pushed.shape[1])
     for column, force in enumerate(pushed.T):
         moved, _ = cg(held.M, force, M=scaled, rtol=1e-8, maxiter=2000)
-        totals[column] = float(force @ moved)
+        totals[column] = float(np.vdot(force, moved).real)
     return np.asarray(carried / np.where(totals > 0.0, totals, 1.0))

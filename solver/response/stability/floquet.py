@@ -22,7 +22,7 @@ from solver.response.stability.monodromy import PERIOD, Element, Monodromy, Stru
 from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import annulus
-from solver.scene.scene import CyclicStructure, Scene
+from solver.scene.scene import Scene
 
 Motions = tuple[Real, ...]  # of every contact, (ports, 2H + 1) full coefficients [m]
 GROWS = 1e-9  # a multiplier's modulus beyond 1 that is more than rounding
@@ -164,7 +164,7 @@ def scene_monodromy(scene: Scene, frequency_hz: float, motions: Motions) -> Mono
     frequency_hz : excitation frequency [Hz].
     motions : (ports, 2H + 1) full coefficients of the relative motions of every contact [m].
     """
-    whole = annulus(scene) if isinstance(scene.structure, CyclicStructure) else scene
+    whole = annulus(scene) if scene.structure.has_sectors else scene
     model = linear_model(whole)
     parts, ends = _parts(scene, motions), np.cumsum(port_counts(whole))[:-1]
     elements = tuple(
@@ -172,14 +172,14 @@ def scene_monodromy(scene: Scene, frequency_hz: float, motions: Motions) -> Mono
         for ports, contact in zip(np.split(model.contact_here, ends), whole.contacts, strict=True)
         for part in parts[contact.name]
     )
-    K, C = (each[0] for each in model.at(np.ones(1, np.complex128), np.ones(1, np.bool_)))
+    K, C, M = (each[0] for each in model.at(np.zeros(1, np.int64), np.ones(1, np.bool_)))
     if np.any(K.imag) or np.any(C.imag):
         wanted = (
             "must have no structural damping and no imaginary coefficients: they are terms of the frequency "
             "domain, and stability is one in time"
         )
         raise SettingError("scene", scene.name, wanted)
-    structure = Structure(M=model.M, C=C.real, K=K.real)
+    structure = Structure(M=M, C=C.real, K=K.real)
     return monodromy(structure, elements, PERIOD * frequency_hz)
 
 
@@ -193,9 +193,9 @@ def _parts(scene: Scene, motions: Motions) -> dict[str, tuple[Part, ...]]:
             raise SettingError("solution", contact.name, wanted)
         own[contact.name] = parts
     structure = scene.structure
-    if not isinstance(structure, CyclicStructure):
+    if not structure.has_sectors:
         return own
-    n, order = structure.sectors, scene.engine_order
+    n, order = structure.sector_count, scene.engine_order
     return {
         f"{name}@{j}": tuple(_earlier(part, PERIOD * (order * j % n) / n) for part in parts)
         for j in range(n)

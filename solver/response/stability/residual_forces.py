@@ -30,7 +30,7 @@ from solver.response.solution import Solution
 from solver.results.told import Piece
 from solver.scene.bodies.body import Load
 from solver.scene.bodies.kinematics import Form
-from solver.scene.scene import CyclicStructure, Scene
+from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
 
 STICKS = (
@@ -104,7 +104,7 @@ def amplitude_range(solution: Solution, effects: Effects | None = None) -> Ampli
         return AmplitudeRange(
             max_abs=most, half_peak_to_peak=half, mean=(low, high), contacts=names, exact=True
         )
-    if isinstance(scene.structure, CyclicStructure):
+    if scene.structure.has_sectors:
         unknown = (math.nan, math.nan)
         return AmplitudeRange(
             max_abs=unknown, half_peak_to_peak=unknown, mean=unknown, contacts=names, exact=False

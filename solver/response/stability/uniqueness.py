@@ -40,19 +40,22 @@ from solver.jit.fourier import Complex, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_counts
 from solver.linear.model import LinearModel
+from solver.matrices.normal_modes import hermitian
 from solver.results.told import Piece
 from solver.scene.cyclic.annulus import annulus
-from solver.scene.scene import CyclicStructure, Scene
+from solver.scene.scene import Scene
 
 PROVEN, NOT_KNOWN = "proven", "not known"
 MARGIN = 0.999  # what rounding may leave of a bound that is below 1
 LARGEST = 120  # coordinates above which the proofs for loads that move are not tried
+_SAME = 1e-12  # of the largest entry, or power: less is rounding
 _CELLS = 4096
 _MOST_MULTIPLES = 10_000
 _MONOTONE = (
     "loads are given, stiffnesses constant, and everything takes out power: any two responses come together, "
     "but for residual forces where contacts stick"
 )
+_POWER = "damping, or a stiffness that is not symmetric, may put in power"
 _CONTRACTS = (
     "the structure with its contacts as springs answers what is left of them by less than it is "
     "({:.3g} of 1): two responses are one, but for residual forces where contacts stick"
@@ -90,16 +93,19 @@ def uniqueness(scene: Scene, frequency_hz: float) -> Uniqueness:
     scene : what vibrates.
     frequency_hz : excitation frequency [Hz].
     """
+    scene = scene.at_frequency(frequency_hz)
     model = linear_model(scene)
     if all(contact.keeps_together for contact in scene.contacts):
         if _takes_out_power(model):
             return Uniqueness(unique=PROVEN, ground=_MONOTONE)
-        return Uniqueness(unique=NOT_KNOWN, ground="damping puts in power")
+        return Uniqueness(unique=NOT_KNOWN, ground=_POWER)
     others = ", ".join(contact.name for contact in scene.contacts if not contact.keeps_together)
     unknown = Uniqueness(unique=NOT_KNOWN, ground=_MAY_BE.format(others))
-    if model.M.shape[0] * model.sectors > LARGEST:
+    in_time = model.extra is None or model.extra.is_real
+    known = in_time and model.every_diameter and not model.prescribed
+    if not known or model.n_coordinates * model.sectors > LARGEST:
         return unknown
-    if isinstance(scene.structure, CyclicStructure):
+    if scene.structure.has_sectors:
         scene = annulus(scene)
         model = linear_model(scene)
     springs = [contact.slopes for contact in scene.contacts]
@@ -126,11 +132,19 @@ def _one_sided(contact: AnyContact) -> bool:
 
 
 def _takes_out_power(model: LinearModel) -> bool:
-    """Whether damping takes out power at every nodal diameter."""
-    for k in range(model.sectors):
-        turn = np.exp(2j * math.pi * k / model.sectors)
-        values = np.linalg.eigvalsh(model.C0 + model.Cp * turn + model.Cp.T / turn)
-        if values[0] < -1e-12 * np.abs(values).max():
+    """Whether damping takes out power at every nodal diameter, and stiffness keeps it.
+
+    Not known where a nodal diameter is not, and of terms of the frequency domain.
+    """
+    if not model.every_diameter or not (model.extra is None or model.extra.is_real):
+        return False
+    free = model.free
+    for n in np.arange(model.sectors)[:, None]:
+        K, C, _ = (each[0][free][:, free] for each in model.at(n, np.ones(1, np.bool_)))
+        if not np.allclose(K, K.conj().T, rtol=0.0, atol=_SAME * np.abs(K).max(initial=0.0)):
+            return False
+        values = np.linalg.eigvalsh(hermitian(C))  # gyroscopic terms do no work
+        if values.min(initial=0.0) < -_SAME * np.abs(values).max(initial=0.0):
             return False
     return True
 
@@ -147,12 +161,13 @@ def _joined(scene: Scene, springs: list[tuple[Real, Real]]) -> tuple[Real, Real]
 
 def _poles(model: LinearModel, centre: Real) -> tuple[Complex, Complex, Complex] | None:
     """Return poles s, and P v and w of the impulse responses Σ P v e^{st} w; None without such a form."""
-    n, P = model.M.shape[0], model.contact_here
-    inverse = np.linalg.inv(model.M)
+    K, C, M = (each[0] for each in model.at(np.zeros(1, np.int64), np.ones(1, np.bool_)))
+    n, P = len(M), model.contact_here
+    inverse = np.linalg.inv(M)
     generator = np.zeros((2 * n, 2 * n))
     generator[:n, n:] = np.eye(n)
-    generator[n:, :n] = -inverse @ (model.K0 + P.T @ (centre[:, None] * P))
-    generator[n:, n:] = -inverse @ model.C0
+    generator[n:, :n] = -inverse @ (K.real + P.T @ (centre[:, None] * P))
+    generator[n:, n:] = -inverse @ C.real
     poles, modes = np.linalg.eig(generator)
     if not np.all(poles.real < 0.0) or np.linalg.cond(modes) > 1e8:
         return None

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, Protocol
 from solver.contacts.fields import NEXT, Between, Vector, parse_end
 from solver.contacts.frames import Axes, cross, unit
 from solver.scene.bodies.body import REVOLUTIONS, Body, Load, Node, Place
-from solver.scene.parts import CyclicStructure, Excitation, Structure
+from solver.scene.parts import Excitation, LumpedStructure, Structure
 from solver.scene.terms.linear_terms import Aerodynamics
 
 
@@ -176,9 +176,9 @@ def _end(scene: HasBodies, text: str) -> _Located:
         return _Located(None, _STILL, False)
     place = places(scene.bodies, scene.nodes)[end.dof]
     structure = scene.structure
-    if not end.next or not isinstance(structure, CyclicStructure) or structure.axis is None:
+    if not end.next or isinstance(structure, LumpedStructure) or structure.axis is None:
         return _Located(place, _STILL, end.next)
-    return _Located(place, _Turn(unit(structure.axis), 2.0 * math.pi / structure.sectors), True)
+    return _Located(place, _Turn(unit(structure.axis), 2.0 * math.pi / structure.sector_count), True)
 
 
 @lru_cache(maxsize=64)

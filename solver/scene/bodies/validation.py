@@ -10,6 +10,7 @@ from solver.contacts.fields import GROUND, parse_end
 from solver.contacts.laws.registry import DEFAULT, laws
 from solver.errors import Issue
 from solver.scene.bodies.shapes import WITH_BODY
+from solver.scene.cyclic.boundary import is_cyclic
 from solver.scene.validation import (
     MOST_ISSUES,
     RESERVED_PREFIXES,
@@ -41,7 +42,7 @@ def body_issues(raw: dict[str, Any]) -> list[Issue]:
     structure = raw.get("structure")
     structure = structure if isinstance(structure, dict) else {}
     found = chain(
-        _name_issues(raw, structure.get("kind") == "cyclic"),
+        _name_issues(raw, is_cyclic(structure)),
         _node_issues(raw, structure),
         _load_issues(raw, dofs),
         *(_contact_issues(steps, row, raw, structure, dofs) for steps, row in rows_of(raw, "contacts")),
@@ -120,7 +121,7 @@ def _contact_issues(
             yield Issue(pointer=pointer_of([*steps, key]), message=message)
     known = _places(raw)
     if given == "motions":
-        yield from _motion_issues(steps, row, structure.get("kind") == "cyclic", dofs)
+        yield from _motion_issues(steps, row, is_cyclic(structure), dofs)
         known += list(dofs or ())
     yield from _end_issues([*steps, "between"], row, structure, known, dofs)
 
@@ -131,7 +132,7 @@ def _end_issues(
     ends = row.get("between")
     if not (isinstance(ends, list) and len(ends) == 2 and all(isinstance(end, str) for end in ends)):
         return
-    cyclic = structure.get("kind") == "cyclic"
+    cyclic = is_cyclic(structure)
     if ends[0] == ends[1]:
         message = f"`between` must join two different ends, got {ends!r}"
         yield Issue(pointer=pointer_of(steps), message=message)
@@ -145,12 +146,18 @@ def _end_issues(
         if end.next and not cyclic:
             message = f"`between`: {text!r} needs a cyclic structure; this one has no next sector"
             yield Issue(pointer=pointer, message=message)
-        elif end.next and row.get("normal") is not None and structure.get("axis") is None:
+        elif end.next and row.get("normal") is not None and not _has_axis(structure):
             message = (
                 f"`between`: {text!r} lies in the next sector, which is turned: "
-                "give the direction of the axis as `axis` of the structure"
+                "give the direction of the axis as `axis` of the structure (matrices: of [structure.cyclic])"
             )
             yield Issue(pointer=pointer, message=message)
+
+
+def _has_axis(structure: dict[str, Any]) -> bool:
+    joined = structure.get("cyclic")
+    table = joined if structure.get("kind") == "matrices" and isinstance(joined, dict) else structure
+    return table.get("axis") is not None
 
 
 def _motion_issues(steps: _Steps, row: dict[str, Any], cyclic: bool, dofs: _Dofs) -> Iterator[Issue]:

@@ -13,6 +13,7 @@ from typing import TypeVar
 from solver.errors import SettingError
 from solver.results.told import Piece
 from solver.scene.bodies.kinematics import forms_of, written_form
+from solver.scene.cyclic.matrices_annulus import matrices_annulus
 from solver.scene.scene import (
     AnyContact,
     Body,
@@ -23,10 +24,12 @@ from solver.scene.scene import (
     Load,
     LumpedStructure,
     Mass,
+    MatricesStructure,
     Node,
     Observe,
     Scene,
     Spring,
+    Structure,
     parse_end,
 )
 from solver.scene.terms.linear_terms import Coupling
@@ -64,11 +67,11 @@ def sectors_needed(scene: Scene) -> Extent:
     sectors: then every sector is in phase or in antiphase with its neighbour.
     """
     structure, order = scene.structure, scene.engine_order
-    if not isinstance(structure, CyclicStructure):
+    if not structure.has_sectors:
         given = "lumped" if isinstance(structure, LumpedStructure) else "given by its matrices"
         return Extent(sectors=1, reason=f"the structure is {given}, it has no sectors")
-    n = structure.sectors
-    factors = structure.mistuning.factors(n) if structure.mistuning is not None else (1.0,)
+    n = structure.sector_count
+    factors = _factors(structure)
     least, most = min(factors), max(factors)
     if least != 1.0 or most != 1.0:
         reason = f"the disk is mistuned by factors from {least:.4g} to {most:.4g}: all {n} sectors are solved"
@@ -101,7 +104,7 @@ def written_out(scene: Scene, *, every_sector: bool = False) -> Scene:
 
     With `every_sector` a disk is written out whether it needs to be or not.
     """
-    if not isinstance(scene.structure, CyclicStructure):
+    if not scene.structure.has_sectors:
         return scene
     if sectors_needed(scene).sectors == 1 and not every_sector:
         return scene
@@ -126,7 +129,7 @@ def check_in_annulus(scene: Scene, path: str) -> None:
 
 
 def annulus(scene: Scene) -> Scene:
-    """Write a cyclic scene out as a lumped one, sector by sector.
+    """Write a disk out sector by sector: of lumped sectors a lumped scene, of matrices one of matrices.
 
     DOF ``tip`` of sector j is ``tip@j``, contact ``shroud`` becomes ``shroud@j`` in the group ``shroud``
     (or in the group it had), a named spring ``k`` becomes ``k@j`` in the group ``k``, times
@@ -139,25 +142,17 @@ def annulus(scene: Scene) -> Scene:
     Raises
     ------
     SettingError
-        The scene is not cyclic.
+        The scene is not cyclic, or a sector was not reduced for every nodal diameter.
     """
     structure = scene.structure
-    if not isinstance(structure, CyclicStructure):
+    if not structure.has_sectors:
         raise SettingError("scene", scene.name, "must have a cyclic structure to be written out")
-    n, sectors = structure.sectors, range(structure.sectors)
+    n, sectors = structure.sector_count, range(structure.sector_count)
     order, standing = scene.engine_order, _standing(scene)
-    scaled = [_mistuned(structure, factor) for factor in _factors(structure)]
     observed = scene.observe.dof
     return Scene(
         name=f"{scene.name}-annulus"[:100],
-        structure=LumpedStructure(
-            kind="lumped",
-            stiffness_proportional_damping=structure.stiffness_proportional_damping,
-            loss_factor=structure.loss_factor,
-            masses=tuple(_mass(mass, j) for j in sectors for mass in scaled[j].masses),
-            springs=tuple(_renamed(s, j) for j in sectors for s in _joining(scaled[j].springs, j, n)),
-            dampers=tuple(_renamed(d, j) for j in sectors for d in _joining(scaled[j].dampers, j, n)),
-        ),
+        structure=_whole_structure(structure),
         contacts=tuple(
             _contact(c, j, _turn(order * j, n), standing=standing)
             for j in sectors
@@ -182,13 +177,32 @@ def annulus(scene: Scene) -> Scene:
     )
 
 
+def _whole_structure(structure: Structure) -> LumpedStructure | MatricesStructure:
+    """The structure of all sectors."""
+    if isinstance(structure, MatricesStructure):
+        return matrices_annulus(structure)
+    if isinstance(structure, LumpedStructure):
+        return structure
+    n, sectors = structure.sectors, range(structure.sectors)
+    scaled = [_mistuned(structure, factor) for factor in _factors(structure)]
+    return LumpedStructure(
+        kind="lumped",
+        stiffness_proportional_damping=structure.stiffness_proportional_damping,
+        loss_factor=structure.loss_factor,
+        masses=tuple(_mass(mass, j) for j in sectors for mass in scaled[j].masses),
+        springs=tuple(_renamed(s, j) for j in sectors for s in _joining(scaled[j].springs, j, n)),
+        dampers=tuple(_renamed(d, j) for j in sectors for d in _joining(scaled[j].dampers, j, n)),
+    )
+
+
 def _standing(scene: Scene) -> bool:
     return any(force.pattern == "standing" for force in scene.excitation)
 
 
-def _factors(structure: CyclicStructure) -> tuple[float, ...]:
-    mistuning = structure.mistuning
-    return (1.0,) * structure.sectors if mistuning is None else mistuning.factors(structure.sectors)
+def _factors(structure: Structure) -> tuple[float, ...]:
+    mistuning = structure.mistuning if isinstance(structure, CyclicStructure) else None
+    n = structure.sector_count
+    return (1.0,) * n if mistuning is None else mistuning.factors(n)
 
 
 def _mistuned(structure: CyclicStructure, factor: float) -> CyclicStructure:

@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from solver.errors import Issue
+from solver.scene.cyclic.boundary import is_cyclic
 from solver.scene.parts import Mistuning
 from solver.scene.validation import listing, nearest, quoted
 
@@ -17,7 +18,7 @@ def cyclic_issues(raw: dict[str, Any]) -> list[Issue]:
     """Patterns and groups that do not fit, mistuned parts that do not exist, factors too few or not > 0."""
     structure = raw.get("structure")
     structure = structure if isinstance(structure, dict) else {}
-    found = [*_pattern_issues(raw.get("excitation"), structure.get("kind"))]
+    found = [*_pattern_issues(raw.get("excitation"), structure)]
     found += _group_issues(structure)
     mistuning = structure.get("mistuning")
     if structure.get("kind") == "cyclic" and isinstance(mistuning, dict):
@@ -25,7 +26,8 @@ def cyclic_issues(raw: dict[str, Any]) -> list[Issue]:
     return found
 
 
-def _pattern_issues(excitation: object, kind: object) -> Iterator[Issue]:
+def _pattern_issues(excitation: object, structure: dict[str, Any]) -> Iterator[Issue]:
+    kind = structure.get("kind")
     one = isinstance(excitation, dict)
     rows = [excitation] if one else excitation if isinstance(excitation, list) else []
     first: object = None
@@ -34,7 +36,7 @@ def _pattern_issues(excitation: object, kind: object) -> Iterator[Issue]:
         if pattern is None:
             continue
         pointer = "/excitation/pattern" if one else f"/excitation/{i}/pattern"
-        if kind in ("lumped", "matrices"):
+        if kind in ("lumped", "matrices") and not is_cyclic(structure):
             message = f"`pattern` = {quoted(pattern)} needs a cyclic structure; remove it from a {kind} one"
             yield Issue(pointer=pointer, message=message)
         elif first is not None and pattern != first:

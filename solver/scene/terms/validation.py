@@ -7,6 +7,7 @@ from itertools import islice
 from typing import Any
 
 from solver.errors import Issue
+from solver.scene.cyclic.boundary import is_cyclic
 from solver.scene.terms.excitation import PLACES
 from solver.scene.validation import MOST_ISSUES, dofs_of, duplicates, pointer_of, rows_of, unknown_dof
 
@@ -22,7 +23,7 @@ def term_issues(raw: dict[str, Any]) -> list[Issue]:
 
 
 def _issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iterator[Issue]:
-    dofs, cyclic = dofs_of(raw), structure.get("kind") == "cyclic"
+    dofs, cyclic = dofs_of(raw), is_cyclic(structure)
     for steps, row in rows_of(raw, "couplings"):
         yield from _places(steps, row, ("on", "of"), dofs)
         if row.get("offset") and not cyclic:

@@ -69,7 +69,9 @@ def issues(raw: object) -> dict[str, str]:
 
 
 def test_shipped_scenes_have_the_published_values():
-    assert shipped_scenes() == ("bladed-disk", "platform-cylinder", "platform-wedge", "shroud-3d", "two-dof")
+    assert shipped_scenes() == (
+        "bladed-disk", "fe-disk", "platform-cylinder", "platform-wedge", "shroud-3d", "two-dof",
+    )  # fmt: skip
     scene = load_scene("two-dof")
     assert [spring.k for spring in scene.structure.springs] == [(4 * math.pi) ** 2, (2 * math.pi) ** 2]
     damper = scene.contacts[0]

@@ -1,0 +1,248 @@
+"""`stickslip import --sectors`: the matrices of one sector of a disk, its boundaries, its nodal diameters."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from service.cli.importing.files import relative
+from service.cli.options.inputs import output_path
+from service.errors import InputError
+from solver.results.files import whole
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from solver.matrices.load_set import MatrixSet
+    from solver.matrices.sectors.reduction import ReducedSector
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disk:
+    """What the options say of the disk.
+
+    Attributes
+    ----------
+    sectors : int
+    low, high : str or None
+        A set of the deck, or numbers of nodes with commas; both None: found by position.
+    nodes : Path or None
+        The deck.
+    axis : (3,) list
+    pair_by : str
+    tolerance : float or None
+        In the units of the deck.
+    engine_order : int
+    """
+
+    sectors: int
+    low: str | None
+    high: str | None
+    nodes: Path | None
+    axis: list[float]
+    pair_by: str
+    tolerance: float | None
+    engine_order: int
+
+    def joined(self, target: Path) -> dict[str, object]:
+        """The table [structure.cyclic] of a scene at `target`."""
+        table: dict[str, object] = {"axis": self.axis}
+        for key, text in (("low", self.low), ("high", self.high)):
+            if text is not None:
+                table[key] = _nodes(text)
+        if self.nodes is not None:
+            table["nodes"] = relative(self.nodes, target)
+        if self.pair_by != "position":
+            table["pair_by"] = self.pair_by
+        if self.tolerance is not None:
+            table["tolerance"] = self.tolerance
+        return table
+
+
+def _nodes(text: str) -> str | list[int]:
+    parts = [part.strip() for part in text.split(",")]
+    return [int(part) for part in parts] if all(part.isdecimal() for part in parts) else text
+
+
+def disk(
+    sectors: int | None, low: str | None, high: str | None, nodes: str | None, axis: str | None,
+    pair_by: str, tolerance: float | None, engine_order: int | None,
+) -> Disk | None:  # fmt: skip
+    """What the options say of a disk; None without --sectors.
+
+    Raises
+    ------
+    InputError
+        Options of a disk without --sectors, or values that are none.
+    """
+    others = {
+        "--low": low, "--high": high, "--nodes": nodes, "--axis": axis, "--tolerance": tolerance,
+        "--engine-order": engine_order,
+    }  # fmt: skip
+    if sectors is None:
+        given = next((name for name, value in others.items() if value is not None), None)
+        if given is not None:
+            raise InputError(f"`{given}` is of a sector of a disk: give --sectors N too")
+        return None
+    if sectors < 1:
+        raise InputError(f"`--sectors` must be >= 1, got {sectors}")
+    if (low is None) != (high is None):
+        raise InputError("`--low` and `--high` go together, or are both left out (then found by position)")
+    if nodes is not None and not Path(nodes).is_file():
+        raise InputError(f"`--nodes`: there is no file {nodes!r}")
+    return Disk(
+        sectors=sectors, low=low, high=high, nodes=None if nodes is None else Path(nodes), axis=_axis(axis),
+        pair_by=pair_by, tolerance=tolerance, engine_order=1 if engine_order is None else engine_order,
+    )  # fmt: skip
+
+
+def _axis(text: str | None) -> list[float]:
+    named = {"x": [1.0, 0.0, 0.0], "y": [0.0, 1.0, 0.0], "z": [0.0, 0.0, 1.0]}
+    if text is None or text.lower() in named:
+        return named[(text or "z").lower()]
+    try:
+        found = [float(part) for part in text.split(",")]
+    except ValueError:
+        found = []
+    if len(found) != 3 or not any(found):
+        raise InputError(f"`--axis` must be x, y, z or a direction such as 0,0,1, got {text!r}")
+    return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WrittenSector:
+    """A reduced sector in its file."""
+
+    path: Path
+    reduced: ReducedSector
+    full: int
+    pairs_of_rows: int
+    axis: list[float]
+    sectors: int
+    seconds: float
+
+    @property
+    def rows(self) -> dict[str, int]:
+        """Row of each DOF in use."""
+        return self.reduced.rows
+
+    @property
+    def good_to_hz(self) -> float:
+        """Frequency up to which those of every nodal diameter are exact to 0.1 % [Hz]."""
+        return self.reduced.good_to_hz
+
+    def table(self, target: Path) -> dict[str, object]:
+        """The table [structure] of a scene at `target`."""
+        name = relative(self.path, target)
+        return {"kind": "matrices", "sectors": self.sectors, "diameters": name, "cyclic": {"axis": self.axis}}
+
+    def facts(self) -> dict[str, object]:
+        """What the reduction kept, for programs."""
+        found = self.reduced
+        return {
+            "file": str(self.path), "dofs": self.full, "modes": found.modes, "highest_hz": found.highest_hz,
+            "good_to_hz": found.good_to_hz, "seconds": self.seconds,
+            "diameters": [
+                {
+                    "diameter": n, "frequencies_hz": quality.system_hz[:10].tolist(),
+                    "good_to_hz": quality.good_to_hz, "static_residual": quality.static_residual,
+                    "relative_errors": [
+                        error if math.isfinite(error) else None
+                        for error in quality.system_error[:10].tolist()
+                    ],
+                    "seconds": seconds,
+                }
+                for n, quality, seconds in zip(
+                    found.matrices.diameters, found.quality, found.seconds, strict=True
+                )
+            ],
+        }  # fmt: skip
+
+    def pairs(self) -> list[tuple[str, str]]:
+        """What the reduction kept, for people."""
+        found = self.reduced
+        told = [
+            ("reduced", f"{self.full} rows to {len(self.rows)} DOFs and {found.modes} modes at each of "
+                        f"{len(found.quality)} nodal diameters in {self.seconds:.1f} s, in {self.path}"),
+            ("boundary", f"{self.pairs_of_rows} rows of the high boundary follow the low one"),
+            ("good to", f"{found.good_to_hz:.5g} Hz: frequencies up to there are estimated 0.1 % exact at "
+                        "every nodal diameter; harmonics that matter should lie below"),
+        ]  # fmt: skip
+        for n, quality, seconds in zip(found.matrices.diameters, found.quality, found.seconds, strict=True):
+            first = ", ".join(f"{f:.6g}" for f in quality.system_hz[:4])
+            told.append((f"diameter {n}", f"{first} Hz, …; {seconds:.1f} s"))
+        return told
+
+
+def reduce_disk(
+    given: MatrixSet, rows: Mapping[str, int], modes: int | None, of: Disk, path: Path
+) -> WrittenSector:
+    """Reduce a sector at every nodal diameter its engine order meets, and write it to `path`."""
+    from scipy.sparse import csr_array
+
+    from solver.matrices.diagnostics import refuse
+    from solver.matrices.sectors.reduction import diameters_met, reduce_sector, write_diameters
+
+    if modes is None or modes < 0:
+        raise InputError("`--reduce` of a sector takes --modes N: as many at each nodal diameter")
+    if path.suffix.lower() != ".npz":
+        raise InputError(f"`--reduced` of a sector must end in .npz, got {path.name!r}")
+    begun = time.perf_counter()
+    matrices: dict[str, Any] = {key: csr_array(matrix) for key, matrix in given.matrices.items()}
+    try:
+        refuse(given, reduced=True)
+        gone = checked_boundaries(given, of).elimination(matrices["M"].shape[0], of.sectors)
+        met = diameters_met([of.engine_order], of.sectors)
+        reduced = reduce_sector(matrices, gone, rows, modes, met, of.sectors)
+    except ValueError as error:
+        raise InputError(f"`--reduce`: {error}") from error
+    with whole(path) as temporary:
+        write_diameters(temporary, reduced)
+    return WrittenSector(
+        path=path, reduced=reduced, full=int(matrices["M"].shape[0]), axis=of.axis, sectors=of.sectors,
+        pairs_of_rows=int(gone.here.shape[0] - gone.kept.size), seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def checked_boundaries(given: MatrixSet, of: Disk) -> Any:
+    """The boundaries of the sector as rows.
+
+    Raises
+    ------
+    InputError
+        Sets or nodes that are not there, or do not match.
+    """
+    from solver.errors import SceneError
+    from solver.matrices.sectors.loading import boundaries
+
+    # Relative to the current folder: the scene's own may be another one.
+    table = of.joined(Path.cwd() / "scene.toml")
+    try:
+        return boundaries(table, given, of.sectors, Path.cwd())
+    except SceneError as error:
+        issue = error.issues[0]
+        raise InputError(
+            f"`--{issue.pointer.rpartition('/')[2].replace('_', '-')}`: {issue.message}"
+        ) from error
+
+
+def found_by_position(of: Disk | None) -> list[str]:
+    """What to know of boundaries that were not named."""
+    if of is None or of.low is not None:
+        return []
+    return [
+        "the boundaries were found by position: faces that only touch the next sector, as of shrouds, lie "
+        "there too and are joined with it; where there are any, name the sets with --low and --high"
+    ]
+
+
+def sector_file(text: str | None, target: Path) -> Path:
+    """Where the reduced sector goes, which must not exist."""
+    name = text or str(target.with_name(f"{target.stem}-reduced.npz"))
+    path = output_path("--reduced", name, (".npz",))
+    if path is None or path.exists():
+        raise InputError(f"`--reduced`: {name!r} exists already; give another name or remove it")
+    return path

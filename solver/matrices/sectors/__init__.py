@@ -1,0 +1,1 @@
+"""One sector of a disk from its matrices: boundaries, nodal diameters, reduction."""

@@ -1,0 +1,171 @@
+"""A reduced sector as a value of a scene: Hermitian matrices for each nodal diameter that was built."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from solver.errors import SettingError
+from solver.matrices.values import MOST_DOFS, Matrix
+
+ComplexArray = NDArray[np.complex128]
+_KEYS = ("diameters", "M", "K", "C")
+_ASYMMETRY = 1e-8  # largest difference from the conjugate transpose, relative to the largest entry
+_MOST = 5001  # nodal diameters of the largest disk
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DiameterMatrices:
+    """M, K and maybe C of one sector at some nodal diameters; equal to another with the same content.
+
+    The first coordinates are DOFs, the same at each nodal diameter; the others may be modes of their own.
+
+    Attributes
+    ----------
+    diameters : tuple of int
+        Ascending, each from 0 to half the number of sectors; that of n backward is the complex conjugate.
+    M, K : (nd, n, n) array
+        Hermitian; read-only.
+    C : (nd, n, n) array or None
+    digest : str
+        Hash of the content.
+    """
+
+    diameters: tuple[int, ...]
+    M: ComplexArray
+    K: ComplexArray
+    C: ComplexArray | None = None
+    digest: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        given = {"M": self.M, "K": self.K} | ({} if self.C is None else {"C": self.C})
+        if not self.diameters or list(self.diameters) != sorted(set(self.diameters)) or self.diameters[0] < 0:
+            raise ValueError(
+                f"`diameters` must be ascending whole numbers >= 0, at least one, got {self.diameters}"
+            )
+        found = hashlib.sha256(repr(self.diameters).encode())
+        for key, value in given.items():
+            array = np.array(value, dtype=np.complex128)
+            wanted = (len(self.diameters), array.shape[-1], array.shape[-1])
+            if array.ndim != 3 or array.shape != wanted or not array.size:
+                raise ValueError(
+                    f"`{key}` must have a square matrix for each of the {len(self.diameters)} nodal "
+                    f"diameters, got {' x '.join(map(str, array.shape))}"
+                )
+            if array.shape[-1] > MOST_DOFS or array.shape != np.shape(self.M):
+                raise ValueError(f"`{key}` must have at most {MOST_DOFS} rows, as many as `M`")
+            if not np.isfinite(array).all():
+                raise ValueError(f"`{key}` must hold finite numbers")
+            turned = np.swapaxes(array.conj(), 1, 2)
+            if np.abs(array - turned).max() > _ASYMMETRY * np.abs(array).max():
+                raise ValueError(f"`{key}` must be Hermitian at each nodal diameter")
+            array = 0.5 * (array + turned)
+            array.setflags(write=False)
+            object.__setattr__(self, key, array)
+            found.update(key.encode() + array.tobytes())
+        for n, mass in zip(self.diameters, self.M, strict=True):
+            try:
+                np.linalg.cholesky(mass)
+            except np.linalg.LinAlgError as error:
+                raise ValueError(f"`M` must be positive definite at nodal diameter {n}") from error
+        object.__setattr__(self, "digest", found.hexdigest())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, DiameterMatrices) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __repr__(self) -> str:
+        listed = ", ".join(map(str, self.diameters))
+        return f"DiameterMatrices({self.size} coordinates, nodal diameters {listed}, {self.digest[:12]})"
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return int(self.M.shape[1])
+
+    def at(self, n: int, sectors: int) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """K, C and M at nodal diameter n, from 0 to half the sectors; real where the phase is.
+
+        Raises
+        ------
+        SettingError
+            The model was not reduced for it.
+        """
+        if n not in self.diameters:
+            built = ", ".join(map(str, self.diameters))
+            raise SettingError(
+                "nodal diameter",
+                n,
+                f"must be one that the model was reduced for ({built}): harmonics of this engine order call "
+                "for it; reduce again with more of them, or ask for fewer harmonics",
+            )
+        i = self.diameters.index(n)
+        C = np.zeros_like(self.K[i]) if self.C is None else self.C[i]
+        found = self.K[i], C, self.M[i]
+        return found if 2 * n % sectors else (found[0].real, found[1].real, found[2].real)
+
+    @classmethod
+    def read(cls, data: object) -> DiameterMatrices:
+        """Read a table of `diameters` and lists `M`, `K`, `C` of tables `real` and maybe `imag` of rows."""
+        if isinstance(data, DiameterMatrices):
+            return data
+        if isinstance(data, str):
+            raise ValueError(
+                "`diameters` must be given inline here: files are read by load_scene only, got the path "
+                f"{data[:80]!r}"
+            )
+        if not isinstance(data, dict) or not {"diameters", "M", "K"} <= set(data) <= set(_KEYS):
+            got = ", ".join(map(str, data))[:200] if isinstance(data, dict) else type(data).__name__
+            raise ValueError(f"`diameters` must be a table with the keys {', '.join(_KEYS)}, got {got}")
+        counts = data["diameters"]
+        good = isinstance(counts, list | tuple) and 0 < len(counts) <= _MOST
+        if not good or any(isinstance(n, bool) or not isinstance(n, int) for n in counts):
+            raise ValueError("`diameters` must be a list of whole numbers")
+        arrays = {key: _stack(key, data[key], len(counts)) for key in ("M", "K", "C") if data.get(key)}
+        return cls(diameters=tuple(counts), **arrays)
+
+    def write(self) -> dict[str, object]:
+        """The table that `read` reads."""
+        table: dict[str, object] = {"diameters": list(self.diameters)}
+        given = {"M": self.M, "K": self.K, "C": self.C}
+        for key, value in given.items():
+            if value is not None:
+                table[key] = [_written(matrix) for matrix in value]
+        return table
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(
+            cls.read, serialization=core_schema.plain_serializer_function_ser_schema(cls.write)
+        )
+
+
+def _stack(key: str, data: object, count: int) -> ComplexArray:
+    if not isinstance(data, list | tuple) or len(data) != count:
+        raise ValueError(f"`{key}` must have a table `real`, `imag` for each of the {count} nodal diameters")
+    return np.array([_complex(key, item) for item in data])
+
+
+def _complex(key: str, item: Any) -> ComplexArray:
+    if not isinstance(item, dict) or not {"real"} <= set(item) <= {"real", "imag"}:
+        raise ValueError(f"`{key}` must hold tables with the keys `real` and `imag`")
+    real = Matrix.read(item["real"]).array
+    imag = Matrix.read(item["imag"]).array if "imag" in item else np.zeros_like(real)
+    if imag.shape != real.shape:
+        raise ValueError(f"`{key}`: `real` and `imag` must be of one size")
+    return np.asarray(real + 1j * imag, dtype=np.complex128)
+
+
+def _written(matrix: ComplexArray) -> dict[str, object]:
+    table: dict[str, object] = {"real": Matrix(matrix.real).write()}
+    if np.any(matrix.imag):
+        table["imag"] = Matrix(matrix.imag).write()
+    return table

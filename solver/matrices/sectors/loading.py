@@ -1,0 +1,203 @@
+"""The table [structure] of a sector in a scene file: its boundaries become rows, a large model is reduced."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from scipy.sparse import csr_array
+
+from solver.errors import Issue, SceneError
+from solver.matrices.load_set import MatrixSet
+from solver.matrices.readers.numbers_in_text import FormatError
+from solver.matrices.readers.reader import MatrixFileError
+from solver.matrices.sectors.decks import Deck, read_deck
+from solver.matrices.sectors.elimination import Elimination, Group, elimination
+from solver.matrices.sectors.pairing import PAIR_BY, groups, paired
+from solver.matrices.sectors.reduction import diameters_met, read_diameters, reduce_sector
+from solver.matrices.values import MOST_DOFS, Matrix
+
+FILE_KEYS = ("low", "high", "nodes", "pair_by", "tolerance", "keep_modes")
+DEFAULT_AXIS = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Boundaries:
+    """The boundaries of a sector as rows, and the axis.
+
+    Attributes
+    ----------
+    low, high : list of tuple of int
+        Pairs of groups of rows.
+    axis : (3,) tuple
+    """
+
+    low: list[Group]
+    high: list[Group]
+    axis: tuple[float, float, float]
+
+    def elimination(self, n: int, sectors: int) -> Elimination:
+        """How the high boundary of a sector of n rows follows."""
+        return elimination(n, self.low, self.high, self.axis, sectors)
+
+    def table(self) -> dict[str, object]:
+        """As the scene keeps it."""
+        return {
+            "low_rows": [list(group) for group in self.low],
+            "high_rows": [list(group) for group in self.high],
+            "axis": list(self.axis),
+        }
+
+
+def boundaries(given: Mapping[str, Any], found: MatrixSet, sectors: int, folder: Path) -> Boundaries:
+    """The boundaries that a table [structure.cyclic] of a scene file names.
+
+    Raises
+    ------
+    SceneError
+        Sets or nodes that are not there, or do not match.
+    """
+    axis = given.get("axis", DEFAULT_AXIS)
+    if not (isinstance(axis, list | tuple) and len(axis) == 3 and any(axis)):
+        raise _refusal("axis", f"`axis` must be a direction [x, y, z], got {axis!r}")
+    pair_by, tolerance = given.get("pair_by", "position"), given.get("tolerance")
+    if pair_by not in PAIR_BY:
+        raise _refusal("pair_by", f"`pair_by` must be one of {', '.join(PAIR_BY)}, got {pair_by!r}")
+    if tolerance is not None and not (isinstance(tolerance, int | float) and tolerance > 0.0):
+        raise _refusal("tolerance", f"`tolerance` must be a distance > 0, got {tolerance!r}")
+    deck = _deck(given.get("nodes"), folder)
+    low, high = (_nodes(key, given.get(key), deck) for key in ("low", "high"))
+    try:
+        pairs = paired(deck, low, high, axis, sectors, pair_by=pair_by, tolerance=tolerance)
+        ours, theirs = groups(pairs, found)
+    except ValueError as error:
+        raise _refusal("low", str(error)) from error
+    return Boundaries(low=ours, high=theirs, axis=(float(axis[0]), float(axis[1]), float(axis[2])))
+
+
+def _deck(name: object, folder: Path) -> Deck | None:
+    if name is None:
+        return None
+    if not isinstance(name, str):
+        raise _refusal("nodes", f"`nodes` must be the name of a deck, got {name!r}")
+    try:
+        return read_deck(folder / name)
+    except FormatError as error:
+        raise _refusal("nodes", f"`nodes`: {name!r}: {error}") from error
+    except OSError as error:
+        raise _refusal("nodes", f"`nodes`: {name!r} cannot be read: {error.strerror or error}") from error
+
+
+def _nodes(key: str, given: object, deck: Deck | None) -> list[int] | None:
+    """The nodes of a boundary: a list of them, or the name of a set of the deck."""
+    if given is None:
+        return None
+    if isinstance(given, list) and given and all(type(node) is int for node in given):
+        return list(dict.fromkeys(given))
+    if not isinstance(given, str):
+        raise _refusal(key, f"`{key}` must be the name of a set or a list of nodes, got {given!r}")
+    if deck is None:
+        raise _refusal("nodes", f"`nodes` is missing: the deck that has the set {given!r}")
+    if given.upper() not in deck.sets:
+        known = ", ".join(sorted(deck.sets)[:20]) or "none"
+        raise _refusal(key, f"`{key}`: there is no set {given!r} of nodes in the deck; known: {known}")
+    return list(dict.fromkeys(deck.sets[given.upper()]))
+
+
+def as_sector(tables: dict[str, Any], found: MatrixSet, folder: Path, orders: list[int]) -> dict[str, Any]:
+    """The tables of a sector with its files read, as the scene keeps them.
+
+    Parameters
+    ----------
+    tables : of [structure], its labels already rows.
+    orders : engine orders of the excitation.
+
+    Raises
+    ------
+    SceneError
+        Anything that cannot be used; the pointer is that of the key.
+    """
+    sectors = tables["sectors"]
+    joined = tables.get("cyclic") or {}
+    if (
+        isinstance(sectors, bool)
+        or not isinstance(sectors, int)
+        or sectors < 1
+        or not isinstance(joined, dict)
+    ):
+        return tables  # what is wrong is said with the rest of the scene
+    if isinstance(tables.get("diameters"), str):
+        return _from_file(tables, folder)
+    if not found.matrices:
+        return tables
+    kept = {key: value for key, value in joined.items() if key not in FILE_KEYS}
+    if "low_rows" in joined or "high_rows" in joined:
+        return {**tables, **_dense(found), "cyclic": kept}
+    ends = boundaries(joined, found, sectors, folder)
+    keep = joined.get("keep_modes")
+    if keep is None:
+        return {**tables, **_dense(found), "cyclic": {**kept, **ends.table()}}
+    if isinstance(keep, bool) or not isinstance(keep, int) or not 0 <= keep <= MOST_DOFS:
+        raise _refusal(
+            "keep_modes", f"`keep_modes` must be a whole number from 0 to {MOST_DOFS}, got {keep!r}"
+        )
+    _refuse_unreduced(tables, found)
+    if not isinstance(tables.get("dofs"), dict):
+        raise SceneError(
+            [Issue(pointer="/structure/dofs", message="`dofs` must be a table of names and rows")]
+        )
+    matrices = {key: csr_array(matrix) for key, matrix in found.matrices.items()}
+    try:
+        gone = ends.elimination(matrices["M"].shape[0], sectors)
+        met = diameters_met(orders, sectors)
+        reduced = reduce_sector(matrices, gone, tables["dofs"], keep, met, sectors)
+    except ValueError as error:
+        raise SceneError([Issue(pointer="/structure/dofs", message=str(error))]) from error
+    return {
+        **{key: value for key, value in tables.items() if key not in matrices},
+        "diameters": reduced.matrices,
+        "dofs": reduced.rows,
+        "cyclic": {**kept, "axis": list(ends.axis)},
+        "reduction": {
+            "dofs": matrices["M"].shape[0], "modes": reduced.modes, "highest_hz": reduced.highest_hz,
+        },
+    }  # fmt: skip
+
+
+def _refuse_unreduced(tables: Mapping[str, Any], found: MatrixSet) -> None:
+    """Refuse what a reduction of a sector does not carry along."""
+    keys: list[str] = [key for key in ("G", "K_omega2") if key in found.matrices]
+    keys += ["symmetric"] if tables.get("symmetric") is False else []
+    for key in keys[:1]:
+        message = (
+            f"`{key}` does not go with `keep_modes` of a sector, which reduces symmetric M, K and C: leave "
+            "`keep_modes` out, or give such terms as [[couplings]] of the DOFs in use"
+        )
+        raise SceneError([Issue(pointer=f"/structure/{key}", message=message)])
+
+
+def _from_file(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
+    try:
+        matrices, was = read_diameters(folder / tables["diameters"])
+    except MatrixFileError as error:
+        message = f"`diameters`: {error}"
+        raise SceneError([Issue(pointer="/structure/diameters", message=message)]) from error
+    return {**tables, "diameters": matrices, "reduction": was}
+
+
+def _dense(found: MatrixSet) -> dict[str, Matrix]:
+    for key, matrix in found.matrices.items():
+        if matrix.shape[0] > MOST_DOFS:
+            message = (
+                f"`{key}` has {matrix.shape[0]} rows, {MOST_DOFS} are the most without reduction: `stickslip "
+                "import --sectors … --reduce` reduces them once; `keep_modes` = 40 (say) in "
+                "[structure.cyclic] does it whenever the scene is loaded"
+            )
+            raise SceneError([Issue(pointer=f"/structure/{key}", message=message)])
+    return {key: Matrix(matrix.toarray()) for key, matrix in found.matrices.items()}
+
+
+def _refusal(key: str, message: str) -> SceneError:
+    return SceneError([Issue(pointer=f"/structure/cyclic/{key}", message=message)])

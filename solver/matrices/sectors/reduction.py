@@ -1,0 +1,181 @@
+"""A full sector reduced onto its DOFs in use, one nodal diameter after the other; and the file of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from solver.matrices.readers.reader import MatrixFileError
+from solver.matrices.reduction.craig_bampton import craig_bampton
+from solver.matrices.reduction.reduction_error import Quality
+from solver.matrices.sectors.diameters import DiameterMatrices
+from solver.matrices.sectors.elimination import Elimination
+from solver.matrices.validation import DofTable
+
+SUFFIX = ".npz"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReducedSector:
+    """The matrices of each nodal diameter, and what each is good for.
+
+    Attributes
+    ----------
+    matrices : DiameterMatrices
+        The DOFs in use first, then the modes of the rest.
+    rows : dict
+        Row of each DOF in use.
+    full : int
+        Rows of the full sector.
+    modes : int
+        Modes kept at each nodal diameter.
+    highest_hz : float
+        Least frequency over the nodal diameters of the highest mode kept [Hz].
+    quality : tuple of Quality
+        Of each nodal diameter.
+    seconds : tuple of float
+        That each took [s].
+    """
+
+    matrices: DiameterMatrices
+    rows: dict[str, int]
+    full: int
+    modes: int
+    highest_hz: float
+    quality: tuple[Quality, ...]
+    seconds: tuple[float, ...]
+
+    @property
+    def good_to_hz(self) -> float:
+        """Frequency up to which those of every nodal diameter are exact to 0.1 % [Hz]."""
+        return min(quality.good_to_hz for quality in self.quality)
+
+
+def diameters_met(orders: Sequence[int], sectors: int) -> tuple[int, ...]:
+    """Nodal diameters from 0 to half the sectors that harmonics of these engine orders meet: multiples."""
+    met = {order * k % sectors for order in orders for k in range(sectors)}
+    return tuple(sorted({min(n, sectors - n) for n in met}))
+
+
+def reduce_sector(
+    matrices: Mapping[str, Any],
+    eliminated: Elimination,
+    dofs: Mapping[str, int],
+    keep_modes: int,
+    diameters: Sequence[int],
+    sectors: int,
+    on_progress: Callable[[int], None] | None = None,
+) -> ReducedSector:
+    """Reduce a sector (Craig, Bampton 1968) at each nodal diameter.
+
+    Parameters
+    ----------
+    matrices : M, K and maybe C, sparse, of the full sector.
+    eliminated : how its high boundary follows.
+    dofs : rows of the DOFs in use in the full sector.
+    keep_modes : of the rest with these held, at each nodal diameter.
+    diameters : ascending.
+    on_progress : called with each nodal diameter that is done.
+
+    Raises
+    ------
+    ValueError
+        A DOF on the high boundary, or a model that cannot be reduced so.
+    """
+    own = _kept_rows(dofs, eliminated)
+    circulants = {key: eliminated.of(matrix) for key, matrix in matrices.items()}
+    found, seconds = [], []
+    for n in diameters:
+        begun = time.perf_counter()
+        at = {key: circulant.at(n, sectors) for key, circulant in circulants.items()}
+        found.append(craig_bampton(at["M"], at["K"], at.get("C"), own, keep_modes, weigh=False))
+        seconds.append(time.perf_counter() - begun)
+        if on_progress is not None:
+            on_progress(n)
+    if len({each.modes for each in found}) > 1:
+        most = max(each.modes for each in found)
+        raise ValueError(
+            f"`keep_modes` = {keep_modes} is too few: a nodal diameter has {most} with its rigid-body modes; "
+            "ask for that many"
+        )
+    stacks = {key: np.array([each.matrices[key] for each in found]) for key in circulants}
+    return ReducedSector(
+        matrices=DiameterMatrices(diameters=tuple(diameters), **stacks),
+        rows={name: row for row, name in enumerate(own)},
+        full=int(eliminated.here.shape[0]),
+        modes=found[0].modes,
+        highest_hz=min(each.highest_hz for each in found),
+        quality=tuple(each.quality for each in found),
+        seconds=tuple(seconds),
+    )
+
+
+def _kept_rows(dofs: Mapping[str, int], eliminated: Elimination) -> DofTable:
+    size = eliminated.here.shape[0]
+    table = {}
+    for name, row in dofs.items():
+        if not 0 <= row < size:
+            raise ValueError(f"`dofs`: {name!r} must have a row from 0 to {size - 1}, got {row}")
+        place = eliminated.row(row)
+        if place >= eliminated.kept.size or eliminated.kept[place] != row:
+            raise ValueError(
+                f"`dofs`: {name!r} is on the high boundary: name the DOF of the low boundary that it is "
+                "paired with; in contacts it is NAME@next"
+            )
+        table[name] = place
+    return DofTable.read(table)
+
+
+def write_diameters(path: Path, reduced: ReducedSector) -> None:
+    """Write a reduced sector: arrays `diameters`, `M`, `K`, maybe `C`, `names` and `good_to_hz` (.npz).
+
+    Raises
+    ------
+    OSError
+        The file cannot be written.
+    """
+    found = reduced.matrices
+    names = [*reduced.rows, *(f"mode{i}" for i in range(1, reduced.modes + 1))]
+    arrays = {"M": found.M, "K": found.K} | ({} if found.C is None else {"C": found.C})
+    np.savez_compressed(
+        path,
+        allow_pickle=False,
+        **arrays,
+        diameters=np.array(found.diameters, np.int64),
+        names=np.array(names),
+        full=np.array(reduced.full),
+        good_to_hz=np.array([quality.good_to_hz for quality in reduced.quality]),
+        held_hz=np.array([quality.held_hz for quality in reduced.quality]),
+    )
+
+
+def read_diameters(path: Path) -> tuple[DiameterMatrices, dict[str, Any]]:
+    """Read a reduced sector, and what it was: `dofs` of the full one, `modes` kept and `highest_hz`.
+
+    Raises
+    ------
+    MatrixFileError
+        No such file, or one of something else.
+    """
+    if path.suffix.lower() != SUFFIX:
+        raise MatrixFileError(f"{str(path)!r} must end in {SUFFIX}: a sector that `stickslip import` reduced")
+    try:
+        with np.load(path, allow_pickle=False) as found:
+            arrays = {key: found[key] for key in found.files}
+        held = arrays.get("held_hz", np.zeros((1, 0)))
+        kept = {key: arrays[key] for key in ("M", "K", "C") if key in arrays}
+        diameters = tuple(int(n) for n in arrays["diameters"])
+        matrices = DiameterMatrices(diameters=diameters, **kept)
+    except OSError as error:
+        raise MatrixFileError(f"{str(path)!r} cannot be read: {error.strerror or error}") from error
+    except (KeyError, TypeError, ValueError) as error:
+        reason = f"has no array {error}" if isinstance(error, KeyError) else f"is no reduced sector: {error}"
+        raise MatrixFileError(f"{str(path)!r} {reason}") from error
+    highest = float(held[:, -1].min()) if held.size else 0.0
+    full = int(arrays.get("full", matrices.size))
+    return matrices, {"dofs": full, "modes": int(held.shape[1]), "highest_hz": highest}

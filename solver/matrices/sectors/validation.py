@@ -1,0 +1,118 @@
+"""What must hold between the parts of a sector given by its matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any, Protocol
+
+import numpy as np
+
+from solver.matrices.sectors.diameters import DiameterMatrices
+from solver.matrices.sectors.elimination import elimination
+from solver.matrices.validation import DofTable
+from solver.matrices.values import Matrix, Modes
+
+_REAL = 1e-9  # imaginary part, relative to the largest entry, that counts as none
+
+
+class Sector(Protocol):
+    """A structure of kind ``matrices``, as far as its sectors go."""
+
+    def __hash__(self) -> int:
+        """Of its content."""
+
+    @property
+    def sectors(self) -> int | None:
+        """Number of sectors."""
+
+    @property
+    def cyclic(self) -> Any:
+        """Boundaries and axis."""
+
+    @property
+    def diameters(self) -> DiameterMatrices | None:
+        """The reduced sector."""
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether K and C are symmetric."""
+
+    @property
+    def modes(self) -> Modes | None:
+        """Modes in place of the matrices."""
+
+    @property
+    def M(self) -> Matrix | None:
+        """Mass of a full sector [kg]."""
+
+    @property
+    def K(self) -> Matrix | None:
+        """Stiffness of a full sector [N/m]."""
+
+    @property
+    def C(self) -> Matrix | None:
+        """Damping of a full sector [N s/m]."""
+
+    @property
+    def dofs(self) -> DofTable:
+        """The DOFs in use."""
+
+
+def check_sector(sector: Sector, spinning: Collection[str]) -> None:
+    """Raise ValueError unless matrices with boundaries, or those of nodal diameters, are there and fit.
+
+    `spinning` names the matrices given that go with the speed of rotation.
+    """
+    count = sector.sectors or 1
+    if sector.modes is not None:
+        raise ValueError(f"`sectors` = {count}: a sector is given by its matrices, not by `modes`")
+    low, high = (None, None) if sector.cyclic is None else (sector.cyclic.low_rows, sector.cyclic.high_rows)
+    if sector.diameters is None:
+        if low is None or high is None:
+            raise ValueError(
+                f"`sectors` = {count} needs the boundaries in [structure.cyclic]: `low` and `high` in a "
+                "scene file, `low_rows` and `high_rows` in a request"
+            )
+        if sector.M is not None:
+            found = elimination(sector.M.size, low, high, sector.cyclic.axis, count)
+            away = np.setdiff1d(np.arange(sector.M.size), found.kept).tolist()
+            _check_kept(sector.dofs, set(away))
+        return
+    if sector.M is not None or low is not None or high is not None:
+        raise ValueError(
+            "`diameters` stands in place of M, K, C, `low_rows` and `high_rows`: remove one or other"
+        )
+    if spinning:
+        raise ValueError(
+            f"`{next(iter(spinning))}` is a matrix of a full sector, not of a reduced one (`diameters`): "
+            "give it as [[couplings]] of the DOFs in use, or the sector by M and K"
+        )
+    if not sector.symmetric:
+        raise ValueError(
+            "`symmetric` = false is for K and C of a full sector: those of `diameters` are Hermitian; give "
+            "what is unsymmetric as [[couplings]] of the DOFs in use"
+        )
+    _check_diameters(sector.diameters, count, sector.dofs)
+
+
+def _check_kept(dofs: DofTable, away: set[int]) -> None:
+    for name, row in dofs.write().items():
+        if row in away:
+            raise ValueError(
+                f"`dofs`: {name!r} is row {row}, on the high boundary: name the DOF of the low boundary that "
+                "it is paired with; in contacts it is NAME@next"
+            )
+
+
+def _check_diameters(found: DiameterMatrices, count: int, dofs: DofTable) -> None:
+    if found.diameters[-1] > count // 2:
+        raise ValueError(
+            f"`diameters` must be from 0 to {count // 2}, half of {count} sectors, got {found.diameters[-1]}"
+        )
+    for n, M, K in zip(found.diameters, found.M, found.K, strict=True):
+        for key, matrix in (("M", M), ("K", K)):
+            if 2 * n % count == 0 and np.abs(matrix.imag).max() > _REAL * np.abs(matrix).max():
+                raise ValueError(f"`{key}` must be real at nodal diameter {n} of {count} sectors")
+    for name, row in dofs.write().items():
+        if row >= found.size:
+            raise ValueError(f"`dofs`: {name!r} must have a row from 0 to {found.size - 1}, got {row}")
