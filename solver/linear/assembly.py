@@ -51,7 +51,7 @@ from solver.scene.scene import (
     Spring,
     Structure,
 )
-from solver.scene.validation import listing, nearest
+from solver.wording import listing, nearest
 
 FloatArray = NDArray[np.float64]
 

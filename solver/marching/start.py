@@ -11,7 +11,7 @@ import numpy as np
 from solver.errors import SettingError
 from solver.marching.equations import Equations
 from solver.marching.kernels import state as kernel
-from solver.scene.validation import listing
+from solver.wording import listing
 
 _FRICTION = (kernel.COULOMB, kernel.ELASTIC_NORMAL, kernel.CIRCLE, kernel.CIRCLE_SECOND)
 _INSIDE = 1e-13  # share of the limit that a force stays below it: from there it slips by its rates

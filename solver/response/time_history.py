@@ -18,7 +18,7 @@ from solver.linear.condensation import force_amplitudes
 from solver.linear.contact_table import port_stiffnesses
 from solver.linear.model import LinearModel
 from solver.response.solution import Solution
-from solver.scene.validation import listing
+from solver.wording import listing
 
 LARGEST_SAMPLES = 10_000_000
 

@@ -27,7 +27,7 @@ from solver.linear.kernels.receptance import receptance
 from solver.response.solution import Solution
 from solver.response.wear_measures import Change, Cycle, friction_work, least_load, slip_travel
 from solver.results.told import Piece
-from solver.scene.validation import listing
+from solver.wording import listing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

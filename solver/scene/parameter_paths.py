@@ -25,7 +25,7 @@ from solver.scene.parts import (
     Structure,
 )
 from solver.scene.terms.speed import SpeedDependence, at_speed
-from solver.scene.validation import listing, nearest
+from solver.wording import listing, nearest
 
 FREQUENCY = "frequency"
 AMPLITUDE = "excitation.amplitude"

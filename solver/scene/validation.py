@@ -6,7 +6,6 @@ not hide a misspelt degree of freedom.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, islice
 from typing import Any, cast
@@ -36,6 +35,7 @@ from solver.scene.parts import (
     Spring,
 )
 from solver.scene.terms.keys import TERM_KEYS
+from solver.wording import listing, nearest, quoted
 
 MOST_ISSUES = 200  # of each kind: a scene with more is not read by a person
 RESERVED_PREFIXES = ("excitation", "structure", "frequency", "observe", "speed")
@@ -115,30 +115,6 @@ def plain(data: object, depth: int = 0) -> object:
     if depth < 50 and isinstance(data, list | tuple):
         return [plain(value, depth + 1) for value in data]
     return data
-
-
-def nearest(name: str, known: Sequence[str]) -> str:
-    """A hint ``; did you mean `x`?``, or nothing when no known name is near (or there are too many)."""
-    few = len(known) <= 300 and len(name) <= 200
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5) if few else []
-    return f"; did you mean `{near[0]}`?" if near else ""
-
-
-def listing(known: Sequence[str]) -> str:
-    """The known names for a message, cut after twenty."""
-    more = f", … ({len(known) - 20} more)" if len(known) > 20 else ""
-    return ", ".join(known[:20]) + more
-
-
-def quoted(value: object) -> str:
-    """A value for a message, cut at 80 characters."""
-    if isinstance(value, dict | list) and len(value) > 8:
-        return f"a {'table' if isinstance(value, dict) else 'list'} of {len(value)}"
-    try:
-        text = repr(value)
-    except (RecursionError, ValueError):
-        text = f"a {type(value).__name__}"
-    return text if len(text) <= 80 else text[:77] + "..."
 
 
 def field_issues(error: ValidationError, raw: dict[str, Any]) -> list[Issue]:

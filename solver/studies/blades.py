@@ -24,7 +24,7 @@ from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import annulus, sectors_needed
 from solver.scene.scene import CyclicStructure, Scene
-from solver.scene.validation import listing, nearest
+from solver.wording import listing, nearest
 
 _OF_THE_SWEEP = 0.4  # share of the time; the rest looks for the peaks of the other blades
 

@@ -18,13 +18,11 @@ from solver.scene.validation import (
     dofs_of,
     duplicates,
     in_space,
-    listing,
-    nearest,
     pointer_of,
-    quoted,
     rows_of,
     unknown_dof,
 )
+from solver.wording import listing, nearest, quoted
 
 _Steps = list[int | str]
 _Dofs = dict[str, None] | None

@@ -34,7 +34,7 @@ from solver.scene.scene import (
 )
 from solver.scene.terms.linear_terms import Coupling
 from solver.scene.terms.recovery import Recovered
-from solver.scene.validation import listing
+from solver.wording import listing
 
 _JoinT = TypeVar("_JoinT", Spring, Damper)
 _NamedT = TypeVar("_NamedT", Spring, Damper, Mass)

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from solver.errors import Issue
 from solver.scene.cyclic.boundary import is_cyclic
 from solver.scene.parts import Mistuning
-from solver.scene.validation import listing, nearest, quoted
+from solver.wording import listing, nearest, quoted
 
 
 def cyclic_issues(raw: dict[str, Any]) -> list[Issue]:
