@@ -19,6 +19,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from multiprocessing.connection import wait
@@ -35,6 +36,8 @@ _STATUS_LOST = 255
 """What the standard library says of a process whose fork server is gone."""
 _STATUS_SECONDS = 5.0
 """How long the fork server has to tell the status of a process that ended [s]."""
+_ANOTHER_SECONDS, _BETWEEN_SECONDS = 5.0, 0.02
+"""How long another fork server is tried for, and the pause between attempts [s]."""
 
 _lock = threading.Lock()
 _settings_of_the_first: dict[str, str] | None = None
@@ -125,14 +128,16 @@ def start(target: Callable[..., None], args: tuple[Any, ...], name: str) -> Proc
     OSError
         If it cannot be started, or the fork server ended meanwhile.
     """
+    until = time.monotonic() + _ANOTHER_SECONDS
     with _lock, _one_thread_each():
-        try:
-            return _started(target, args, name)
-        except (EOFError, ConnectionError):  # the fork server ended at this moment: there will be another
+        while True:
             try:
                 return _started(target, args, name)
-            except EOFError as error:
-                raise ConnectionAbortedError("what processes are forked off ended twice") from error
+            except (EOFError, ConnectionError) as error:
+                # The fork server ended at this moment. There will be another once the system says so.
+                if time.monotonic() > until:
+                    raise ConnectionAbortedError("what processes are forked off keeps ending") from error
+                time.sleep(_BETWEEN_SECONDS)
 
 
 def _started(target: Callable[..., None], args: tuple[Any, ...], name: str) -> Process:

@@ -117,5 +117,6 @@ def http(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
 @pytest.fixture(scope="module")
 def shipped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
     """The kinds that come with the service, shared by the tests of a module."""
-    with serving(tmp_path_factory.mktemp("shipped"), SHIPPED) as client:
+    # Bodies as large as a service takes by itself: a disk is a megabyte of matrices.
+    with serving(tmp_path_factory.mktemp("shipped"), SHIPPED, max_body_bytes=4_000_000) as client:
         yield client
