@@ -368,10 +368,8 @@ def _engine_order_issues(raw: dict[str, Any], structure: dict[str, Any]) -> Iter
             continue
         pointer = pointer_of([*steps, "engine_order"])
         if kind in ("lumped", "matrices") and not is_cyclic(structure):
-            message = (
-                f"`engine_order` = {quoted(order)} needs a cyclic structure; remove it from a {kind} one"
-            )
-            yield Issue(pointer=pointer, message=message)
+            needs = f"needs a cyclic structure; remove it from a {kind} one"
+            yield Issue(pointer=pointer, message=f"`engine_order` = {quoted(order)} {needs}")
         elif first is not None and order != first:
             message = f"`engine_order` must be the same everywhere, got {quoted(order)} after {quoted(first)}"
             yield Issue(pointer=pointer, message=message)
