@@ -11,6 +11,7 @@ import pytest
 from service_helpers import is_problem
 
 import solver
+from service.jobs.common.scene_text import MOST_OF_TOML
 from solver.scene.toml import toml_text
 
 PATHS = {"two-dof": "damper.N0", "bladed-disk": "shroud.N0", "shroud-3d": "shroud.N0"}
@@ -24,7 +25,11 @@ def test_a_scene_comes_back_from_its_toml(shipped: httpx.Client, name: str) -> N
     assert answer.text.startswith("# a\n# b\n")
     wanted = solver.load_scene(name).with_values({path: 150.0})
     assert solver.Scene.from_dict(tomllib.loads(answer.text)) == wanted
-    read = shipped.post("/v1/scenes/read", json={"text": answer.text}).json()
+    answered = shipped.post("/v1/scenes/read", json={"text": answer.text})
+    if len(answer.text) > MOST_OF_TOML:  # whole matrices: for files, not for a form
+        assert f"got {len(answer.text)}" in is_problem(answered, 422)["errors"][0]["detail"]
+        return
+    read = answered.json()
     assert read["issues"] == []
     assert solver.Scene.from_dict(read["scene"]) == wanted
 
