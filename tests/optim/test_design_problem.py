@@ -30,15 +30,15 @@ def test_several_bands_levels_and_orders_are_judged_together() -> None:
         {"name": "order 2", "engine_order": 2, "weight": 0.5},
         {"name": "stronger", "set": {"excitation.amplitude": 80.0}, "band": [700.0, 800.0], "weight": 0.6},
     ]
-    result = optim.design(scene, variables=DISK, cases=cases)
+    result = optim.design(scene, variables=DISK, cases=cases, harmonics=5)
     assert result.reached
     N0 = result.optimum["shroud.N0"]
     here = scene.with_values({"shroud.N0": N0})
     from optim.problem.cases import with_engine_order
 
-    second = highest(with_engine_order(here, 2))
-    third = highest(here.with_values({"excitation.amplitude": 80.0}), start=700.0, stop=800.0)
-    expected = max(highest(here), 0.5 * second, 0.6 * third)
+    second = highest(with_engine_order(here, 2), harmonics=5)
+    third = highest(here.with_values({"excitation.amplitude": 80.0}), start=700.0, stop=800.0, harmonics=5)
+    expected = max(highest(here, harmonics=5), 0.5 * second, 0.6 * third)
     assert result.evaluation.objective == pytest.approx(expected, rel=1e-9)  # type: ignore[union-attr]
     for factor in (0.97, 1.03):
         there = evaluate(result.problem, {"shroud.N0": N0 * factor})
@@ -93,7 +93,7 @@ def test_a_forbidden_range_keeps_the_resonance_out() -> None:
     assert kept.reached
     assert inside(kept.optimum["shroud.N0"]) <= limit * (1.0 + 1e-6)
     assert kept.peak.value >= free.peak.value * (1.0 - 1e-9)  # type: ignore[union-attr]
-    for N0 in np.geomspace(20.0, 3000.0, 25):
+    for N0 in np.geomspace(20.0, 3000.0, 13):
         if inside(float(N0)) <= limit:
             peak = highest(scene.with_values({"shroud.N0": float(N0)}), harmonics=3)
             assert peak >= kept.peak.value * (1.0 - 1e-9)  # type: ignore[union-attr]

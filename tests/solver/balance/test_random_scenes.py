@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from referee import law_error, lost_power, motion_error
+from sampling import sampled
 
 from benchmarks.random_scenes import Seeded, random_scene
 from solver import BranchStatus, Scene, Solution, load_scene, march, solve, sweep
@@ -78,7 +79,7 @@ def test_random_solves(seed: int):
     solved(*drawn(seed))
 
 
-@pytest.mark.parametrize("seed", range(BEYOND, BEYOND + 25))
+@pytest.mark.parametrize("seed", sampled(range(BEYOND, BEYOND + 25), 3))
 def test_random_responses(seed: int):
     swept(*drawn(seed)[:2])
 
