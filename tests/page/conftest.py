@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+import json
+import os
 import shutil
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -9,6 +12,8 @@ from page_site import Site, Watch, opened
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext
+
+TESTS = Path(__file__).resolve().parents[1]
 
 
 # Playwright keeps an event loop running in its thread, which other tests' own loops do not bear beside them:
@@ -32,6 +37,20 @@ def browser() -> Iterator[Browser]:
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """A service that begins with an empty database, shared by all tests of the page."""
     made = Site(tmp_path_factory.mktemp("page"))
+    made.start()
+    yield made
+    made.stop()
+
+
+@pytest.fixture(scope="session")
+def extended(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """A service with a law and a kind of job from outside the package: those of tests/extensions."""
+    made = Site(
+        tmp_path_factory.mktemp("extended"),
+        PYTHONPATH=os.pathsep.join(str(TESTS / folder) for folder in ("..", "cases", "extensions")),
+        STICKSLIP_EXTENSIONS=json.dumps(["sliders:SlidersContact"]),
+        STICKSLIP_KINDS=json.dumps(["test_a_kind:DISTORTION"]),
+    )
     made.start()
     yield made
     made.stop()

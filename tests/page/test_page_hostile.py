@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import httpx
 import pytest
 
 pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
@@ -17,8 +16,11 @@ from page_site import Site, opened
 from playwright.sync_api import expect
 
 import optim
+from service.client.embedded import EmbeddedService
+from service.db.models import JobState
 from service.rendering.report.design import design_report
 from service.rendering.report.sections import Designed
+from service.settings.settings import load_settings
 from solver.scene.scene import load_scene
 
 if TYPE_CHECKING:
@@ -28,7 +30,7 @@ BAD = (
     '"><img src=x onerror="window.hurt=1"><script src="http://evil.invalid/a.js"></script>'
     '<svg onload="window.hurt=1"><a href="javascript:window.hurt=1">${window.hurt=1}'
 )
-SWEEP = {"kind": "sweep", "scene": "two-dof", "harmonics": 3}
+SWEEP = {"scene": "two-dof", "harmonics": 3}
 
 
 @pytest.fixture(scope="module")
@@ -36,10 +38,8 @@ def poisoned(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """A service whose database somebody has filled with markup."""
     folder = tmp_path_factory.mktemp("poisoned")
     site = Site(folder)
-    site.start()
-    answer = httpx.post(f"{site.url}/v1/jobs", json=SWEEP, headers={"Prefer": "wait=60"}, timeout=120.0)
-    assert answer.status_code == 200
-    site.stop()
+    with EmbeddedService(load_settings(database=site.database, workers=1, answer_workers=1)) as service:
+        assert service.wait(service.submit("sweep", SWEEP)).status is JobState.SUCCESSFUL
     with sqlite3.connect(folder / "jobs.db") as connection:
         for column in ("scene_name", "parameter", "status", "owner"):
             connection.execute(f"UPDATE sweep SET {column} = ?", [BAD if column != "owner" else ""])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -42,16 +40,11 @@ IN_SPACE: dict[str, Any] = {
 
 
 @pytest.fixture(scope="module")
-def outside(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+def outside(extended: Site) -> Site:
     """A service that knows a law from outside the package, with scenes stored."""
-    paths = os.pathsep.join((str(ROOT), str(ROOT / "tests" / "extensions")))
-    named = json.dumps(["sliders:SlidersContact"])
-    made = Site(tmp_path_factory.mktemp("laws"), STICKSLIP_EXTENSIONS=named, PYTHONPATH=paths)
-    made.start()
     for scene in (JOINED, IN_SPACE):
-        assert httpx.post(f"{made.url}/v1/scenes", json=scene, timeout=60.0).status_code == 201
-    yield made
-    made.stop()
+        assert httpx.post(f"{extended.url}/v1/scenes", json=scene, timeout=60.0).status_code == 201
+    return extended
 
 
 @pytest.fixture

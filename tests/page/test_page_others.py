@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
-from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import httpx
@@ -16,22 +12,6 @@ expect = pytest.importorskip("playwright.sync_api", reason="the package playwrig
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
-
-TESTS = Path(__file__).parents[1]
-
-
-@pytest.fixture(scope="module")
-def extended(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    """A service with the kind of tests/extensions/test_a_kind.py."""
-    paths = [str(TESTS.parent), str(TESTS / "cases"), str(TESTS / "extensions")]
-    made = Site(
-        tmp_path_factory.mktemp("others"),
-        PYTHONPATH=os.pathsep.join(paths),
-        STICKSLIP_KINDS=json.dumps(["test_a_kind:DISTORTION"]),
-    )
-    made.start()
-    yield made
-    made.stop()
 
 
 def test_a_kind_without_a_view_has_a_form_and_a_result(browser: Browser, extended: Site) -> None:
