@@ -129,9 +129,18 @@ class Coordinates:
         return hash(self.key)
 
 
-@lru_cache(maxsize=16)
 def own_terms(structure: MatricesStructure) -> OwnTerms | None:
-    """Return the terms of a structure beside its symmetric matrices; None where there are none."""
+    """Return the terms of a structure beside its symmetric matrices; None where there are none.
+
+    The same object each time for the same structure.
+    """
+    if structure.symmetric and structure.G is None and structure.K_omega2 is None:
+        return None
+    return _own(structure)
+
+
+@lru_cache(maxsize=16)
+def _own(structure: MatricesStructure) -> OwnTerms | None:
     K, C = (
         None if structure.symmetric or matrix is None else 0.5 * (matrix.array - matrix.array.T)
         for matrix in (structure.K, structure.C)
