@@ -6,7 +6,6 @@ import itertools
 import math
 
 import numpy as np
-from scipy.stats import qmc
 
 from optim.problem.problem import Problem
 from optim.problem.variables import Real, unscaled
@@ -24,7 +23,7 @@ def coarse(problem: Problem) -> list[dict[str, float]]:
     if n == 1:
         points = [[i / (COARSE_ONE - 1.0)] for i in range(COARSE_ONE)]
     else:
-        points = qmc.Sobol(n, scramble=False).random(2 ** math.ceil(math.log2(COARSE_EACH * n))).tolist()
+        points = quasi_random(n, 2 ** math.ceil(math.log2(COARSE_EACH * n))).tolist()
     designs = [unscaled(problem.variables, point) for point in points]
     start = None if problem.start is None else dict(problem.start)
     return [start, *designs] if start is not None and start not in designs else designs
@@ -42,9 +41,16 @@ def places(n: int) -> Real:
     faces = np.repeat(middle, 2 * n, axis=0)
     for i in range(n):
         faces[2 * i, i], faces[2 * i + 1, i] = 0.0, 1.0
-    between = qmc.Sobol(n, scramble=False).random(2 ** math.ceil(math.log2(LOOKS_EACH * n)))
+    between = quasi_random(n, 2 ** math.ceil(math.log2(LOOKS_EACH * n)))
     # The first place of the sequence is a corner, the second the middle.
     return np.vstack([middle, corners(n), faces, between[2:]])
+
+
+def quasi_random(n: int, count: int, seed: int | None = None) -> Real:
+    """Return the first places of a Sobol sequence in the unit box, (count, n); scrambled if it has a seed."""
+    from scipy.stats import qmc  # takes half a second to load, and a design of one variable needs none
+
+    return np.asarray(qmc.Sobol(n, scramble=seed is not None, seed=seed).random(count))
 
 
 def corners(n: int) -> Real:

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
 
 from optim.criteria.linearised import Model
+from optim.methods.multistart import quasi_random
 from optim.problem.variables import Real
 
 NEAREST = 2  # designs a variable, and two more, whose models predict a place
@@ -87,7 +87,7 @@ def candidates(n: int, seed: int) -> Real:
     """Return places of the unit box that are compared, (k, n); other ones for another seed."""
     if n == 1:
         return np.linspace(0.0, 1.0, 2 * CANDIDATES + 1)[:, None]
-    places = qmc.Sobol(n, scramble=True, seed=seed).random(2 ** int(np.ceil(np.log2(CANDIDATES * n))))
+    places = quasi_random(n, 2 ** int(np.ceil(np.log2(CANDIDATES * n))), seed)
     # A share of them on the faces: the best design often lies on one.
     faces = np.arange(0, len(places), 4)
     places[faces, faces // 4 % n] = (faces // 4 // n) % 2

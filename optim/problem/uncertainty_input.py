@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from optim.errors import DesignError
 from optim.problem.numbers import is_number
@@ -190,7 +190,7 @@ def _confidence(table: Mapping[str, object], n: int) -> float:
     share = table.get("confidence", CONFIDENCE)
     if not is_number(share) or not 0.0 < share < 1.0:
         raise DesignError((*_WHERE, "confidence"), share, "must be a number between 0 and 1")
-    return math.sqrt(float(chi2.ppf(share, n)))
+    return math.sqrt(2.0 * float(gammaincinv(0.5 * n, share)))
 
 
 def _root(where: Place, given: object, n: int) -> Real:

@@ -12,29 +12,51 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing.util import Finalize
 from pathlib import Path
+from typing import TextIO
 
 PREFIX = "stickslip-service-"
 _LOCK = "lock"
+_OF_MULTIPROCESSING = "pymp-"
+_AFTER_MULTIPROCESSING = -200  # it removes its own folder at -100
 
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """Inside the block every temporary file of this process is in a folder that is removed at its end."""
+    """Inside the block every temporary file of this process is in a folder that is removed at its end.
+
+    Where multiprocessing has made its own folder in it, which it looks for once more when the process ends,
+    that one stays until then.
+    """
     remove_abandoned()
     before, variable = tempfile.tempdir, os.environ.get("TMPDIR")
-    with tempfile.TemporaryDirectory(prefix=PREFIX) as name, (Path(name) / _LOCK).open("w") as lock:
-        _try_lock(lock.fileno())
-        # Processes that read uploads for this one find it in the environment.
-        tempfile.tempdir = os.environ["TMPDIR"] = name
-        try:
-            yield Path(name)
-        finally:
-            tempfile.tempdir = before
-            if variable is None:
-                del os.environ["TMPDIR"]
-            else:
-                os.environ["TMPDIR"] = variable
+    folder = Path(tempfile.mkdtemp(prefix=PREFIX))
+    lock = (folder / _LOCK).open("w")
+    _try_lock(lock.fileno())
+    # Processes that read uploads for this one find it in the environment.
+    tempfile.tempdir = os.environ["TMPDIR"] = str(folder)
+    try:
+        yield folder
+    finally:
+        tempfile.tempdir = before
+        if variable is None:
+            del os.environ["TMPDIR"]
+        else:
+            os.environ["TMPDIR"] = variable
+        kept = [part for part in folder.iterdir() if part.name.startswith(_OF_MULTIPROCESSING)]
+        for part in set(folder.iterdir()) - {*kept, folder / _LOCK}:
+            shutil.rmtree(part, ignore_errors=True) if part.is_dir() else part.unlink(missing_ok=True)
+        if kept:
+            Finalize(None, _remove, args=(folder, lock), exitpriority=_AFTER_MULTIPROCESSING)
+        else:
+            _remove(folder, lock)
+
+
+def _remove(folder: Path, lock: TextIO) -> None:
+    """Remove a folder whose lock this process holds."""
+    shutil.rmtree(folder, ignore_errors=True)
+    lock.close()
 
 
 def remove_abandoned() -> list[Path]:

@@ -35,6 +35,17 @@ def test_temporary_files_are_inside_and_go(tmp_path: Path) -> None:
     assert tempfile.gettempdir() == str(tmp_path)
 
 
+def test_the_folder_of_multiprocessing_stays_until_the_process_ends(tmp_path: Path) -> None:
+    """It looks for it once more, and would say that it is gone."""
+    work = f"import multiprocessing.util as util\n{_WORK}    util.get_temp_dir()\nprint(util.get_temp_dir())"
+    done = subprocess.run(
+        [sys.executable, "-c", work], input="", capture_output=True, text=True, check=True
+    )  # fmt: skip
+    assert done.stderr == ""
+    assert Path(done.stdout.split()[-1]).parent.name.startswith("stickslip-service-")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_what_a_killed_service_left_is_removed(tmp_path: Path) -> None:
     command = [sys.executable, "-c", _WORK]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
