@@ -128,7 +128,7 @@ def plate(nodes: int = 100, modes: int = 40) -> Scene:
     """Many nodes of a plate given by its modes, each rubbing on the ground in space."""
     rng = np.random.default_rng(5)
     side = math.isqrt(nodes)
-    x, y = (np.stack(np.meshgrid(*2 * [np.linspace(0.05, 0.95, side)])).reshape(2, -1))
+    x, y = np.stack(np.meshgrid(*2 * [np.linspace(0.05, 0.95, side)])).reshape(2, -1)
     shapes = np.zeros((3 * nodes, modes))
     frequencies = np.zeros(modes)
     for m in range(modes):
@@ -202,7 +202,9 @@ def cost(case: Case) -> Cost:
         begun = time.process_time()
         stretches = list(walk(workspace, low, high, ContinuationSettings(), start.u))
         seconds = time.process_time() - begun
-        expect(f"{case.name}: the branch ends {stretches[-1].status}", stretches[-1].status.name == "COMPLETED")
+        expect(
+            f"{case.name}: the branch ends {stretches[-1].status}", stretches[-1].status.name == "COMPLETED"
+        )
         points = sum(len(stretch.solutions) for stretch in stretches)
         best, last = min(best, seconds / points), stretches[len(stretches) // 2].solutions[-1]
     u, p = last[:-1].copy(), float(last[-1])

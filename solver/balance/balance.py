@@ -61,6 +61,11 @@ class Balance:
         return int(self.system.owner.size)
 
     @property
+    def n_leading(self) -> int:
+        """Relative motions that all others follow from: what a Newton step is solved for."""
+        return int(self.system.leading.size)
+
+    @property
     def n_coefficients(self) -> int:
         """Real coefficients kept of each motion."""
         return int(2 * self.system.ks.size - (self.system.ks[0] == 0))
@@ -225,7 +230,8 @@ def _system(
         wanted = "moves the contacts, which are followed in gradients and designs, not continued in"
         raise SettingError("parameter", parameter.path, wanted)
     reduced = reduce_model(
-        model, ks, port_stiffnesses(scene, model), derivative, whole_matrices=effects.whole_matrices
+        model, ks, port_stiffnesses(scene, model), derivative, whole_matrices=effects.whole_matrices,
+        each_port=effects.every_port,
     )  # fmt: skip
     highest = max(int(ks[-1]), 1)
     cos_table, sin_table = grid_tables(grid_size(highest), highest)
@@ -237,7 +243,7 @@ def _system(
         samples=0, condense=0 if effects.every_contact else 1,
         least_size=reduced.least_size,
         active=parameter.active, load_rise=line.load_rise, level=line.level,
-        shift=reduced.shift, loose=reduced.loose, hold=0,
+        shift=reduced.shift, leading=reduced.leading, span=reduced.span, loose=reduced.loose, hold=0,
         kind=parameter.code, omega=omega,
         level_reference=_level(scene), phase_reference=scene.value("excitation.phase"),
         parameter_reference=scene.value(parameter.path) if derivative is not None else 0.0,

@@ -29,6 +29,8 @@ class Effects:
         Even harmonics and the mean, even where the response is half-wave symmetric.
     every_contact : bool
         Every contact stays in the Newton step, even one that cannot slip or never touches.
+    every_port : bool
+        Newton steps are solved for the motions of every contact, even where fewer lead them all.
     every_sector : bool
         The whole annulus, even of a tuned disk under a travelling wave.
     whole_matrices : bool
@@ -37,6 +39,7 @@ class Effects:
 
     even_harmonics: bool = False
     every_contact: bool = False
+    every_port: bool = False
     every_sector: bool = False
     whole_matrices: bool = False
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.balance.balance import Balance, fewer_harmonics
 from solver.balance.closed_loop_poles import ClosedLoop
-from solver.balance.kernels.jacobian import fill_jacobian
+from solver.balance.kernels.jacobian import fill_jacobian, whole_jacobian
 from solver.balance.kernels.locate import slope_by_parameter
 from solver.balance.kernels.newton import from_stuck, ladder, newton, stuck_start
 from solver.balance.kernels.output import MEASURES
@@ -25,6 +25,7 @@ from solver.contacts.kernels.system import (
     evaluation_by_value,
     new_evaluation,
     new_receptance,
+    of_all_ports,
     receptance_by_value,
 )
 from solver.jit.fourier import Integer, Real
@@ -199,10 +200,11 @@ class Workspace:
     def drive(self, u: Real, p: float) -> Drive:
         """Return the mean force left on what contacts alone hold, where (u, p) solves the rest."""
         system, n = self.balance.system, self.balance.n_coefficients
-        _, point = self.evaluate(u, p)
+        _, point = self.forces(u, p)
         forces = self._mean_forces(point)
         carried = np.abs(system.loose) @ np.abs(point.F).max(axis=1)
-        applied = np.abs(system.loose @ (system.shift * self.receptance(p).u_linear[0, 0].real))
+        free = receptance_by_value(self.linear).u_linear[0, 0].real
+        applied = np.abs(system.loose @ (system.shift * free))
         size = max(float(carried.max()), float(applied.max()), float(np.abs(forces).max()))
         # Of a part far away the forces are the rounding of its place.
         lost = ROUNDING * (np.abs(system.loose) @ (system.shift * np.abs(u[::n]))).max()
@@ -242,7 +244,7 @@ class Workspace:
                 break
             drive = self.drive(u, p)
             if drive.relative <= BALANCED:
-                norm, _ = self.evaluate(u, p)
+                norm, _ = self.forces(u, p)
                 return PointSolution(converged=True, u=u, iterations=spent, residual=norm)
             if drive.unheld:
                 return PointSolution(converged=False, u=u, iterations=spent, residual=np.inf, ratchets=True)
@@ -259,7 +261,7 @@ class Workspace:
         It is None where no contact that sticks all the time may.
         """
         system, n = self.balance.system, self.balance.n_coefficients
-        _, point = self.evaluate(u, p)
+        _, point = self.forces(u, p)
         way = -(self._mean_forces(point) @ system.loose)
         may = (point.elastic > 0.0) & (way != 0.0)
         if not np.any(may):
@@ -342,15 +344,25 @@ class Workspace:
 
     def evaluate(self, u: Real, p: float) -> tuple[float, Evaluation]:
         """Return the relative residual at (u, p) and everything evaluated there (views of scratch arrays)."""
+        norm, point = self.forces(u, p)
+        if point.jacobian.shape[0] == u.size:
+            fill_jacobian(self.system, self.linear, self.point)
+            return norm, point
+        point = point._replace(jacobian=np.empty((u.size, u.size)))
+        A = of_all_ports(self.balance.system, receptance_by_value(self.linear)).A
+        whole_jacobian(self.system, A[0], self.point, point.jacobian)
+        return norm, point
+
+    def forces(self, u: Real, p: float) -> tuple[float, Evaluation]:
+        """Return the same without the Jacobian, which is not in place."""
         receptance(self.system, p, self.linear)
         norm = evaluate(self.system, self.linear, u, p, 0.0, self.point)
-        fill_jacobian(self.system, self.linear, self.point)
         return float(norm), evaluation_by_value(self.point)
 
     def receptance(self, p: float) -> Receptance:
-        """Return the condensed linear part at λ = `p` (views of scratch arrays)."""
+        """Return the condensed linear part of all ports at λ = `p` (views of scratch arrays, or new ones)."""
         receptance(self.system, p, self.linear)
-        return receptance_by_value(self.linear)
+        return of_all_ports(self.balance.system, receptance_by_value(self.linear))
 
     def measure(self, u: Real, p: float) -> PointMeasures | None:
         """Return what is observed at the solution (u, p) with slopes by λ; None where dr/du is singular."""

@@ -18,6 +18,7 @@ from solver.contacts.kernels.system import DENSE
 from solver.jit.fourier import Complex, Flags, Integer, Real
 from solver.linear.assembly import linear_model
 from solver.linear.contact_table import port_stiffnesses
+from solver.linear.leading_ports import every_port, leading_ports
 from solver.linear.modal import Decomposition, Held, decompose, held_alone, held_by, matrices_of
 from solver.linear.model import ForceTerm, LinearModel, LinearModelDerivative
 from solver.linear.rigid_body_modes import loose_motions
@@ -34,6 +35,8 @@ class Reduced:
     which: Integer
     shift: Real
     loose: Real
+    leading: Integer
+    span: Real
     least_size: float
     form: int
     eigenvalues: Complex
@@ -62,6 +65,7 @@ def reduce_model(
     derivative: LinearModelDerivative | None = None,
     *,
     whole_matrices: bool = False,
+    each_port: bool = False,
 ) -> Reduced:
     """Bring a linear model into the form of the compiled loops.
 
@@ -73,6 +77,7 @@ def reduce_model(
         hold a part in place.
     derivative : by the structural parameter that is continued in; then the dense form is kept.
     whole_matrices : keep the dense form whatever the damping is.
+    each_port : keep every port, even where all follow from fewer.
 
     Raises
     ------
@@ -112,7 +117,12 @@ def reduce_model(
         modes = _projected(found, L, model.observe, forces, which)
         dense = {name: np.zeros((0,) * axes, np.complex128) for name, axes in _DENSE_AXES.items()}
     least = 0.0 if found is None else _least_size(found, L, forces, which)
-    return Reduced(which=which.astype(np.int64), shift=shift, loose=loose, least_size=least, **modes, **dense)
+    seen = (L, L.conj()) if found is None else (modes["contact_modes"], modes["contact_duals"])
+    ports = every_port(kt.size) if each_port else leading_ports(*seen)
+    return Reduced(
+        which=which.astype(np.int64), shift=shift, loose=loose, least_size=least, **ports._asdict(), **modes,
+        **dense,
+    )  # fmt: skip
 
 
 def _structures(model: LinearModel, ks: Integer, *, apart: bool) -> tuple[Integer, Integer, Flags]:

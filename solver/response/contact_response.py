@@ -99,7 +99,7 @@ class ContactResponse(Piece):
 def contact_responses(workspace: Workspace, u: Real, p: float) -> tuple[ContactResponse, ...]:
     """Return motion, force and state of every contact at a solution (u, λ = p)."""
     balance = workspace.balance
-    _, point = workspace.evaluate(u, p)
+    _, point = workspace.forces(u, p)
     ks, top = balance.system.ks, balance.highest_harmonic
     slips = fourier.to_full(u.reshape(balance.n_ports, balance.n_coefficients), ks, top)
     forces = fourier.to_full(point.F, ks, top)

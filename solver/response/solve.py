@@ -146,7 +146,7 @@ def _law_fails(workspace: Workspace, u: Real, p: float) -> bool:
     states = evaluation_by_value(workspace.point).states
     for motion in (u, start):
         states[:] = STUCK
-        workspace.evaluate(motion, p)
+        workspace.forces(motion, p)
         if np.any(states == FAILED):
             return True
     return False

@@ -267,7 +267,7 @@ class Sensitivities:
         With v_i = Z⁻¹ (f_i − Lᴴ ∂F/∂p_i − Z_i x) the slip motions obey dr/du U_i = L v_i.
         """
         workspace, amplitudes, shift = self._workspace, self._amplitudes, self.balance.system.shift[:, None]
-        if not math.isfinite(workspace.evaluate(u, omega)[0]):
+        if not math.isfinite(workspace.forces(u, omega)[0]):
             return None
         if factorise(workspace.system, workspace.linear, workspace.point, u, 0.0, 0.0) == 0.0:
             return None

@@ -15,6 +15,7 @@ from solver.contacts.kernels.system import (
     POLES,
     by_reference,
     new_receptance,
+    of_all_ports,
     receptance_by_value,
 )
 from solver.jit.fourier import Real
@@ -250,7 +251,7 @@ def _stuck_force(balance: Balance) -> Real:
     stiffness = kt - balance.system.shift
     for frequency in np.linspace(*low_high, _FREQUENCIES):
         receptance(system, 2.0 * np.pi * float(frequency), out)
-        linear = receptance_by_value(out)
+        linear = of_all_ports(forced.system, receptance_by_value(out))
         total = np.zeros(kt.size)
         for k, A, free in zip(forced.system.ks, linear.A[0], linear.u_linear[0], strict=True):
             if k > 0 and np.any(free):

@@ -14,6 +14,7 @@ import math
 
 import numpy as np
 
+from solver.balance.kernels.coordinates import is_reduced, responses
 from solver.contacts.kernels.stick_slip_events import STUCK
 from solver.contacts.kernels.system import UNHELD, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
@@ -118,8 +119,15 @@ def rebase(system: System, linear: Receptance, u: Real, point: Evaluation, rhs: 
     if system.loose.shape[0] == 0:
         return
     n, nc = coefficient_count(system.ks), system.owner.size
+    off, motions = np.zeros(nc, np.complex128), np.zeros(nc, np.complex128)
     for d in range(nc):
         if point.elastic[d] > 0.0:
-            off = point.elastic[d] * u[d * n] - point.F[d, 0]
+            off[d] = point.elastic[d] * u[d * n] - point.F[d, 0]
+    if is_reduced(system, linear):
+        responses(system, linear.A[0, 0], off, motions)
+    else:
+        for d in range(nc):
             for c in range(nc):
-                rhs[c * n] += linear.A[0, 0, c, d].real * off
+                motions[c] += linear.A[0, 0, c, d] * off[d]
+    for c in range(nc):
+        rhs[c * n] += motions[c].real

@@ -8,7 +8,8 @@ harmonic. With g = slope − shift of those ports, G = ∂F/∂U − shift of th
 
 the step of the free ports solves (I + A' G) δ_f = r_f − V r_h and δ_h = D⁻¹ r_h − W G δ_f. A bordered system
 [dr/du dr/dλ; tᵀ w] condenses in the same way. Nothing is approximated: a contact that begins to slip is free
-at the next evaluation.
+at the next evaluation. Where fewer leading ports move all others, `solver.balance.kernels.coordinates` takes
+its place.
 """
 
 from __future__ import annotations
@@ -17,7 +18,14 @@ import math
 
 import numpy as np
 
+from solver.balance.kernels.coordinates import (
+    factorise_coordinates,
+    is_reduced,
+    step_in_coordinates,
+    step_in_coordinates_transposed,
+)
 from solver.balance.kernels.gauge import keep_means
+from solver.balance.kernels.slopes import take_slopes
 from solver.contacts.kernels.system import (
     AT_BRANCH_POINT,
     FREE,
@@ -33,7 +41,6 @@ from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine
 from solver.jit.lapack import (
     back_substitute,
     back_substitute_transposed,
-    copy_block,
     copy_to,
     fill,
     fill_block,
@@ -61,29 +68,17 @@ def _add_block(
 
 
 @compiled
-def _take_slopes(system: System, point: Evaluation) -> None:
-    """Fill G with dF/dU less the shift, with the slopes of `elastic` in it."""
-    n = coefficient_count(system.ks)
-    for e in range(system.laws.size):
-        first, m = system.first_port[e], system.first_port[e + 1] - system.first_port[e]
-        for a in range(m):
-            for b in range(m):
-                block = system.first_block[e] + a * m + b
-                G = point.G[block]
-                copy_block(G, point.dF_dU[block])
-                if a == b:
-                    stiffness = system.shift[first + a]
-                    for i in range(n):
-                        G[i, i] -= stiffness
-                    G[0, 0] += point.elastic[first + a]
+def fill_jacobian(system: System, linear: Receptance, point: Evaluation) -> None:
+    """Fill `point.jacobian` with dr/du where `point` was evaluated last; the receptance is of all ports."""
+    whole_jacobian(system, linear.A[0], point, point.jacobian)
 
 
 @apart
-def fill_jacobian(system: System, linear: Receptance, point: Evaluation) -> None:
-    """Fill `point.jacobian` with dr/du where `point` was evaluated last."""
-    n, nc, J = coefficient_count(system.ks), system.owner.size, point.jacobian
+def whole_jacobian(system: System, A: Complex, point: Evaluation, J: Real) -> None:
+    """Fill J (nt, nt) with dr/du where `point` was evaluated last; A (nk, nc, nc) of all ports."""
+    n, nc = coefficient_count(system.ks), system.owner.size
     fill_block(J, 0.0)
-    _take_slopes(system, point)
+    take_slopes(system, point)
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
         has_sine = system.ks[i] > 0
@@ -94,7 +89,7 @@ def fill_jacobian(system: System, linear: Receptance, point: Evaluation) -> None
                 for d in range(first, first + m):
                     for q in range(first, first + m):
                         block = system.first_block[e] + (d - first) * m + q - first
-                        _add_block(J, point.G[block], row, q * n, here, linear.A[0, i, c, d], has_sine)
+                        _add_block(J, point.G[block], row, q * n, here, A[i, c, d], has_sine)
             J[row, row] += 1.0
             if has_sine:
                 J[row + 1, row + 1] += 1.0
@@ -261,9 +256,11 @@ def factorise(
     -------
     The sign of the determinant, which condensing does not change; 0.0 if singular.
     """
+    if is_reduced(system, linear):
+        return factorise_coordinates(system, linear, point, tangent, weight_u, weight_p)
     n, lu = coefficient_count(system.ks), point.lu
     _part(system, point)
-    _take_slopes(system, point)
+    take_slopes(system, point)
     if not _eliminate(system, linear, point):
         return 0.0
     _assemble(system, point, lu)
@@ -317,6 +314,9 @@ def step_back(system: System, point: Evaluation, x: Real) -> None:
     ----------
     x : (nt,) or, with a border, (nt + 1,) the right-hand side, last the border's.
     """
+    if point.pushed.shape[1] > 0:
+        step_in_coordinates(system, point, x)
+        return
     n = coefficient_count(system.ks)
     free, held = point.counts[FREE], point.counts[HELD]
     end, size = free * n, point.counts[SIZE]
@@ -367,6 +367,9 @@ def step_back_transposed(system: System, point: Evaluation, x: Real) -> None:
     ----------
     x : (nt,) the right-hand side.
     """
+    if point.pushed.shape[1] > 0:
+        step_in_coordinates_transposed(system, point, x)
+        return
     n = coefficient_count(system.ks)
     free, held = point.counts[FREE], point.counts[HELD]
     size = point.counts[SIZE]

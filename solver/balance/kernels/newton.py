@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from solver.balance.kernels.coordinates import is_reduced, springs_response
 from solver.balance.kernels.gauge import rebase
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.residual import contact_values, evaluate
@@ -19,7 +20,7 @@ from solver.contacts.kernels.columns import KT, MU
 from solver.contacts.kernels.normal_load import largest_load, least_load
 from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Integer, Real, coefficient_count, cosine_position
+from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine_position
 from solver.jit.lapack import copy_to, invert, set_to
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance import receptance
@@ -153,23 +154,17 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
     """
     nc, n = system.owner.size, coefficient_count(system.ks)
     table, _, _, _ = contact_values(system, p, 0.0)
-    matrix, inverse = np.empty((nc, nc), np.complex128), np.empty((nc, nc), np.complex128)
+    stiffness, motions = np.empty(nc), np.empty(nc, np.complex128)
+    for c in range(nc):
+        held = _held_stiffness(table[system.owner[c]], system.held[c], system.constant_mean)
+        stiffness[c] = held - system.shift[c]
     for i in range(system.ks.size):
-        for c in range(nc):
-            for d in range(nc):
-                e = system.owner[d]
-                held = _held_stiffness(table[e], system.held[d], system.constant_mean)
-                matrix[c, d] = linear.A[0, i, c, d] * (held - system.shift[d])
-            matrix[c, c] += 1.0
-        good = invert(matrix, inverse)
+        good = _on_springs(system, linear, i, stiffness, motions)
         here = cosine_position(system.ks, i)
         for c in range(nc):
-            motion = complex(0.0)
-            for d in range(nc):
-                motion += inverse[c, d] * linear.u_linear[0, i, d]
-            u[c * n + here] = motion.real if good else 0.0
+            u[c * n + here] = motions[c].real if good else 0.0
             if system.ks[i] > 0:
-                u[c * n + here + 1] = -motion.imag if good else 0.0
+                u[c * n + here + 1] = -motions[c].imag if good else 0.0
     added = 0.0
     for c in range(nc):
         e = system.owner[c]
@@ -181,6 +176,27 @@ def stuck_start(system: System, linear: Receptance, p: float, u: Real) -> float:
             needed += 1.05 * row[system.held[normal, 0]] * _reach(system, u, normal)
         added = max(added, needed)
     return added
+
+
+@apart
+def _on_springs(system: System, linear: Receptance, i: int, stiffness: Real, motions: Complex) -> bool:
+    """Fill motions (nc,) of harmonic number i with springs for contacts; False if there is no such motion."""
+    if is_reduced(system, linear):
+        return springs_response(system, linear.A[0, i], stiffness, linear.u_linear[0, i], motions)
+    nc = stiffness.size
+    matrix, inverse = np.empty((nc, nc), np.complex128), np.empty((nc, nc), np.complex128)
+    for c in range(nc):
+        for d in range(nc):
+            matrix[c, d] = linear.A[0, i, c, d] * stiffness[d]
+        matrix[c, c] += 1.0
+    if not invert(matrix, inverse):
+        return False
+    for c in range(nc):
+        motion = complex(0.0)
+        for d in range(nc):
+            motion += inverse[c, d] * linear.u_linear[0, i, d]
+        motions[c] = motion
+    return True
 
 
 @compiled

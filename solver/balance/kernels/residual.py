@@ -6,6 +6,9 @@ import math
 
 import numpy as np
 
+from solver.balance.kernels.coordinates import is_reduced
+from solver.balance.kernels.coordinates import reaches as span_reaches
+from solver.balance.kernels.coordinates import responses as span_responses
 from solver.balance.kernels.gauge import find_gauge, let_hold
 from solver.contacts.kernels.columns import COLUMN_KIND, COLUMNS, KT, N0, N1, OMEGA, RATIO
 from solver.contacts.kernels.laws import call_law
@@ -13,7 +16,7 @@ from solver.contacts.kernels.normal_load import fill_load, tie
 from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, STUCK, UNLOADED
 from solver.contacts.kernels.system import FREQUENCY, LEVEL, LOAD_COEFFICIENTS, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Real, coefficient_count, cosine_position
+from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position
 from solver.jit.lapack import copy_block
 from solver.jit.separate import apart
 
@@ -122,6 +125,42 @@ def _sizes(system: System, u: Real, out: Evaluation) -> tuple[float, float]:
 
 
 @apart
+def _fill_responses(
+    system: System, linear: Receptance, u: Real, i: int, out: Evaluation, responses: Complex, reaches: Real
+) -> None:
+    """Fill the motions (2, nc) that the contact forces of harmonic number i make, and their slopes by λ.
+
+    reaches : (nc,) the largest entry of the receptance to each port; filled.
+    """
+    nc, here, has_sine = system.owner.size, cosine_position(system.ks, i), system.ks[i] > 0
+    n = coefficient_count(system.ks)
+    forces = np.empty((2, nc), np.complex128)
+    for d in range(nc):
+        at, stiffness = d * n + here, system.shift[d]
+        fc, fs, dfs = out.F[d, here] - stiffness * u[at], 0.0, 0.0
+        if has_sine:
+            fs, dfs = out.F[d, here + 1] - stiffness * u[at + 1], out.dF_dp[d, here + 1]
+        forces[0, d], forces[1, d] = complex(fc, -fs), complex(out.dF_dp[d, here], -dfs)
+    if is_reduced(system, linear):
+        more = np.empty(nc, np.complex128)
+        span_responses(system, linear.A[0, i], forces[0], responses[0])
+        span_responses(system, linear.A[0, i], forces[1], responses[1])
+        span_responses(system, linear.A[1, i], forces[0], more)
+        for c in range(nc):
+            responses[1, c] += more[c]
+        span_reaches(system, linear.A[0, i], reaches)
+        return
+    for c in range(nc):
+        response, dresponse, reach = complex(0.0), complex(0.0), 0.0
+        for d in range(nc):
+            a, da = linear.A[0, i, c, d], linear.A[1, i, c, d]
+            response += a * forces[0, d]
+            dresponse += a * forces[1, d] + da * forces[0, d]
+            reach = max(reach, abs(a.real) + abs(a.imag))
+        responses[0, c], responses[1, c], reaches[c] = response, dresponse, reach
+
+
+@apart
 def _residual(system: System, linear: Receptance, u: Real, least: float, out: Evaluation) -> float:
     """Put r and dr/dλ together from the contact forces and the receptance.
 
@@ -135,26 +174,15 @@ def _residual(system: System, linear: Receptance, u: Real, least: float, out: Ev
     if system.loose.shape[0] > 0:
         find_gauge(system, out)
     worst, check = 0.0, 0.0
+    responses, reaches = np.empty((2, nc), np.complex128), np.empty(nc)
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
         has_sine = system.ks[i] > 0
         scale, residual = max(least, motion), 0.0
+        _fill_responses(system, linear, u, i, out, responses, reaches)
         for c in range(nc):
             row = c * n + here
-            response, dresponse, reach = complex(0.0), complex(0.0), 0.0
-            for d in range(nc):
-                at = d * n + here
-                stiffness = system.shift[d]
-                fc = out.F[d, here] - stiffness * u[at]
-                fs, dfs = 0.0, 0.0
-                if has_sine:
-                    fs = out.F[d, here + 1] - stiffness * u[at + 1]
-                    dfs = out.dF_dp[d, here + 1]
-                a, da = linear.A[0, i, c, d], linear.A[1, i, c, d]
-                force, dforce = complex(fc, -fs), complex(out.dF_dp[d, here], -dfs)
-                response += a * force
-                dresponse += a * dforce + da * force
-                reach = max(reach, abs(a.real) + abs(a.imag))
+            response, dresponse, reach = responses[0, c], responses[1, c], reaches[c]
             free, dfree = linear.u_linear[0, i, c], linear.u_linear[1, i, c]
             scale = max(scale, abs(free), reach * force_scale)
             if has_sine:

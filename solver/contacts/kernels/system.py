@@ -9,6 +9,10 @@ is a parameter of the structure itself).
 A stiffness `shift` of each port may be moved into the structure and taken out of the force again,
 r = u − ū + A (F − shift u): the same equation, but Z_0 stays regular when only contacts hold a part in place.
 
+Where fewer modes, coordinates or rigid bodies move the ports than there are ports, all motions follow from
+those of `leading` ones, L = P L_leading with P = `span`: A_k = P Â_k Pᵀ, of which Â_k is kept, see
+`solver.balance.kernels.coordinates`.
+
 An element (a contact, of whatever law) has one or more ports: relative motions with n coefficients each, the
 force of each depending on all of them. The unknowns are the motions of all ports, port after port.
 """
@@ -63,6 +67,8 @@ class System(NamedTuple):
         Real  # (2, 3) factor of the excitation, and of constant forces, by 1, ω, ω² where λ is the frequency
     )
     shift: Real  # (nc,) stiffness moved into the structure [N/m]
+    leading: Integer  # (r,) ports whose motions all others follow from; all of them where `span` is empty
+    span: Real  # (nc, r) the motion of every port as a sum of theirs, (nc, 0) where none follows from others
     loose: Real  # (nr, nc) ports' part in the rigid-body motions of what contacts alone hold, see `loose`
     hold: int  # 1: where no contact holds such a part, a constant force does
     samples: int  # in a period, for contact forces by samples in time; 0: in closed form
@@ -97,7 +103,7 @@ class System(NamedTuple):
 class Receptance(NamedTuple):
     """Condensed linear part at one λ, and its derivative by λ (first index 0: value, 1: derivative)."""
 
-    A: Complex  # (2, nk, nc, nc)
+    A: Complex  # (2, nk, nc, nc), or Â (2, nk, r, r) of the leading ports alone where r < nc
     u_linear: Complex  # (2, nk, nc)
     B: Complex  # (2, nk, nc) from the contact forces to the observed DOF
     x_linear: Complex  # (2, nk)
@@ -140,6 +146,9 @@ class Evaluation(NamedTuple):
     gauge: Real  # (nr, nc) motions of the ports that nothing holds, see `solver.balance.kernels.gauge`
     unheld: Real  # (nr, nr) forces along them, over the rigid-body motions
     elastic: Real  # (nc,) stiffness of contacts that carry all the mean force they can [N/m], else 0
+    pushed: Real  # (nc, n·r·n) G P, scratch as the two below; see `solver.balance.kernels.coordinates`
+    springs: Real  # (r, n·r·n) Pᵀ G P
+    rows: Real  # (4·r, r·n)
 
 
 # Inside the compiled loops each record is one pointer: forty arrays passed by value at every call cost more
@@ -211,7 +220,7 @@ def evaluation_arrays(point: Evaluation) -> Evaluation:
         point.dF_dN, point.states, point.pieces, point.slopes, point.segments, point.jacobian, point.lu,
         point.pivots, point.free, point.held, point.counts, point.G, point.inverse, point.V, point.W,
         point.reduced, point.border, point.held_slope, point.work, point.gauge, point.unheld,
-        point.elastic,
+        point.elastic, point.pushed, point.springs, point.rows,
     )  # fmt: skip
 
 
@@ -226,6 +235,13 @@ def receptance_by_value(linear: Receptance) -> Receptance:
     return cast(_ReceptanceReference, linear).arrays
 
 
+def of_all_ports(system: System, linear: Receptance) -> Receptance:
+    """Return a receptance by value with A (2, nk, nc, nc) of all ports."""
+    if system.span.shape[1] == 0 or linear.A.shape[2] == system.span.shape[0]:
+        return linear
+    return linear._replace(A=np.ascontiguousarray(system.span @ linear.A @ system.span.T))
+
+
 @compiled
 def receptance_arrays(linear: Receptance) -> Receptance:
     """Return the same, made anew."""
@@ -233,11 +249,17 @@ def receptance_arrays(linear: Receptance) -> Receptance:
 
 
 @compiled
+def is_spanned(system: System) -> bool:
+    """Return whether the motions of all ports follow from those of fewer."""
+    return bool(system.span.shape[1] > 0)
+
+
+@compiled
 def new_receptance(system: System) -> Receptance:
     """Return an empty receptance for `system`."""
-    nk, nc = system.ks.size, system.owner.size
+    nk, nc, r = system.ks.size, system.owner.size, system.leading.size
     return _receptance_of(
-        np.zeros((2, nk, nc, nc), np.complex128),
+        np.zeros((2, nk, r, r), np.complex128),
         np.zeros((2, nk, nc), np.complex128),
         np.zeros((2, nk, nc), np.complex128),
         np.zeros((2, nk), np.complex128),
@@ -246,19 +268,33 @@ def new_receptance(system: System) -> Receptance:
 
 @compiled
 def new_evaluation(system: System) -> Evaluation:
-    """Return empty arrays for `evaluate`."""
+    """Return empty arrays for `evaluate`: where the ports are spanned by fewer, there is no whole Jacobian."""
+    return _new_evaluation(system, is_spanned(system))
+
+
+@compiled
+def new_whole_evaluation(system: System) -> Evaluation:
+    """Return empty arrays for `evaluate` with a receptance of all ports, spanned or not."""
+    return _new_evaluation(system, False)
+
+
+@compiled
+def _new_evaluation(system: System, spanned: bool) -> Evaluation:
+    """Return empty arrays, for factors in the leading ports alone if `spanned`."""
     ne, nc, n, nk = system.laws.size, system.owner.size, coefficient_count(system.ks), system.ks.size
-    blocks, nt = system.first_block[ne], nc * n
+    blocks, nt, rigid = system.first_block[ne], nc * n, system.loose.shape[0]
+    r = system.leading.size if spanned else 0
+    size, whole, ports = (r * n, 0, 0) if spanned else (nt, nt, nc)
+    kept = r if spanned else nc
     return _evaluation_of(
         np.zeros(nt), np.zeros(nt), np.zeros((nc, n)), np.zeros((blocks, n, n)), np.zeros((nc, n)),
         np.zeros(n), np.zeros(n), np.zeros((n, LOAD_COEFFICIENTS)), np.zeros(ne, np.int64),
         np.zeros(ne, np.int64), np.zeros(ne),
-        np.zeros((segment_capacity(max(system.ks[-1], 1)), SEGMENT_COLUMNS)), np.zeros((nt, nt)),
-        np.zeros((nt + 1, nt + 1)), np.zeros(nt + 1, np.int32), np.zeros(nc, np.int64),
+        np.zeros((segment_capacity(max(system.ks[-1], 1)), SEGMENT_COLUMNS)), np.zeros((whole, whole)),
+        np.zeros((size + 1, size + 1)), np.zeros(nt + 1, np.int32), np.zeros(nc, np.int64),
         np.zeros(nc, np.int64), np.zeros(5, np.int64), np.zeros((blocks, n, n)),
-        np.zeros((nk, nc, nc), np.complex128), np.zeros((nk, nc, nc), np.complex128),
-        np.zeros((nk, nc, nc), np.complex128), np.zeros((nk, nc, nc), np.complex128), np.zeros(nt),
-        np.zeros(nt), np.zeros((4, nt + 1)),
-        np.zeros((system.loose.shape[0], nc)), np.zeros((system.loose.shape[0], system.loose.shape[0])),
-        np.zeros(nc),
+        np.zeros((nk, ports, ports), np.complex128), np.zeros((nk, ports, ports), np.complex128),
+        np.zeros((nk, ports, ports), np.complex128), np.zeros((nk, kept, kept), np.complex128), np.zeros(nt),
+        np.zeros(nt), np.zeros((4, nt + 1)), np.zeros((rigid, nc)), np.zeros((rigid, rigid)), np.zeros(nc),
+        np.zeros((nc, n * r * n)), np.zeros((r, n * r * n)), np.zeros((4 * r, r * n)),
     )  # fmt: skip

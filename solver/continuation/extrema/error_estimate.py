@@ -18,6 +18,7 @@ from solver.contacts.kernels.system import (
     by_reference,
     evaluation_by_value,
     new_receptance,
+    of_all_ports,
     receptance_by_value,
 )
 from solver.continuation.branch import Branch
@@ -172,7 +173,7 @@ class ErrorEstimator:
         """
         ks, kept = self._larger.balance.system.ks, self._workspace.balance.system.ks
         receptance(self._beyond, p, self._beyond_linear)
-        linear = receptance_by_value(self._beyond_linear)
+        linear = of_all_ports(self._larger.balance.system, receptance_by_value(self._beyond_linear))
         B, A = np.abs(linear.B[0]), np.abs(linear.A[0])
         sizes = np.zeros((F.shape[0], ks.size))
         moving = ks > 0

@@ -73,12 +73,12 @@ def clear(out: Any) -> None:
 @compiled
 def _clear_harmonic(out: Any, order: int, i: int) -> None:
     """Set one derivative of harmonic number i to zero."""
-    nc = out.B.shape[2]
     out.x_linear[order, i] = 0.0
-    for c in range(nc):
+    for c in range(out.B.shape[2]):
         out.u_linear[order, i, c] = 0.0
         out.B[order, i, c] = 0.0
-        for d in range(nc):
+    for c in range(out.A.shape[2]):
+        for d in range(out.A.shape[2]):
             out.A[order, i, c, d] = 0.0
 
 
@@ -91,9 +91,9 @@ def _modal_receptance(system: System, p: float, out: Receptance) -> None:
     """
     omega = p if system.kind == FREQUENCY else system.omega
     by_omega = 1.0 if system.kind == FREQUENCY else 0.0
-    nc, most = out.B.shape[2], min(BLOCK, system.eigenvalues.shape[1])
+    nc, r, most = out.B.shape[2], system.leading.size, min(BLOCK, system.eigenvalues.shape[1])
     clear(out)
-    weights, driven = np.empty((2 * (nc * nc + nc), most)), np.empty((2 * (nc + 1), most))
+    weights, driven = np.empty((2 * (r * r + nc), most)), np.empty((2 * (nc + 1), most))
     terms = np.empty((4, most))
     for s in range(system.eigenvalues.shape[0]):
         for first in range(0, system.eigenvalues.shape[1], BLOCK):
@@ -109,22 +109,23 @@ def _modal_receptance(system: System, p: float, out: Receptance) -> None:
 
 @compiled
 def _fill_weights(system: System, s: int, first: int, size: int, weights: Real) -> bool:
-    """Fill in real and imaginary rows of x_m y_mᴴ at pairs of contacts, then from contacts to the observer.
+    """Fill in real and imaginary rows of x_m y_mᴴ at pairs of leading ports, then from ports to the observer.
 
     For modes, whose y is x, pairs with d ≤ c are enough. Returns whether any imaginary part is not zero.
     """
-    nc, symmetric = system.contact_modes.shape[1], system.form == MODES
+    nc, r, symmetric = system.contact_modes.shape[1], system.leading.size, system.form == MODES
     modes, duals, seen = system.contact_modes, system.contact_duals, system.observe_modes
     turns = 0.0
-    for c in range(nc):
-        for d in range(c + 1 if symmetric else nc):
-            row = 2 * (c * nc + d)
+    for a in range(r):
+        for b in range(a + 1 if symmetric else r):
+            row, c, d = 2 * (a * r + b), system.leading[a], system.leading[b]
             for m in range(size):
                 x, y = modes[s, c, first + m], duals[s, d, first + m]
                 weights[row, m] = x.real * y.real - x.imag * y.imag
                 weights[row + 1, m] = x.real * y.imag + x.imag * y.real
                 turns += abs(weights[row + 1, m])
-        row = 2 * (nc * nc + c)
+    for c in range(nc):
+        row = 2 * (r * r + c)
         for m in range(size):
             x, y = seen[s, first + m], duals[s, c, first + m]
             weights[row, m] = x.real * y.real - x.imag * y.imag
@@ -208,11 +209,11 @@ def _add_pairs(
 ) -> None:
     """Add a block of modes to A and B of harmonic number i."""
     A, B = out.A, out.B
-    nc, symmetric = B.shape[2], system.form == MODES
+    nc, r, symmetric = B.shape[2], system.leading.size, system.form == MODES
     turned, dturned = complex(0.0), complex(0.0)
-    for c in range(nc):
-        for d in range(c + 1 if symmetric else nc):
-            row = 2 * (c * nc + d)
+    for c in range(r):
+        for d in range(c + 1 if symmetric else r):
+            row = 2 * (c * r + d)
             value, dvalue = _sums(weights, row, terms, size)
             if turns:
                 turned, dturned = _sums(weights, row + 1, terms, size)
@@ -221,7 +222,8 @@ def _add_pairs(
             if symmetric and c != d:
                 A[0, i, d, c] += value - 1j * turned
                 A[1, i, d, c] += dvalue - 1j * dturned
-        row = 2 * (nc * nc + c)
+    for c in range(nc):
+        row = 2 * (r * r + c)
         value, dvalue = _sums(weights, row, terms, size)
         if turns:
             turned, dturned = _sums(weights, row + 1, terms, size)
@@ -339,5 +341,7 @@ def _project(
                 out.u_linear[order, i, c] += system.L[s, c, a] * driven
                 back = value * system.L[s, c, b].conjugate()
                 out.B[order, i, c] += system.observe[a] * back
-                for d in range(nc):
-                    out.A[order, i, d, c] += system.L[s, d, a] * back
+            for c in range(system.leading.size):
+                back = value * system.L[s, system.leading[c], b].conjugate()
+                for d in range(system.leading.size):
+                    out.A[order, i, d, c] += system.L[s, system.leading[d], a] * back

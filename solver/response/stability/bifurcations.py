@@ -113,7 +113,7 @@ class Along:
     def sign(self, node: Node) -> float:
         """The sign of the determinant at a node."""
         workspace = self.workspace
-        workspace.evaluate(np.ascontiguousarray(node.solution[:-1]), node.at)
+        workspace.forces(np.ascontiguousarray(node.solution[:-1]), node.at)
         nothing = np.zeros(node.solution.size)
         return float(factorise(workspace.system, workspace.linear, workspace.point, nothing, 0.0, 0.0))
 

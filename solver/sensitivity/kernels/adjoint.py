@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from solver.balance.kernels.coordinates import is_reduced, responses
 from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.output import SAME_HEIGHT, extremes, observed_motion
 from solver.balance.kernels.residual import contact_values, evaluate
@@ -24,7 +25,7 @@ from solver.contacts.kernels.coulomb.force import contact_force
 from solver.contacts.kernels.stick_slip_events import FAILED
 from solver.contacts.kernels.system import LOAD_COEFFICIENTS, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
-from solver.jit.fourier import Integer, Real, coefficient_count, cosine_position
+from solver.jit.fourier import Complex, Integer, Real, coefficient_count, cosine_position
 from solver.jit.separate import apart
 from solver.linear.kernels.receptance import receptance
 
@@ -133,6 +134,23 @@ def _fill_pull(system: System, point: Evaluation, weights: Real, pull: Real) -> 
 
 
 @apart
+def _fill_pulled(system: System, linear: Receptance, i: int, pull: Real, pulled: Complex) -> None:
+    """Fill `pulled` (nc,) with (∂A/∂λ)ᵀ λ of harmonic number i; λ = `pull` without a sign."""
+    nc, n, here = system.owner.size, coefficient_count(system.ks), cosine_position(system.ks, i)
+    pulls = np.empty(nc, np.complex128)
+    for c in range(nc):
+        at = c * n + here
+        pulls[c] = complex(pull[at], pull[at + 1] if system.ks[i] > 0 else 0.0)
+    if is_reduced(system, linear):
+        responses(system, linear.A[1, i].T, pulls, pulled)
+        return
+    for d in range(nc):
+        pulled[d] = 0.0
+        for c in range(nc):
+            pulled[d] += pulls[c] * linear.A[1, i, c, d]
+
+
+@apart
 def _by_linear_part(
     system: System, linear: Receptance, u: Real, point: Evaluation, top: Real, pull: Real, by: Real
 ) -> None:
@@ -140,6 +158,7 @@ def _by_linear_part(
     nc, n = system.owner.size, coefficient_count(system.ks)
     sign, tau = top[SIGN], top[TAU]
     by_omega, level, phase = 0.0, 0.0, 0.0
+    pulled = np.empty(nc, np.complex128)
     for i in range(system.ks.size):
         here, k = cosine_position(system.ks, i), system.ks[i]
         turn = sign * complex(math.cos(k * tau), math.sin(k * tau))
@@ -150,11 +169,9 @@ def _by_linear_part(
             lam = complex(pull[at], pull[at + 1] if k > 0 else 0.0)
             driven -= lam * linear.u_linear[0, i, c]
             by_omega -= (lam * linear.u_linear[1, i, c]).real
+        _fill_pulled(system, linear, i, pull, pulled)
         for d in range(nc):
-            weight = -turn * linear.B[1, i, d]
-            for c in range(nc):
-                at = c * n + here
-                weight += complex(pull[at], pull[at + 1] if k > 0 else 0.0) * linear.A[1, i, c, d]
+            weight = -turn * linear.B[1, i, d] + pulled[d]
             at = d * n + here
             by_omega += weight.real * (point.F[d, here] - system.shift[d] * u[at])
             if k > 0:

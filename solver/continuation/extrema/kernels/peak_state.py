@@ -16,7 +16,7 @@ from solver.contacts.kernels.system import (
     Evaluation,
     Receptance,
     System,
-    new_evaluation,
+    new_whole_evaluation,
     receptance_over,
 )
 from solver.jit.decorators import compiled
@@ -81,7 +81,7 @@ def new_summit(system: System) -> Summit:
     ne, nc, n = system.laws.size, system.shift.size, coefficient_count(system.ks)
     nt, m = nc * n, LOAD_COEFFICIENTS
     capacity = segment_capacity(max(system.ks[-1], system.load_ks[-1]))
-    jets, point = new_jets(system), new_evaluation(system)
+    jets, point = new_jets(system), new_whole_evaluation(system)
     linear = receptance_over(jets.A, jets.u_linear, jets.B, jets.x_linear)
     return _new(
         jets, linear, point, np.zeros((nc, n)), point.dF_dU, np.zeros((nc, n)), np.full(ne, -1, np.int64),
