@@ -116,8 +116,8 @@ def damper() -> Scene:
                 }
             ],
             "excitation": [
-                {"dof": "ax", "amplitude": 30.0},
-                {"dof": "bx", "amplitude": 30.0, "phase": 3.1},
+                {"dof": "ax", "amplitude": 150.0},
+                {"dof": "bx", "amplitude": 150.0, "phase": 3.1},
             ],
             "observe": {"dof": "ax", "band": [300.0, 420.0]},
         }
@@ -158,7 +158,7 @@ def plate(nodes: int = 100, modes: int = 40) -> Scene:
             "excitation": [
                 {"dof": f"n{i}{axis}", "amplitude": amplitude, "phase": phase}
                 for i in range(0, nodes, 7)
-                for axis, amplitude, phase in (("x", 6.0, 0.0), ("y", 4.0, 1.2), ("z", 6.0, 0.5))
+                for axis, amplitude, phase in (("x", 40.0, 0.0), ("y", 30.0, 1.2), ("z", 10.0, 0.5))
             ],
             "observe": {"dof": "n0x", "band": [0.8, 1.6]},
         }

@@ -21,6 +21,7 @@ class ContactSet(NamedTuple):
 
     laws: Integer
     jenkins: Integer
+    alone: Integer
     normal_port: Integer
     first_port: Integer
     first_block: Integer
@@ -45,6 +46,7 @@ def contact_set(scene: Scene) -> ContactSet:
     return ContactSet(
         laws=np.array([law_number(contact.kernel) for contact in contacts], dtype=np.int64),
         jenkins=np.array([contact.JENKINS for contact in contacts], dtype=np.int64),
+        alone=np.array([contact.force_alone for contact in contacts], dtype=np.int64),
         normal_port=np.array(normal, dtype=np.int64), first_port=first,
         first_block=np.append(0, np.cumsum(ports**2)), owner=np.repeat(np.arange(ports.size), ports),
         rubs=rubs, held=np.array(held, dtype=np.int64).reshape(-1, 3),

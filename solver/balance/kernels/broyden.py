@@ -13,7 +13,7 @@ import numpy as np
 
 from solver.balance.kernels.jacobian import step_back
 from solver.balance.kernels.newton import ACCEPTED, TARGET
-from solver.balance.kernels.residual import evaluate
+from solver.balance.kernels.residual import evaluate_forces
 from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
@@ -37,7 +37,7 @@ def frozen_arc(
 
     Returns
     -------
-    (converged, solves, p, relative residual).
+    (converged, solves, p, relative residual); derivatives of the forces are not in place.
     """
     n = u.size
     steps, sizes = np.empty((_MOST_SOLVES + 1, n + 1)), np.empty(_MOST_SOLVES + 1)
@@ -47,7 +47,7 @@ def frozen_arc(
         across += weight_u * tangent[i] * tangent[i]
     for iteration in range(_MOST_SOLVES + 1):
         receptance(system, p, linear)
-        norm = evaluate(system, linear, u, p, 0.0, point)
+        norm = evaluate_forces(system, linear, u, p, point)
         if not math.isfinite(norm):
             return False, iteration, p, norm
         if norm <= TARGET:

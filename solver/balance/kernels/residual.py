@@ -53,7 +53,7 @@ def contact_values(system: System, p: float, added: float) -> tuple[Real, Real, 
     return table, load, slope, dload
 
 
-@apart
+@compiled
 def evaluate(system: System, linear: Receptance, u: Real, p: float, added: float, out: Evaluation) -> float:
     """Evaluate the balance at (u, λ = p) for a receptance already filled at p.
 
@@ -61,24 +61,44 @@ def evaluate(system: System, linear: Receptance, u: Real, p: float, added: float
     -------
     The relative residual, see `_residual` (NaN if a contact failed, or Z is singular).
     """
+    return _evaluate(system, linear, u, p, added, False, out)
+
+
+@compiled
+def evaluate_forces(system: System, linear: Receptance, u: Real, p: float, out: Evaluation) -> float:
+    """Evaluate the residual alone where kernels do that for less: derivatives are not in place then.
+
+    Where a constant force holds what no contact does the residual itself depends on derivatives.
+    """
+    return _evaluate(system, linear, u, p, 0.0, system.hold == 0, out)
+
+
+@apart
+def _evaluate(
+    system: System, linear: Receptance, u: Real, p: float, added: float, alone: bool, out: Evaluation
+) -> float:
+    """Evaluate the balance; with `alone` without the derivatives of the laws that can do without."""
     for i in range(system.ks.size):
         if not math.isfinite(linear.x_linear[0, i].real):
             return np.nan
     table, load, slope, dload = contact_values(system, p, added)
     for e in range(system.laws.size):
-        good = _element(system, e, u, table[e], load[e], slope[e], dload[e], out)
+        good = _element(system, e, u, table[e], load[e], slope[e], dload[e], alone, out)
         if not good:
             return np.nan
-    return _residual(system, linear, u, least_size(system, p), out)
+    return _residual(system, linear, u, least_size(system, p), alone, out)
 
 
 @compiled
 def _element(
-    system: System, e: int, u: Real, table: Real, load: Real, slope: Real, dload: Real, out: Evaluation
-) -> bool:
-    """Evaluate an element of any law; False if it failed."""
+    system: System, e: int, u: Real, table: Real, load: Real, slope: Real, dload: Real, alone: bool,
+    out: Evaluation,
+) -> bool:  # fmt: skip
+    """Evaluate an element of any law, `alone`: its force alone if it can; False if it failed."""
     n, c, block = coefficient_count(system.ks), system.first_port[e], system.first_block[e]
     end, last = system.first_port[e + 1], system.first_block[e + 1]
+    if alone and system.alone[e] == 1:
+        last = block
     U = u[c * n : end * n].reshape((end - c, n))
     state, piece = call_law(
         system.laws[e], U, system.ks, load, system.load_ks, table, slope, dload, system.cos_table,
@@ -161,7 +181,9 @@ def _fill_responses(
 
 
 @apart
-def _residual(system: System, linear: Receptance, u: Real, least: float, out: Evaluation) -> float:
+def _residual(
+    system: System, linear: Receptance, u: Real, least: float, alone: bool, out: Evaluation
+) -> float:
     """Put r and dr/dλ together from the contact forces and the receptance.
 
     Each harmonic's residual is taken relative to the largest of its own ū and A F and of all motions: near an
@@ -171,7 +193,7 @@ def _residual(system: System, linear: Receptance, u: Real, least: float, out: Ev
     nc, n = system.owner.size, coefficient_count(system.ks)
     r, dr = out.residual, out.dr_dp
     motion, force_scale = _sizes(system, u, out)
-    if system.loose.shape[0] > 0:
+    if system.loose.shape[0] > 0 and not alone:
         find_gauge(system, out)
     worst, check = 0.0, 0.0
     responses, reaches = np.empty((2, nc), np.complex128), np.empty(nc)

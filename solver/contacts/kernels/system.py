@@ -37,7 +37,8 @@ FREQUENCY, LEVEL, FORCE_PHASE, STRUCTURE = 0, 1, 2, 3
 MODES, POLES, DENSE = 0, 1, 2
 LOAD_COEFFICIENTS = 3
 # Numbers in `Evaluation.counts`.
-FREE, HELD, SIZE, AT_BRANCH_POINT, UNHELD = 0, 1, 2, 3, 4
+FREE, HELD, SIZE, AT_BRANCH_POINT, UNHELD, PINNED = 0, 1, 2, 3, 4, 5
+COUNTS = 6
 
 
 class System(NamedTuple):
@@ -54,6 +55,7 @@ class System(NamedTuple):
     sin_table: Real
     laws: Integer  # (ne,) numbers of the kernels, see `solver.contacts.kernels.laws`
     jenkins: Integer  # (ne,) 1: the force is that of one spring and slider under the given load, else 0
+    alone: Integer  # (ne,) 1: the kernel finds the force alone for less, given no blocks of dF_dU, else 0
     normal_port: Integer  # (ne,) the port whose motion changes the normal load, −1: the load is given
     first_port: Integer  # (ne + 1,) where the ports of each element begin
     first_block: Integer  # (ne + 1,) where its blocks of dF_dU begin: ports² of them, row after row
@@ -133,8 +135,8 @@ class Evaluation(NamedTuple):
     pivots: Index  # (nt + 1,)
     free: Integer  # (nc,) ports kept in it
     held: Integer  # (nc,) ports eliminated
-    counts: Integer  # (5,) numbers of both, size of the factors, whether they belong to a branch point, and
-    # the number of directions in which nothing holds a part
+    counts: Integer  # (COUNTS,) numbers of both, size of the factors, whether they belong to a branch point,
+    # the number of directions in which nothing holds a part, and that at the factors' point
     G: Real  # (blocks, n, n) dF_dU less the shift, at the factors' point
     inverse: Complex  # (nk, nc, nc) D⁻¹, likewise below; see `solver.balance.kernels.jacobian`
     V: Complex  # (nk, nc, nc)
@@ -146,6 +148,7 @@ class Evaluation(NamedTuple):
     gauge: Real  # (nr, nc) motions of the ports that nothing holds, see `solver.balance.kernels.gauge`
     unheld: Real  # (nr, nr) forces along them, over the rigid-body motions
     elastic: Real  # (nc,) stiffness of contacts that carry all the mean force they can [N/m], else 0
+    pinned: Real  # (nr, nc) kt l along these motions at the factors' point
     pushed: Real  # (nc, n·r·n) G P, scratch as the two below; see `solver.balance.kernels.coordinates`
     springs: Real  # (r, n·r·n) Pᵀ G P
     rows: Real  # (4·r, r·n)
@@ -220,7 +223,7 @@ def evaluation_arrays(point: Evaluation) -> Evaluation:
         point.dF_dN, point.states, point.pieces, point.slopes, point.segments, point.jacobian, point.lu,
         point.pivots, point.free, point.held, point.counts, point.G, point.inverse, point.V, point.W,
         point.reduced, point.border, point.held_slope, point.work, point.gauge, point.unheld,
-        point.elastic, point.pushed, point.springs, point.rows,
+        point.elastic, point.pinned, point.pushed, point.springs, point.rows,
     )  # fmt: skip
 
 
@@ -292,9 +295,9 @@ def _new_evaluation(system: System, spanned: bool) -> Evaluation:
         np.zeros(ne, np.int64), np.zeros(ne),
         np.zeros((segment_capacity(max(system.ks[-1], 1)), SEGMENT_COLUMNS)), np.zeros((whole, whole)),
         np.zeros((size + 1, size + 1)), np.zeros(nt + 1, np.int32), np.zeros(nc, np.int64),
-        np.zeros(nc, np.int64), np.zeros(5, np.int64), np.zeros((blocks, n, n)),
+        np.zeros(nc, np.int64), np.zeros(COUNTS, np.int64), np.zeros((blocks, n, n)),
         np.zeros((nk, ports, ports), np.complex128), np.zeros((nk, ports, ports), np.complex128),
         np.zeros((nk, ports, ports), np.complex128), np.zeros((nk, kept, kept), np.complex128), np.zeros(nt),
         np.zeros(nt), np.zeros((4, nt + 1)), np.zeros((rigid, nc)), np.zeros((rigid, rigid)), np.zeros(nc),
-        np.zeros((nc, n * r * n)), np.zeros((r, n * r * n)), np.zeros((4 * r, r * n)),
+        np.zeros((rigid, nc)), np.zeros((nc, n * r * n)), np.zeros((r, n * r * n)), np.zeros((4 * r, r * n)),
     )  # fmt: skip

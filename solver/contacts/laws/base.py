@@ -107,6 +107,11 @@ class AnyContact(Element, InSpace):
         return self.HELD
 
     @property
+    def force_alone(self) -> bool:
+        """Whether its kernel finds the force alone for less, given no blocks for the Jacobian."""
+        return False
+
+    @property
     def normal_port(self) -> int | None:
         """The port whose motion changes its normal load, or None."""
         return self.NORMAL_PORT

@@ -26,6 +26,11 @@ class SlidesInAPlane(FrictionContact):
     limit: Literal["circle", "box"] | None = None
 
     @property
+    def force_alone(self) -> bool:
+        """Whether its limit is the circle, whose kernel finds the force alone for less."""
+        return self.kernel == CIRCLE
+
+    @property
     def limits_apart(self) -> bool:
         """Whether each direction has its own limit."""
         return self.limit == "box"

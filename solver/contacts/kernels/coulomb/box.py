@@ -72,5 +72,5 @@ def coulomb_box(
         intervals = np.empty((count, 2))
         for i in range(count):
             intervals[i, 0], intervals[i, 1] = segments[i, BEGIN], segments[i, END]
-        press(U, ks, load, load_ks, row, slope, dload, together, intervals, F[2], dF_dU[8], dF_dp[2])
+        press(U, ks, load, load_ks, row, slope, dload, together, intervals, F[2], dF_dU[8:], dF_dp[2])
     return together, piece
