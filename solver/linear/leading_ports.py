@@ -1,9 +1,9 @@
 """Ports whose motions all others follow from: where few modes, coordinates or bodies move many contacts.
 
 The motions of a rigid body's contacts follow from those of six of them, those of a structure with 40 modes
-from 40. With the rows of `leading` ports, L = P L_leading, the receptance of all is A = P Â Pᵀ: an identity, no
-approximation (an interpolative decomposition: Cheng, Gimbutas, Martinsson, Rokhlin, SIAM J. Sci. Comput. 26
-(2005) 1389, doi:10.1137/030602678).
+from 40. With the rows of `leading` ports, L = P L_leading, the receptance of all is A = P Â Pᵀ: an identity,
+no approximation (an interpolative decomposition: Cheng, Gimbutas, Martinsson, Rokhlin, SIAM J. Sci. Comput.
+26 (2005) 1389, doi:10.1137/030602678).
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg as sla
 from numpy.typing import NDArray
 
 from solver.jit.fourier import Complex, Integer, Real
@@ -52,6 +51,8 @@ def leading_ports(motions: Complex, duals: Complex) -> LeadingPorts:
     rows = _rows(motions, duals)
     if rows.shape[1] == 0:
         return every_port(nc)
+    import scipy.linalg as sla  # for many contacts alone: a small response does not load SciPy's packages
+
     # Modes have sizes of their own: each counts as much as the others.
     sizes = np.linalg.norm(rows, axis=0)
     triangle, order = sla.qr((rows[:, sizes > 0.0] / sizes[sizes > 0.0]).T, mode="r", pivoting=True)

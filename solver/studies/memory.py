@@ -8,6 +8,7 @@ import numpy as np
 
 from solver.balance.simplifications import even_harmonics_reason
 from solver.linear.contact_table import port_counts
+from solver.linear.leading_ports import FEWEST_PORTS, WORTHWHILE
 from solver.scene.cyclic.annulus import sectors_needed
 from solver.scene.harmonics import MULTIPLES, kept_harmonics
 from solver.scene.parts import MatricesStructure
@@ -22,6 +23,7 @@ _OF_A_MARCH = 8
 # Of the ports at each harmonic: receptance and slope; and what a Jacobian is condensed with.
 _OF_PORTS = 2
 _OF_CONDENSATION = 6
+_OF_LEADING = 3
 # Resonances are looked for in many matrices of the modes kept at a time, with their eigenvectors.
 _LOOKED_AT = 2_000_000
 _OF_RESONANCES = 4
@@ -78,11 +80,15 @@ def dense_bytes(scene: Scene, harmonics: int, *, every_sector: bool = False) -> 
         structures = np.unique((kept * scene.engine_order) % scene.structure.sector_count).size
         number = _COMPLEX
     modes = min(n, _MODES_LOOKED_AT)
+    # No more motions lead than there are coordinates, in one sector those with the neighbour's.
+    leading = min(ports, n * (1 if number == _REAL else 2))
+    if ports < FEWEST_PORTS or leading > WORTHWHILE * ports:
+        leading = ports
     resonances = min(_LOOKED_AT, _POINTS_LOOKED_AT * kept.size * modes**2)
     return DenseBytes(
         structure=structures * (_OF_MODES if _is_diagonal(scene) else _OF_POLES) * number * n**2,
-        balance=_balance(ports, kept)
-        + _balance(ports, more)
+        balance=_balance(ports, leading, kept)
+        + _balance(ports, leading, more)
         + _OF_PORTS * _COMPLEX * (_TAIL * beyond + 1) * ports**2
         + _OF_RESONANCES * _COMPLEX * resonances,
     )
@@ -120,10 +126,14 @@ def _is_diagonal(scene: Scene) -> bool:
     return not structure.dampers and (not ratios or (len(ratios) == 1 and not undamped))
 
 
-def _balance(ports: int, ks: np.ndarray) -> int:
+def _balance(ports: int, leading: int, ks: np.ndarray) -> int:
     """Return the bytes of `solver.contacts.kernels.system.Evaluation` and `Receptance`."""
     coefficients = 2 * ks.size - int(ks[0] == 0)
-    unknowns = ports * coefficients
-    jacobian = unknowns**2 + (unknowns + 1) ** 2
+    unknowns, kept = ports * coefficients, leading * coefficients
     at_contacts = 2 * ports * coefficients**2
+    if leading < ports:
+        # Factors, Pᵀ G P, and G P.
+        matrices = (kept + 1) ** 2 + kept**2 + unknowns * kept
+        return _REAL * (matrices + at_contacts) + _COMPLEX * _OF_LEADING * ks.size * leading**2
+    jacobian = unknowns**2 + (unknowns + 1) ** 2
     return _REAL * (jacobian + at_contacts) + _COMPLEX * _OF_CONDENSATION * ks.size * ports**2

@@ -20,6 +20,7 @@ from solver.contacts.kernels.system import (
 )
 from solver.jit.fourier import Real
 from solver.linear.kernels.receptance import receptance
+from solver.linear.leading_ports import FEWEST_PORTS
 from solver.results.base import Shown
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import sectors_needed
@@ -129,7 +130,8 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
     n, contacts = balance.n_unknowns, balance.n_ports
     carried = _stuck_force(balance)
     slips = tuple(_slip(balance, i, carried) for i in range(len(balance.scene.contacts)))
-    kept = sum(effect.used for effect in slips) * balance.n_coefficients
+    kept = sum(effect.used for effect in slips) if balance.n_leading == contacts else balance.n_leading
+    kept *= balance.n_coefficients
     iteration = (
         _SECONDS_AN_ITERATION
         + _SECONDS_A_CONTACT * contacts * balance.n_coefficients**2
@@ -139,6 +141,7 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
         scene=scene.name,
         effects=(
             _condensation(balance),
+            *_leading(balance),
             _one_sector(scene, asked),
             *(_separation(contact) for contact in balance.scene.contacts),
             *slips,
@@ -167,6 +170,25 @@ def _condensation(balance: Balance) -> Effect:
             f"(contacts x coefficients) instead of {dofs * coefficients}"
         ),
     )
+
+
+def _leading(balance: Balance) -> tuple[Effect, ...]:
+    """Which motions a Newton step is solved for, where contacts are many enough for a choice."""
+    ports, leading = balance.n_ports, balance.n_leading
+    if ports < FEWEST_PORTS:
+        return ()
+    name, used = "every motion of the contacts in the Newton step", leading == ports
+    if balance.effects.every_port:
+        return (Effect(name=name, used=True, reason="asked for, whether they follow from fewer or not"),)
+    if used:
+        reason = f"few or none of the {ports} motions follow from others: the modes and bodies are as many"
+        return (Effect(name=name, used=True, reason=reason),)
+    reason = (
+        f"all {ports} follow from {leading} of them, those of modes and bodies: a step is solved for "
+        f"{leading * balance.n_coefficients} instead of {balance.n_unknowns} unknowns (exact); second "
+        "derivatives and tracked peaks take all of them"
+    )
+    return (Effect(name=name, used=False, reason=reason),)
 
 
 def _linear_dofs(scene: Scene) -> int:

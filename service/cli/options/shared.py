@@ -10,7 +10,7 @@ from service.cli import completion
 from service.cli.options.numeric import amount, count
 from solver.scene.examples import DISK_LOAD
 
-EFFECTS = ("even-harmonics", "every-contact", "every-sector", "whole-matrices")
+EFFECTS = ("even-harmonics", "every-contact", "every-port", "every-sector", "whole-matrices")
 
 Scene = Annotated[
     str,
@@ -80,7 +80,7 @@ Effects = Annotated[
     typer.Option(
         "--effects", metavar="auto|all|NAME,…",
         help="What to pay for though the scene does not call for it: even-harmonics, every-contact, "
-        "every-sector, whole-matrices.",
+        "every-port, every-sector, whole-matrices.",
         autocompletion=completion.words("auto", "all", *EFFECTS),
     ),
 ]  # fmt: skip

@@ -271,7 +271,7 @@ def new_receptance(system: System) -> Receptance:
 
 @compiled
 def new_evaluation(system: System) -> Evaluation:
-    """Return empty arrays for `evaluate`: where the ports are spanned by fewer, there is no whole Jacobian."""
+    """Return empty arrays for `evaluate`; without a whole Jacobian where ports are spanned by fewer."""
     return _new_evaluation(system, is_spanned(system))
 
 
