@@ -144,40 +144,52 @@ def _sizes(system: System, u: Real, out: Evaluation) -> tuple[float, float]:
     return motion, max(_CANCELLED * force, _LOST * steepest * max(motion, mean))
 
 
+@compiled
+def _response(
+    system: System, linear: Receptance, u: Real, i: int, c: int, out: Evaluation
+) -> tuple[complex, complex, float]:
+    """Return the motion of port c that the forces of harmonic number i make, and its slope by λ.
+
+    The last number is the largest entry of the receptance to the port.
+    """
+    n, here, has_sine = coefficient_count(system.ks), cosine_position(system.ks, i), system.ks[i] > 0
+    response, dresponse, reach = complex(0.0), complex(0.0), 0.0
+    for d in range(system.owner.size):
+        at = d * n + here
+        stiffness = system.shift[d]
+        fc = out.F[d, here] - stiffness * u[at]
+        fs, dfs = 0.0, 0.0
+        if has_sine:
+            fs = out.F[d, here + 1] - stiffness * u[at + 1]
+            dfs = out.dF_dp[d, here + 1]
+        a, da = linear.A[0, i, c, d], linear.A[1, i, c, d]
+        force, dforce = complex(fc, -fs), complex(out.dF_dp[d, here], -dfs)
+        response += a * force
+        dresponse += a * dforce + da * force
+        reach = max(reach, abs(a.real) + abs(a.imag))
+    return response, dresponse, reach
+
+
 @apart
-def _fill_responses(
+def _led_responses(
     system: System, linear: Receptance, u: Real, i: int, out: Evaluation, responses: Complex, reaches: Real
 ) -> None:
-    """Fill the motions (2, nc) that the contact forces of harmonic number i make, and their slopes by λ.
-
-    reaches : (nc,) the largest entry of the receptance to each port; filled.
-    """
+    """Fill the same of all ports, (2, nc) and (nc,), from the receptance of the leading ones."""
     nc, here, has_sine = system.owner.size, cosine_position(system.ks, i), system.ks[i] > 0
     n = coefficient_count(system.ks)
-    forces = np.empty((2, nc), np.complex128)
+    forces, more = np.empty((2, nc), np.complex128), np.empty(nc, np.complex128)
     for d in range(nc):
         at, stiffness = d * n + here, system.shift[d]
         fc, fs, dfs = out.F[d, here] - stiffness * u[at], 0.0, 0.0
         if has_sine:
             fs, dfs = out.F[d, here + 1] - stiffness * u[at + 1], out.dF_dp[d, here + 1]
         forces[0, d], forces[1, d] = complex(fc, -fs), complex(out.dF_dp[d, here], -dfs)
-    if is_reduced(system, linear):
-        more = np.empty(nc, np.complex128)
-        span_responses(system, linear.A[0, i], forces[0], responses[0])
-        span_responses(system, linear.A[0, i], forces[1], responses[1])
-        span_responses(system, linear.A[1, i], forces[0], more)
-        for c in range(nc):
-            responses[1, c] += more[c]
-        span_reaches(system, linear.A[0, i], reaches)
-        return
+    span_responses(system, linear.A[0, i], forces[0], responses[0])
+    span_responses(system, linear.A[0, i], forces[1], responses[1])
+    span_responses(system, linear.A[1, i], forces[0], more)
     for c in range(nc):
-        response, dresponse, reach = complex(0.0), complex(0.0), 0.0
-        for d in range(nc):
-            a, da = linear.A[0, i, c, d], linear.A[1, i, c, d]
-            response += a * forces[0, d]
-            dresponse += a * forces[1, d] + da * forces[0, d]
-            reach = max(reach, abs(a.real) + abs(a.imag))
-        responses[0, c], responses[1, c], reaches[c] = response, dresponse, reach
+        responses[1, c] += more[c]
+    span_reaches(system, linear.A[0, i], reaches)
 
 
 @apart
@@ -196,15 +208,21 @@ def _residual(
     if system.loose.shape[0] > 0 and not alone:
         find_gauge(system, out)
     worst, check = 0.0, 0.0
-    responses, reaches = np.empty((2, nc), np.complex128), np.empty(nc)
+    led = is_reduced(system, linear)
+    some = nc if led else 0
+    responses, reaches = np.empty((2, some), np.complex128), np.empty(some)
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
         has_sine = system.ks[i] > 0
         scale, residual = max(least, motion), 0.0
-        _fill_responses(system, linear, u, i, out, responses, reaches)
+        if led:
+            _led_responses(system, linear, u, i, out, responses, reaches)
         for c in range(nc):
             row = c * n + here
-            response, dresponse, reach = responses[0, c], responses[1, c], reaches[c]
+            if led:
+                response, dresponse, reach = responses[0, c], responses[1, c], reaches[c]
+            else:
+                response, dresponse, reach = _response(system, linear, u, i, c, out)
             free, dfree = linear.u_linear[0, i, c], linear.u_linear[1, i, c]
             scale = max(scale, abs(free), reach * force_scale)
             if has_sine:
