@@ -59,8 +59,18 @@ def disk(sectors: int) -> dict[str, Any]:
     return {**DISK, "structure": {**DISK["structure"], "sectors": sectors}, "observe": observe}
 
 
+def rubbing(count: int) -> dict[str, Any]:
+    """A contact on each mass: no motion follows from others."""
+    raw = masses(count, damper=False)
+    rows = [
+        {**TWO["contacts"][0], "name": f"c{n}", "between": [f"m{n}", "ground"]} for n in range(1, count + 1)
+    ]
+    return {**raw, "contacts": rows}
+
+
 CASES: dict[str, tuple[dict[str, Any], dict[str, Any], str, int]] = {
-    "contacts and harmonics": (contacts(50), contacts(2), "solve", 20),
+    "contacts and harmonics": (rubbing(50), rubbing(8), "solve", 20),
+    "contacts of two masses": (contacts(50), contacts(8), "solve", 20),
     "masses": (masses(700, damper=False), masses(20, damper=False), "solve", 1),
     "masses with a damper": (masses(400, damper=True), masses(20, damper=True), "solve", 1),
     "sectors": (disk(50), disk(3), "sweep", 2),
