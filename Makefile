@@ -50,11 +50,11 @@ $(DEV): $(STAMP)
 demo: setup
 	$(BIN)/stickslip demo
 
-# The kernels are compiled before, so that not every process does it. Three processes for two cores: tests of the
+# The kernels are compiled before, so that not every process does it. Four processes for two cores: tests of the
 # service also wait. They may write bytecode: what is read again by hundreds of processes, and the tests themselves.
 test: lint
 	$(BIN)/python -m service.warm_up
-	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 3 --dist worksteal $(PYTEST)
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 4 --dist worksteal $(PYTEST)
 
 test-long: dev
 	$(BIN)/python -m pytest -m long $(PYTEST)

@@ -24,6 +24,7 @@ _OF_A_MARCH = 8
 _OF_PORTS = 2
 _OF_CONDENSATION = 6
 _OF_LEADING = 3
+_OF_ALL_PORTS = 4  # while the model is condensed, before the leading ones are known
 # Resonances are looked for in many matrices of the modes kept at a time, with their eigenvectors.
 _LOOKED_AT = 2_000_000
 _OF_RESONANCES = 4
@@ -134,6 +135,7 @@ def _balance(ports: int, leading: int, ks: np.ndarray) -> int:
     if leading < ports:
         # Factors, Pᵀ G P, and G P.
         matrices = (kept + 1) ** 2 + kept**2 + unknowns * kept
-        return _REAL * (matrices + at_contacts) + _COMPLEX * _OF_LEADING * ks.size * leading**2
+        receptances = _OF_LEADING * leading**2 + _OF_ALL_PORTS * ports**2
+        return _REAL * (matrices + at_contacts) + _COMPLEX * ks.size * receptances
     jacobian = unknowns**2 + (unknowns + 1) ** 2
     return _REAL * (jacobian + at_contacts) + _COMPLEX * _OF_CONDENSATION * ks.size * ports**2
