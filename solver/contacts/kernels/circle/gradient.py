@@ -153,6 +153,7 @@ def _slip_begin(
     if not after_stick:
         px, py = -np.sin(theta), np.cos(theta)
     for r in range(eta.size):
+        if at[LIMIT]==0.0: print("limit")
         psi[0, r], psi[1, r] = px * eta[r] / at[LIMIT], py * eta[r] / at[LIMIT]
     if after_stick and kappa != 1.0:
         size = (G.shape[1] - 1) // 3
@@ -264,6 +265,7 @@ def _close(psi: Array, rows: int, G: Array) -> None:
     a, b = psi[0, rows], psi[0, rows + 1]
     c, d = psi[1, rows], psi[1, rows + 1]
     determinant = (1.0 - a) * (1.0 - d) - b * c
+    if determinant == 0.0: print("det")
     for r in range(rows):
         x = ((1.0 - d) * psi[0, r] + b * psi[1, r]) / determinant
         y = (c * psi[0, r] + (1.0 - a) * psi[1, r]) / determinant

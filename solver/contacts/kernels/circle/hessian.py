@@ -90,6 +90,7 @@ def _end_of_stick(
         tx, ty = offset_x + at[X], offset_y + at[Y] / kappa
         excess = tx * tx + ty * ty - at[LIMIT] * at[LIMIT]
         rise = 2.0 * (tx * at[DX] + ty * at[DY] / kappa - at[LIMIT] * at[DLIMIT])
+        if rise == 0.0: print("rise")
         tau -= excess / rise
     return tau
 
@@ -98,6 +99,7 @@ def _end_of_stick(
 def _direction(theta: float, tx: Number, ty: Number) -> Number:
     """Return the direction of (tx, ty), whose real part is near `theta`."""
     c, s = np.cos(theta), np.sin(theta)
+    if c*tx+s*ty == 0.0: print("direction", theta)
     return theta + (c * ty - s * tx) / (c * tx + s * ty)
 
 
@@ -114,6 +116,7 @@ def _carry_slip(
     count, length = int(before[COUNT]), before[END] - before[BEGIN]
     for _ in range(ROUNDS):
         theta = panels[first, START]
+        if length == 0.0: print("length")
         stretch = (row[END] - row[BEGIN]) / length
         for p in range(first, first + count):
             panel = panels[p]
@@ -130,10 +133,12 @@ def _carry_slip(
         slope = SLOPES[STAGES - 1, 0] * panel[START]
         for j in range(STAGES):
             slope += SLOPES[STAGES - 1, j + 1] * panel[START + 1 + j]
+        if panel[TO] == panel[FROM]: print("panel")
         slope /= panel[TO] - panel[FROM]
         c, s = np.cos(theta), np.sin(theta)
         fall = c * last[DDX] + s * last[DDY] / kappa - last[DDLIMIT]
         fall += (c * last[DY] / kappa - s * last[DX]) * slope
+        if fall == 0.0: print("fall")
         row[END] -= slip_rate(last, kappa, theta) / fall
 
 
@@ -179,6 +184,10 @@ def _carry(
                 theta -= F / slope
             panels[first, START] = theta
         else:
+            if tx == 0.0 and ty == 0.0:
+                print("how", found[HOW], i, count, follows, before[BEGIN], before[END], at[LIMIT].real, at[DLIMIT].real)
+                for q in range(count):
+                    print(whole[q,0],whole[q,1],whole[q,2],whole[q,3],whole[q,4],whole[q,5],whole[q,6],whole[q,7])
             panels[first, START] = _direction(given[first, START], tx, ty)
         sticks = followed and whole[i + 1, MOTION] == STICK
         _carry_slip(waves, kappa, row, before, panels, given, sticks)
@@ -206,6 +215,7 @@ def _carried(
         curves_at(waves, 0.0j, at)
         start[0], start[1] = at[X], at[Y] / kappa
         if pieces[0, BEGAN] != UNLOADED:
+            if start[0]*start[0] + start[1]*start[1]==0.0: print("cut")
             share = at[LIMIT] / np.sqrt(start[0] * start[0] + start[1] * start[1])
             start[0], start[1] = share * start[0], share * start[1]
     tx, ty = pieces[0, TX] + 0.0j, pieces[0, TY] + 0.0j
@@ -216,6 +226,7 @@ def _carried(
         _carry(waves, kappa, found, out_pieces, out_panels, panels, pieces, start)
         memory = found[FACTOR] * (found[PX] * found[MX] + found[PY] * found[MY])
         along = found[FACTOR] * (found[PX] * (start[0] - tx) + found[PY] * (start[1] - ty))
+        if memory == 1.0: print("memory")
         step = along / (1.0 - memory)
         tx, ty = start[0] + step * found[MX], start[1] + step * found[MY]
 

@@ -112,6 +112,7 @@ def panel_rows(
     nodes: Array, kappa: Number, h: Number, theta0: Number, theta: Array, matrix: Array, right: Array
 ) -> None:
     """Fill ∂R/∂θ (STAGES, STAGES) and, as columns of `right`, −R and −∂R/∂θ0, from the curves at `nodes`."""
+    if h == 0.0: print("h")
     inverse = 1.0 / h
     for i in range(STAGES):
         F, slope, g, dg = turning(nodes[i], kappa, theta[i])
