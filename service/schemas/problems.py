@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import secrets
 from collections.abc import Mapping
@@ -224,7 +225,7 @@ class _Boundary:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass the request on; answer 500 if that fails before an answer began."""
+        """Pass the request on; if that fails before an answer began, answer 500, or 503 at the end."""
         began = False
 
         async def watch(message: Message) -> None:
@@ -234,10 +235,25 @@ class _Boundary:
 
         try:
             await self._app(scope, receive, watch)
+        except asyncio.CancelledError:
+            # The server cancels what has not ended when its grace is over, and answers 500 to it by itself.
+            if began or scope["type"] != "http":
+                raise
+            await _ended_with_the_service(Request(scope))(scope, receive, send)
         except Exception as error:
             if began or scope["type"] != "http":
                 raise
             await _unexpected(Request(scope), error)(scope, receive, send)
+
+
+def _ended_with_the_service(request: Request) -> JSONResponse:
+    """A request that the end of the service interrupts; what it had begun in a thread may still be done."""
+    detail = (
+        "the service stops and did not finish this; what was to be written may have been: "
+        "repeat the request, a submission with its Idempotency-Key"
+    )
+    headers = {"Retry-After": str(_RETRY_SECONDS)}
+    return problem(request, 503, "stopping", "The service is stopping", detail, headers=headers)
 
 
 def _unexpected(request: Request, error: Exception) -> JSONResponse:

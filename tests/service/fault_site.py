@@ -171,7 +171,7 @@ class Site:
                 self.accepted[job] = body
                 return job
             self.refused[answer.status_code] += 1
-            if answer.status_code not in (500, 503, 507):
+            if answer.status_code not in (503, 507):
                 self.wrong.append(f"a good job was answered {answer.status_code}: {answer.text}")
                 return None
             time.sleep(0.1)

@@ -15,7 +15,7 @@ from pathlib import Path
 import httpx
 import pytest
 from launch import answers
-from service_helpers import PATIENCE, pids, until
+from service_helpers import PATIENCE, is_problem, pids, until
 
 import solver
 from service.client.client import Client
@@ -223,3 +223,35 @@ def test_a_stop_waits_for_nobody(
         one.close()
     assert set(ended) == {"one", "two", "waiting"}
     assert max(ended.values()) - asked < 3.0, "who waits is sent home at once, not after 3 s"
+
+
+def test_what_the_end_of_a_service_interrupts_is_answered_503_and_can_be_repeated(
+    port: int, client: Client, start: Start
+) -> None:
+    """The first submission waits for the workers to come up; the service is told to stop meanwhile."""
+    found: list[httpx.Response] = []
+    headers = {"Idempotency-Key": "once"}
+
+    def submit() -> None:
+        body = {"kind": "iteration", "seconds": 0.0, "seed": 1}
+        found.append(
+            httpx.post(f"http://127.0.0.1:{port}/v1/jobs", json=body, headers=headers, timeout=PATIENCE)
+        )
+
+    process = start(port)
+    until(lambda: answers(port))
+    thread = threading.Thread(target=submit)
+    thread.start()
+    time.sleep(0.1)
+    process.terminate()
+    thread.join()
+    assert process.wait(PATIENCE) == 0
+    if found[0].status_code != 202:  # 202 if it was written in time
+        assert is_problem(found[0], 503)["type"].endswith("stopping")
+        assert int(found[0].headers["retry-after"]) >= 1
+    start(port)
+    until(lambda: answers(port))
+    submit()
+    assert found[1].status_code == 202
+    client.wait(found[1].json()["id"])
+    assert len(list(client.jobs())) == 1
