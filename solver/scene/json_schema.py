@@ -20,6 +20,7 @@ from solver.matrices.load_set import UNITS
 from solver.scene import matrices_structure as matrices_part
 from solver.scene import parts as scene_parts
 from solver.scene.bodies import body as scene_bodies
+from solver.scene.bodies import patch as scene_patch
 from solver.scene.bodies import shapes as scene_shapes
 from solver.scene.bodies.validation import further_ends
 from solver.scene.descriptions import EXAMPLES, WORDS
@@ -30,7 +31,10 @@ from solver.scene.terms import speed as scene_speed
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*\n((?:    .*\n?)+)", re.MULTILINE)
-_HOMES = (scene_parts, scene_bodies, scene_shapes, scene_terms, scene_speed, scene_recovery, matrices_part)
+_HOMES = (
+    scene_parts, scene_bodies, scene_shapes, scene_patch, scene_terms, scene_speed, scene_recovery,
+    matrices_part,
+)  # fmt: skip
 
 
 class _Generator(GenerateJsonSchema):

@@ -119,7 +119,7 @@ class Scene(Part):
         Positions of DOFs, for contacts with a place.
     loads : tuple of Load
         Constant forces.
-    dampers : tuple of Wedge, Cylinder, Asymmetric, SplitRing and Shroud
+    dampers : tuple of Wedge, Cylinder, Asymmetric, SplitRing, Shroud and Patch
         Dampers by their shape; their bodies and contacts are among `bodies` and `contacts`.
     speed : float or None
         Speed of rotation [1/min], by which bodies with a `radius_of_rotation` are loaded and on which

@@ -12,7 +12,38 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.importing.files import Sources, dof_table, read_sources, rows_of, sources
+from service.cli.importing.files import Sources, deck_file, dof_table, read_sources, rows_of, sources
+from service.cli.importing.options import (
+    Axis,
+    Contacts,
+    Deck,
+    Dofs,
+    EngineOrder,
+    Excite,
+    Files,
+    Forces,
+    Formats,
+    From,
+    High,
+    Keep,
+    Low,
+    Mapping,
+    ModesKept,
+    Observed,
+    Out,
+    PairBy,
+    PatchTexts,
+    Reduce,
+    ReducedFile,
+    SectorCount,
+    To,
+    Tolerance,
+    Units,
+    UpTo,
+)
+from service.cli.importing.parts import contacts as contact_tables
+from service.cli.importing.parts import excitation
+from service.cli.importing.patches import Patches
 from service.cli.importing.reduction import Written, reduce, reduced_file
 from service.cli.importing.scene import band, toml
 from service.cli.importing.sector import (
@@ -25,7 +56,6 @@ from service.cli.importing.sector import (
     sector_file,
 )
 from service.cli.options.inputs import output_path
-from service.cli.options.numeric import amount, count
 from service.errors import InputError
 from service.rendering.tables.text import print_json, print_pairs
 from solver.results.files import whole
@@ -35,121 +65,6 @@ if TYPE_CHECKING:
 
     from solver.matrices.load_set import MatrixSet
     from solver.scene.scene import Scene
-
-Files = Annotated[
-    list[str],
-    typer.Argument(
-        metavar="FILES",
-        help="M K [C], in this order or named so; or one file with M, K, C or modes; and maybe a file that "
-        "names the rows.",
-    ),
-]
-Out = Annotated[str, typer.Option("--out", metavar="SCENE.toml", help="The scene to write.")]
-Dofs = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--dof", metavar="NAME=ROW",
-        help="A DOF in use and its row, zero-based, or its node and component (tip=1203.UX); repeatable.",
-    ),
-]  # fmt: skip
-Excite = Annotated[
-    str | None,
-    typer.Option("--excite", metavar="NAME", help="DOF of the force; the first --dof if left out."),
-]
-Observed = Annotated[
-    str | None,
-    typer.Option("--observe", metavar="NAME", help="DOF to observe; that of the force if left out."),
-]
-From = Annotated[float | None, amount("--from", "HZ", "Start of the band of interest.")]
-To = Annotated[float | None, amount("--to", "HZ", "End of the band of interest.")]
-Keep = Annotated[
-    int | None,
-    count(
-        "--keep-modes", "N", "Let the scene refer to the full matrices and reduce them whenever it is loaded."
-    ),
-]
-Reduce = Annotated[
-    bool,
-    typer.Option("--reduce", help="Reduce a large model once, onto the DOFs in use and modes of the rest."),
-]
-ModesKept = Annotated[
-    int | None,
-    count("--modes", "N", "With --reduce: modes of the rest to keep."),
-]
-UpTo = Annotated[
-    float | None,
-    amount("--up-to", "HZ", "With --reduce: keep all modes up to here."),
-]
-ReducedFile = Annotated[
-    str | None,
-    typer.Option("--reduced", metavar="F", help="Where the reduced model goes (.npz, .mat)."),
-]
-Units = Annotated[
-    str,
-    typer.Option("--units", metavar="U", help="Units of the files: SI, mm (mm, t, N, s), in (in, lbf, s)."),
-]
-Mapping = Annotated[
-    str | None,
-    typer.Option("--mapping", metavar="F", help="A file that names the rows."),
-]
-
-
-SectorCount = Annotated[
-    int | None,
-    count("--sectors", "N", "The files are one of so many sectors of a disk."),
-]
-Low = Annotated[
-    str | None,
-    typer.Option(
-        "--low", metavar="SET",
-        help="Nodes of the boundary to the sector before: a set of the deck, or numbers with commas.",
-    ),
-]  # fmt: skip
-High = Annotated[
-    str | None,
-    typer.Option(
-        "--high", metavar="SET",
-        help="Those of the boundary to the next sector: where the low one comes by the right-hand turn about "
-        "the axis. Both left out: found by position.",
-    ),
-]  # fmt: skip
-Deck = Annotated[
-    str | None,
-    typer.Option("--nodes", metavar="DECK", help="The input deck with the nodes and their sets."),
-]
-Axis = Annotated[
-    str | None, typer.Option("--axis", metavar="A", help="Axis of the disk: x, y, z or 0,0,1; z if left out.")
-]
-PairBy = Annotated[
-    str, typer.Option("--pair-by", metavar="HOW", help="Nodes are paired by position, or by their order.")
-]
-Tolerance = Annotated[
-    float | None,
-    amount("--tolerance", "D", "Nodes this near are one place, in units of the deck."),
-]
-EngineOrder = Annotated[
-    int | None,
-    count(
-        "--engine-order", "E",
-        "Of the force; 1 if left out. --reduce builds the nodal diameters that its harmonics meet.",
-    ),
-]  # fmt: skip
-
-
-def _print_formats(wanted: bool) -> None:
-    if wanted:
-        from solver.matrices.readers.registry import readers
-
-        print_pairs("Files", [(", ".join(one.suffixes), one.help.replace("`", "")) for one in readers()])
-        raise typer.Exit
-
-
-Formats = Annotated[
-    bool,
-    typer.Option(
-        "--formats", callback=_print_formats, is_eager=True, help="Print the formats that can be read."
-    ),
-]
 
 
 def import_scene(
@@ -175,13 +90,16 @@ def import_scene(
     pair_by: PairBy = "position",
     tolerance: Tolerance = None,
     engine_order: EngineOrder = None,
+    contacts: Contacts = None,
+    forces: Forces = None,
+    patches: PatchTexts = None,
     _formats: Formats = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Make a scene of matrices or modes in files.
 
     The files are read and checked first. The scene refers to them or, with --reduce, to the reduced model,
-    which is written beside it. Contacts are then added by hand: a template stands in the scene. With
+    which is written beside it. Without --contact or --patch a template of a contact stands in the scene. With
     --sectors the matrices are of one sector of a disk, reduced at every nodal diameter that is met.
     """
     target = output_path("--out", out, (".toml",))
@@ -191,10 +109,15 @@ def import_scene(
         raise InputError("`--modes`, `--up-to` and `--reduced` go with --reduce")
     if reduce_once and keep_modes is not None:
         raise InputError("`--keep-modes` reduces on every load, --reduce once: keep one of them")
-    of = disk(sectors, low, high, nodes, axis, pair_by, tolerance, engine_order)
+    deck = deck_file(nodes)
+    of = disk(sectors, low, high, deck, axis, pair_by, tolerance, engine_order, patches=bool(patches))
     found = sources(files, mapping, units)
     given = read_sources(found)
-    table = dof_table(dofs, found, given)
+    faces = Patches(patches, deck, units, None if of is None else (of.sectors, of.axis), tolerance)
+    table = dof_table(dofs, found, given, patches=bool(patches))
+    made = faces.made(given, table)
+    table |= made.dofs
+    parts = made.tables | {"contacts": contact_tables(contacts)}
     with ExitStack() as undo:
         structure, written = found.table(target), None
         if reduce_once:
@@ -207,12 +130,12 @@ def import_scene(
             _checked(given, reduced=keep_modes is not None)
             kept = {} if keep_modes is None else {"keep_modes": keep_modes}
             structure |= kept if of is None else _joined(given, of, target, kept)
-        force = excite or next(iter(table))
+        driven = excitation(forces, excite, next(iter(table)))
         raw = _Parts(
-            target=target, structure={**structure, "dofs": table}, force=force, observe=observe or force,
-            engine_order=None if of is None else of.engine_order,
+            target=target, structure={**structure, "dofs": table}, excitation=driven, observe=observe,
+            engine_order=None if of is None else of.engine_order, parts=parts,
         )  # fmt: skip
-        omega2 = _omega2(_load(raw.table([1.0, 2.0]), target.parent))
+        omega2 = _omega2(_load(raw.table([1.0, 2.0], bare=True), target.parent))
         frequencies = [math.sqrt(max(float(value), 0.0)) / (2.0 * math.pi) for value in omega2]
         scene = _write(target, raw.table(band(start, stop, frequencies)), found, written)
         undo.pop_all()
@@ -227,17 +150,21 @@ class _Parts:
 
     target: Path
     structure: dict[str, object]
-    force: str
-    observe: str
+    excitation: dict[str, Any]
+    observe: str | None
     engine_order: int | None = None
+    parts: dict[str, list[dict[str, Any]]]
 
-    def table(self, between: list[float]) -> dict[str, Any]:
+    def table(self, between: list[float], *, bare: bool = False) -> dict[str, Any]:
+        """All tables; bare without contacts, which do not move natural frequencies."""
+        order = {} if self.engine_order is None else {"engine_order": self.engine_order}
+        forced = self.excitation.get("dof") or next(iter(self.excitation["forces"]))
         return {
             "name": re.sub(r"[^A-Za-z0-9_-]", "-", self.target.stem)[:100],
             "structure": self.structure,
-            "excitation": {"dof": self.force, "amplitude": 1.0}
-            | ({} if self.engine_order is None else {"engine_order": self.engine_order}),
-            "observe": {"dof": self.observe, "band": between},
+            **({} if bare else {key: rows for key, rows in self.parts.items() if rows}),
+            "excitation": self.excitation | order,
+            "observe": {"dof": self.observe or forced, "band": between},
         }
 
 
@@ -351,8 +278,9 @@ def _report(
     if written is not None:
         pairs += written.pairs()
     pairs += [("note", note) for note in notes]
+    missing = "a damping" if scene.contacts else "[[contacts]] and a damping"
     pairs += [
         ("compare", "frequencies and mass with those of your program; else see --units"),
-        ("next", "add [[contacts]] and a damping in the file, then `stickslip plan`"),
+        ("next", f"add {missing} in the file, then `stickslip plan`"),
     ]
     print_pairs(f"Scene {scene.name} in {target}", pairs)

@@ -87,10 +87,30 @@ def read_sources(found: Sources) -> MatrixSet | None:
         raise InputError(f"`FILES`: {error}") from error
 
 
-def dof_table(texts: Sequence[str] | None, found: Sources, given: MatrixSet | None) -> dict[str, int | str]:
-    """Names of DOFs, each with its row or label; all rows of a small model if none is named."""
+def deck_file(text: str | None) -> Path | None:
+    """The input deck with nodes and sets.
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    """
+    if text is not None and not Path(text).is_file():
+        raise InputError(f"`--nodes`: there is no file {text!r}")
+    return None if text is None else Path(text)
+
+
+def dof_table(
+    texts: Sequence[str] | None, found: Sources, given: MatrixSet | None, *, patches: bool = False
+) -> dict[str, int | str]:
+    """Names of DOFs, each with its row or label; all rows of a small model if none is named.
+
+    Parameters
+    ----------
+    patches : whether patches name DOFs too, so that none need be named here.
+    """
     if not texts:
-        return _all_rows(found, given)
+        return {} if patches else _all_rows(found, given)
     table: dict[str, int | str] = {}
     for text in texts:
         name, row = _dof(text)

@@ -32,6 +32,15 @@ def band(start: float | None, stop: float | None, frequencies: Sequence[float]) 
     return [float(f"{low:.6g}"), float(f"{high:.6g}")]
 
 
+def _value(value: object) -> str:
+    """A value as TOML on one line, lists of tables on a line each."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{json.dumps(key)} = {_value(one)}" for key, one in value.items()) + " }"
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return "[\n" + "".join(f"  {_value(one)},\n" for one in value) + "]"
+    return json.dumps(value, ensure_ascii=False)
+
+
 def toml(raw: Mapping[str, Any], remarks: Sequence[str] = ()) -> str:
     """The scene as a file; JSON texts are TOML texts."""
     structure, observe, force = raw["structure"], raw["observe"], raw["excitation"]
@@ -47,12 +56,14 @@ def toml(raw: Mapping[str, Any], remarks: Sequence[str] = ()) -> str:
         lines += [f"{key} = {json.dumps(value)}" for key, value in structure["cyclic"].items()]
     lines += ["", "[structure.dofs] # rows of the matrices, zero-based, or node and component"]
     lines += [f"{json.dumps(name)} = {json.dumps(row)}" for name, row in structure["dofs"].items()]
-    used = (force["dof"], observe["dof"])
-    rubbing = next((name for name in structure["dofs"] if name not in used), force["dof"])
-    lines += [_CONTACT.format(dof=rubbing).rstrip("\n"), "", "[excitation]"]
-    lines += [f"dof = {json.dumps(force['dof'])}", "amplitude = 1.0 # N"]
-    if "engine_order" in force:
-        lines.append(f"engine_order = {force['engine_order']}")
+    if not (raw.get("contacts") or raw.get("dampers")):
+        used = (force.get("dof"), observe["dof"])
+        rubbing = next((name for name in structure["dofs"] if name not in used), observe["dof"])
+        lines.append(_CONTACT.format(dof=rubbing).rstrip("\n"))
+    for key in ("nodes", "contacts", "dampers"):
+        for row in raw.get(key, ()):
+            lines += ["", f"[[{key}]]", *(f"{name} = {_value(value)}" for name, value in row.items())]
+    lines += ["", "[excitation]", *(f"{key} = {_value(value)}" for key, value in force.items())]
     lines += ["", "[observe]"]
     lines += [f"dof = {json.dumps(observe['dof'])}", f"band = {json.dumps(observe['band'])} # Hz", ""]
     return "\n".join(lines)

@@ -68,20 +68,25 @@ def _nodes(text: str) -> str | list[int]:
 
 
 def disk(
-    sectors: int | None, low: str | None, high: str | None, nodes: str | None, axis: str | None,
-    pair_by: str, tolerance: float | None, engine_order: int | None,
+    sectors: int | None, low: str | None, high: str | None, nodes: Path | None, axis: str | None,
+    pair_by: str, tolerance: float | None, engine_order: int | None, *, patches: bool = False,
 ) -> Disk | None:  # fmt: skip
     """What the options say of a disk; None without --sectors.
+
+    Parameters
+    ----------
+    patches : whether there are patches, which take --nodes and --tolerance too.
 
     Raises
     ------
     InputError
         Options of a disk without --sectors, or values that are none.
     """
-    others = {
-        "--low": low, "--high": high, "--nodes": nodes, "--axis": axis, "--tolerance": tolerance,
-        "--engine-order": engine_order,
+    others: dict[str, object] = {
+        "--low": low, "--high": high, "--axis": axis, "--engine-order": engine_order,
     }  # fmt: skip
+    if not patches:
+        others |= {"--nodes": nodes, "--tolerance": tolerance}
     if sectors is None:
         given = next((name for name, value in others.items() if value is not None), None)
         if given is not None:
@@ -91,10 +96,8 @@ def disk(
         raise InputError(f"`--sectors` must be >= 1, got {sectors}")
     if (low is None) != (high is None):
         raise InputError("`--low` and `--high` go together, or are both left out (then found by position)")
-    if nodes is not None and not Path(nodes).is_file():
-        raise InputError(f"`--nodes`: there is no file {nodes!r}")
     return Disk(
-        sectors=sectors, low=low, high=high, nodes=None if nodes is None else Path(nodes), axis=_axis(axis),
+        sectors=sectors, low=low, high=high, nodes=nodes, axis=_axis(axis),
         pair_by=pair_by, tolerance=tolerance, engine_order=1 if engine_order is None else engine_order,
     )  # fmt: skip
 

@@ -133,8 +133,8 @@ def contact_shares(scene: HasShapes, path: str) -> dict[str, float] | None:
     if found is None or found[1] not in found[0].FACE:
         return None
     shape, key = found
-    share = 1.0 / shape.points if key in shape.SHARED else 1.0
-    return {contact.name: share for contact in contacts_of(shape)}
+    parts = shape.shares if key in shape.SHARED else (1.0,) * len(shape.shares)
+    return {contact.name: part for contact, part in zip(contacts_of(shape), parts, strict=True)}
 
 
 def motion_derivatives(scene: HasShapes, path: str) -> dict[str, tuple[Form, ...]] | None:

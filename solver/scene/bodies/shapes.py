@@ -9,30 +9,21 @@ N = load / (2 cos a) each. Stiffness and preload of a face are shared out evenly
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from solver.contacts.fields import EndName, Friction, Name, NonNegative, Part, Positive, Signed, Vector
-from solver.contacts.frames import cross, dot, is_unit, unit
+from solver.contacts.fields import EndName, NonNegative, Positive
+from solver.contacts.frames import cross, unit
 from solver.scene.bodies.body import Body, Row
+from solver.scene.bodies.patch import Patch
+from solver.scene.bodies.shape_base import Shape, Spot
 
 MOST_POINTS = 100
 POINTS = "points"
-LAWS = ("coulomb-3d", "elastic-normal")
 Points = Annotated[int, Field(strict=True, ge=1, le=MOST_POINTS)]
 Inclination = Annotated[float, Field(strict=True, gt=-1.5, lt=1.5, allow_inf_nan=False)]
-
-
-class Spot(NamedTuple):
-    """One point of a face: its name, what it joins, and its place; numbers may be symbols."""
-
-    name: str
-    between: tuple[str, str]
-    at: tuple[Any, Any, Any]
-    axes: tuple[tuple[Any, Any, Any], ...]
 
 
 def _cosine_and_sine(angle: Any) -> tuple[Any, Any]:
@@ -48,93 +39,26 @@ def _spread(points: int) -> list[float]:
     return [(i + 0.5) / points - 0.5 for i in range(points)]
 
 
-class _Shape(Part):
-    """What all shapes have.
+class _Faced(Shape):
+    """A shape with faces of its own, over which points are spread.
 
     Attributes
     ----------
-    name : str
-        Name of the damper and of its body, in DOFs and parameter paths.
-    at : (3,) tuple
-        Position of the centre of mass; of a shroud, of the middle of its face [m].
-    out : (3,) tuple
-        Unit vector outward: along it the centrifugal load acts.
-    axial : (3,) tuple
-        Unit vector along the axis of rotation.
-    law : str
-        Contact law of every point.
-    kt, kn : float
-        Tangential and normal stiffness of a face [N/m], shared out over its points.
-    mu : float
-        Friction coefficient.
-    N0 : float
-        Preload of a face at rest [N], shared out over its points.
     points : int
         Points of a face.
     """
 
-    SHAPE: ClassVar[str]
-    GEOMETRY: ClassVar[tuple[str, ...]]
-    """Its parameters that the places of its contacts depend on."""
-    FACE: ClassVar[tuple[str, ...]] = ("kt", "kn", "mu", "N0")
-    """Its parameters that are those of its contacts."""
-    SHARED: ClassVar[tuple[str, ...]] = ("kt", "kn", "N0")
-    """Those that are shared out over the points of a face."""
-
-    name: Name
-    at: Vector = (0.0, 0.0, 0.0)
-    out: Vector = (0.0, 1.0, 0.0)
-    axial: Vector = (0.0, 0.0, 1.0)
-    law: Literal["coulomb-3d", "elastic-normal"]
-    kt: Positive
-    kn: Positive
-    mu: Friction
-    N0: Signed = 0.0
     points: Points = 1
-
-    @model_validator(mode="after")
-    def _directions(self) -> _Shape:
-        for key in ("out", "axial"):
-            if not is_unit(getattr(self, key)):
-                raise ValueError(f"`{key}` must be a unit vector, got {list(getattr(self, key))!r}")
-        if abs(dot(self.out, self.axial)) > 1e-2:
-            raise ValueError(f"`axial` must be perpendicular to `out`, got {list(self.axial)!r}")
-        return self
-
-    @abstractmethod
-    def spots(self, values: Mapping[str, Any]) -> Iterator[Spot]:
-        """The points of every face, with `values` for the parameters of `GEOMETRY`."""
-
-    @property
-    def geometry(self) -> dict[str, float]:
-        """The values of `GEOMETRY` as they are."""
-        return {key: float(getattr(self, key)) for key in self.GEOMETRY}
-
-    @property
-    def bodies(self) -> tuple[Body, ...]:
-        """Its rigid bodies."""
-        return ()
 
     @property
     def parameters(self) -> tuple[str, ...]:
         """Its numbers that are parameter paths."""
-        return (*self.GEOMETRY, *self.FACE, "points")
-
-    def contacts(self) -> list[dict[str, Any]]:
-        """Its contacts, as tables of a scene."""
-        shared = {key: getattr(self, key) / self.points for key in self.SHARED}
-        return [
-            {
-                "name": spot.name, "group": f"{self.name}-faces", "law": self.law,
-                "between": list(spot.between), "at": list(spot.at), "normal": list(spot.axes[2]),
-                "tangents": [list(axis) for axis in spot.axes[:2]], "mu": self.mu, **shared, **self._settings,
-            }
-            for spot in self.spots(self.geometry)
-        ]  # fmt: skip
+        return (*super().parameters, POINTS)
 
     @property
-    def _settings(self) -> dict[str, Any]:
-        return {}
+    def shares(self) -> tuple[float, ...]:
+        """The part of its face that each of its contacts has."""
+        return (1.0 / self.points,) * sum(1 for _ in self.spots(self.geometry))
 
     def _placed(self, across: Any, outward: Any, axial: Any) -> tuple[Any, Any, Any]:
         """A vector of the damper's directions in those of the scene."""
@@ -161,7 +85,7 @@ class _Shape(Part):
         return Spot(name, between, here, axes)
 
 
-class _Underplatform(_Shape):
+class _Underplatform(_Faced):
     """A body between two platforms, pressed on them by rotation.
 
     Attributes
@@ -326,7 +250,7 @@ class SplitRing(_Underplatform):
             yield from self._flat(side, 0.0, 0.5 * values["width"], 0.5 * values["width"])
 
 
-class Shroud(_Shape):
+class Shroud(_Faced):
     """The faces with which the shrouds of two blades touch, pressed on each other by their twist.
 
     Attributes
@@ -362,11 +286,11 @@ class Shroud(_Shape):
 
 
 AnyShape = Annotated[
-    Wedge | Cylinder | Asymmetric | SplitRing | Shroud,
+    Wedge | Cylinder | Asymmetric | SplitRing | Shroud | Patch,
     Field(discriminator="shape"),
 ]
-SHAPES: dict[str, type[_Shape]] = {
-    each.SHAPE: each for each in (Wedge, Cylinder, Asymmetric, SplitRing, Shroud)
+SHAPES: dict[str, type[Shape]] = {
+    each.SHAPE: each for each in (Wedge, Cylinder, Asymmetric, SplitRing, Shroud, Patch)
 }
 WITH_BODY = tuple(word for word, each in SHAPES.items() if issubclass(each, _Underplatform))
 """The shapes that are bodies."""

@@ -46,10 +46,18 @@ def body_issues(raw: dict[str, Any]) -> list[Issue]:
         *(_contact_issues(steps, row, raw, structure, dofs) for steps, row in rows_of(raw, "contacts")),
         *(
             _end_issues([*steps, "between"], {**row, "normal": True}, structure, _places(raw), dofs)
-            for steps, row in rows_of(raw, "dampers")
+            for at, damper in rows_of(raw, "dampers")
+            for steps, row in [(at, damper), *_points_of(at, damper)]
         ),
     )
     return list(islice(found, MOST_ISSUES))
+
+
+def _points_of(at: _Steps, damper: dict[str, Any]) -> list[tuple[_Steps, dict[str, Any]]]:
+    """The points of a patch, which have ends of their own."""
+    pairs = damper.get("pairs")
+    rows = enumerate(pairs if isinstance(pairs, list | tuple) else ())
+    return [([*at, "pairs", i], row) for i, row in rows if isinstance(row, dict)]
 
 
 def _named(raw: dict[str, Any], *tables: str) -> list[tuple[_Steps, str]]:

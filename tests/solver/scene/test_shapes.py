@@ -161,4 +161,4 @@ def test_mistakes_in_shapes_are_named(change: dict[str, Any], pointer: str, word
 
 
 def test_every_shape_is_tried_here() -> None:
-    assert {*FACES, "shroud"} == set(SHAPES)
+    assert {*FACES, "shroud", "patch"} == set(SHAPES)  # the last in tests/solver/matrices/test_faces.py

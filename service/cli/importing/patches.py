@@ -1,0 +1,178 @@
+"""`stickslip import --patch`: faces of a mesh that lie on each other become contacts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from service.cli.importing.parts import split
+from service.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from solver.matrices.load_set import MatrixSet
+
+GROUND = "ground"
+_NEXT = "@next"
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+_METRES = {"SI": 1.0, "mm": 1e-3, "in": 0.0254}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Made:
+    """What patches add to a scene.
+
+    Attributes
+    ----------
+    dofs : dict
+        DOFs of their nodes that had no name, each with its label.
+    tables : dict
+        The tables [[nodes]] and [[dampers]].
+    """
+
+    dofs: dict[str, int | str]
+    tables: dict[str, list[dict[str, Any]]]
+
+
+class Patches:
+    """The patches of a model, each two sets of nodes that lie on each other.
+
+    Parameters
+    ----------
+    texts : such as ``shroud=AHEAD:BEHIND@next,normal=y,kt=1e7,kn=2e7,mu=0.3,N0=100``.
+    deck : the input deck with positions and sets, or None.
+    units : of the deck.
+    turn : sectors and axis of a disk, for faces that touch the next sector.
+    tolerance : distance within which nodes touch, in the units of the deck.
+
+    Raises
+    ------
+    InputError
+        Texts that are none, sets that are not there or nodes that do not lie on each other.
+    """
+
+    def __init__(
+        self, texts: Sequence[str] | None, deck: Path | None, units: str,
+        turn: tuple[int, Sequence[float]] | None, tolerance: float | None,
+    ) -> None:  # fmt: skip
+        self._dampers: list[dict[str, Any]] = []
+        self._nodes: dict[int, tuple[float, float, float]] = {}
+        self._turn = turn
+        self._tolerance, self._metres = tolerance, _METRES[units]
+        if not texts:
+            return
+        if deck is None:
+            raise InputError(
+                "`--patch` needs --nodes DECK, the deck with the positions and the sets of nodes"
+            )
+        from solver.matrices.readers.numbers_in_text import FormatError
+        from solver.matrices.sectors.decks import read_deck
+
+        try:
+            self._deck = read_deck(deck)
+        except (FormatError, OSError) as error:
+            raise InputError(f"`--nodes`: {error}") from error
+        for text in texts:
+            self._add(text)
+
+    def _add(self, text: str) -> None:
+        example = "shroud=AHEAD:BEHIND,normal=y,kt=1e7,kn=2e7,mu=0.3,N0=100"
+        name, ends, values = split("--patch", text, example)
+        first, second = (self._members(name, end.removesuffix(_NEXT)) for end in ends)
+        ahead = [end.endswith(_NEXT) for end in ends]
+        if first is None or ahead[0]:
+            raise InputError(f"`--patch` {name!r}: the first face must be a set of nodes, got {ends[0]!r}")
+        if ahead[1] and self._turn is None:
+            raise InputError(f"`--patch` {name!r}: {ends[1]!r} lies in the next sector: give --sectors N")
+        found = self._paired(name, first, second, next_sector=ahead[1])
+        normal = self._normal(name, values.pop("normal", None), found.plane)
+        pairs = []
+        for (node, other), place, area in zip(found.pairs, found.places, found.areas, strict=True):
+            for one in (node, other):
+                if one is not None:
+                    self._nodes[one] = self._deck.nodes[one]
+            end = GROUND if other is None else f"n{other}" + (_NEXT if ahead[1] else "")
+            at = [float(value) * self._metres for value in place]
+            pairs.append({"between": [f"n{node}", end], "at": at, "area": float(area) * self._metres**2})
+        law = values.pop("law", "coulomb-3d")
+        self._dampers.append(
+            {"name": name, "shape": "patch", "law": law, "normal": normal, **values, "pairs": pairs}
+        )
+
+    def _members(self, name: str, end: str) -> list[int] | None:
+        if end == GROUND:
+            return None
+        found = self._deck.sets.get(end.upper())
+        if found is None:
+            known = ", ".join(sorted(self._deck.sets)) or "none"
+            raise InputError(f"`--patch` {name!r}: the deck has no set {end!r}; it has {known}")
+        return list(dict.fromkeys(found))
+
+    def _paired(self, name: str, first: list[int], second: list[int] | None, *, next_sector: bool) -> Any:
+        from solver.matrices.faces import face
+        from solver.matrices.sectors.elimination import rotation
+
+        turn = None
+        if next_sector and self._turn is not None:
+            sectors, axis = self._turn
+            turn = rotation(axis, 2.0 * math.pi / sectors)
+        try:
+            return face(self._deck, first, second, turn, self._tolerance)
+        except ValueError as error:
+            raise InputError(f"`--patch` {name!r}: {error}") from error
+
+    def _normal(self, name: str, given: object, plane: Any) -> list[float]:
+        """The unit vector asked for; it is not guessed, because its sign says which way the face opens."""
+        text = str(given)
+        sign = -1.0 if text.startswith("-") else 1.0
+        if text.lstrip("+-").lower() in _AXES:
+            return [sign * value for value in _AXES[text.lstrip("+-").lower()]]
+        try:
+            vector = [float(part) for part in text.split("/")]
+        except ValueError:
+            vector = []
+        size = math.sqrt(sum(value * value for value in vector))
+        if given is None or len(vector) != 3 or not 0.0 < size < math.inf:
+            fitted = (
+                "" if plane is None else "; the plane of its nodes has " + "/".join(f"{v:.4g}" for v in plane)
+            )
+            got = "" if given is None else f", got {text!r}"
+            raise InputError(
+                f"`--patch` {name!r} needs normal=x, -y or such as 0/1/0, across the face from the first set "
+                f"to the second{got}{fitted} or its opposite"
+            )
+        return [value / size for value in vector]
+
+    def made(self, given: MatrixSet | None, known: Mapping[str, int | str]) -> Made:
+        """What the patches add to a scene.
+
+        Parameters
+        ----------
+        given : the matrices.
+        known : DOFs that have a name already, each with its row or label.
+
+        Raises
+        ------
+        InputError
+            The rows of the matrices have no names, or a node has no row.
+        """
+        if self._nodes and (given is None or given.labels is None):
+            raise InputError(
+                "`--patch` needs matrices whose rows are named: give the file that names them (--mapping)"
+            )
+        rows = set() if given is None else {str(label) for label in given.labels or ()}
+        named = {row: name for name, row in known.items() if isinstance(row, str)}
+        dofs: dict[str, int | str] = {}
+        nodes = []
+        for node in self._nodes:
+            labels = {axis: f"{node}.U{axis.upper()}" for axis in "xyz"}
+            own = {axis: named.get(text, f"n{node}{axis}") for axis, text in labels.items() if text in rows}
+            if not own:
+                raise InputError(f"`--patch`: node {node} has no row in the matrices")
+            dofs |= {dof: labels[axis] for axis, dof in own.items() if dof not in known}
+            at = [value * self._metres for value in self._nodes[node]]
+            nodes.append({"name": f"n{node}", "at": at, "dofs": own})
+        return Made(dofs=dofs, tables={"nodes": nodes, "dampers": self._dampers})
