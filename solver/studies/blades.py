@@ -11,7 +11,7 @@ import numpy as np
 
 from solver.contacts.kernels.stick_slip_events import largest
 from solver.continuation.branch import Branch, BranchStatus
-from solver.continuation.branches.observation import observing
+from solver.continuation.branches.observation import highest_peaks, observing
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
@@ -77,7 +77,8 @@ class BladePeaks(Drawn):
     status : tuple of BranchStatus
         How each sector's branch ended.
     branches : tuple of Branch
-        The response of each blade, the same one where all are alike; without those that were not reached.
+        The response of each blade, the same one where all are alike; without those that were not reached. Of
+        the worst blade alone where no more was asked for.
     """
 
     dof: str
@@ -111,6 +112,7 @@ def blade_peaks(
     dof: str | None = None,
     harmonics: int = 11,
     settings: ContinuationSettings | None = None,
+    every_branch: bool = True,
     on_progress: Callable[[float, int], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> BladePeaks:
@@ -123,6 +125,8 @@ def blade_peaks(
     dof : name of the DOF in one sector; the observed one if left out.
     harmonics : highest harmonic kept.
     settings : of the continuation.
+    every_branch : whether to make the whole response of every blade, with all of its peaks and its error
+        estimate; else `branches` has that of the worst blade alone, in half the time.
     on_progress : called with (share done, blades so far).
     should_stop : asked between stretches of the sweep and between blades.
 
@@ -147,6 +151,8 @@ def blade_peaks(
         _observing(scene, names[0]), start=start, stop=stop, harmonics=harmonics, settings=settings,
         on_progress=progress, should_stop=should_stop,
     )  # fmt: skip
+    if len(names) > 1 and branch.completed and not every_branch:
+        return _highest(branch, name, names)
     branches = [branch] * repeats
     for done, each in enumerate(names[1:], 1):
         if should_stop is not None and should_stop():
@@ -164,6 +170,19 @@ def blade_peaks(
         status=tuple(each.status for each in branches) + (BranchStatus.STOPPED,) * missing,
         branches=tuple(branches),
     )
+
+
+def _highest(branch: Branch, name: str, names: Sequence[str]) -> BladePeaks:
+    """Return the highest peaks of all blades of a completed response, and the branch of the worst alone."""
+    first = branch.peak
+    peaks = [*([] if first is None else [first]), *highest_peaks(branch, names[1:])]
+    value = np.array([peak.value for peak in peaks])
+    worst = int(value.argmax())
+    return BladePeaks(
+        dof=name, value=value, at_hz=np.array([peak.at for peak in peaks]),
+        status=(branch.status,) * len(names),
+        branches=(branch if worst == 0 else observing(branch, names[worst]),),
+    )  # fmt: skip
 
 
 def _observing(scene: Scene, dof: str) -> Scene:

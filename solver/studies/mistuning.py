@@ -225,8 +225,9 @@ def mistuning_study(
         share, disks = 1.0 / (samples + 1.0), max(done - 1, 0)
         progress = part_of(on_progress, done * share, (done + 1) * share, disks, counting=False)
         return blade_peaks(
-            disk, start, stop, dof=dof, harmonics=harmonics, on_progress=progress, should_stop=should_stop
-        )
+            disk, start, stop, dof=dof, harmonics=harmonics, every_branch=False, on_progress=progress,
+            should_stop=should_stop,
+        )  # fmt: skip
 
     tuned = peaks_of(without_mistuning(scene), 0)
     ahead = range(samples if worst_branch(tuned) else 0)
@@ -308,7 +309,9 @@ def without_mistuning(scene: Scene) -> Scene:
 
 def worst_branch(peaks: BladePeaks) -> tuple[Branch, ...]:
     """Return the response of the blade with the highest peak, if all are known and one moves."""
-    return (peaks.branches[peaks.worst],) if peaks.largest > 0.0 else ()
+    if not peaks.largest > 0.0:
+        return ()
+    return (peaks.branches[peaks.worst],) if len(peaks.branches) > 1 else peaks.branches
 
 
 def _status(compared: bool, disks: Sequence[MistunedDisk]) -> MistuningStatus:

@@ -217,6 +217,7 @@ def run_part(
             spec["stop"],
             dof=spec["dof"],
             harmonics=spec["harmonics"],
+            every_branch=False,
             on_progress=each,
             should_stop=should_stop,
         )

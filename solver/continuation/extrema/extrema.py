@@ -51,10 +51,17 @@ MOST_DIPS = 24  # of one in which the amplitude may cross the limit there and ba
 
 
 class Survey:
-    """Looks for peaks and band edges on a branch; counts the Newton iterations it spends."""
+    """Looks for peaks and band edges on a branch; counts the Newton iterations it spends.
 
-    def __init__(self, workspace: Workspace, points: Points) -> None:
-        self._workspace, self._points = workspace, points
+    Parameters
+    ----------
+    workspace, points : the branch.
+    worth : share of the highest point below which no maximum is polished. By default all but the smallest
+        are; who looks for the highest alone needs no more than those that compete with it.
+    """
+
+    def __init__(self, workspace: Workspace, points: Points, worth: float = WORTH_POLISHING) -> None:
+        self._workspace, self._points, self._worth = workspace, points, worth
         self._solver = NodeSolver(workspace)
         self._nodes = self._solver.nodes_of(points)
         self._peaks: list[Peak] = []
@@ -62,7 +69,7 @@ class Survey:
         self._search = Search(nodes=self._nodes)
         if self._nodes:
             if len(self._nodes) > 1:
-                changes = ChangeSearch(self._solver)
+                changes = ChangeSearch(self._solver, worth)
                 self._nodes = changes.run(self._nodes)
                 self._undone += changes.left
             self._look_for_resonances()
@@ -182,7 +189,7 @@ class Survey:
         higher = left if left.measures[value] > right.measures[value] else right
         height = higher.measures[value] + 0.25 * (ends[0] - ends[1])
         hidden = height < HIDDEN * min(left.measures[MAX_ABS], right.measures[MAX_ABS])
-        if hidden or height < WORTH_POLISHING * top:
+        if hidden or height < self._worth * top:
             return higher
         close = SHARP if height >= COMPETES * top else ENOUGH
         node = self._solver.refine(left, right, what, 0.0, ends, close)

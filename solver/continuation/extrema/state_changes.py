@@ -27,10 +27,15 @@ _APART, _BEFORE, _BEHIND, _BETWEEN = 0, 1, 2, 3  # an interval and changes
 
 
 class ChangeSearch:
-    """Adds to a branch the points on both sides of changes of piece, and between where the curves bend."""
+    """Adds to a branch the points on both sides of changes of piece, and between where the curves bend.
 
-    def __init__(self, solver: NodeSolver) -> None:
-        self._solver = solver
+    Parameters
+    ----------
+    worth : share of the highest point below which changes do not matter.
+    """
+
+    def __init__(self, solver: NodeSolver, worth: float = WORTH_POLISHING) -> None:
+        self._solver, self._worth = solver, worth
         self.left: list[tuple[float, str]] = []  # λ where a change was not settled, and why
 
     def run(self, nodes: list[Node]) -> list[Node]:
@@ -58,7 +63,7 @@ class ChangeSearch:
         """Return in which intervals a change may hide a maximum, (P − 1,)."""
         seen = self._solver.look(nodes, top)
         stands = np.maximum(seen.measures[1:, MAX_ABS], seen.measures[:-1, MAX_ABS])
-        wanted = (np.diff(seen.measures[:, PIECE]) != 0.0) & (stands >= WORTH_POLISHING * top)
+        wanted = (np.diff(seen.measures[:, PIECE]) != 0.0) & (stands >= self._worth * top)
         onward = np.array([node.tangent[-1] for node in nodes])
         wanted &= onward[1:] * onward[:-1] > 0.0
         if wanted.any():
