@@ -78,7 +78,7 @@ class BladePeaks(Drawn):
         How each sector's branch ended.
     branches : tuple of Branch
         The response of each blade, the same one where all are alike; without those that were not reached. Of
-        the worst blade alone where no more was asked for.
+        the first blade alone where no more was asked for.
     """
 
     dof: str
@@ -96,6 +96,15 @@ class BladePeaks(Drawn):
     def worst(self) -> int:
         """The sector that has it."""
         return int(self.value.argmax())
+
+    @property
+    def worst_branch(self) -> Branch | None:
+        """The response of the blade with the highest peak; None if one is not known or none moves."""
+        if not self.largest > 0.0:
+            return None
+        if len(self.branches) == len(self.value):
+            return self.branches[self.worst]
+        return observing(self.branches[0], f"{self.dof}@{self.worst}")
 
     VIEWS: ClassVar = Views("solver.views", "of_blade_peaks", "blade_peaks_dataset", "of_blade_peaks")
 
@@ -126,7 +135,7 @@ def blade_peaks(
     harmonics : highest harmonic kept.
     settings : of the continuation.
     every_branch : whether to make the whole response of every blade, with all of its peaks and its error
-        estimate; else `branches` has that of the worst blade alone, in half the time.
+        estimate; else `branches` has that of the first blade alone, in half the time.
     on_progress : called with (share done, blades so far).
     should_stop : asked between stretches of the sweep and between blades.
 
@@ -173,15 +182,13 @@ def blade_peaks(
 
 
 def _highest(branch: Branch, name: str, names: Sequence[str]) -> BladePeaks:
-    """Return the highest peaks of all blades of a completed response, and the branch of the worst alone."""
+    """Return the highest peaks of all blades of a completed response, with its branch."""
     first = branch.peak
     peaks = [*([] if first is None else [first]), *highest_peaks(branch, names[1:])]
-    value = np.array([peak.value for peak in peaks])
-    worst = int(value.argmax())
     return BladePeaks(
-        dof=name, value=value, at_hz=np.array([peak.at for peak in peaks]),
-        status=(branch.status,) * len(names),
-        branches=(branch if worst == 0 else observing(branch, names[worst]),),
+        dof=name, value=np.array([peak.value for peak in peaks]),
+        at_hz=np.array([peak.at for peak in peaks]), status=(branch.status,) * len(names),
+        branches=(branch,),
     )  # fmt: skip
 
 

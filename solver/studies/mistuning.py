@@ -309,9 +309,8 @@ def without_mistuning(scene: Scene) -> Scene:
 
 def worst_branch(peaks: BladePeaks) -> tuple[Branch, ...]:
     """Return the response of the blade with the highest peak, if all are known and one moves."""
-    if not peaks.largest > 0.0:
-        return ()
-    return (peaks.branches[peaks.worst],) if len(peaks.branches) > 1 else peaks.branches
+    found = peaks.worst_branch
+    return () if found is None else (found,)
 
 
 def _status(compared: bool, disks: Sequence[MistunedDisk]) -> MistuningStatus:
