@@ -17,9 +17,9 @@ from solver.continuation.branch import Branch, Peak
 from solver.continuation.branches.sweep import highest_between
 from solver.continuation.extrema.branch_error import branch_error
 from solver.continuation.extrema.extrema import Survey, band_limit
-from solver.continuation.extrema.nodes import Points
+from solver.continuation.extrema.nodes import Place, Points
 from solver.jit.fourier import Real, to_full
-from solver.linear.kernels.receptance import receptance
+from solver.linear.kernels.receptance import observer_receptance, receptance
 
 COMPETES_FOR_HIGHEST = 0.8  # share of the highest point from which a maximum may turn out to be the highest
 
@@ -103,17 +103,19 @@ def highest_peaks(branch: Branch, dofs: Sequence[str]) -> list[Peak]:
         point = workspaces[0].point
         for j, workspace in enumerate(workspaces):
             system, linear = workspace.system, workspace.linear
-            receptance(system, p, linear)
             if j == 0:
+                receptance(system, p, linear)
                 evaluate(system, linear, u, p, 0.0, point)
+            else:
+                observer_receptance(system, p, linear)
             measure(system, linear, u, point, du, dp, rows[j, i], measures[j, i])
-    found = []
+    found, lost = [], set[Place]()
     for j, workspace in enumerate(workspaces):
         points = Points(
             solutions=branch.solutions, tangents=branch.tangents, measures=measures[j], observed=rows[j],
             states=branch.states,
         )  # fmt: skip
-        found.append(Survey(workspace, points, worth=COMPETES_FOR_HIGHEST).peaks[0])
+        found.append(Survey(workspace, points, worth=COMPETES_FOR_HIGHEST, lost=lost).peaks[0])
     return found
 
 

@@ -27,7 +27,7 @@ from solver.continuation.branch import Band, Edge, Peak
 from solver.continuation.certificate import PeakCertificate, certified, uncertain
 from solver.continuation.extrema.intervals import CURVES, highest_share, lowest_share, may_cross
 from solver.continuation.extrema.kernels.intervals import IS_BENT, WAVES, WORTH_POLISHING
-from solver.continuation.extrema.nodes import Node, NodeSolver, Points
+from solver.continuation.extrema.nodes import Node, NodeSolver, Place, Points
 from solver.continuation.extrema.resonance_search import ResonanceSearch, Search
 from solver.continuation.extrema.state_changes import ChangeSearch
 from solver.continuation.folds import fold_between, motion_scales
@@ -58,11 +58,15 @@ class Survey:
     workspace, points : the branch.
     worth : share of the highest point below which no maximum is polished. By default all but the smallest
         are; who looks for the highest alone needs no more than those that compete with it.
+    lost : as of `NodeSolver`.
     """
 
-    def __init__(self, workspace: Workspace, points: Points, worth: float = WORTH_POLISHING) -> None:
+    def __init__(
+        self, workspace: Workspace, points: Points, worth: float = WORTH_POLISHING,
+        lost: set[Place] | None = None,
+    ) -> None:  # fmt: skip
         self._workspace, self._points, self._worth = workspace, points, worth
-        self._solver = NodeSolver(workspace)
+        self._solver = NodeSolver(workspace, lost)
         self._nodes = self._solver.nodes_of(points)
         self._peaks: list[Peak] = []
         self._undone: list[tuple[float, str]] = []  # λ and why

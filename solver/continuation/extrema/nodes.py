@@ -42,6 +42,10 @@ SLOPES = [SLOPE, RANGE_SLOPE, HIGH_SLOPE, LOW_SLOPE]  # measures along the tange
 NARROW = 1e-13  # relative width at which a place is found
 
 
+Place = tuple[float, float, float]
+"""λ of two nodes, and λ between them."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Points:
     """The rows of a branch; see `solver.continuation.branch.Branch`."""
@@ -85,10 +89,18 @@ class Between:
 
 
 class NodeSolver:
-    """Solves for nodes between others; counts the Newton iterations it spends."""
+    """Solves for nodes between others; counts the Newton iterations it spends.
 
-    def __init__(self, workspace: Workspace) -> None:
+    Parameters
+    ----------
+    workspace : of the branch.
+    lost : where no solution was found from anywhere, by surveys of the same branch with other DOFs observed;
+        what is lost here is added. To look there again would cost as much as hundreds of points.
+    """
+
+    def __init__(self, workspace: Workspace, lost: set[Place] | None = None) -> None:
         self.workspace = workspace
+        self._lost = set() if lost is None else lost
         self.spent = 0
         self.least = workspace.balance.system.least_size
         balance = workspace.balance
@@ -257,9 +269,14 @@ class NodeSolver:
         """
         if left.tangent[-1] * right.tangent[-1] <= 0.0 or right.at == left.at:
             return None
+        if (left.at, right.at, p) in self._lost:
+            return None
         share = (p - left.at) / (right.at - left.at)
         straight = (1.0 - share) * left.solution[:-1] + share * right.solution[:-1]
-        return self.at(p, [straight], math.copysign(1.0, right.at - left.at))
+        found = self.at(p, [straight], math.copysign(1.0, right.at - left.at))
+        if found is None:
+            self._lost.add((left.at, right.at, p))
+        return found
 
     def _bracketed(self, left: Node, right: Node, what: int, level: float, close: float) -> Node | None:
         """Return the peak or edge between two nodes by solving at values of λ (Illinois), else None."""

@@ -52,7 +52,26 @@ def receptance(system: System, p: float, out: Receptance) -> None:
     if system.form == DENSE:
         _dense_receptance(system, p, out)
     else:
-        _modal_receptance(system, p, out)
+        _modal_receptance(system, p, system.leading.size, out)
+    _scale(system, p, out)
+
+
+@apart
+def observer_receptance(system: System, p: float, out: Receptance) -> None:
+    """Fill in what the observed DOF needs: B and x̄ with their derivatives; A is not what it should be.
+
+    Of many observed DOFs on one motion each needs its own, but A, by far the most work, need not be known.
+    """
+    if system.form == DENSE:
+        _dense_receptance(system, p, out)
+    else:
+        _modal_receptance(system, p, 0, out)
+    _scale(system, p, out)
+
+
+@compiled
+def _scale(system: System, p: float, out: Receptance) -> None:
+    """Multiply the motions under the unit excitation by its level and phase."""
     for k in range(system.ks.size):
         f, df = excitation(system, p, system.ks[k])
         out.x_linear[1, k] = f * out.x_linear[1, k] + df * out.x_linear[0, k]
@@ -83,37 +102,38 @@ def _clear_harmonic(out: Any, order: int, i: int) -> None:
 
 
 @apart
-def _modal_receptance(system: System, p: float, out: Receptance) -> None:
+def _modal_receptance(system: System, p: float, r: int, out: Receptance) -> None:
     """Sum the modes: Z⁻¹ = Σ x_m y_mᴴ / d_m with d_m = ω_m² − (kω)² + ikω c_m, or ikω − s_m for poles.
 
     Block by block: the products of modes at pairs of contacts once for all harmonics of a structure, then one
-    real sum over the block for each of them, which the compiler vectorises.
+    real sum over the block for each of them, which the compiler vectorises. Of the leading ports the first r
+    are summed.
     """
     omega = p if system.kind == FREQUENCY else system.omega
     by_omega = 1.0 if system.kind == FREQUENCY else 0.0
-    nc, r, most = out.B.shape[2], system.leading.size, min(BLOCK, system.eigenvalues.shape[1])
+    nc, most = out.B.shape[2], min(BLOCK, system.eigenvalues.shape[1])
     clear(out)
     weights, driven = np.empty((2 * (r * r + nc), most)), np.empty((2 * (nc + 1), most))
     terms = np.empty((4, most))
     for s in range(system.eigenvalues.shape[0]):
         for first in range(0, system.eigenvalues.shape[1], BLOCK):
             size = min(BLOCK, system.eigenvalues.shape[1] - first)
-            turns = _fill_weights(system, s, first, size, weights)
+            turns = _fill_weights(system, s, r, first, size, weights)
             for i in range(system.ks.size):
                 if system.which[i] == s:
                     _fill_terms(system, s, first, size, float(system.ks[i]), omega, by_omega, terms)
-                    _add_pairs(system, size, i, turns, weights, terms, out)
+                    _add_pairs(system, r, size, i, turns, weights, terms, out)
                     if _fill_driven(system, s, first, size, i, driven):
                         _add_driven(size, i, driven, terms, out)
 
 
 @compiled
-def _fill_weights(system: System, s: int, first: int, size: int, weights: Real) -> bool:
+def _fill_weights(system: System, s: int, r: int, first: int, size: int, weights: Real) -> bool:
     """Fill in real and imaginary rows of x_m y_mᴴ at pairs of leading ports, then from ports to the observer.
 
     For modes, whose y is x, pairs with d ≤ c are enough. Returns whether any imaginary part is not zero.
     """
-    nc, r, symmetric = system.contact_modes.shape[1], system.leading.size, system.form == MODES
+    nc, symmetric = system.contact_modes.shape[1], system.form == MODES
     modes, duals, seen = system.contact_modes, system.contact_duals, system.observe_modes
     turns = 0.0
     for a in range(r):
@@ -205,11 +225,11 @@ def _sums(weights: Real, row: int, terms: Real, size: int) -> tuple[complex, com
 
 @compiled
 def _add_pairs(
-    system: System, size: int, i: int, turns: bool, weights: Real, terms: Real, out: Receptance
+    system: System, r: int, size: int, i: int, turns: bool, weights: Real, terms: Real, out: Receptance
 ) -> None:
     """Add a block of modes to A and B of harmonic number i."""
     A, B = out.A, out.B
-    nc, r, symmetric = B.shape[2], system.leading.size, system.form == MODES
+    nc, symmetric = B.shape[2], system.form == MODES
     turned, dturned = complex(0.0), complex(0.0)
     for c in range(r):
         for d in range(c + 1 if symmetric else r):
