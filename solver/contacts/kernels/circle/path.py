@@ -60,11 +60,14 @@ BLIND = 1e-7  # rad, for so long
 
 
 @compiled
-def _falls(nodes: Real, kappa: float, theta: Real, first: float, tol: float) -> int:
-    """Return the number of the node (from 1) at or before which the rate of slip q falls below 0, or 0."""
-    before = first
-    here = slip_rate(nodes[0], kappa, theta[0])
-    for i in range(STAGES):
+def _falls(nodes: Real, kappa: float, theta: Real, first: float, tol: float, past: int) -> int:
+    """Return the number of the node (from 1) at or before which the rate of slip q falls below 0, or 0.
+
+    Negative if it may do so in a dip about that node. Nodes up to `past` are known not to be in one.
+    """
+    before = first if past == 0 else slip_rate(nodes[past - 1], kappa, theta[past - 1])
+    here = slip_rate(nodes[past], kappa, theta[past])
+    for i in range(past, STAGES):
         if here < -tol:
             return i + 1
         if i + 1 == STAGES:
@@ -176,10 +179,17 @@ def _stop_in(
     tol: float, at: Real,
 ) -> float:  # fmt: skip
     """Return the place in [0, 1] of a panel where the rate of slip falls below 0, or NOWHERE."""
-    node = _falls(nodes, kappa, theta, first, tol)
-    if node == 0:
-        return NOWHERE
-    return _where_it_falls(waves, kappa, begin, h, theta0, theta, node, tol, at)
+    past = 0
+    while past < STAGES:
+        node = _falls(nodes, kappa, theta, first, tol, past)
+        if node == 0:
+            return NOWHERE
+        place = _where_it_falls(waves, kappa, begin, h, theta0, theta, node, tol, at)
+        if place < NOWHERE:
+            return place
+        # A dip that does not reach 0; it may fall below 0 behind it.
+        past = abs(node)
+    return NOWHERE
 
 
 @compiled
