@@ -23,13 +23,14 @@ from solver.contacts.kernels.circle.panels import (
     X,
     Y,
     curves_at,
+    onset_direction,
     slip_rate,
     solve_panel,
     turning,
 )
 from solver.contacts.kernels.circle.radau import NODES, SLOPES, STAGES, between, tail
 from solver.contacts.kernels.circle.stick import leave_stick
-from solver.contacts.kernels.stick_slip_events import AFTER_SLIP, NO_LENGTH, SLIP, STICK
+from solver.contacts.kernels.stick_slip_events import AFTER_SEPARATION, AFTER_SLIP, NO_LENGTH, SLIP, STICK
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
 from solver.jit.separate import apart
@@ -296,8 +297,8 @@ def march_path(
     -------
     Numbers of pieces and panels, or (TABLE_FULL, 0) or (UNSOLVED, 0).
     """
-    tau, idle = begin, 0
-    at = np.empty(CURVES)
+    tau, idle, first = begin, 0, count
+    at, opens = np.empty(CURVES), state[S_BEGAN] == AFTER_SEPARATION
     while tau < end:
         if count >= pieces.shape[0]:
             return TABLE_FULL, 0
@@ -308,6 +309,11 @@ def march_path(
             curves_at(waves, tau, at)
             offset_x, offset_y = state[S_TX] - at[X], state[S_TY] - at[Y] / kappa
             tau, leaves = leave_stick(waves, kappa, grid, offset_x, offset_y, tau, end, numbers[TOL])
+            if leaves and opens and tau - begin <= NO_LENGTH:
+                # At the margin of stick and slip neither has a length: contact begins with a slip.
+                tau, count, idle = begin, first, IDLE
+                _slip_from_contact(waves, kappa, tau, at, state)
+                continue
             curves_at(waves, tau, at)
             state[S_TX], state[S_TY] = offset_x + at[X], offset_y + at[Y] / kappa
             if leaves:
@@ -334,6 +340,14 @@ def march_path(
             return UNSOLVED, 0
         count += 1
     return count, filled
+
+
+@compiled
+def _slip_from_contact(waves: Real, kappa: float, tau: float, at: Real, state: Real) -> None:
+    """Begin a slip where contact begins at τ; nothing depends on the force before it, which is 0."""
+    curves_at(waves, tau, at)
+    state[S_MOTION], state[S_BEGAN], state[S_THETA] = SLIP, AFTER_SEPARATION, onset_direction(at, kappa)
+    state[S_TX], state[S_TY], state[S_SLIPPED], state[S_FACTOR] = 0.0, 0.0, 1.0, 0.0
 
 
 @compiled
