@@ -208,11 +208,16 @@ def with_harmonics(balance: Balance, ks: Integer) -> Balance:
 
 def check_level(scene: Scene) -> None:
     """Raise SettingError where constant forces are partly excitation, which has a level, and partly loads."""
-    if static_forces(scene) and any(force.harmonic == 0 for force in scene.excitation):
+    if not level_scales_all(scene):
         raise SettingError(
             "parameter", AMPLITUDE,
             "scales static forces of the excitation but no loads: write those as [[loads]] too",
         )  # fmt: skip
+
+
+def level_scales_all(scene: Scene) -> bool:
+    """Return whether the level of the excitation scales all constant forces, or none of them."""
+    return not (static_forces(scene) and any(force.harmonic == 0 for force in scene.excitation))
 
 
 def _level(scene: Scene) -> float:

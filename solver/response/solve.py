@@ -18,6 +18,7 @@ from solver.balance.simplifications import Effects
 from solver.balance.workspace import PointSolution, Workspace
 from solver.contacts.kernels.stick_slip_events import FAILED, STUCK
 from solver.contacts.kernels.system import UNHELD, evaluation_by_value
+from solver.continuation.along_level import solve_from_nothing
 from solver.continuation.branches.adaptive_harmonics import solve_to
 from solver.continuation.branches.symmetry_breaking import assumed_flags, seen
 from solver.continuation.extrema.error_estimate import UNKNOWN, truncation_error
@@ -66,7 +67,7 @@ def solve(
     good_enough = True
     if accuracy is None:
         workspace = Workspace.of(build(scene, harmonics=harmonics, effects=effects))
-        found = workspace.solve(omega)
+        found = solve_from_nothing(workspace, omega)
     else:
         workspace, found, good_enough = solve_to(
             lambda h: build(scene, harmonics=h, effects=effects), omega, accuracy

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from solver.balance.kernels.coordinates import is_reduced, responses
-from solver.contacts.kernels.stick_slip_events import STUCK
+from solver.contacts.kernels.stick_slip_events import SEPARATED, STUCK
 from solver.contacts.kernels.system import UNHELD, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real, coefficient_count
@@ -110,15 +110,43 @@ def keep_means(system: System, point: Evaluation, J: Real, n: int) -> None:
 
 
 @compiled
+def _pin_means(system: System, u: Real, point: Evaluation, rhs: Real) -> None:
+    """Let a Newton step move the means along `gauge` to where the mean forces are those of first loading.
+
+    Any mean along a gauge is as good, until a contact that slipped sticks: it begins unloaded, with kt u as
+    its first force. Means that Newton's steps left anywhere would then be pulls that nothing balances, and
+    the response that goes on there could not be reached. Σ l (kt u₀ − F₀) = 0 over what slips leaves none.
+    The step has J l = l, see `keep_means`. A motion that takes contacts along that are open is left alone:
+    they may close; and so is all where a constant force holds the part, which may stand on either side.
+    """
+    if system.hold == 1:
+        return
+    n = coefficient_count(system.ks)
+    for k in range(point.counts[UNHELD]):
+        beside, off = 0.0, 0.0
+        for c in range(system.owner.size):
+            along, stiffness = point.gauge[k, c], system.shift[c]
+            if system.rubs[c] == 0 or point.states[system.owner[c]] == SEPARATED:
+                beside += along * stiffness * along
+            else:
+                off += along * (stiffness * u[c * n] - point.F[c, 0])
+        if beside <= FREE:
+            for c in range(system.owner.size):
+                rhs[c * n] += off * point.gauge[k, c]
+
+
+@compiled
 def rebase(system: System, linear: Receptance, u: Real, point: Evaluation, rhs: Real) -> None:
     """Make the right-hand side of a Newton step that of contacts which stick at rest about their mean.
 
     A contact that sticks beyond what it slipped when first loaded has a constant mean force, whatever its
     mean: the motion with that force on its first loading line is as good, and from there the line leads on.
+    So are the means that nothing holds, of contacts that slip.
     """
     if system.loose.shape[0] == 0:
         return
     n, nc = coefficient_count(system.ks), system.owner.size
+    _pin_means(system, u, point, rhs)
     off, motions = np.zeros(nc, np.complex128), np.zeros(nc, np.complex128)
     for d in range(nc):
         if point.elastic[d] > 0.0:

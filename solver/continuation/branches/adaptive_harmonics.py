@@ -12,6 +12,7 @@ from solver.balance.balance import Balance
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS
 from solver.balance.more_harmonics import less_harmonics, more_harmonics, pad
 from solver.balance.workspace import PointSolution, Workspace
+from solver.continuation.along_level import solve_from_nothing
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.extrema.error_estimate import ErrorEstimator
 from solver.errors import SettingError
@@ -86,7 +87,7 @@ def solve_to(
     check_accuracy(accuracy)
     for harmonics in FIRST_TRIES:
         workspace = Workspace.of(build_with(harmonics))
-        found = workspace.solve(p)
+        found = solve_from_nothing(workspace, p)
         if found.converged:
             break
     if not found.converged:

@@ -15,6 +15,7 @@ from solver.balance.balance import Balance, build
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
+from solver.continuation.along_level import solve_from_nothing
 from solver.continuation.branch import ENDINGS, Branch, BranchStatus, Peak
 from solver.continuation.branches.adaptive_harmonics import sweep_to
 from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
@@ -240,7 +241,7 @@ def walk(
     )  # fmt: skip
     linear, point = workspace.linear, workspace.point
     if resume is None:
-        found = workspace.solve(control.start, guess)
+        found = solve_from_nothing(workspace, control.start, guess)
         spent = found.iterations
         if not found.converged:
             yield _no_start(balance, spent, begun, ratchets=found.ratchets)

@@ -55,6 +55,7 @@ from solver.linear.kernels.receptance import receptance
 
 _TINY = 64.0  # smallest steps: a step as short as this may turn as it likes
 STRAIGHT_ON = 0.98  # cosine of the turn at a branch point; more than that is a step across a sharp peak
+CLEARLY = 0.1  # share of the accepted residual below which a point is more than nearly a solution
 FROZEN_FROM = 64  # unknowns from which old factors beat new ones (measured)
 
 
@@ -242,7 +243,8 @@ def _step_over(system: System, linear: Receptance, point: Evaluation, control: C
         copy_to(trial, walk.u)
         good, iterations, norm = newton(system, linear, trial, p, 0.0, point)
         walk.numbers[ITERATIONS] += iterations
-        if not good:
+        # Just beyond a fold the tip of the branch is a solution to the tolerance: it leads nowhere.
+        if not good or norm > CLEARLY * ACCEPTED:
             continue
         weight_u, weight_p = weights(system, walk, control)
         if distance(trial, p, walk.u, walk.numbers[P], weight_u, weight_p) > 4.0 * control.largest_step:

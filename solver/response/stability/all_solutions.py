@@ -16,6 +16,7 @@ import numpy as np
 
 from solver.balance.balance import build, check_frequency
 from solver.balance.simplifications import Effects
+from solver.continuation.along_level import solve_from_nothing
 from solver.errors import SettingError
 from solver.response.solution import Solution
 from solver.response.solve import describe
@@ -179,7 +180,7 @@ def solve_all(
         effects = replace(effects, even_harmonics=True)
     balance = build(scene, harmonics=harmonics, effects=effects)
     search = Search(balance, 2.0 * math.pi * frequency_hz)
-    search.keep(search.workspace.solve(search.omega), "solve")
+    search.keep(solve_from_nothing(search.workspace, search.omega), "solve")
     stopped = False
     if not only.proven:
         stopped = search.everywhere(starts, np.random.default_rng(seed), on_progress, should_stop)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from many_contacts import nodes_on_modes, parallel_sliders, wedge_of_points
 
-from solver import Effects, Scene, march, plan, solve, sweep
+from solver import Effects, Scene, load_scene, march, plan, solve, sweep
 from solver.balance.balance import build
 from solver.balance.kernels.jacobian import factorise, step_back, step_back_transposed
 from solver.balance.workspace import Workspace
-from solver.contacts.kernels.system import evaluation_by_value
+from solver.contacts.kernels.system import UNHELD, evaluation_by_value
 from solver.linear.assembly import linear_model
 from solver.linear.leading_ports import leading_ports
 from solver.scene.harmonics import spread
@@ -90,6 +90,49 @@ def test_factors_solve_what_the_whole_jacobian_does(scene: Scene, at_hz: float, 
     solved, expected = right.copy(), np.linalg.solve(bordered, right)
     step_back(few.system, few.point, solved)
     np.testing.assert_allclose(solved, expected, rtol=0.0, atol=1e-8 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("every_port", [False, True], ids=["leading ports", "all ports"])
+def test_a_step_leaves_a_gauge_as_it_is(every_port: bool) -> None:
+    """dr/du l = l where nothing holds a wedge along l: what is asked of a step along l is what it does."""
+    scene, effects = load_scene("platform-wedge"), Effects(every_port=every_port)
+    workspace = Workspace.of(build(scene, harmonics=3, effects=effects))
+    assert (workspace.balance.n_leading < workspace.balance.n_ports) is not every_port
+    found = workspace.solve(TWO_PI * 345.0)
+    assert found.converged
+    norm, point = workspace.forces(found.u, TWO_PI * 345.0)
+    assert norm <= 1e-9
+    unheld = int(point.counts[UNHELD])
+    assert unheld >= 1
+    nothing = np.zeros(found.u.size + 1)
+    assert factorise(workspace.system, workspace.linear, workspace.point, nothing, 0.0, 0.0) != 0.0
+    for gauge in point.gauge[:unheld]:
+        along = np.zeros((workspace.balance.n_ports, workspace.balance.n_coefficients))
+        along[:, 0] = gauge
+        step = along.ravel().copy()
+        step_back(workspace.system, workspace.point, step)
+        np.testing.assert_allclose(step, along.ravel(), rtol=0.0, atol=1e-9 * np.abs(along).max())
+
+
+@pytest.mark.parametrize("every_port", [False, True], ids=["leading ports", "all ports"])
+def test_what_slips_stays_where_it_would_stick_unloaded(every_port: bool) -> None:
+    """A start anywhere along the gauge ends where kt u₀ and F₀ of the contacts balance along it."""
+    effects = Effects(every_port=every_port)
+    workspace = Workspace.of(build(load_scene("platform-wedge"), harmonics=3, effects=effects))
+    omega = TWO_PI * 345.0
+    found = workspace.solve(omega)
+    _, point = workspace.forces(found.u, omega)
+    kt, n = workspace.balance.system.shift, workspace.balance.n_coefficients
+    gauge = point.gauge[: point.counts[UNHELD]].copy()
+    moved = found.u.reshape(-1, n).copy()
+    moved[:, 0] += (1e-3 * np.abs(found.u).max() / np.abs(gauge).max()) * gauge.sum(axis=0)
+    moved[:, 1] *= 1.01  # so that a step is taken
+    again = workspace.solve_from(omega, moved.ravel())
+    assert again.converged
+    _, point = workspace.forces(again.u, omega)
+    pull = kt * again.u[::n] - point.F[:, 0]
+    assert np.abs(gauge @ pull).max() <= 1e-6 * (np.abs(gauge) @ np.abs(kt * moved[:, 0])).max()
+    np.testing.assert_allclose(again.u, found.u, rtol=0.0, atol=1e-7 * np.abs(found.u).max())
 
 
 @pytest.mark.parametrize(("scene", "at_hz", "harmonics"), CASES, ids=NAMES)

@@ -71,6 +71,23 @@ def test_extremes_are_the_integrated_law_too():
     assert compared >= 4
 
 
+def test_a_slip_ends_behind_a_dip_of_its_rate():
+    """The rate of slip dips at 4.02 and falls below zero at 4.26 rad, in one panel.
+
+    It is a point of `platform-wedge` with 4.5 g at 317.5 Hz, in N and µm.
+    """
+    u = [96.49367, -4.64098, -33.21144, 9.056336, -1.574839, 2.495399, -1.115396, 0.710389, 0.3903933]
+    v = [5.085705, 1.009546, -1.14854, -0.6224295, 0.07674498, -0.1095588, 0.07463083, -0.05050278]
+    last = [[-0.4257518, -0.9911092], [-0.02700998, 0.09741692, 0.06651671]]
+    U = np.array([[*u, *last[0]], np.zeros(11), [*v, *last[1]]])
+    for share in (0.9998, 0.9999, 1.0, 1.0001, 1.0002):
+        element = Element(U=share * U, load=np.zeros(3), row=row_of(10.0, 10.0, 0.3, 15.0))
+        truth = integrated(element)
+        np.testing.assert_allclose(
+            evaluate(element).F[:2], truth, rtol=0.0, atol=1e-9 * np.abs(truth).max(), err_msg=str(share)
+        )
+
+
 def test_no_motion_is_too_extreme():
     states: Counter[int] = Counter()
     for kind, element in extreme_elements(1, 350):

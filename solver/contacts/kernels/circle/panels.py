@@ -17,6 +17,7 @@ direction (complex step: W. Squire, G. Trapp, SIAM Rev. 40 (1998) 110).
 
 from __future__ import annotations
 
+import math
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 
 from solver.contacts.kernels.circle.radau import NODES, SLOPES, STAGES
 from solver.jit.decorators import compiled
+from solver.jit.fourier import Real
 from solver.jit.separate import apart
 
 Array: TypeAlias = NDArray[Any]  # of real or of complex numbers
@@ -70,6 +72,28 @@ def turning(at: Array, kappa: Number, theta: Number) -> tuple[Number, Number, Nu
 def slip_rate(at: Array, kappa: Number, theta: Number) -> Number:
     """Return q; the force slips on while it is positive."""
     return np.cos(theta) * at[DX] + np.sin(theta) * at[DY] / kappa - at[DLIMIT]
+
+
+@compiled
+def onset_direction(at: Real, kappa: float) -> float:
+    """Return the direction in which a force begins to slip where contact begins, from the curves there.
+
+    There t' = L' n, so n = (X'/(L' + Λ), Y'/(κL' + Λ)) with Λ > 0 from |n| = 1.
+    """
+    rise, dx, dy = at[DLIMIT], at[DX], at[DY]
+    if kappa == 1.0:
+        return math.atan2(dy, dx)
+    more = 0.0
+    for _ in range(60):
+        a, b = rise + more, kappa * rise + more
+        size = (dx / a) ** 2 + (dy / b) ** 2
+        slope = -2.0 * (dx * dx / a**3 + dy * dy / b**3)
+        # Newton's method on 1/√size − 1, which is nearly linear.
+        step = 2.0 * size * (1.0 - math.sqrt(size)) / slope
+        more = max(more + step, 0.0)
+        if abs(step) <= 1e-15 * (rise + more):
+            break
+    return math.atan2(dy / (kappa * rise + more), dx / (rise + more))
 
 
 @compiled

@@ -23,13 +23,14 @@ from solver.contacts.kernels.circle.panels import (
     X,
     Y,
     curves_at,
+    onset_direction,
     slip_rate,
     solve_panel,
     turning,
 )
 from solver.contacts.kernels.circle.radau import NODES, SLOPES, STAGES, between, tail
 from solver.contacts.kernels.circle.stick import leave_stick
-from solver.contacts.kernels.stick_slip_events import AFTER_SLIP, NO_LENGTH, SLIP, STICK
+from solver.contacts.kernels.stick_slip_events import AFTER_SEPARATION, AFTER_SLIP, NO_LENGTH, SLIP, STICK
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
 from solver.jit.separate import apart
@@ -60,11 +61,14 @@ BLIND = 1e-7  # rad, for so long
 
 
 @compiled
-def _falls(nodes: Real, kappa: float, theta: Real, first: float, tol: float) -> int:
-    """Return the number of the node (from 1) at or before which the rate of slip q falls below 0, or 0."""
-    before = first
-    here = slip_rate(nodes[0], kappa, theta[0])
-    for i in range(STAGES):
+def _falls(nodes: Real, kappa: float, theta: Real, first: float, tol: float, past: int) -> int:
+    """Return the number of the node (from 1) at or before which the rate of slip q falls below 0, or 0.
+
+    Negative if it may do so in a dip about that node. Nodes up to `past` are known not to be in one.
+    """
+    before = first if past == 0 else slip_rate(nodes[past - 1], kappa, theta[past - 1])
+    here = slip_rate(nodes[past], kappa, theta[past])
+    for i in range(past, STAGES):
         if here < -tol:
             return i + 1
         if i + 1 == STAGES:
@@ -176,10 +180,17 @@ def _stop_in(
     tol: float, at: Real,
 ) -> float:  # fmt: skip
     """Return the place in [0, 1] of a panel where the rate of slip falls below 0, or NOWHERE."""
-    node = _falls(nodes, kappa, theta, first, tol)
-    if node == 0:
-        return NOWHERE
-    return _where_it_falls(waves, kappa, begin, h, theta0, theta, node, tol, at)
+    past = 0
+    while past < STAGES:
+        node = _falls(nodes, kappa, theta, first, tol, past)
+        if node == 0:
+            return NOWHERE
+        place = _where_it_falls(waves, kappa, begin, h, theta0, theta, node, tol, at)
+        if place < NOWHERE:
+            return place
+        # A dip that does not reach 0; it may fall below 0 behind it.
+        past = abs(node)
+    return NOWHERE
 
 
 @compiled
@@ -286,8 +297,8 @@ def march_path(
     -------
     Numbers of pieces and panels, or (TABLE_FULL, 0) or (UNSOLVED, 0).
     """
-    tau, idle = begin, 0
-    at = np.empty(CURVES)
+    tau, idle, first = begin, 0, count
+    at, opens = np.empty(CURVES), state[S_BEGAN] == AFTER_SEPARATION
     while tau < end:
         if count >= pieces.shape[0]:
             return TABLE_FULL, 0
@@ -298,6 +309,11 @@ def march_path(
             curves_at(waves, tau, at)
             offset_x, offset_y = state[S_TX] - at[X], state[S_TY] - at[Y] / kappa
             tau, leaves = leave_stick(waves, kappa, grid, offset_x, offset_y, tau, end, numbers[TOL])
+            if leaves and opens and tau - begin <= NO_LENGTH:
+                # At the margin of stick and slip neither has a length: contact begins with a slip.
+                tau, count, idle = begin, first, IDLE
+                _slip_from_contact(waves, kappa, tau, at, state)
+                continue
             curves_at(waves, tau, at)
             state[S_TX], state[S_TY] = offset_x + at[X], offset_y + at[Y] / kappa
             if leaves:
@@ -324,6 +340,14 @@ def march_path(
             return UNSOLVED, 0
         count += 1
     return count, filled
+
+
+@compiled
+def _slip_from_contact(waves: Real, kappa: float, tau: float, at: Real, state: Real) -> None:
+    """Begin a slip where contact begins at τ; nothing depends on the force before it, which is 0."""
+    curves_at(waves, tau, at)
+    state[S_MOTION], state[S_BEGAN], state[S_THETA] = SLIP, AFTER_SEPARATION, onset_direction(at, kappa)
+    state[S_TX], state[S_TY], state[S_SLIPPED], state[S_FACTOR] = 0.0, 0.0, 1.0, 0.0
 
 
 @compiled

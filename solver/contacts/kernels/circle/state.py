@@ -13,7 +13,18 @@ import math
 
 import numpy as np
 
-from solver.contacts.kernels.circle.panels import CURVES, DLIMIT, DX, DY, LIMIT, X, Y, curves_at, slip_rate
+from solver.contacts.kernels.circle.panels import (
+    CURVES,
+    DLIMIT,
+    DX,
+    DY,
+    LIMIT,
+    X,
+    Y,
+    curves_at,
+    onset_direction,
+    slip_rate,
+)
 from solver.contacts.kernels.circle.path import (
     LONGEST,
     PANEL_COLUMNS,
@@ -78,28 +89,6 @@ def contact_grid(waves: Real, degree: int, cos_table: Real, sin_table: Real, gri
     """Fill `grid` (6, n) with X, Y, L and their slopes at τ_j = 2πj/n."""
     for x in range(3):
         on_grid(waves[x, 0], waves[x, 1], degree, cos_table, sin_table, grid[x], grid[3 + x])
-
-
-@compiled
-def onset_direction(at: Real, kappa: float) -> float:
-    """Return the direction in which a force begins to slip where contact begins, from the curves there.
-
-    There t' = L' n, so n = (X'/(L' + Λ), Y'/(κL' + Λ)) with Λ > 0 from |n| = 1.
-    """
-    rise, dx, dy = at[DLIMIT], at[DX], at[DY]
-    if kappa == 1.0:
-        return math.atan2(dy, dx)
-    more = 0.0
-    for _ in range(60):
-        a, b = rise + more, kappa * rise + more
-        size = (dx / a) ** 2 + (dy / b) ** 2
-        slope = -2.0 * (dx * dx / a**3 + dy * dy / b**3)
-        # Newton's method on 1/√size − 1, which is nearly linear.
-        step = 2.0 * size * (1.0 - math.sqrt(size)) / slope
-        more = max(more + step, 0.0)
-        if abs(step) <= 1e-15 * (rise + more):
-            break
-    return math.atan2(dy / (kappa * rise + more), dx / (rise + more))
 
 
 @compiled

@@ -1,0 +1,64 @@
+"""Wedges so light that some of their points slip and others stick: responses that fold where a point begins
+to slip, and branches that pass there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import solver
+from solver import BranchStatus, start_of
+
+AXIAL = slice(1, None, 3)  # ports of the second tangential direction, along the wedge
+
+
+def wedge(grams: float, **values: float) -> solver.Scene:
+    changed = {f"wedge.{key}": value for key, value in values.items()}
+    return solver.load_scene("platform-wedge").with_values({"wedge.mass": 1e-3 * grams, **changed})
+
+
+def random_wedge(seed: int) -> solver.Scene:
+    """A wedge between slipping all the time and sticking all the time."""
+    rng = np.random.default_rng(seed)
+    return wedge(
+        rng.uniform(4.0, 12.0), angle=rng.uniform(0.2, 0.6), mu=rng.uniform(0.2, 0.4),
+        kt=10.0 ** rng.uniform(7.0, 7.6),
+    )  # fmt: skip
+
+
+def test_a_sweep_passes_folds_where_points_begin_to_slip() -> None:
+    """With 8 g the branch turns in its frequency at 314.66 Hz, on the way to a stuck wedge."""
+    branch = solver.sweep(wedge(8.0), start=312.0, stop=317.0, harmonics=5)
+    assert branch.status is BranchStatus.COMPLETED
+    assert np.any(np.diff(branch.values) < 0.0)
+    assert len({tuple(states) for states in branch.states.tolist()}) > 2
+    # Nothing moves along the wedge, and what slips leaves its place there where nothing pulls.
+    motions = branch.solutions[:, :-1].reshape(len(branch.values), 12, -1)
+    assert np.abs(motions[:, AXIAL]).max() <= 1e-6 * np.abs(motions[:, 0]).max()
+
+
+def test_a_response_is_found_beyond_a_fold_of_the_level() -> None:
+    """Every way by steps fails; the response found along the arc is one that a march stays in."""
+    solution = solver.solve(wedge(5.5), frequency_hz=300.0, harmonics=5)
+    assert solution.converged
+    marched = solver.march(wedge(5.5), frequency_hz=300.0, start=start_of(solution), max_periods=2)
+    assert marched.half_peak_to_peak == pytest.approx(solution.half_peak_to_peak, rel=0.02)
+
+
+def assert_followed(seed: int) -> None:
+    """The branch comes to an end of its range, through solutions alone."""
+    branch = solver.sweep(random_wedge(seed), start=310.0, stop=330.0, harmonics=3)
+    assert branch.status in (BranchStatus.COMPLETED, BranchStatus.TURNED_BACK), seed
+    if branch.status is BranchStatus.TURNED_BACK:
+        assert abs(branch.values[-1] - 310.0) < 2.0, seed
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_wedges_are_followed(seed: int) -> None:
+    assert_followed(seed)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(3, 40))
+def test_many_random_wedges_are_followed(seed: int) -> None:
+    assert_followed(seed)
