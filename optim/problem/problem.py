@@ -17,6 +17,7 @@ from optim.problem.variables import Variable, check_variables
 from optim.problem.words import Method as Method
 from solver.balance.balance import check_harmonics
 from solver.contacts.laws.base import without_second
+from solver.scene.bodies.shape_parts import moves_contacts
 from solver.scene.scene import Scene
 
 
@@ -68,6 +69,8 @@ class Problem(Goals):
             return (
                 "tracked takes no engine-order line (`speed_order`), along which loads follow the frequency"
             )
+        if moves_contacts(self.scene, self.paths[0]):
+            return f"tracked follows no geometry: `{self.paths[0]}` moves the contacts"
         others = without_second(self.scene.contacts)
         if others:
             return f"tracked needs laws with second derivatives, which {others} has not"

@@ -137,13 +137,19 @@ def contact_shares(scene: HasShapes, path: str) -> dict[str, float] | None:
     return {contact.name: part for contact, part in zip(contacts_of(shape), parts, strict=True)}
 
 
+def moves_contacts(scene: HasShapes, path: str) -> bool:
+    """Whether a path is of the geometry that places contacts; they are not continued in it."""
+    found = shape_of(scene, path)
+    return found is not None and found[1] in found[0].GEOMETRY
+
+
 def motion_derivatives(scene: HasShapes, path: str) -> dict[str, tuple[Form, ...]] | None:
     """Derivatives of the motions of each contact, by its name, by a path of the geometry; None of others.
 
     They are those of the very lines that give the motions, with a symbol for the parameter.
     """
     found = shape_of(scene, path)
-    if found is None or found[1] not in found[0].GEOMETRY:
+    if found is None or not moves_contacts(scene, path):
         return None
     import casadi
 
