@@ -32,7 +32,7 @@ from service.jobs.registry import Registry
 from service.jobs.validation import validated
 from service.queue.health import check
 from service.settings.settings import Settings, load_settings
-from service.workers import executor_of
+from service.workers.executors import executor_of
 
 BOTH = PRIVATE.extended(*SHIPPED)
 DISK: dict[str, Any] = dict(solver.load_scene("bladed-disk").to_dict())
