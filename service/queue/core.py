@@ -47,8 +47,8 @@ from service.queue.scene_store import SceneStore
 from service.queue.subscriptions import Event, Waiters
 from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
-from service.workers import executor_of
 from service.workers.answers import AnswerLimits, Answers
+from service.workers.executors import executor_of
 from service.workers.preview_workers import Previews
 from solver.errors import Issue
 

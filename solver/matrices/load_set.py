@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
+from solver.matrices.file_units import UNITS
 from solver.matrices.files import MatrixFileError, read_labelled
 from solver.matrices.labels import label as parsed
 from solver.matrices.labels import labels_beside, read_labels
@@ -16,10 +17,6 @@ from solver.matrices.readers.label import Label
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.readers.registry import label_suffixes
 from solver.matrices.readers.triplets import Labelled
-
-# Forces over displacements, and moments over angles, in the units of the files: what they are in N/m and
-# N m. Masses go with them, as seconds stay seconds: t, mm, N and lbf s²/in, in, lbf are consistent units.
-UNITS = {"SI": (1.0, 1.0), "mm": (1e3, 1e-3), "in": (4.4482216152605 / 0.0254, 4.4482216152605 * 0.0254)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,9 +10,10 @@ import numpy as np
 from scipy.sparse import coo_array
 
 from solver.errors import Issue, SceneError
+from solver.matrices.file_units import UNITS
 from solver.matrices.files import MatrixFileError, read_labelled, read_modes
 from solver.matrices.labels import label
-from solver.matrices.load_set import UNITS, MatrixSet, in_si, put_together
+from solver.matrices.load_set import MatrixSet, in_si, put_together
 from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton
 from solver.matrices.sectors.loading import as_sector
 from solver.matrices.validation import DofTable

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.jit.fourier import Real, basis
 from solver.results.dataset import Attribute, Dataset, Variable
 from solver.views.io import scene_attributes
 
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
+    from solver.jit.fourier import Real
     from solver.marching.result import MarchResult
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
@@ -121,6 +121,9 @@ def branch_dataset(branch: Branch) -> Dataset:
 
 def solution_dataset(solution: Solution) -> Dataset:
     """Harmonics of the observed DOF and of every contact, and one period in time."""
+    # Not above: the service tells stored sweeps without Numba, which this loads.
+    from solver.jit.fourier import basis
+
     top, names = solution.n_harmonics, [contact.name for contact in solution.contacts]
     share = np.linspace(0.0, 1.0, _SAMPLES, endpoint=False)
     functions = basis(2.0 * np.pi * share, solution.highest_harmonic)

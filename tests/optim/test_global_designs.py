@@ -21,6 +21,7 @@ from random_designs import (
     rank,
     stands,
 )
+from sampling import others_long
 
 import optim
 import solver
@@ -50,9 +51,7 @@ def check_design(asked: dict[str, Any], n: int, **finer: int) -> None:
 
 
 # Seed 0 has a limit that no design keeps, 3 a forbidden range and an optimum on a bound.
-@pytest.mark.parametrize(
-    "seed", [8, 3, pytest.param(0, marks=pytest.mark.long), pytest.param(18, marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize("seed", others_long((8, 3, 0, 18), keep=(3,)))
 def test_one_variable(seed: int) -> None:
     check_design(random_design(seed, 1, limits=seed % 3 == 0), 25, levels=3)
 

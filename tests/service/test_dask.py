@@ -32,7 +32,7 @@ from service.jobs.registry import Registry
 from service.jobs.validation import validated
 from service.queue.health import check
 from service.settings.settings import Settings, load_settings
-from service.workers import executor_of
+from service.workers.executors import executor_of
 
 BOTH = PRIVATE.extended(*SHIPPED)
 DISK: dict[str, Any] = dict(solver.load_scene("bladed-disk").to_dict())
@@ -49,7 +49,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "accuracy": {"scene": "two-dof", "harmonics": [1, 3], "samples": [64], "repeats": 1},
     "campbell": {"scene": "two-dof", "speeds_rpm": [[60, 100]], "harmonics": 3},
     "mistuning": {
-        "scene": DISK, "of": ["tip_middle", "tip"], "spread": 0.03, "samples": 12, "seed": 5, "from": 700,
+        "scene": DISK, "of": ["tip_middle", "tip"], "spread": 0.03, "samples": 6, "seed": 5, "from": 700,
         "to": 850, "harmonics": 1,
     },
 }  # fmt: skip
@@ -311,7 +311,7 @@ def test_a_part_that_is_lost_is_computed_again_alone(
     service: tuple[EmbeddedService, DaskCluster],
 ) -> None:
     embedded, dask = service
-    body = {**BODIES["mistuning"], "samples": 24, "seed": 70}
+    body = {**BODIES["mistuning"], "samples": 16, "seed": 70}
     job = embedded.submit("mistuning", body)
     until(lambda: embedded.job(job).points > 0)
     victim = next(p for p in dask.family(dask.workers[0]) if "spawn_main" in " ".join(p.cmdline()))

@@ -116,13 +116,16 @@ def test_a_disk_that_is_full_for_a_while(tmp_path: Path, small_disk: Path, numbe
     undergo(site, {"disk full": disk_full(small_disk)}, number, seed=number)
 
 
-@pytest.mark.parametrize("number", [6, pytest.param(100, marks=pytest.mark.long)])
+# Four: the server's own, and those after which another service goes on with the jobs.
+@pytest.mark.parametrize("number", [4, pytest.param(100, marks=pytest.mark.long)])
 def test_services_and_a_dispatcher_on_postgresql(cluster: Cluster, tmp_path: Path, number: int) -> None:
     with cluster.database(empty=False) as url:
         site = Site(url, tmp_path, [free_port(), free_port(), None])
         own = {
             "PostgreSQL restarted": server_restarted(cluster),
             "connections cut": connections_cut(cluster, url),
+            "service killed": program_killed,
+            "service paused past the lease": program_paused,
         }
         undergo(site, {**own, **COMMON}, number, seed=number)
 

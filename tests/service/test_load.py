@@ -22,12 +22,13 @@ def job(number: int) -> dict[str, Any]:
     return {"kind": "iteration", "seed": number, "sweeps": 1}
 
 
-def test_every_job_of_many_clients_is_done_once(url: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [40, pytest.param(96, marks=pytest.mark.long)])
+def test_every_job_of_many_clients_is_done_once(url: str, tmp_path: Path, number: int) -> None:
     with serving(url, workers=2, log=tmp_path / "log", command=words) as service:
-        handed_in = run_load(service, 96, 16, wait=False, job=job)
-        waited_for = run_load(service, 96, 16, wait=True, first=96, job=job)
-    assert len(handed_in.latencies) == len(waited_for.latencies) == 96
-    check_jobs(url, 192)
+        handed_in = run_load(service, number, 16, wait=False, job=job)
+        waited_for = run_load(service, number, 16, wait=True, first=number, job=job)
+    assert len(handed_in.latencies) == len(waited_for.latencies) == number
+    check_jobs(url, 2 * number)
 
 
 @pytest.mark.long

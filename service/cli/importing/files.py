@@ -54,8 +54,8 @@ def relative(path: Path, target: Path) -> str:
 def sources(files: Sequence[str], mapping: str | None, units: str) -> Sources:
     """Sort the files given by what they are."""
     from solver.matrices.file_roles import MAPPING, sorted_files
+    from solver.matrices.file_units import UNITS
     from solver.matrices.files import MatrixFileError
-    from solver.matrices.load_set import UNITS
 
     if units not in UNITS:
         raise InputError(

@@ -92,3 +92,23 @@ assert np.abs(scipy.linalg.solve(A, np.ones(n)) - x).max() < 1e-9 * np.abs(x).ma
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def modules_after(code: str) -> set[str]:
+    """The modules of a process that ran some code."""
+    told = f"{code}; import sys; print(' '.join(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_what_serves_loads_no_numbers() -> None:
+    """The computing is done in other processes: the one with the routes needs none of what they load."""
+    loaded = modules_after("import service.http.process.server")
+    assert loaded & (PICTURES | DESIGN | {"numba", "llvmlite", "scipy"}) == set()
+
+
+def test_what_computes_loads_no_service() -> None:
+    """What workers are forked off, and each of them: they talk to the service through pipes alone."""
+    loaded = modules_after("import service.workers.preloaded, service.workers.worker")
+    assert "numba" in loaded
+    assert loaded & (SERVICE | PICTURES | {"service.settings.settings"}) == set()

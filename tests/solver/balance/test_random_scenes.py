@@ -74,7 +74,7 @@ def failures(count: int, judge: Callable[[int], object]) -> list[str]:
     return failed
 
 
-@pytest.mark.parametrize("seed", range(BEYOND, BEYOND + 150))
+@pytest.mark.parametrize("seed", sampled(range(BEYOND, BEYOND + 150), 3))
 def test_random_solves(seed: int):
     solved(*drawn(seed))
 
@@ -84,9 +84,10 @@ def test_random_responses(seed: int):
     swept(*drawn(seed)[:2])
 
 
-def test_random_motions_against_time_marching():
-    settled = [marched(*drawn(seed)) for seed in range(BEYOND, BEYOND + 40)]
-    assert sum(settled) >= 15
+@pytest.mark.parametrize("count", [16, pytest.param(40, marks=pytest.mark.long)])
+def test_random_motions_against_time_marching(count: int):
+    settled = [marched(*drawn(seed)) for seed in range(BEYOND, BEYOND + count)]
+    assert sum(settled) >= 0.375 * count
 
 
 def test_a_sharp_resonance_is_not_leapt_over():

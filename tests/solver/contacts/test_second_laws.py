@@ -165,11 +165,12 @@ def error_of(law: Law, at: Point, w: np.ndarray, way: Point) -> float:
     return best
 
 
+@pytest.mark.parametrize("count", [15, pytest.param(40, marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", LAWS)
-def test_second_derivatives_equal_differences_of_the_gradient(name: str) -> None:
+def test_second_derivatives_equal_differences_of_the_gradient(name: str, count: int) -> None:
     """To 1e-5 in every state, along the motions, the numbers and the load at once."""
     law, rng, seen, errors = LAWS[name], np.random.default_rng(4), Counter[int](), []
-    for at in random_points(name, 40):
+    for at in random_points(name, count):
         w = rng.normal(size=at.U.shape)
         errors.append(error_of(law, at, w, random_way(rng, law, at)))
         seen[gradient(law, at, w)[1][0]] += 1

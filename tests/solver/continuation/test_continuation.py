@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from contact_cases import central_difference
 from lumped_structure import lumped
+from sampling import sampled
 from scene_cases import bladed_disk, loose_mass, mixed_disk, oscillator, two_dof
 from walked_branches import UNSTABLE, walked, with_damping
 
@@ -59,9 +60,11 @@ def band_of(scene: Scene) -> tuple[float, float]:
     return scene.observe.band
 
 
-@pytest.mark.parametrize("predictor", Predictor)
-@pytest.mark.parametrize("name", RESPONSES)
-def test_whole_responses(name: str, predictor: Predictor):
+# Every scene with one predictor or two, each of the three with scenes of both kinds.
+@pytest.mark.parametrize(
+    ("predictor", "name"), sampled([(p, name) for name in RESPONSES for p in Predictor], 2)
+)
+def test_whole_responses(predictor: Predictor, name: str):
     """From end to end of the band, up and down, every point converged, nothing turned or stalled."""
     scene = RESPONSES[name]()
     low, high = band_of(scene)
@@ -152,10 +155,11 @@ def test_other_scenes(scene: Scene):
     assert branch.residuals.max() <= 1e-9
 
 
-def test_random_oscillators():
+@pytest.mark.parametrize("count", [40, pytest.param(120, marks=pytest.mark.long)])
+def test_random_oscillators(count: int):
     """Cusps at the edge of full stick, touching loads, stiff contacts, little damping: none turns back."""
     rng = np.random.default_rng(2)
-    for _ in range(120):
+    for _ in range(count):
         kt = 10.0 ** rng.uniform(-1.0, 1.5)
         contact = {
             "kt": kt,

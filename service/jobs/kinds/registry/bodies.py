@@ -15,6 +15,12 @@ DESIGN = "design"
 
 
 @cache
+def _examples_in(request: type[JobRequest]) -> tuple[dict[str, Any], ...]:
+    """The examples that a request's schema tells; a schema takes long to make."""
+    return tuple(request.model_json_schema().get("examples", ()))
+
+
+@cache
 def body_model(name: str, request: type[JobRequest]) -> type[BaseModel]:
     """The body of a kind: `kind` first, and the keys of its request with their examples.
 
@@ -28,9 +34,8 @@ def body_model(name: str, request: type[JobRequest]) -> type[BaseModel]:
         listed = schema["properties"]
         schema["properties"] = {KIND: listed.pop(KIND), **listed}
         schema["required"] = [KIND, *(key for key in schema.get("required", ()) if key != KIND)]
-        examples = request.model_json_schema().get("examples", ())
-        if examples:
-            schema["examples"] = [{KIND: name, **example} for example in examples]
+        if found := _examples_in(request):
+            schema["examples"] = [{KIND: name, **example} for example in found]
 
     title = "".join(part.capitalize() for part in name.split("-")) + "Body"
     kind: Any = (Literal[name], Field(description="Kind of the job."))
@@ -91,5 +96,5 @@ def examples_of(registry: Registry, name: str, called: str | None = None) -> dic
     """The examples of one kind, without the key `kind`; none of a kind that is not there."""
     if name not in registry:
         return {}
-    title, found = called or name, registry[name].request.model_json_schema().get("examples", ())
+    title, found = called or name, _examples_in(registry[name].request)
     return {f"{title} {k}" if k > 1 else title: {"value": example} for k, example in enumerate(found, 1)}
