@@ -29,6 +29,7 @@ from service.db.repositories.jobs.queue_limits import Room, require_share
 from service.db.repositories.jobs.recovery import FREE, change, recover
 from service.db.repositories.rows import Attempt, JobRow, NewJob, Recovered
 from service.db.repositories.sweeps import insert_sweeps
+from service.db.repositories.workbench.words import in_the_bin, insert_words
 from service.errors import IdempotencyError
 from service.jobs.ids import new_id
 from service.jobs.outputs import JobFailure, JobOutput, Piece
@@ -144,8 +145,8 @@ class JobRepository:
         before: str | None = None,
         limit: int = 100,
     ) -> list[JobRow]:
-        """Jobs of an owner, or of everybody (None), newest first, older than the job `before`."""
-        query = select(*_LISTED).order_by(Job.id.desc()).limit(limit)
+        """Jobs outside of the bin, of an owner or of everybody (None), newest first, older than `before`."""
+        query = select(*_LISTED).where(~in_the_bin(Job.id)).order_by(Job.id.desc()).limit(limit)
         if before is not None:
             query = query.where(Job.id < before)
         equal = ((Job.state, state), (Job.kind, kind), (Job.scene_name, scene))
@@ -375,6 +376,7 @@ class JobRepository:
         request, spec = encoded(new.request), encoded(new.spec)
         stored = {"request": request, "spec": spec, "stored_bytes": len(request) + len(spec)}
         connection.execute(statements.INSERT_JOB, written | stored)
+        insert_words(connection, written["id"], new.owner, new.words, now)
         return JobRow(**{name: written[name] for name in statements.ROW})
 
     @staticmethod
