@@ -7,11 +7,18 @@ from typing import Any
 
 import httpx
 import pytest
-from service_helpers import ServedClient, is_problem, until
+from service_helpers import ServedClient, is_problem, new_job, until
 
 from service.client import Client
 from service.db.clock import utc_now
-from service.errors import ServiceProblem
+from service.db.engine import Database
+from service.db.models import JobState
+from service.db.repositories import JobRepository
+from service.db.repositories.rows import RunWords
+from service.db.repositories.workbench.projects import ProjectRepository
+from service.db.repositories.workbench.rows import RunFilter
+from service.db.repositories.workbench.runs import RunRepository
+from service.errors import ChangedMeanwhileError, InvalidRequestError, ServiceProblem, StorageFullError
 from service.jobs.differences import differences, figures
 from solver.scene.scene import load_scene
 
@@ -268,3 +275,49 @@ def test_the_client_has_a_method_for_each(http: ServedClient) -> None:
         assert client.delete_project(project.id).deleted
         assert client.restore_project(project.id).deleted is None
         assert client.project(project.id).runs == 2
+
+
+def test_every_filter_holds_on_both_databases(database: Database) -> None:
+    jobs, runs = JobRepository(database), RunRepository(database, utc_now)
+    projects = ProjectRepository(database, utc_now)
+    project = projects.add("ann", "shroud", "", most=1).id
+    with pytest.raises(StorageFullError):
+        projects.add("ann", "one too many", "", most=1)
+
+    def made(owner: str, **words: Any) -> str:
+        return jobs.submit(new_job(owner=owner, words=RunWords(**words)), queue_limit=100)[0].id
+
+    soft = made("ann", project=project, name="Softer", notes="a_b", tags=("x", "y"))
+    hard = made("ann", name="harder", tags=("y",))
+    other = made("ben", name="softer", tags=("x", "y"))
+    with pytest.raises(InvalidRequestError, match="`project` must be the id of a project of the same owner"):
+        made("ben", project=project)
+    assert len(jobs.page(owner=None)) == 3, "what was refused is not there"
+
+    def found(**wanted: Any) -> list[str]:
+        return [row.job.id for row in runs.page(RunFilter(**{"owner": "ann", **wanted}), 10)]
+
+    assert found() == [hard, soft]
+    assert found(owner=None) == [other, hard, soft]
+    assert found(owner=None, of_owner="ben") == [other]
+    assert found(project=project) == found(tags=("x", "y")) == found(text="SOFTER") == [soft]
+    assert found(text="a_b") == [soft]
+    assert found(text="aXb") == found(text="%") == []
+    assert found(states=[JobState.RUNNING]) == []
+    assert found(states=[JobState.RUNNING, JobState.ACCEPTED], kind="iteration") == [hard, soft]
+    created = {row.id: row.created for row in jobs.page(owner="ann")}
+    assert found(after=created[soft], before=created[hard]) == [soft]
+    assert [row.job.id for row in runs.page(RunFilter(owner="ann"), 10, before=hard)] == [soft]
+    row = runs.get(soft)
+    assert row is not None
+    runs.change(row, {"tags": ("z",), "project": None}, expected={1})
+    with pytest.raises(ChangedMeanwhileError):
+        runs.change(row, {"name": "late"}, expected={1})
+    changed = runs.get(soft)
+    assert changed is not None
+    assert (changed.words, changed.revision) == (RunWords(name="Softer", notes="a_b", tags=("z",)), 2)
+    runs.put_in_bin(hard)
+    assert found() == [row.id for row in jobs.page(owner="ann")] == [soft]
+    assert found(deleted=True) == [hard]
+    runs.restore(hard)
+    assert found() == [hard, soft]

@@ -49,17 +49,10 @@ def require_project(connection: Connection, project: str | None, owner: str) -> 
         raise InvalidRequestError([Issue(pointer="/project", message=message)])
 
 
-def insert_words(connection: Connection, job_id: str, owner: str, words: RunWords, now: datetime) -> None:
-    """Write what is said of a job that was inserted just now, if anything is.
-
-    Raises
-    ------
-    InvalidRequestError
-        See `require_project`.
-    """
+def insert_words(connection: Connection, job_id: str, words: RunWords, now: datetime) -> None:
+    """Write what is said of a job that was inserted just now, if anything is; see `require_project`."""
     if words == NO_WORDS:
         return
-    require_project(connection, words.project, owner)
     about = {"job_id": job_id, "project_id": words.project, "name": words.name, "notes": words.notes}
     connection.execute(_INSERT, about | {"changed": now, "revision": 1, "deleted": None})
     put_tags(connection, job_id, words.tags)
