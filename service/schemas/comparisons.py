@@ -12,7 +12,7 @@ from service.queue.core import Service
 from service.schemas.workbench_answers import Comparison, Figure, InputDifference, RunAnswer
 
 _MOST_INPUTS = 500
-_MOST_COUNTED = 100_000
+_MOST_COUNTED = 10_000
 
 
 def comparison(service: Service, a: str, b: str, caller: Caller) -> Comparison:

@@ -111,13 +111,19 @@ class RetentionRepository:
 
     def delete_projects(self, before: datetime) -> int:
         """Delete the projects that were put in the bin before a time; how many were. Their runs stay."""
-        with self._db.writing() as connection:
-            return connection.execute(delete(Project).where(Project.deleted < before)).rowcount
+        return self._delete_any(Project, Project.deleted < before)
 
     def delete_links(self, now: datetime) -> int:
         """Delete the links to runs whose time is over; how many were."""
+        return self._delete_any(Share, Share.expires < now)
+
+    def _delete_any(self, table: type[Project | Share], condition: ColumnElement[bool]) -> int:
+        """Delete the rows of a condition; nothing is written where there is none."""
+        with self._db.reading() as connection:
+            if connection.execute(select(table.id).where(condition).limit(1)).one_or_none() is None:
+                return 0
         with self._db.writing() as connection:
-            return connection.execute(delete(Share).where(Share.expires < now)).rowcount
+            return connection.execute(delete(table).where(condition)).rowcount
 
     def old_uploads(self, before: datetime) -> list[str]:
         """Ids of the uploads that came before a time and that nobody uses, oldest first.
