@@ -10,7 +10,7 @@ from alembic import context
 from sqlalchemy import Connection
 
 from service.db.engine import migration_engine
-from service.db.models import Base
+from service.db.run_models import Project
 from service.settings.settings import load_settings
 
 
@@ -18,7 +18,7 @@ def run(connection: Connection) -> None:
     """Run the migrations in one transaction of `connection`; the keys hold before it commits."""
     context.configure(
         connection=connection,
-        target_metadata=Base.metadata,
+        target_metadata=Project.metadata,
         render_as_batch=True,
         transactional_ddl=True,
         compare_type=True,

@@ -137,6 +137,10 @@ class IdempotencyError(ServiceError):
     """An `Idempotency-Key` used again for a different request."""
 
 
+class ChangedMeanwhileError(ServiceError):
+    """What is to be changed is not what the client had seen (`If-Match`)."""
+
+
 class RetryLaterError(ServiceError):
     """Something that can be asked for again later.
 

@@ -63,6 +63,7 @@ class Doorkeeper:
         self._lock = threading.Lock()
         self._requests = Buckets(steady=steady)
         self._failures = Buckets(steady=steady)
+        self._links = Buckets(steady=steady)
 
     def known(self, token: str | None) -> bool:
         """Whether `admit` can answer at once, without the database."""
@@ -122,6 +123,21 @@ class Doorkeeper:
         wait = self._requests.take(caller.key_id, most)
         if wait > 0.0:
             raise TooManyRequestsError(f"the key may make {most} requests a minute", math.ceil(wait))
+
+    def count_link(self, token: str, address: str) -> None:
+        """Count a request by a link to a run, of which neither an address nor a link has more than a key.
+
+        Raises
+        ------
+        TooManyRequestsError
+            There were as many as may be made.
+        """
+        most = self._settings.requests_per_minute
+        waits = [self._links.take(name, most) for name in (f"from {_neighbourhood(address)}", f"by {token}")]
+        if max(waits) > 0.0:
+            raise TooManyRequestsError(
+                f"by links {most} requests a minute may be made", math.ceil(max(waits))
+            )
 
     def _failed(self, reason: str, address: str) -> UnauthorizedError | TooManyRequestsError:
         """The refusal of a key; a working key from the same address is admitted all the same.

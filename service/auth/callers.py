@@ -105,6 +105,10 @@ KEYLESS = Caller()
 """Somebody without a key where none is needed, and a program that embeds the service."""
 
 
+LINK_READERS = Caller(owner="links to runs", scopes=frozenset())
+"""Whoever reads a run by its link: all of them together, under a name that no owner can have."""
+
+
 class Owned(Protocol):
     """A row that belongs to somebody."""
 

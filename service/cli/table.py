@@ -69,7 +69,26 @@ KEYS = (
     Entry("revoke", "commands.keys.revoke", "End a key, within a second in every service."),
 )  # fmt: skip
 
+RUNS = (
+    Entry("list", "commands.runs.show", "List the runs, newest first.", keyed=True),
+    Entry("change", "commands.runs.change", "Change project, name, notes or tags of a run.", keyed=True),
+    Entry("delete", "commands.runs.delete", "Put a run in the bin.", keyed=True),
+    Entry("restore", "commands.runs.restore", "Take a run out of the bin.", keyed=True),
+    Entry("compare", "commands.runs.compare", "Say what differs between two runs.", keyed=True),
+    Entry("share", "commands.runs.share", "Make a link to a run that needs no key.", keyed=True),
+)
+
+PROJECTS = (
+    Entry("list", "commands.projects.show", "List the projects, newest first.", keyed=True),
+    Entry("create", "commands.projects.create", "Make a project and print its id.", keyed=True),
+    Entry("change", "commands.projects.change", "Change name or notes of a project.", keyed=True),
+    Entry("delete", "commands.projects.delete", "Put a project in the bin; its runs stay.", keyed=True),
+    Entry("restore", "commands.projects.restore", "Take a project out of the bin.", keyed=True),
+)
+
 GROUPS = (
+    ("runs", "Name, find, compare and delete runs of a service.", RUNS),
+    ("projects", "Gather runs in projects.", PROJECTS),
     ("db", "Look after the database.", DATABASE),
     ("keys", "Make and end keys to the service.", KEYS),
 )

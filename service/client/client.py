@@ -7,14 +7,14 @@ import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import httpx
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel
 
 from service.client.transport import Transport, pauses, segment, words
+from service.client.workbench import Workbench
 from service.errors import ServiceProblem
 from service.schemas.answers import (
     DesignAnswer,
@@ -44,10 +44,8 @@ _SILENCE_SECONDS = 60.0
 if TYPE_CHECKING:
     from service.queue.health import Health, Readiness
 
-ModelT = TypeVar("ModelT", bound=BaseModel)
 
-
-class Client:
+class Client(Workbench):
     """Submits jobs to a service, watches them and fetches what they computed; a context manager.
 
     Every method raises `ServiceProblem` with the problem document if the service refuses, and
@@ -323,14 +321,3 @@ class Client:
     def _sweep_as(self, sweep_id: str, media: str) -> bytes:
         headers = {"Accept": media}
         return self._transport.send("GET", f"/v1/sweeps/{segment(sweep_id)}", headers=headers).content
-
-    def _get(self, model: type[ModelT], path: str) -> ModelT:
-        return model.model_validate(self._transport.json("GET", path))
-
-    def _pages(self, model: type[Any], path: str, filters: Mapping[str, Any]) -> Iterator[Any]:
-        """The items of a list, page after page."""
-        page = model.model_validate(self._transport.json("GET", path, params=words(filters)))
-        yield from page.items
-        while page.next is not None:
-            page = model.model_validate(self._transport.json("GET", page.next))
-            yield from page.items

@@ -21,6 +21,7 @@ from sqlalchemy import (
     Text,
     TypeDecorator,
     UniqueConstraint,
+    false,
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
@@ -249,6 +250,7 @@ class Sweep(Base):
     rejected_steps: Mapped[int]
     seconds: Mapped[float]
     completed: Mapped[bool]
+    intermediate: Mapped[bool] = mapped_column(default=False, server_default=false())
     status: Mapped[str] = mapped_column(Text())
     created: Mapped[datetime]
 
@@ -264,6 +266,7 @@ class Sweep(Base):
         Index(None, "scene_name", "id"),
         Index(None, "scene_hash", "id"),
         Index(None, "completed", "id"),
+        Index(None, "intermediate", "id"),
         Index(None, "parameter", "id"),
         Index(None, "peak", "id"),
         Index(None, "peak_at", "id"),

@@ -39,6 +39,7 @@ from service.http.routes import (
     sweeps,
     uploads,
 )
+from service.http.workbench import projects, runs, shares
 from service.jobs.registry import Registry
 from service.queue.core import SOLVER_VERSION, Service
 from service.queue.health import Probe
@@ -91,6 +92,7 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     # The last one added is the outermost.
     app.add_middleware(Head)
     doorkeeper = Doorkeeper(service.keys, service.settings, service.jobs.now)
+    app.state.doorkeeper = doorkeeper
     app.add_middleware(Gate, doorkeeper=doorkeeper, turnstile=Turnstile(service.settings))
     app.add_middleware(HostCheck, hosts=service.settings.hosts)
     app.add_middleware(Measured, metrics=app.state.metrics)
@@ -101,7 +103,7 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     app.include_router(jobs.submissions(service.registry))
     for module in (
         jobs, kinds, laws, events, designs, sweeps, scene_text, scenes, uploads, matrices, plan, previews,
-        health, metrics, reference, page,
+        projects, runs, shares, health, metrics, reference, page,
     ):  # fmt: skip
         app.include_router(module.router)
     openapi.install(app, service.registry)

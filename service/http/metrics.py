@@ -71,6 +71,7 @@ class _State(Collector):
         pruned.add_metric(("jobs",), float(gone.jobs))
         pruned.add_metric(("sweeps",), float(gone.sweeps))
         pruned.add_metric(("uploads",), float(gone.uploads))
+        pruned.add_metric(("projects",), float(gone.projects))
         yield pruned
 
 

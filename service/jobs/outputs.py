@@ -80,7 +80,13 @@ class Pace:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SweepRecord:
-    """A branch to be stored: the columns people filter by, and its parts."""
+    """A branch to be stored: the columns people filter by, and its parts.
+
+    Attributes
+    ----------
+    intermediate : bool
+        Whether it was computed on the way to another result, rather than being what was asked for.
+    """
 
     scene_name: str
     scene_hash: str
@@ -102,6 +108,7 @@ class SweepRecord:
     status: str
     error_estimate: float | None = None
     peaks_known: bool | None = None
+    intermediate: bool = False
     contacts: tuple[ContactValues, ...] = ()
     arrays: Mapping[str, StoredArray] = field(default_factory=dict)
 

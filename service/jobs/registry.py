@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from service.errors import InvalidRequestError
 from service.jobs.kind_view import KindView
 from service.jobs.outputs import JobOutput, Progress, Run, ShouldStop
+from service.jobs.run_words import Notes, RunName, Tags
 from solver.errors import Issue, pointer
 
 if TYPE_CHECKING:
@@ -35,6 +36,9 @@ class JobRequest(BaseModel):
         Of one owner's jobs those of a higher priority run first; equal ones in the order they came.
     max_seconds : float or None
         Longest time an attempt at it may take [s]; that of the service if left out.
+    project, name, notes, tags
+        What is said of the run (`ABOUT_THE_RUN`). They are no part of what is computed: a dump of the model
+        leaves them out.
     """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, validate_by_name=True)
@@ -52,6 +56,15 @@ class JobRequest(BaseModel):
         le=1e7,
         description="Longest time an attempt may take [s]; at most, and if left out, that of the service.",
     )
+    project: str | None = Field(
+        default=None, max_length=36, exclude=True, description="Id of the project the run belongs to."
+    )
+    name: RunName = Field(default="", exclude=True, description="Name of the run, to be found again by.")
+    notes: Notes = Field(default="", exclude=True, description="Notes on the run.")
+    tags: Tags = Field(default=(), exclude=True, description="Words the run is marked with.")
+
+
+ABOUT_THE_RUN = ("project", "name", "notes", "tags")
 
 
 class SceneSource(Protocol):

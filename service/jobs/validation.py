@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -13,6 +14,7 @@ from solver.errors import Issue, pointer
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
+_SHOULD = re.compile(r"^(?:Input|String|List|Tuple) should (be|have)\b")
 _SHOWN = 80  # characters of what was given
 _MESSAGES = {
     "extra_forbidden": "is not a known key",
@@ -54,8 +56,7 @@ def _issue(error: Mapping[str, Any]) -> Issue:
         return _unknown_tag(error, location)
     key = _cut(str(location[-1])) if location else "body"
     message = _MESSAGES.get(kind) or str(error["msg"]).removeprefix("Value error, ")
-    if message.startswith("Input should be "):
-        message = "must be " + message.removeprefix("Input should be ")
+    message = _SHOULD.sub(r"must \1", message)
     if not message.startswith("`"):
         message = f"`{key}` {message}"
         if kind not in ("missing", "extra_forbidden"):

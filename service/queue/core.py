@@ -31,6 +31,7 @@ from service.db.repositories import (
     UploadRepository,
 )
 from service.db.repositories.keys import KeyRepository
+from service.db.repositories.rows import RunWords
 from service.db.repositories.storage import StorageRepository
 from service.errors import ConflictError, InvalidRequestError, JobFailedError, NotFoundError
 from service.jobs import answering
@@ -38,13 +39,14 @@ from service.jobs.answering import Prepared, prepared
 from service.jobs.kinds.registry.bodies import KIND
 from service.jobs.kinds.registry.loading import registry_of
 from service.jobs.outputs import OnProgress
-from service.jobs.registry import JobKind, JobRequest, Registry
+from service.jobs.registry import ABOUT_THE_RUN, JobKind, JobRequest, Registry
 from service.jobs.validation import validated
 from service.queue.lanes import Lanes
 from service.queue.queue import JobQueue
 from service.queue.retention import Retention
 from service.queue.scene_store import SceneStore
 from service.queue.subscriptions import Event, Waiters
+from service.queue.workbench import Projects, Runs, Shares
 from service.settings.settings import Settings
 from service.uploads.uploads import Uploads
 from service.workers.answers import AnswerLimits, Answers
@@ -118,6 +120,9 @@ class Service:
         self.storage = Storage(StorageRepository(self.database), settings)
         self.uploads = Uploads(UploadRepository(self.database), settings, self.storage)
         self.scenes = SceneStore(SceneRepository(self.database), self.uploads)
+        self.runs = Runs(self.database, settings, self.jobs.now)
+        self.projects = Projects(self.database, settings, self.jobs.now)
+        self.shares = Shares(self.database, self.runs, self.jobs.now)
         self.waiters = Waiters()
         self.lanes = Lanes(settings.database_seconds)
         self.previews = Previews(settings.preview_seconds, memory_bytes=settings.answer_memory_bytes)
@@ -248,6 +253,7 @@ class Service:
             idempotency_key=idempotency_key,
             owner=caller.owner,
             seconds_limit=seconds,
+            words=RunWords(**{name: getattr(request, name) for name in ABOUT_THE_RUN}),
         )
         waiting = None if caller.key_id is None else share(caller, self.settings, "waiting")
         row, inserted = self.jobs.submit(new, self.settings.queue_limit, waiting)

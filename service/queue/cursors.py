@@ -44,7 +44,7 @@ def next_link(path: str, query: BaseModel, value: float | None, row_id: str) -> 
     """The link to the page behind a row: what was asked, but with that row's position."""
     given = query.model_dump(exclude_defaults=True, exclude={"cursor"}, mode="json")
     words = {key: str(item).lower() if isinstance(item, bool) else item for key, item in given.items()}
-    return f"{path}?" + urlencode({**words, "cursor": encode(value, row_id)})
+    return f"{path}?" + urlencode({**words, "cursor": encode(value, row_id)}, doseq=True)
 
 
 def _refused(cursor: str) -> InvalidRequestError:

@@ -12,7 +12,7 @@ from service.db.repositories.jobs.repository import JobRepository
 from service.db.repositories.retention import Pruned, RetentionRepository
 from service.db.revisions import off_head
 from service.errors import DatabaseError
-from service.queue.retention import prune, prune_uploads
+from service.queue.retention import empty_bin, prune, prune_uploads
 
 
 def prune_database(
@@ -25,6 +25,8 @@ def prune_database(
     vacuum: bool = False,
 ) -> Pruned:
     """Delete the jobs that ended longer ago than `seconds`, and uploads as old, or count them.
+
+    What was put in the bin longer ago goes with them, designs too.
 
     Raises
     ------
@@ -52,6 +54,7 @@ def prune_database(
             return replace(counted, uploads=len(repository.old_uploads(before)) if uploads else 0)
         database.acquire()
         found = prune(database, before, keep_designs=keep_designs, pause=_at_once)
+        found += empty_bin(database, before, pause=_at_once)
         if uploads:
             found += prune_uploads(database, before, pause=_at_once)
         if vacuum:

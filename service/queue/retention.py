@@ -71,6 +71,7 @@ def prune(
     before: datetime,
     *,
     keep_designs: bool,
+    binned: bool = False,
     pause: Callable[[float], bool] | None = None,
     on_progress: Callable[[Pruned], None] | None = None,
 ) -> Pruned:
@@ -79,13 +80,14 @@ def prune(
     Parameters
     ----------
     keep_designs : of designs delete the sweeps alone.
+    binned : those that were put in the bin before the time, in place of those that ended before it.
     pause : called between transactions with the time the last one took [s]; True ends the work.
     on_progress : called with what was deleted in every round.
     """
     repository, paced = RetentionRepository(database), _Paced(database, pause or _sleep)
     total = Pruned()
     while not paced.stopped:
-        jobs = repository.take(before, _JOBS, keep_designs=keep_designs)
+        jobs = repository.take(before, _JOBS, keep_designs=keep_designs, binned=binned)
         sweeps = paced.all(partial(repository.delete_sweeps, jobs, keep_designs=keep_designs))
         deleted = 0
         for index in range(0, len(jobs), _JOBS_AT_ONCE):
@@ -98,6 +100,23 @@ def prune(
         if found == Pruned():
             return total
     return total
+
+
+def empty_bin(
+    database: Database,
+    before: datetime,
+    *,
+    pause: Callable[[float], bool] | None = None,
+    on_progress: Callable[[Pruned], None] | None = None,
+) -> Pruned:
+    """Delete the runs and projects that were put in the bin before a time; arguments as of `prune`."""
+    found = prune(
+        database, before, keep_designs=False, binned=True, pause=pause, on_progress=on_progress
+    )  # fmt: skip
+    projects = Pruned(projects=RetentionRepository(database).delete_projects(before))
+    if on_progress is not None:
+        on_progress(projects)
+    return found + projects
 
 
 def prune_uploads(
@@ -122,8 +141,8 @@ class Retention:
     database : Database
         Where the jobs are.
     settings : Settings
-        `retention_days`, `retention_keep_designs` and `retention_upload_days`; without days nothing is ever
-        deleted.
+        `retention_days`, `retention_keep_designs` and `retention_upload_days`, without which no jobs and
+        uploads are deleted but those in the bin; `bin_days`.
     now : callable
         The clock of the database.
     """
@@ -137,9 +156,8 @@ class Retention:
         self.pruned = Pruned()
 
     def start(self) -> None:
-        """Begin, if the settings say so."""
-        if (self._settings.retention_days, self._settings.retention_upload_days) != (None, None):
-            self._thread.start()
+        """Begin."""
+        self._thread.start()
 
     def stop(self) -> None:
         """End within the transaction that runs."""
@@ -155,8 +173,8 @@ class Retention:
                 log.exception("what is old could not be deleted, it is tried again later")
             else:
                 if found != Pruned():
-                    words = "deleted %d old jobs, %d old sweeps and %d old uploads"
-                    log.info(words, found.jobs, found.sweeps, found.uploads)
+                    words = "deleted %d old jobs, %d old sweeps, %d old uploads, %d projects and %d links"
+                    log.info(words, found.jobs, found.sweeps, found.uploads, found.projects, found.links)
             self._stop.wait(_ROUND_SECONDS)
 
     def once(self) -> Pruned:
@@ -175,7 +193,19 @@ class Retention:
             uploads = prune_uploads(self._database, now - timedelta(days=upload_days), pause=self._stop.wait)
             self._count(uploads)
             found += uploads
-        return found
+        return found + self._bin(now)
+
+    def _bin(self, now: datetime) -> Pruned:
+        """Delete what was in the bin for long enough, and links whose time is over."""
+        if self._stop.is_set():
+            return Pruned()
+        found = empty_bin(
+            self._database, now - timedelta(days=self._settings.bin_days), pause=self._stop.wait,
+            on_progress=self._count,
+        )  # fmt: skip
+        links = Pruned(links=RetentionRepository(self._database).delete_links(now))
+        self._count(links)
+        return found + links
 
     def _count(self, found: Pruned) -> None:
         self.pruned += found

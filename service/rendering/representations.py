@@ -90,7 +90,11 @@ def _flat(item: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]
             if key not in _NOT_OF_LISTS:
                 yield from _flat(value, f"{prefix}{key}.")
         elif key not in _NOT_OF_LISTS:
-            yield prefix + key, value
+            yield prefix + key, "; ".join(map(str, value)) if _texts(value) else value
+
+
+def _texts(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(one, str) for one in value)
 
 
 def _csv(columns: Sequence[str], rows: Iterable[Iterable[Any]]) -> bytes:

@@ -47,6 +47,7 @@ _STATUS: dict[type[errors.ServiceError], tuple[int, str, str]] = {
     errors.TooManyRequestsError: (429, "too-many-requests", "Too many requests"),
     errors.NotFoundError: (404, "not-found", "Not found"),
     errors.ConflictError: (409, "conflict", "The request does not fit the present state"),
+    errors.ChangedMeanwhileError: (412, "changed-meanwhile", "It was changed meanwhile"),
     errors.IdempotencyError: (
         422,
         "idempotency-key-reused",

@@ -46,6 +46,7 @@ class StoredQuery(BaseModel):
             equal={column: value for column, value in equal.items() if value is not None},
             ranges={column: self._range(name) for name, column in self.ranges.items()},
             part=getattr(self, self.part),
+            of=getattr(self, "of", None),
             part_ranges={column: bounds for column, bounds in of_parts.items() if bounds != (None, None)},
             sort=self.sort.removeprefix("-"),
             descending=self.sort.startswith("-"),

@@ -33,6 +33,7 @@ class SweepQuery(StoredQuery):
         "harmonics": "harmonics",
         "job": "job_id",
         "completed": "completed",
+        "intermediate": "intermediate",
     }
     ranges: ClassVar[Mapping[str, str]] = {
         name: name for name in ("peak", "peak_at", "band_hz", "points", "seconds")
@@ -46,7 +47,13 @@ class SweepQuery(StoredQuery):
     parameter: Name = None
     harmonics: Count = None
     job: Name = None
+    of: Name = Field(
+        default=None, description="With the run of this id; also if an earlier one computed them for it."
+    )
     completed: bool | None = None
+    intermediate: bool | None = Field(
+        default=None, description="Whether it was computed on the way to another result; both if left out."
+    )
     peak_min: Bound = None
     peak_max: Bound = None
     peak_at_min: Bound = None

@@ -207,6 +207,13 @@ class Settings(Limits):
         description="Days after which uploads are deleted that no unfinished job and none that came since "
         "names; unset: never.",
     )
+    bin_days: float = Field(
+        default=7.0,
+        ge=0.01,
+        le=100_000.0,
+        description="Days after which runs and projects that were put in the bin are deleted for good, with "
+        "results and sweeps; they can be restored until then.",
+    )
     preview_seconds: float = Field(
         default=3.0, ge=0.05, le=60.0, description="Longest time a preview may be computed [s]."
     )

@@ -123,3 +123,14 @@ def test_what_a_job_computed_short_of_its_goal_is_no_damage(url: str) -> None:
         assert done.status is JobState.FAILED
         assert service.results(done.id).sweeps
         assert check(url).trouble == ()
+
+
+def test_runs_against_their_jobs_and_projects(copy: Path) -> None:
+    said = "SELECT id, NULL, '', '', created, 1, created FROM job"
+    change(copy, f"INSERT INTO run (job_id, project_id, name, notes, changed, revision, deleted) {said}")
+    assert trouble(copy) == ""
+    change(copy, "INSERT INTO project VALUES ('p', 'ben', '', '', '2026-01-01', '2026-01-01', 1, NULL)")
+    change(copy, "UPDATE run SET project_id = 'p'")
+    assert "1 runs in a project of another owner" in trouble(copy)
+    change(copy, "UPDATE job SET state = 'accepted'")
+    assert "1 runs in the bin whose job has not ended" in trouble(copy)

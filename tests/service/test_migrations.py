@@ -71,6 +71,9 @@ def test_up_down_and_up_again_keeps_every_row(old: str) -> None:
     for name, rows in before.items():
         same = [{key: row[key] for key in first} for first, row in zip(rows, above[name], strict=True)]
         assert same == rows
+    kinds = {row["id"]: row["kind"] for row in above["job"]}
+    on_the_way = {(kinds[row["job_id"]], bool(row["intermediate"])) for row in above["sweep"]}
+    assert on_the_way == {("design", True), ("sweep", False)}
     down(old, "0001")
     assert contents(old) == before
     assert revisions.upgrade(old) == revisions.head_revision()
@@ -127,3 +130,22 @@ def test_what_several_owners_made_is_told_apart_no_more_below_the_keys(old: str)
     assert len(keyed) == 1
     assert keyed != ["zz"]
     assert len(rows["job"]) == 9
+
+
+def test_what_is_said_of_runs_goes_with_its_tables_and_the_runs_stay(old: str) -> None:
+    revisions.upgrade(old)
+    service = Service(load_settings(database=old, workers=1))
+    service.open()
+    try:
+        job = service.jobs.page(limit=1)[0].id
+        project = service.projects.add("old things", "").id
+        words = {"name": "of old", "project": project, "tags": ("a", "b")}
+        assert service.runs.change(job, words).words.tags == ("a", "b")
+        service.shares.add(job, None)
+    finally:
+        service.database.close()
+    assert check(old).trouble == ()
+    down(old, "0005")
+    assert job in {row["id"] for row in contents(old)["job"]}
+    revisions.upgrade(old)
+    assert check(old).trouble == ()

@@ -68,6 +68,8 @@ def test_every_body_has_examples_that_work(shipped: ServedClient, description: d
             elif path == "/v1/uploads":
                 data = {"params": {"name": "example.mtx"}, "content": examples[0]}
                 assert shipped.request(method, path, **data).status_code in (200, 201)
+            elif "{" in path:
+                continue  # tests/service/test_workbench.py sends them
             elif path != "/v1/designs":
                 assert shipped.request(method, path, json=examples[0]).status_code in (200, 201), path
     assert bodies >= 10

@@ -18,6 +18,7 @@ from service.jobs.common.problem import arguments, problem_of
 from service.jobs.kinds.design import DesignRequest, resolve
 from service.jobs.kinds.pareto import ParetoRequest
 from service.jobs.kinds.pareto import resolve as resolve_front
+from service.jobs.registry import ABOUT_THE_RUN
 from service.jobs.validation import validated
 
 VARIABLES = {"damper.N0": [20, 1000]}
@@ -181,7 +182,7 @@ def test_a_scene_without_friction_has_nothing_to_choose_by_itself() -> None:
 def test_a_front_has_the_keys_of_a_design_but_its_own() -> None:
     theirs = set(inspect.signature(optim.pareto_front).parameters) - NO_KEYS
     keys = set(ParetoRequest.model_fields)
-    assert theirs == keys - {"scene", "set", "fresh", "priority", "max_seconds"}
+    assert theirs == keys - {"scene", "set", "fresh", "priority", "max_seconds", *ABOUT_THE_RUN}
     body = {**EVERY_KEY, "points": 5}
     for key in ("weights", "max_band_hz", "basins"):
         with pytest.raises(InvalidRequestError, match="is not a known key") as caught:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -23,11 +24,18 @@ from service.db.integrity import check
 from service.db.models import Design, Job, JobResult, JobState, Sweep, SweepArray, Upload
 from service.db.repositories import JobRepository, UploadRepository
 from service.db.repositories.retention import Pruned, RetentionRepository
-from service.errors import DatabaseError
+from service.db.repositories.rows import RunWords
+from service.db.repositories.workbench.projects import ProjectRepository
+from service.db.repositories.workbench.rows import ShareRow
+from service.db.repositories.workbench.runs import RunRepository
+from service.db.repositories.workbench.shares import ShareRepository
+from service.db.run_models import RunTag
+from service.errors import ConflictError, DatabaseError, StorageFullError
 from service.jobs.arrays import encode
 from service.jobs.outputs import DesignRecord, JobOutput, SweepRecord
 from service.queue.pruning import prune_database
-from service.queue.retention import prune, prune_uploads
+from service.queue.retention import Retention, prune, prune_uploads
+from service.queue.workbench import Runs
 
 DAY = timedelta(days=1)
 
@@ -218,7 +226,9 @@ def test_the_command(tmp_path: Path, make_settings: MakeSettings, capsys: pytest
         assert "is in use by another stickslip service" in capsys.readouterr().err
     size = (tmp_path / "jobs.db").stat().st_size
     assert main(["db", "prune", "--older-than", "30d", "--vacuum", "--json", "--database", url]) == 0
-    assert json.loads(capsys.readouterr().out) == {"jobs": 30, "sweeps": 30, "uploads": 0, "deleted": True}
+    assert json.loads(capsys.readouterr().out) == {
+        "jobs": 30, "sweeps": 30, "uploads": 0, "projects": 0, "links": 0, "deleted": True
+    }  # fmt: skip
     assert main(["db", "prune", "--older-than", "30d", "--uploads", "--database", url]) == 0
     assert "0 jobs, 0 sweeps and 1 uploads are deleted" in capsys.readouterr().out
     database = Database(url)
@@ -241,3 +251,61 @@ def test_tables_of_another_revision_are_left_alone(database: Database) -> None:
 def test_space_of_postgresql_is_its_own_affair(cluster: Any) -> None:
     with cluster.database(empty=False) as url, pytest.raises(DatabaseError, match="autovacuum"):
         prune_database(url, 1.0, keep_designs=True, vacuum=True)
+
+
+@pytest.fixture
+def binned(database: Database) -> tuple[Database, dict[str, str]]:
+    """A run and a design put in the bin eight days ago, a run put there today, one whose answer is in use."""
+    output = JobOutput(result={}, sweeps=(sweep(),))
+    found = {
+        "old": ended(database, 9.0, output, spec_hash="1" * 64, words=RunWords(name="old", tags=("a",))),
+        "design": ended(database, 9.0, JobOutput(result={}, sweeps=(sweep(),), design=design())),
+        "young": ended(database, 9.0, output, spec_hash="2" * 64),
+        "source": ended(database, 9.0, output, spec_hash="3" * 64),
+    }
+    found["user"] = ended(database, 9.0, output, spec_hash="3" * 64, fresh=False)
+    shares = ShareRepository(database)
+    for number, days in enumerate((-1.0, 1.0)):
+        row = ShareRow(
+            id=str(number), job_id=found["user"], digest="0" * 64, created=utc_now(),
+            expires=utc_now() + days * DAY,
+        )  # fmt: skip
+        shares.add(row, most=2)
+    with pytest.raises(StorageFullError):
+        shares.add(replace(row, id="2"), most=2)
+    for name, days in (("old", 8.0), ("design", 8.0), ("young", 1.0), ("source", 8.0)):
+        RunRepository(database, lambda days=days: utc_now() - days * DAY).put_in_bin(found[name])
+    return database, found
+
+
+def test_what_was_in_the_bin_for_days_is_deleted_for_good(
+    binned: tuple[Database, dict[str, str]], make_settings: MakeSettings
+) -> None:
+    database, made = binned
+    projects = ProjectRepository(database, lambda: utc_now() - 8.0 * DAY)
+    project, kept = (projects.add("", name, "", most=9).id for name in ("thrown away", "kept"))
+    RunRepository(database, utc_now).change(
+        RunRepository(database, utc_now).get(made["user"]), {"project": project}
+    )
+    projects.change(project, {"deleted": utc_now() - 8.0 * DAY})
+    assert RetentionRepository(database).count(before(7), keep_designs=True).projects == 1
+    retention = Retention(database, make_settings(), utc_now)
+    assert retention.once() == Pruned(jobs=2, sweeps=2, projects=1, links=1)
+    runs = RunRepository(database, utc_now)
+    there = {name: runs.get(job) for name, job in made.items()}
+    assert {name for name, row in there.items() if row is not None} == {"young", "source", "user"}
+    assert there["user"].words.project is None, "its runs stay without it"
+    assert projects.get(kept) is not None
+    assert retention.once() == Pruned()
+    with database.reading() as connection:
+        assert connection.execute(select(func.count()).select_from(RunTag)).scalar_one() == 0
+
+
+def test_a_run_whose_time_in_the_bin_is_over_is_not_restored(
+    binned: tuple[Database, dict[str, str]], make_settings: MakeSettings
+) -> None:
+    database, made = binned
+    runs = Runs(database, make_settings(), utc_now)
+    with pytest.raises(ConflictError, match="in the bin for more than 7 days"):
+        runs.restore(made["old"])
+    assert runs.restore(made["young"]).deleted is None

@@ -36,8 +36,10 @@ def known(service: ServedClient) -> dict[str, str]:
     body = {"scene": "two-dof", "variables": {"damper.N0": [20, 1000]}}
     job = service.post("/v1/designs", json=body, headers={"Prefer": "wait=60"}).json()
     upload = service.post("/v1/uploads", params={"name": "a.mtx"}, content=MATRIX).json()
+    project = service.post("/v1/projects", json={"name": "known"}).json()
     return {"job_id": job["id"], "design_id": job["id"], "sweep_id": job["sweeps"][0]["id"],
-            "upload_id": upload["id"], "name": "two-dof"}  # fmt: skip
+            "upload_id": upload["id"], "name": "two-dof", "project_id": project["id"],
+            "share_id": "none"}  # fmt: skip
 
 
 def check(case: Any, url: str) -> None:

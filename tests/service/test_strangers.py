@@ -36,6 +36,7 @@ OWNED = (401, 401, 404, 401, 401, 200, 200, 200)
 ENDED = (401, 401, 404, 401, 401, 403, 409, 409)
 MADE = (401, 401, 202, 401, 401, 403, 202, 202)
 STORED = (401, 401, 201, 401, 401, 403, 201, 201)
+CHANGED = (401, 401, 404, 401, 401, 403, 200, 200)
 PLANNED = (401, 401, 200, 401, 401, 403, 200, 200)
 MINE = {**load_scene("two-dof").to_dict(), "name": "mine"}
 NEW = {**MINE, "name": "another-scene"}
@@ -56,6 +57,27 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     "GET /v1/jobs/{job_id}/scene": ((401, 401, 404, 401, 401, 404, 404, 404), None),
     "GET /v1/jobs/{job_id}/events": (OWNED, None),
     "DELETE /v1/jobs/{job_id}": (ENDED, None),
+    "GET /v1/projects": (LISTED, None),
+    "POST /v1/projects": (STORED, {"name": "shroud"}),
+    "GET /v1/projects/{project_id}": (OWNED, None),
+    "PATCH /v1/projects/{project_id}": (CHANGED, {"notes": "of May"}),
+    "DELETE /v1/projects/{project_id}": (CHANGED, None),
+    "POST /v1/projects/{project_id}/restore": (CHANGED, None),
+    "GET /v1/runs": (LISTED, None),
+    "GET /v1/runs/compare": (OWNED, None),
+    "GET /v1/runs/{job_id}": (OWNED, None),
+    "PATCH /v1/runs/{job_id}": (CHANGED, {"name": "softer"}),
+    "DELETE /v1/runs/{job_id}": (CHANGED, None),
+    "POST /v1/runs/{job_id}/restore": (CHANGED, None),
+    "GET /v1/runs/{job_id}/shares": (OWNED, None),
+    "POST /v1/runs/{job_id}/shares": ((401, 401, 404, 401, 401, 403, 201, 201), {"days": 1.0}),
+    # Whoever may end it does so, and it is gone.
+    "DELETE /v1/runs/{job_id}/shares/{share_id}": ((401, 401, 404, 401, 401, 403, 204, 404), None),
+    # A link needs no key; one that does not work is refused all the same.
+    "GET /v1/shared": (OPEN, None),
+    "GET /v1/shared/results": (OPEN, None),
+    "GET /v1/shared/scene": ((404, 401, 404, 401, 401, 404, 404, 404), None),
+    "GET /v1/shared/sweeps/{sweep_id}": (OPEN, None),
     "GET /v1/designs": (LISTED, None),
     # Its kind is not among those of these tests, which says so to whoever gets that far.
     "POST /v1/designs": ((401, 401, 422, 401, 401, 403, 422, 422), {}),
@@ -92,6 +114,12 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     # The page itself, which asks for a key.
     "GET /": (OPEN, None),
     "GET /page/{hashed}/{path:path}": (OPEN, None),
+}
+QUERIES = {
+    "/v1/runs/compare": "?a={job_id}&b={design_id}",
+    **dict.fromkeys(
+        ("/v1/shared", "/v1/shared/results", "/v1/shared/scene", "/v1/shared/sweeps/"), "?token={token}"
+    ),
 }
 PAGE = ("GET /", "GET /page/{hashed}/{path:path}")
 
@@ -135,6 +163,10 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[House]:
         made.ids.update(mass_id=mass["id"])
         made.ids.update(job_id=job["id"], sweep_id=job["sweeps"][0]["id"], upload_id=upload["id"])
         made.ids.update(design_id=add_design(client, "ann"), name="mine")
+        project = made.ask("submit", "POST", "/v1/projects", json={"name": "mine"}).json()
+        made.ids.update(project_id=project["id"])
+        links = [made.ask("submit", "POST", f"/v1/runs/{job['id']}/shares", json={}).json() for _ in "ab"]
+        made.ids.update(share_id=links[0]["id"], token=links[1]["token"])
         made.ids.update(hashed=page.version(), path="icon.svg")
         yield made
 
@@ -212,6 +244,7 @@ def test_everybody_gets_what_is_theirs(house: House, route: str) -> None:
     method, path = route.split()
     expected, body = TABLE[route]
     address, got = path.replace(":path", "").format(**house.ids), []
+    address += QUERIES.get(path.removesuffix("{sweep_id}"), "").format(**house.ids)
     for role in ROLES:
         answer = house.ask(role, method, address, **arguments_of(house.filled(body), len(got)))
         got.append(answer.status_code)

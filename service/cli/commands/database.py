@@ -61,7 +61,8 @@ def prune(
         print_json({**asdict(found), "deleted": not dry_run})
     else:
         words = "would be deleted" if dry_run else "are deleted"
-        say(f"{found.jobs} jobs, {found.sweeps} sweeps and {found.uploads} uploads {words}")
+        projects = f", {found.projects} projects" if found.projects else ""
+        say(f"{found.jobs} jobs, {found.sweeps} sweeps{projects} and {found.uploads} uploads {words}")
 
 
 def check(database: options.Database = None, as_json: options.Json = False) -> None:

@@ -32,6 +32,7 @@ def report(
     """
     import solver
     from service.cli.commands.jobs import client_of
+    from service.jobs.registry import ABOUT_THE_RUN
     from service.rendering.report.sections import Designed
 
     target = inputs.output_path("--out", out, SUFFIXES)
@@ -44,7 +45,8 @@ def report(
             )
         answer = client.results(job)
         scene = solver.Scene.from_dict(client.job_scene(job))
-    problem = {k: v for k, v in (asked.request or {}).items() if k not in _NOT_OF_A_PROBLEM}
+    apart = (*_NOT_OF_A_PROBLEM, *ABOUT_THE_RUN)
+    problem = {k: v for k, v in (asked.request or {}).items() if k not in apart}
     if target is not None:
         write(Designed(scene=scene, problem=problem, result=answer.result), target)
         say(f"{target} is written")

@@ -22,12 +22,12 @@ from service.cli.options.key_options import (
 from service.cli.options.keyed import keyed
 from service.cli.options.problem import FLAGS, ProblemFlags, takes_problem
 from service.cli.table import COMMANDS
-from service.jobs.registry import JobKind
+from service.jobs.registry import ABOUT_THE_RUN, JobKind
 
 if TYPE_CHECKING:
     from service.jobs.common.problem import ProblemRequest
 
-_OF_ALL = ("fresh", "priority", "max_seconds")
+_OF_ALL = ("fresh", "priority", "max_seconds", *ABOUT_THE_RUN)
 
 
 def command_of(kind: JobKind) -> Any:

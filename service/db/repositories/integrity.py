@@ -10,11 +10,13 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, Engine, Select, Text, and_, cast, exists, func, select, text
 
 from service.db.models import Job, JobResult, JobState, Sweep, SweepArray
+from service.db.run_models import Project, Run
 from service.jobs.outputs import StoredArray
 
 # A job that ends as `successful` wrote its result with the same transaction, unless it repeats another's.
 # One that failed may have kept what it computed short of its goal.
 _WITHOUT_RESULT = (JobState.ACCEPTED, JobState.RUNNING, JobState.DISMISSED)
+_UNFINISHED = (JobState.ACCEPTED, JobState.RUNNING)
 _WITH_RESULT = exists().where(JobResult.job_id == Job.id)
 _WITH_SWEEPS = exists().where(Sweep.job_id == Job.id)
 
@@ -54,6 +56,12 @@ def contradictions(connection: Connection) -> list[str]:
         "sweeps without their arrays": select(func.count())
         .select_from(Sweep)
         .where(~exists().where(SweepArray.sweep_id == Sweep.id)),
+        "runs in the bin whose job has not ended": _runs(
+            Job.state.in_(_UNFINISHED), Run.deleted.is_not(None)
+        ),
+        "runs in a project of another owner": _runs(
+            exists().where(Project.id == Run.project_id, Project.owner != Job.owner)
+        ),
     }
     counts = {words: connection.execute(query).scalar_one() for words, query in questions.items()}
     return [f"{count} {words}" for words, count in counts.items() if count]
@@ -61,6 +69,10 @@ def contradictions(connection: Connection) -> list[str]:
 
 def _jobs(*conditions: ColumnElement[bool]) -> Select[Any]:
     return select(func.count()).select_from(Job).where(and_(*conditions))
+
+
+def _runs(*conditions: ColumnElement[bool]) -> Select[Any]:
+    return select(func.count()).select_from(Run).join(Job, Job.id == Run.job_id).where(and_(*conditions))
 
 
 def arrays(engine: Engine) -> Iterator[tuple[str, str, StoredArray]]:

@@ -13,6 +13,7 @@ from sqlalchemy.orm import aliased
 from service.db.engine import Database
 from service.db.models import Design, Job, JobState, Sweep, SweepArray, Upload
 from service.db.repositories.jobs.statements import ADD_STORED
+from service.db.run_models import Project, Run, Share
 from service.jobs.common.scenes import UPLOAD
 
 _ENDED = [state for state in JobState if state.finished]
@@ -27,17 +28,21 @@ _IS_AN_ANSWER = select(_later.id).where(_later.result_of == Job.id).correlate(Jo
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pruned:
-    """How much was, or would be, deleted: jobs with their results, sweeps with their arrays, uploads."""
+    """How much was, or would be, deleted: jobs with their results, sweeps with their arrays, and others."""
 
     jobs: int = 0
     sweeps: int = 0
     uploads: int = 0
+    projects: int = 0
+    links: int = 0
 
     def __add__(self, other: Pruned) -> Pruned:
         return Pruned(
             jobs=self.jobs + other.jobs,
             sweeps=self.sweeps + other.sweeps,
             uploads=self.uploads + other.uploads,
+            projects=self.projects + other.projects,
+            links=self.links + other.links,
         )
 
 
@@ -53,19 +58,29 @@ class RetentionRepository:
         self._db = database
 
     def count(self, before: datetime, *, keep_designs: bool) -> Pruned:
-        """How much `take` and `delete` would delete of jobs that ended before a time."""
+        """How much would be deleted of jobs that ended, or were put in the bin, before a time."""
         old = _old(before, keep_designs=keep_designs)
         gone = and_(old, ~_HAS_DESIGN) if keep_designs else old
+        binned = _binned(before)
+        old, gone = or_(old, binned), or_(gone, binned)
         jobs = select(func.count()).select_from(Job).where(gone)
         sweeps = select(func.count()).select_from(Sweep).join(Job, Job.id == Sweep.job_id).where(old)
+        projects = select(func.count()).select_from(Project).where(Project.deleted < before)
         with self._db.reading() as connection:
             return Pruned(
-                jobs=connection.execute(jobs).scalar_one(), sweeps=connection.execute(sweeps).scalar_one()
-            )
+                jobs=connection.execute(jobs).scalar_one(), sweeps=connection.execute(sweeps).scalar_one(),
+                projects=connection.execute(projects).scalar_one(),
+            )  # fmt: skip
 
-    def take(self, before: datetime, most: int, *, keep_designs: bool) -> list[str]:
-        """Take up to `most` old jobs out of the store of results; their ids, oldest first."""
-        query = select(Job.id).where(_old(before, keep_designs=keep_designs)).order_by(Job.id).limit(most)
+    def take(self, before: datetime, most: int, *, keep_designs: bool, binned: bool = False) -> list[str]:
+        """Take up to `most` old jobs out of the store of results; their ids, oldest first.
+
+        Parameters
+        ----------
+        binned : those that were put in the bin before the time, in place of those that ended before it.
+        """
+        old = _binned(before) if binned else _old(before, keep_designs=keep_designs)
+        query = select(Job.id).where(old).order_by(Job.id).limit(most)
         with self._db.reading() as connection:
             ids = list(connection.execute(query).scalars())
         if ids:
@@ -93,6 +108,22 @@ class RetentionRepository:
             if ids:
                 connection.execute(delete(Job).where(Job.id.in_(ids)))
         return len(ids)
+
+    def delete_projects(self, before: datetime) -> int:
+        """Delete the projects that were put in the bin before a time; how many were. Their runs stay."""
+        return self._delete_any(Project, Project.deleted < before)
+
+    def delete_links(self, now: datetime) -> int:
+        """Delete the links to runs whose time is over; how many were."""
+        return self._delete_any(Share, Share.expires < now)
+
+    def _delete_any(self, table: type[Project | Share], condition: ColumnElement[bool]) -> int:
+        """Delete the rows of a condition; nothing is written where there is none."""
+        with self._db.reading() as connection:
+            if connection.execute(select(table.id).where(condition).limit(1)).one_or_none() is None:
+                return 0
+        with self._db.writing() as connection:
+            return connection.execute(delete(table).where(condition)).rowcount
 
     def old_uploads(self, before: datetime) -> list[str]:
         """Ids of the uploads that came before a time and that nobody uses, oldest first.
@@ -136,3 +167,9 @@ def _old(before: datetime, *, keep_designs: bool) -> ColumnElement[bool]:
     if not keep_designs:
         return and_(ended, ~_IS_AN_ANSWER)
     return and_(ended, or_(and_(~_HAS_DESIGN, ~_IS_AN_ANSWER), and_(_HAS_DESIGN, _HAS_SWEEPS)))
+
+
+def _binned(before: datetime) -> ColumnElement[bool]:
+    """Jobs that were put in the bin before a time, and that no younger one gives as its answer."""
+    deleted = select(Run.job_id).where(Run.deleted < before)
+    return and_(Job.id.in_(deleted), Job.state.in_(_ENDED), ~_IS_AN_ANSWER)

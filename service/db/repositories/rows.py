@@ -40,6 +40,19 @@ class JobRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RunWords:
+    """What is said of a run: the id of its project, its name, its notes, the words it is marked with."""
+
+    project: str | None = None
+    name: str = ""
+    notes: str = ""
+    tags: tuple[str, ...] = ()
+
+
+NO_WORDS = RunWords()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class NewJob:
     """A job to be inserted."""
 
@@ -56,6 +69,7 @@ class NewJob:
     idempotency_key: str | None = None
     owner: str = NOBODY
     seconds_limit: float | None = None
+    words: RunWords = NO_WORDS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Generic, TypeVar
 
-from sqlalchemy import Connection, Select, bindparam, select
+from sqlalchemy import Connection, Select, bindparam, func, select
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from service.db.engine import Database
-from service.db.models import NOBODY
+from service.db.models import NOBODY, Job
 from service.db.pagination import (
     FEW,
     Condition,
@@ -22,6 +22,7 @@ from service.db.pagination import (
     plain_conditions,
     within,
 )
+from service.db.repositories.workbench.words import in_the_bin
 
 Row = TypeVar("Row")
 Part = TypeVar("Part")
@@ -45,6 +46,8 @@ class Filter:
         Name of a part it must have; None for any.
     part_ranges : mapping
         Column name of the parts to (lowest, highest); one part must meet all of them.
+    of : str or None
+        With the run of this job, be it that an earlier job computed them; None for any.
     sort : str
         ``created`` (by the time the job was handed in) or a sort of the table; rows that have no such value
         are left out.
@@ -57,6 +60,7 @@ class Filter:
     ranges: Mapping[str, Range] = field(default_factory=dict)
     part: str | None = None
     part_ranges: Mapping[str, Range] = field(default_factory=dict)
+    of: str | None = None
     sort: str = CREATED
     descending: bool = True
 
@@ -115,14 +119,19 @@ class StoredRepository(Generic[Row, Part]):
         )
 
     def page(self, wanted: Filter, limit: int, after: Position | None = None) -> list[Row]:
-        """A page of rows; `after` is the sort value and id of the last one of the page before."""
+        """A page of rows; `after` is the sort value and id of the last one of the page before.
+
+        Those of runs in the bin are left out, unless it is their run that is asked for.
+        """
         with self._db.reading() as connection:
             column = self._sorts.get(wanted.sort)
             conditions = self._conditions(wanted)
-            leads = column is None and not wanted.equal
+            leads = column is None and not wanted.equal and wanted.of is None
             owner: Column = self._table.owner
             conditions += owner_condition(connection, self._identity, owner, wanted.owner, leads=leads)
             query = met(connection, self._select, self._identity, conditions, column)
+            if "job_id" not in wanted.equal and wanted.of is None:
+                query = query.where(~in_the_bin(self._table.job_id))
             query = ordered(query, self._identity, column, descending=wanted.descending, after=after)
             return self._read(connection, query.limit(limit))
 
@@ -155,6 +164,9 @@ class StoredRepository(Generic[Row, Part]):
 
     def _conditions(self, wanted: Filter) -> list[Condition]:
         found = [getattr(self._table, name) == value for name, value in wanted.equal.items()]
+        if wanted.of is not None:
+            source = select(func.coalesce(Job.result_of, Job.id)).where(Job.id == wanted.of)
+            found.append(self._table.job_id == source.scalar_subquery())
         for name, bounds in wanted.ranges.items():
             found.extend(within(getattr(self._table, name), bounds))
         conditions = plain_conditions(self._identity, found)

@@ -15,7 +15,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.auth import callers
 from service.auth.authenticator import REMEMBERED_SECONDS, Doorkeeper
-from service.auth.callers import Caller
+from service.auth.callers import LINK_READERS, Caller
 from service.auth.keys import id_of
 from service.errors import OriginRefusedError, ServiceError, UnauthorizedError
 from service.http.middleware.turnstile import Turnstile
@@ -24,6 +24,8 @@ from service.schemas.problems import AWAY, answered
 OPEN = frozenset({"/health/live", "/health/ready", "/openapi.json", "/docs", "/docs/style.css", "/"})
 """Paths that need no key: whether the service lives, what its API is, and the page, which asks for a key."""
 _PAGE = "/page/"
+_SHARED = "/v1/shared"
+"""What a link to a run shows, by the token in the query."""
 _MONITORED = frozenset({"/metrics"})
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _OURS = frozenset({"same-origin", "none"})
@@ -32,11 +34,16 @@ _BEARER = "bearer "
 
 def scope_of(method: str, path: str) -> callers.Scope | None:
     """The scope that a request needs; None for none."""
-    if (path in OPEN or path.startswith(_PAGE)) and method in _READING:
+    if (path in OPEN or path.startswith(_PAGE) or by_link(path)) and method in _READING:
         return None
     if path in _MONITORED:
         return callers.Scope.MONITOR
     return callers.Scope.READ if method in _READING else callers.Scope.SUBMIT
+
+
+def by_link(path: str) -> bool:
+    """Whether a path is one that a link to a run opens."""
+    return path == _SHARED or path.startswith(f"{_SHARED}/")
 
 
 class Gate:
@@ -62,6 +69,8 @@ class Gate:
                 if needed is not None:
                     self._doorkeeper.require(caller, needed)
                     held.enter_context(self._turnstile.passed(caller, scope))
+                elif by_link(scope["path"]):
+                    held.enter_context(self._turnstile.passed(LINK_READERS, scope))
                 self._doorkeeper.count(caller)
             except (ServiceError, *AWAY) as error:
                 await answered(request, error)(scope, receive, send)

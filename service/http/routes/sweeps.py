@@ -10,6 +10,7 @@ from service.db.models import Sweep
 from service.http.dependencies import CallerDependency, ServiceDependency, listing, tagged
 from service.http.in_lane import drawing, reading, writing_files
 from service.http.routes.described import BINARY, LISTED, TEXT, UNCHANGED, media
+from service.queue.core import Service
 from service.rendering.representations import (
     BY_FORMAT,
     JSON,
@@ -25,10 +26,16 @@ from service.schemas.sweep_queries import SweepQuery, sweep_page
 router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
 
 _PICTURE_TYPES = {"svg": "image/svg+xml", "png": "image/png"}
-_FORMS: dict[int | str, dict[str, Any]] = {
+SWEEP_FORMS: dict[int | str, dict[str, Any]] = {
     200: media({form: TEXT if form.startswith("text/") else BINARY for form in SWEEP_MEDIA if form != JSON}),
     **UNCHANGED,
 }
+
+
+SweepForm = Annotated[
+    Literal["json", "csv", "npz", "parquet"] | None,
+    Query(alias="format", description="In place of `Accept`, for links."),
+]
 
 
 @router.get("", response_model=SweepPage, responses=LISTED)
@@ -43,17 +50,14 @@ def list_sweeps(
     return listing(request, sweep_page(service.sweeps, query, service.settings, caller.sees))
 
 
-@router.get("/{sweep_id}", response_model=SweepDetail, responses=_FORMS)
+@router.get("/{sweep_id}", response_model=SweepDetail, responses=SWEEP_FORMS)
 @writing_files
 def get_sweep(
     sweep_id: str,
     request: Request,
     service: ServiceDependency,
     caller: CallerDependency,
-    form: Annotated[
-        Literal["json", "csv", "npz", "parquet"] | None,
-        Query(alias="format", description="In place of `Accept`, for links."),
-    ] = None,
+    form: SweepForm = None,
 ) -> Response:
     """A stored sweep with its arrays, in the form that `Accept` prefers.
 
@@ -61,12 +65,16 @@ def get_sweep(
     `application/x-npz` (also as `application/zip`), which `numpy.load` reads, and in
     `application/vnd.apache.parquet`.
     """
+    return sweep_answer(service.sweep(sweep_id, caller), form, request, service)
+
+
+def sweep_answer(sweep: Sweep, form: str | None, request: Request, service: Service) -> Response:
+    """A stored sweep in the form of `form`, or the one that `Accept` prefers."""
     accept = request.headers.get("accept") if form is None else BY_FORMAT[form]
     kind = chosen(accept, SWEEP_MEDIA)
     headers = {"Vary": "Accept"}
     if kind in SUFFIXES:
-        headers["Content-Disposition"] = f'attachment; filename="sweep-{sweep_id}.{SUFFIXES[kind]}"'
-    sweep = service.sweep(sweep_id, caller)
+        headers["Content-Disposition"] = f'attachment; filename="sweep-{sweep.id}.{SUFFIXES[kind]}"'
     scene = None if kind == "application/json" else service.jobs.spec(sweep.job_id).get("scene")
     return tagged(request, sweep_body(sweep, kind, service.sweeps, scene), kind, headers)
 

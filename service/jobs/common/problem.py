@@ -12,6 +12,7 @@ from optim.criteria.json_types import Pair as Pair
 from optim.criteria.json_types import Ranges as Ranges
 from optim.problem.keys import ProblemKeys
 from service.jobs.common.scenes import HarmonicRequest
+from service.jobs.registry import ABOUT_THE_RUN
 from solver.scene.scene import Scene
 
 
@@ -22,7 +23,7 @@ class ProblemRequest(ProblemKeys, HarmonicRequest):
 
 
 ABOUT_THE_SCENE = ("scene", "set")
-ABOUT_THE_JOB = ("fresh", "priority", "max_seconds")
+ABOUT_THE_JOB = ("fresh", "priority", "max_seconds", *ABOUT_THE_RUN)
 
 
 def arguments(request: ProblemRequest) -> dict[str, Any]:

@@ -23,7 +23,9 @@ _STORED = tuple(field.name for field in fields(ContactValues) if field.name != "
 _ARRAYS = ("amplitude", "half_peak_to_peak", "mean", "coefficients", "observed")
 
 
-def sweep_record(branch: Branch, frequency_hz: float | None = None) -> SweepRecord:
+def sweep_record(
+    branch: Branch, frequency_hz: float | None = None, *, intermediate: bool = False
+) -> SweepRecord:
     """The branch with the columns people filter by; the scene's values are those that stayed fixed.
 
     Parameters
@@ -32,6 +34,8 @@ def sweep_record(branch: Branch, frequency_hz: float | None = None) -> SweepReco
         With at least one point.
     frequency_hz : float or None
         Excitation frequency [Hz], if another parameter was swept.
+    intermediate : bool
+        Whether it was computed on the way to another result.
     """
     scene, parameter = branch.balance.scene, branch.parameter
     peak = branch.peak
@@ -59,6 +63,7 @@ def sweep_record(branch: Branch, frequency_hz: float | None = None) -> SweepReco
         status=branch.status.value,
         error_estimate=_finite(branch.error_estimate),
         peaks_known=branch.peak_certificate.known,
+        intermediate=intermediate,
         contacts=contact_values(scene, parameter),
         arrays={
             "parameter": encode(branch.values),
@@ -70,10 +75,10 @@ def sweep_record(branch: Branch, frequency_hz: float | None = None) -> SweepReco
     )
 
 
-def sweep_records(branches: Iterable[Branch]) -> tuple[SweepRecord, ...]:
-    """The frequency responses that have points, each once."""
+def sweep_records(branches: Iterable[Branch], *, intermediate: bool = False) -> tuple[SweepRecord, ...]:
+    """The frequency responses that have points, each once; `intermediate` as of `sweep_record`."""
     once = {id(branch): branch for branch in branches if len(branch.values)}
-    return tuple(sweep_record(branch) for branch in once.values())
+    return tuple(sweep_record(branch, intermediate=intermediate) for branch in once.values())
 
 
 def packed(records: Iterable[SweepRecord]) -> tuple[list[dict[str, Any]], dict[str, StoredArray]]:

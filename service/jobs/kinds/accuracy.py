@@ -118,7 +118,7 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     return JobOutput.of(
         study,
         reached=study.completed,
-        sweeps=() if study.branch is None else sweep_records([study.branch]),
+        sweeps=() if study.branch is None else sweep_records([study.branch], intermediate=True),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ConfigDict, RootModel
@@ -15,7 +15,7 @@ from service.jobs.common.scenes import refusal, require, resolve_scene, resolved
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
 from service.jobs.kinds.registry.results import Amplitude, PeakAt, ReachedResult, Table
-from service.jobs.outputs import JobOutput, Progress, ShouldStop
+from service.jobs.outputs import JobOutput, Progress, ShouldStop, SweepRecord
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, pointer
 from solver.scene.examples import DISK_LOAD
@@ -24,6 +24,7 @@ from solver.scene.scene import Scene
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from solver import Branch
 
 UNCERTAIN = "uncertain"
 _NOT_ROBUST = ("basins",)
@@ -162,7 +163,7 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     return JobOutput.of(
         found,
         reached=found.reached,
-        sweeps=tuple(sweep_record(branch) for branch in found.sweeps if len(branch.values)),
+        sweeps=_on_the_way(found.sweeps),
         design=design_record(found),
     )
 
@@ -175,9 +176,14 @@ def _run_robust(
     return JobOutput.of(
         found,
         reached=found.reached,
-        sweeps=tuple(sweep_record(branch) for branch in found.design.sweeps if len(branch.values)),
+        sweeps=_on_the_way(found.design.sweeps),
         design=robust_record(found),
     )
+
+
+def _on_the_way(branches: Iterable[Branch]) -> tuple[SweepRecord, ...]:
+    """The responses that a search computed, as they are stored."""
+    return tuple(sweep_record(branch, intermediate=True) for branch in branches if len(branch.values))
 
 
 def draw(result: Json, sweeps: Sequence[StoredSweep], read: ReadSweep) -> Figure:

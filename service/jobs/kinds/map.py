@@ -184,7 +184,7 @@ def _ridge(spec: Mapping[str, Any], progress: OnProgress, should_stop: ShouldSto
     )
     if track.status is solver.TrackStatus.STOPPED:
         raise PartStoppedError
-    sweeps, arrays = packed(sweep_records(track.branches))
+    sweeps, arrays = packed(sweep_records(track.branches, intermediate=True))
     return PartOutput(result={"ridge": strict_json.finite(track.to_json()), "sweeps": sweeps}, arrays=arrays)
 
 

@@ -82,7 +82,7 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     return JobOutput.of(
         found,
         reached=found.reached,
-        sweeps=tuple(sweep_record(branch) for branch in branches if len(branch.values)),
+        sweeps=tuple(sweep_record(branch, intermediate=True) for branch in branches if len(branch.values)),
     )
 
 

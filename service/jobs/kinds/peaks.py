@@ -95,7 +95,7 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     return JobOutput.of(
         track,
         reached=track.completed,
-        sweeps=sweep_records(track.branches),
+        sweeps=sweep_records(track.branches, intermediate=True),
     )
 
 

@@ -29,6 +29,7 @@ from service.db.repositories.jobs.queue_limits import Room, require_share
 from service.db.repositories.jobs.recovery import FREE, change, recover
 from service.db.repositories.rows import Attempt, JobRow, NewJob, Recovered
 from service.db.repositories.sweeps import insert_sweeps
+from service.db.repositories.workbench.words import in_the_bin, insert_words, require_project
 from service.errors import IdempotencyError
 from service.jobs.ids import new_id
 from service.jobs.outputs import JobFailure, JobOutput, Piece
@@ -101,6 +102,8 @@ class JobRepository:
             `queue_limit` jobs wait already.
         TooManyRequestsError
             `waiting_limit` jobs of this owner wait already.
+        InvalidRequestError
+            The owner has no such project.
         """
         return self._db.grouped(lambda connection: self._submit(connection, new, queue_limit, waiting_limit))
 
@@ -110,6 +113,8 @@ class JobRepository:
         known = self._by_key(connection, new)
         if known is not None:
             return known, False
+        # Before anything is written: what others do in the same transaction is kept if this is refused.
+        require_project(connection, new.words.project, new.owner)
         source = None if new.fresh else self._computed_before(connection, new)
         if source is None:
             if waiting_limit is not None:
@@ -144,8 +149,8 @@ class JobRepository:
         before: str | None = None,
         limit: int = 100,
     ) -> list[JobRow]:
-        """Jobs of an owner, or of everybody (None), newest first, older than the job `before`."""
-        query = select(*_LISTED).order_by(Job.id.desc()).limit(limit)
+        """Jobs outside of the bin, of an owner or of everybody (None), newest first, older than `before`."""
+        query = select(*_LISTED).where(~in_the_bin(Job.id)).order_by(Job.id.desc()).limit(limit)
         if before is not None:
             query = query.where(Job.id < before)
         equal = ((Job.state, state), (Job.kind, kind), (Job.scene_name, scene))
@@ -375,6 +380,7 @@ class JobRepository:
         request, spec = encoded(new.request), encoded(new.spec)
         stored = {"request": request, "spec": spec, "stored_bytes": len(request) + len(spec)}
         connection.execute(statements.INSERT_JOB, written | stored)
+        insert_words(connection, written["id"], new.words, now)
         return JobRow(**{name: written[name] for name in statements.ROW})
 
     @staticmethod

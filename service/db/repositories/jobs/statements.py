@@ -11,13 +11,14 @@ from sqlalchemy.sql.elements import ColumnElement
 from service.db.models import Job, JobResult, JobState
 from service.db.repositories.jobs.guards import OWNED
 from service.db.repositories.rows import Attempt, JobRow, NewJob
+from service.db.repositories.workbench.words import in_the_bin
 
 _JOB: Table = Job.metadata.tables["job"]
 _RESULT: Table = JobResult.metadata.tables["job_result"]
 _C = _JOB.c
 
 ROW = [item.name for item in fields(JobRow)]
-NEW_COLUMNS = [item.name for item in fields(NewJob) if item.name != "fresh"]
+NEW_COLUMNS = [item.name for item in fields(NewJob) if item.name not in ("fresh", "words")]
 INITIAL: dict[str, Any] = {
     "state": JobState.ACCEPTED, "attempt": 0, "cancel_requested": False, "progress": 0.0, "points": 0,
     "started": None, "finished": None, "result_of": None, "error": None,
@@ -39,7 +40,7 @@ ADD_STORED = (
 COMPUTED_BEFORE = (
     select(_C.id)
     .where(_C.spec_hash == bindparam("hash"), _C.state == JobState.SUCCESSFUL, _C.result_of.is_(None))
-    .where(_C.owner == bindparam("owner"))
+    .where(_C.owner == bindparam("owner"), ~in_the_bin(Job.id))
     .order_by(_C.id.concat("").desc())
     .limit(1)
 )

@@ -10,7 +10,8 @@ import { resume, run } from "../network/jobs.js";
 import { asked } from "../scene/scenes.js";
 import { VIEWS } from "../views.js";
 
-const OF_THE_PAGE = ["kind", "scene", "set", "harmonics", "fresh", "priority", "max_seconds"];
+const OF_THE_PAGE = ["kind", "scene", "set", "harmonics", "fresh", "priority", "max_seconds",
+  "project", "name", "notes", "tags"];
 const ROWS = 200;
 let kinds = [];
 

@@ -1,0 +1,175 @@
+"""The commands about runs of a service: listed, named, put in the bin, compared, shared."""
+
+from __future__ import annotations
+
+from itertools import islice
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from service.cli.commands.jobs import client_of
+from service.cli.options import shared as options
+from service.cli.options.numeric import amount, count
+from service.errors import InputError
+from service.rendering.tables.text import print_json, print_table, say
+
+if TYPE_CHECKING:
+    from service.schemas.workbench_answers import RunAnswer
+
+_MOST = 50
+
+OfProject = Annotated[
+    str | None, typer.Option("--project", metavar="ID", help="Id of a project, as `projects list` shows it.")
+]
+Tags = Annotated[list[str] | None, typer.Option("--tag", metavar="WORD", help="Marked with it; repeatable.")]
+Text = Annotated[str | None, typer.Option("--text", metavar="TEXT", help="In the name or the notes.")]
+States = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--status", metavar="S", help="accepted, running, successful, failed or dismissed; repeatable."
+    ),
+]
+Name = Annotated[str | None, typer.Option("--name", metavar="TEXT", help="Its name.")]
+Notes = Annotated[str | None, typer.Option("--notes", metavar="TEXT", help="Its notes.")]
+Binned = Annotated[bool, typer.Option("--deleted", help="Those in the bin.")]
+Count = Annotated[int | None, count("--count", "N", f"At most so many; {_MOST}.")]
+First = Annotated[str, typer.Argument(metavar="A", help="Id of a run.")]
+Second = Annotated[str, typer.Argument(metavar="B", help="Id of another one.")]
+Days = Annotated[float | None, amount("--days", "N", "After which the link ends; never.")]
+
+
+def most_of(given: int | None) -> int:
+    """How many to list."""
+    most = _MOST if given is None else given
+    if most < 1:
+        raise InputError(f"`--count` must be >= 1, got {most!r}")
+    return most
+
+
+def given_of(**changes: Any) -> dict[str, Any]:
+    """The changes that were given.
+
+    Raises
+    ------
+    InputError
+        None was.
+    """
+    given = {key: value for key, value in changes.items() if value is not None}
+    if not given:
+        raise InputError(f"give what is to be changed: {', '.join(f'--{key}' for key in changes)}")
+    return given
+
+
+def show(
+    project: OfProject = None,
+    tag: Tags = None,
+    text: Text = None,
+    status: States = None,
+    deleted: Binned = False,
+    limit: Count = None,
+    as_json: options.Json = False,
+    url: options.Url = options.DEFAULT_URL,
+) -> None:
+    """List the runs, newest first."""
+    most = most_of(limit)
+    filters = {
+        "project": project, "tag": tag or None, "text": text, "status": status or None,
+        "deleted": deleted or None, "limit": min(most, 1000),
+    }  # fmt: skip
+    with client_of(url) as client:
+        found = list(islice(client.runs(**filters), most))
+    if as_json:
+        print_json({"items": [one.model_dump(mode="json") for one in found]})
+        return
+    rows = [
+        (one.id, one.kind, one.status.value, one.scene or "", one.name, ", ".join(one.tags), str(one.sweeps))
+        for one in found
+    ]
+    print_table("Runs", ("id", "kind", "status", "scene", "name", "tags", "sweeps"), rows, right="6")
+
+
+def change(
+    run: options.Job,
+    name: Name = None,
+    notes: Notes = None,
+    project: OfProject = None,
+    tag: Annotated[
+        list[str] | None,
+        typer.Option("--tag", metavar="WORD", help="In place of those it has; repeatable, empty for none."),
+    ] = None,
+    as_json: options.Json = False,
+    url: options.Url = options.DEFAULT_URL,
+) -> None:
+    """Change project, name, notes or tags of a run."""
+    changes = given_of(name=name, notes=notes, project=project, tag=tag or None)
+    if "tag" in changes:
+        changes["tags"] = [word for word in changes.pop("tag") if word]
+    with client_of(url) as client:
+        _told(client.change_run(run, **changes), "is changed", as_json=as_json)
+
+
+def delete(run: options.Job, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL) -> None:
+    """Put a run in the bin.
+
+    It has ended. `stickslip runs restore` takes it out until the service deletes it for good.
+    """
+    with client_of(url) as client:
+        _told(client.delete_run(run), "is in the bin", as_json=as_json)
+
+
+def restore(run: options.Job, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL) -> None:
+    """Take a run out of the bin."""
+    with client_of(url) as client:
+        _told(client.restore_run(run), "is out of the bin", as_json=as_json)
+
+
+def compare(
+    a: First, b: Second, as_json: options.Json = False, url: options.Url = options.DEFAULT_URL
+) -> None:
+    """Say what differs between two runs.
+
+    Their inputs as they were computed, and the main figures of their results.
+    """
+    with client_of(url) as client:
+        found = client.compare(a, b)
+    if as_json:
+        print_json(found.model_dump(mode="json"))
+        return
+    heads = (found.a.name or "A", found.b.name or "B")
+    inputs = [(one.path, _word(one.a), _word(one.b)) for one in found.inputs]
+    print_table("Inputs that differ", ("input", *heads), inputs, right="12")
+    if found.more_inputs:
+        say(f"and {found.more_inputs} more")
+    figures = [(one.name, _word(one.a), _word(one.b)) for one in found.results]
+    print_table("Results", ("figure", *heads), figures, right="12")
+
+
+def share(
+    run: options.Job,
+    days: Days = None,
+    as_json: options.Json = False,
+    url: options.Url = options.DEFAULT_URL,
+) -> None:
+    """Make a link to a run that needs no key.
+
+    It is printed this once. Whoever has it can read the run and its results.
+    """
+    with client_of(url) as client:
+        made = client.share_run(run, days)
+    if as_json:
+        print_json(made.model_dump(mode="json"))
+    else:
+        say(f"{url.rstrip('/')}{made.link}")
+
+
+def _told(run: RunAnswer, what: str, *, as_json: bool) -> None:
+    if as_json:
+        print_json(run.model_dump(mode="json"))
+    else:
+        say(f"run {run.id} {what}")
+
+
+def _word(value: Any) -> str:
+    if value is None:
+        return ""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,1 @@
+"""Projects, what is said of runs, and links that share them."""

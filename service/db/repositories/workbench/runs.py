@@ -1,0 +1,188 @@
+"""The runs: jobs with what is said of them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+from sqlalchemy import ColumnElement, Connection, Select, func, literal, null, or_, select, update
+from sqlalchemy.dialects import postgresql, sqlite
+
+from service.db.clock import Clock
+from service.db.engine import Database
+from service.db.models import Job, Sweep
+from service.db.pagination import Condition, met, owner_condition, plain_conditions
+from service.db.repositories.rows import JobRow, RunWords
+from service.db.repositories.workbench.rows import RunFilter, RunRow
+from service.db.repositories.workbench.words import in_the_bin, put_tags, require_project
+from service.db.run_models import Run, RunTag
+from service.errors import ChangedMeanwhileError
+
+_NEVER_LEADS = -1
+_OF_JOBS = [getattr(Job, field.name) for field in fields(JobRow) if field.name != "request"]
+_OF_RUNS = (Run.project_id, Run.name, Run.notes, Run.revision, Run.changed, Run.deleted)
+_LISTED = select(*_OF_JOBS, *_OF_RUNS).outerjoin(Run, Run.job_id == Job.id)
+_WHOLE = select(*_OF_JOBS, Job.request, *_OF_RUNS).outerjoin(Run, Run.job_id == Job.id)
+_OF_ROW = [field.name for field in fields(JobRow)]
+
+
+class RunRepository:
+    """Runs of one database.
+
+    Parameters
+    ----------
+    database : where they are.
+    now : the clock of the database.
+    """
+
+    def __init__(self, database: Database, now: Clock) -> None:
+        self._db = database
+        self._now = now
+
+    def get(self, job_id: str) -> RunRow | None:
+        """The run, in the bin or not, or None."""
+        with self._db.reading() as connection:
+            return next(iter(_rows(connection, _WHOLE.where(Job.id == job_id))), None)
+
+    def page(self, wanted: RunFilter, limit: int, before: str | None = None) -> list[RunRow]:
+        """Runs that meet every condition, newest first, older than the run `before`."""
+        query = _LISTED.order_by(Job.id.desc()).limit(limit)
+        if before is not None:
+            query = query.where(Job.id < before)
+        conditions = _conditions(wanted)
+        leads = wanted.kind is None and wanted.scene is None
+        if not wanted.deleted:
+            query = query.where(~in_the_bin(Job.id))
+        with self._db.reading() as connection:
+            conditions += owner_condition(connection, Job.id, Job.owner, wanted.owner, leads=leads)
+            return _rows(connection, met(connection, query, Job.id, conditions))
+
+    def change(
+        self, row: RunRow, changes: Mapping[str, Any], expected: Collection[int] | None = None
+    ) -> None:
+        """Change words of a run: `project`, `name`, `notes`, `tags`.
+
+        Parameters
+        ----------
+        expected : the revisions of which it must have one; any if None.
+
+        Raises
+        ------
+        ChangedMeanwhileError
+            It has another one.
+        InvalidRequestError
+            There is no such project of the run's owner.
+        """
+        with self._db.writing() as connection:
+            self._locked(connection, row.job.id, expected)
+            values = {key: value for key, value in changes.items() if key in ("name", "notes")}
+            if "project" in changes:
+                require_project(connection, changes["project"], row.owner)
+                values["project_id"] = changes["project"]
+            if "tags" in changes:
+                put_tags(connection, row.job.id, changes["tags"])
+            self._write(connection, row.job.id, values)
+
+    def put_in_bin(self, job_id: str) -> None:
+        """Put a run in the bin; one that is there stays since then."""
+        with self._db.writing() as connection:
+            self._locked(connection, job_id, None)
+            self._write(
+                connection,
+                job_id,
+                {"deleted": func.coalesce(Run.deleted, literal(self._now(), Run.deleted.type))},
+            )
+
+    def restore(self, job_id: str) -> None:
+        """Take a run out of the bin."""
+        with self._db.writing() as connection:
+            self._locked(connection, job_id, None)
+            self._write(connection, job_id, {"deleted": None})
+
+    def _locked(self, connection: Connection, job_id: str, expected: Collection[int] | None) -> None:
+        """Make a row if there is none, lock it and compare its revision."""
+        insert = sqlite.insert if connection.dialect.name == "sqlite" else postgresql.insert
+        names = ["job_id", "project_id", "name", "notes", "changed", "revision", "deleted"]
+        now = literal(self._now(), Run.changed.type)
+        made = select(Job.id, null(), literal(""), literal(""), now, literal(0), null()).where(
+            Job.id == job_id
+        )
+        connection.execute(insert(Run).from_select(names, made).on_conflict_do_nothing())
+        query = select(Run.revision).where(Run.job_id == job_id).with_for_update()
+        revision = connection.execute(query).scalar_one_or_none()
+        if expected is not None and revision not in expected:
+            raise ChangedMeanwhileError(f"run {job_id} was changed meanwhile: get it again, and change that")
+
+    def _write(self, connection: Connection, job_id: str, values: Mapping[str, Any]) -> None:
+        counted = {"revision": Run.revision + 1, "changed": self._now()}
+        connection.execute(update(Run).where(Run.job_id == job_id).values(**values, **counted))
+
+
+def _conditions(wanted: RunFilter) -> list[Condition]:
+    equal = (
+        (Job.kind, wanted.kind),
+        (Job.scene_name, wanted.scene),
+        (Job.owner, wanted.of_owner),
+    )
+    found = [column == value for column, value in equal if value is not None]
+    if wanted.states:
+        found.append(Job.state.in_(list(wanted.states)))
+    conditions = plain_conditions(Job.id, found)
+    times = [Job.created >= wanted.after] if wanted.after is not None else []
+    times += [Job.created < wanted.before] if wanted.before is not None else []
+    conditions += [Condition(ids=select(Job.id), holds=holds, few=_NEVER_LEADS) for holds in times]
+    if wanted.project is not None:
+        conditions.append(_said(Run.project_id == wanted.project))
+    if wanted.deleted:
+        conditions.append(_said(Run.deleted.is_not(None)))
+    if wanted.text is not None:
+        text = or_(*(one.icontains(wanted.text, autoescape=True) for one in (Run.name, Run.notes)))
+        conditions.append(_said(text, few=_NEVER_LEADS))
+    for tag in wanted.tags:
+        ids = select(RunTag.job_id).where(RunTag.tag == tag)
+        holds = ids.where(RunTag.job_id == Job.id).correlate(Job).exists()
+        conditions.append(Condition(ids=ids, holds=holds, apart=True))
+    return conditions
+
+
+def _said(holds: ColumnElement[bool], **values: Any) -> Condition:
+    """A condition on what is said of a run."""
+    ids = select(Run.job_id).where(holds)
+    return Condition(ids=ids, holds=holds, apart="few" not in values, **values)
+
+
+def _rows(connection: Connection, query: Select[Any]) -> list[RunRow]:
+    rows = connection.execute(query).mappings().all()
+    jobs = [row["id"] for row in rows]
+    tags = _tags(connection, jobs)
+    sweeps = _sweeps(connection, [row["result_of"] or row["id"] for row in rows])
+    return [
+        RunRow(
+            job=JobRow(**{name: row[name] for name in _OF_ROW if name in row}),
+            words=RunWords(
+                project=row["project_id"], name=row["name"] or "", notes=row["notes"] or "",
+                tags=tuple(tags[row["id"]]),
+            ),
+            revision=row["revision"] or 0,
+            changed=row["changed"],
+            deleted=row["deleted"],
+            sweeps=sweeps.get(row["result_of"] or row["id"], 0),
+        )
+        for row in rows
+    ]  # fmt: skip
+
+
+def _tags(connection: Connection, jobs: Sequence[str]) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = defaultdict(list)
+    query = select(RunTag.job_id, RunTag.tag).where(RunTag.job_id.in_(jobs)).order_by(RunTag.tag)
+    for row in connection.execute(query):
+        found[row.job_id].append(row.tag)
+    return found
+
+
+def _sweeps(connection: Connection, jobs: Sequence[str]) -> dict[str, int]:
+    """How many sweeps are stored with each of the jobs."""
+    query = select(Sweep.job_id, func.count()).where(Sweep.job_id.in_(jobs)).group_by(Sweep.job_id)
+    return {row[0]: row[1] for row in connection.execute(query)}

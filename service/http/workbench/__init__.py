@@ -1,0 +1,1 @@
+"""The routes of the workbench: projects, runs, links that share a run."""

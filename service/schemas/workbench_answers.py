@@ -1,0 +1,166 @@
+"""What the service answers about projects, runs and links to them."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, Self
+
+from pydantic import Field
+
+from service.db.repositories.workbench.rows import ProjectRow, RunRow, ShareRow
+from service.schemas.answers import Answer, JobAnswer
+
+_REVISION = "Counts the changes; the `ETag`, for `If-Match` of a change."
+_DELETED = "When it was put in the bin; null outside of it."
+
+
+class RunAnswer(JobAnswer):
+    """A run: a job with what is said of it."""
+
+    project: str | None = Field(description="Id of the project it belongs to.")
+    name: str
+    notes: str
+    tags: list[str]
+    sweeps: int = Field(description="How many sweeps are stored with it: GET /v1/sweeps?of=ID lists them.")
+    revision: int = Field(description=_REVISION)
+    changed: datetime | None = Field(description="When that was; null if nothing was ever said of it.")
+    deleted: datetime | None = Field(description=_DELETED)
+
+    @classmethod
+    def of_run(cls, row: RunRow, live: tuple[float, int] | None = None) -> Self:
+        """The answer for a row, with progress that is newer than the row if there is any."""
+        job = JobAnswer.of(row.job, live)
+        about = f"/v1/runs/{row.job.id}"
+        links = {**job.links, "self": about, "job": job.links["self"], "shares": f"{about}/shares"}
+        return cls(
+            **{**job.model_dump(), "links": links},
+            project=row.words.project,
+            name=row.words.name,
+            notes=row.words.notes,
+            tags=list(row.words.tags),
+            sweeps=row.sweeps,
+            revision=row.revision,
+            changed=row.changed,
+            deleted=row.deleted,
+        )
+
+
+class RunPage(Answer):
+    """A page of runs, newest first."""
+
+    items: list[RunAnswer]
+    next: str | None = Field(description="Link to the next page; null on the last one.")
+
+
+class ProjectAnswer(Answer):
+    """A project."""
+
+    id: str
+    owner: str
+    name: str
+    notes: str
+    runs: int = Field(description="How many runs are in it, without those in the bin.")
+    created: datetime
+    changed: datetime
+    revision: int = Field(description=_REVISION)
+    deleted: datetime | None = Field(description=_DELETED)
+    links: dict[str, str]
+
+    @classmethod
+    def of(cls, row: ProjectRow) -> Self:
+        """The answer for a row."""
+        values = {name: getattr(row, name) for name in cls.model_fields if name != "links"}
+        about = f"/v1/projects/{row.id}"
+        return cls(**values, links={"self": about, "runs": f"/v1/runs?project={row.id}"})
+
+
+class ProjectPage(Answer):
+    """A page of projects, newest first."""
+
+    items: list[ProjectAnswer]
+    next: str | None = Field(description="Link to the next page; null on the last one.")
+
+
+class ShareAnswer(Answer):
+    """A link to a run that needs no key, without its token."""
+
+    id: str
+    run: str
+    created: datetime
+    expires: datetime | None
+
+    @classmethod
+    def values(cls, row: ShareRow) -> dict[str, Any]:
+        """The fields of the answer for a row."""
+        return {"id": row.id, "run": row.job_id, "created": row.created, "expires": row.expires}
+
+
+class NewShareAnswer(ShareAnswer):
+    """A link that was just made; its token is told this once."""
+
+    token: str
+    link: str = Field(description="Of the run, below the address of the service.")
+
+
+class ShareList(Answer):
+    """The links to a run, oldest first."""
+
+    items: list[ShareAnswer]
+
+
+class SharedRun(Answer):
+    """A run as a link shows it: what was asked and how it ended."""
+
+    id: str
+    kind: str
+    status: str
+    progress: float
+    scene: str | None
+    name: str
+    notes: str
+    tags: list[str]
+    created: datetime
+    started: datetime | None
+    finished: datetime | None
+    error: dict[str, Any] | None
+    request: dict[str, Any] | None
+
+    @classmethod
+    def of(cls, row: RunRow) -> Self:
+        """The answer for a row."""
+        job, words = row.job, row.words
+        same = ("id", "kind", "progress", "created", "started", "finished", "error")
+        # The project is not shared with the run.
+        request = {key: value for key, value in (job.request or {}).items() if key != "project"}
+        return cls(
+            **{name: getattr(job, name) for name in same},
+            status=job.state.value, scene=job.scene_name, name=words.name, notes=words.notes,
+            tags=list(words.tags), request=request,
+        )  # fmt: skip
+
+
+class InputDifference(Answer):
+    """An input that two runs do not share; null where it is not given."""
+
+    path: str = Field(description="`damper.N0` for a value of a contact, else the keys joined by dots.")
+    part: str = Field(description="`scene`, or `settings` for what the kind takes besides.")
+    a: Any
+    b: Any
+
+
+class Figure(Answer):
+    """A figure of the results of two runs; null where a run has none."""
+
+    name: str
+    a: float | str | bool | None
+    b: float | str | bool | None
+
+
+class Comparison(Answer):
+    """Two runs side by side."""
+
+    a: RunAnswer
+    b: RunAnswer
+    inputs: list[InputDifference] = Field(description="What differs, as it was computed.")
+    more_inputs: int = Field(description="How many more differ than are listed.")
+    results: list[Figure] = Field(description="The main figures of both, equal ones too.")
