@@ -31,31 +31,21 @@ MOST_POINTS = 1024  # of the arc; a smooth one takes 70, that of a light wedge s
 _STRETCH = 64  # points between two looks
 
 
-def solve_from_nothing(workspace: Workspace, p: float, guess: Real | None = None) -> PointSolution:
-    """Solve at λ = `p` (inside unit) as `Workspace.solve` does, and where that fails along the level.
-
-    Parameters
-    ----------
-    guess : (n_unknowns,) slip motions to start from [m].
+def solve_along_level(workspace: Workspace, p: float) -> tuple[PointSolution | None, int]:
+    """Solve at λ = `p` (inside unit) from the end of the arc of the level.
 
     Returns
     -------
-    The solution, or the attempt without one of `Workspace.solve`; its iterations are those of both ways. A
-    motion that ratchets is not looked for further: there is no periodic one.
+    (the converged solution or None, Newton iterations).
     """
-    found = workspace.solve(p, guess)
-    if found.converged or found.ratchets:
-        return found
     balance = _over_level(workspace.balance, p)
     if balance is None:
-        return found
+        return None, 0
     end, spent = _followed(balance)
-    if end is not None:
-        again = workspace.solve_from(p, end)
-        spent += again.iterations
-        if again.converged:
-            return replace(again, iterations=found.iterations + spent)
-    return replace(found, iterations=found.iterations + spent)
+    if end is None:
+        return None, spent
+    again = workspace.solve_from(p, end)
+    return (again if again.converged else None), spent + again.iterations
 
 
 def _over_level(balance: Balance, p: float) -> Balance | None:

@@ -18,10 +18,10 @@ from solver.balance.simplifications import Effects
 from solver.balance.workspace import PointSolution, Workspace
 from solver.contacts.kernels.stick_slip_events import FAILED, STUCK
 from solver.contacts.kernels.system import UNHELD, evaluation_by_value
-from solver.continuation.along_level import solve_from_nothing
 from solver.continuation.branches.adaptive_harmonics import solve_to
 from solver.continuation.branches.symmetry_breaking import assumed_flags, seen
 from solver.continuation.extrema.error_estimate import UNKNOWN, truncation_error
+from solver.continuation.from_nothing import solve_from_nothing
 from solver.jit import fourier
 from solver.jit.fourier import Real
 from solver.linear.condensation import loose_ports

@@ -63,6 +63,19 @@ def matrix_files(folder: Path) -> set[str]:
     return {"beam-M.mtx", "beam-K.rsa"}
 
 
+def mesh_files(folder: Path) -> set[str]:
+    """The block on a face of four nodes of another one that the pages speak of; names of its files."""
+    nodes = [*range(1, 5), *range(101, 105), 812]
+    mmwrite(folder / "M.mtx", sparse.eye_array(3 * len(nodes)).tocoo(), symmetry="symmetric")
+    mmwrite(folder / "K.mtx", 1e6 * sparse.eye_array(3 * len(nodes)).tocoo(), symmetry="symmetric")
+    (folder / "model.dof").write_text("".join(f"{node}.{axis}\n" for node in nodes for axis in (1, 2, 3)))
+    corners = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    places = [f"{first + i}, {x}, 0, {z}" for first in (1, 101) for i, (x, z) in enumerate(corners)]
+    lines = ["*NODE", *places, "812, 0, 1, 0", "*NSET, NSET=BLADE", "1, 2, 3, 4", "*NSET, NSET=DISK"]
+    (folder / "model.inp").write_text("\n".join([*lines, "101, 102, 103, 104"]) + "\n")
+    return {"M.mtx", "K.mtx", "model.dof", "model.inp"}
+
+
 def test_every_language_is_looked_at() -> None:
     """A block in another language needs a test of its own."""
     assert {language for language, _ in BLOCKS} <= {"sh", "python", "toml", "json"}
@@ -117,7 +130,9 @@ def test_commands_run(
         words.append("--help")
     if words[1] == "submit":
         monkeypatch.setenv("STICKSLIP_URL", request.getfixturevalue("server"))
-    given = matrix_files(tmp_path) if words[1] == "import" else set()
+    given: set[str] = set()
+    if words[1] == "import":
+        given = mesh_files(tmp_path) if "--nodes" in words else matrix_files(tmp_path)
     if words[1] == "keys":
         given |= {"stickslip.db"}
     if "--reduce" in words:

@@ -14,6 +14,8 @@ from service.http.process.gc_freeze import Sparing
 
 @pytest.fixture(autouse=True)
 def _unfrozen() -> Iterator[None]:
+    """What the collection of the tests left out of the collector's work counts for it again."""
+    gc.unfreeze()
     yield
     gc.unfreeze()
 

@@ -12,9 +12,9 @@ from solver.balance.balance import Balance
 from solver.balance.kernels.output import HALF_RANGE, MAX_ABS
 from solver.balance.more_harmonics import less_harmonics, more_harmonics, pad
 from solver.balance.workspace import PointSolution, Workspace
-from solver.continuation.along_level import solve_from_nothing
 from solver.continuation.branch import Branch, BranchStatus
 from solver.continuation.extrema.error_estimate import ErrorEstimator
+from solver.continuation.from_nothing import solve_from_nothing
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 

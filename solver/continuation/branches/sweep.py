@@ -15,7 +15,6 @@ from solver.balance.balance import Balance, build
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
-from solver.continuation.along_level import solve_from_nothing
 from solver.continuation.branch import ENDINGS, Branch, BranchStatus, Peak
 from solver.continuation.branches.adaptive_harmonics import sweep_to
 from solver.continuation.branches.point_by_point import is_unique, rows_before_a_turn, walk_by_points
@@ -24,6 +23,7 @@ from solver.continuation.endings import MANY, ratchets_ahead, stands_still, take
 from solver.continuation.extrema.branch_error import branch_error
 from solver.continuation.extrema.extrema import Survey, band_limit
 from solver.continuation.extrema.nodes import Points
+from solver.continuation.from_nothing import solve_from_nothing
 from solver.continuation.kernels import state as walk_states
 from solver.continuation.kernels.pseudo_arclength import begin_walk, walk_on
 from solver.continuation.kernels.state import Control, walk_by_value

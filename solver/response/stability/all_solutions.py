@@ -16,7 +16,7 @@ import numpy as np
 
 from solver.balance.balance import build, check_frequency
 from solver.balance.simplifications import Effects
-from solver.continuation.along_level import solve_from_nothing
+from solver.continuation.from_nothing import solve_from_nothing
 from solver.errors import SettingError
 from solver.response.solution import Solution
 from solver.response.solve import describe

@@ -1,0 +1,75 @@
+"""Designs of the platform wedge against points that are solved one by one, without a sweep."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+import optim
+import solver
+from optim import DesignStatus
+from solver import Scene
+
+HARMONICS = 3
+GRID = np.linspace(300.0, 420.0, 121)  # Hz
+
+
+def _at(scene: Scene, hz: float) -> float:
+    found = solver.solve(scene, frequency_hz=float(hz), harmonics=HARMONICS)
+    return found.max_abs if found.converged else math.nan
+
+
+def highest_by_points(scene: Scene) -> float:
+    """The highest max|x| in the band [m]: a grid of solutions from nothing, then a search about its tops."""
+    values = np.array([_at(scene, hz) for hz in GRID])
+    assert np.isfinite(values).mean() > 0.95
+    values = np.nan_to_num(values)
+    best = values.max()
+    for i in np.flatnonzero(values >= 0.9 * best):
+        if i in (0, GRID.size - 1) or values[i] < max(values[i - 1], values[i + 1]):
+            continue
+        top = minimize_scalar(
+            lambda hz: -_at(scene, hz), bounds=(GRID[i - 1], GRID[i + 1]), method="bounded",
+            options={"xatol": 1e-9},
+        )  # fmt: skip
+        best = max(best, -top.fun)
+    return float(best)
+
+
+def _is_least(scene: Scene, found: optim.DesignResult, steps: tuple[float, ...]) -> None:
+    """Its peak is that of the points, and no point beside it is lower."""
+    assert found.peak is not None
+    values = {path: float(value) for path, value in found.optimum.items()}
+    here = highest_by_points(scene.with_values(values))
+    assert found.peak.value == pytest.approx(here, rel=1e-6)
+    for path, value in values.items():
+        for step in steps:
+            beside = highest_by_points(scene.with_values({**values, path: value * (1.0 + step)}))
+            assert beside >= here * (1.0 - 1e-6), (path, step)
+
+
+def test_a_stiffer_face_is_better_up_to_its_bound() -> None:
+    scene = solver.load_scene("platform-wedge").with_values({"wedge.mass": 0.0042})
+    found = optim.design(scene, variables={"wedge.kt": (5e6, 8e7)}, harmonics=HARMONICS)
+    assert found.status is DesignStatus.AT_BOUND
+    _is_least(scene, found, (-1e-3,))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "variables",
+    [
+        {"wedge.angle": (0.1, 0.8)},
+        {"wedge.mass": (0.003, 0.009)},
+        {"wedge.mass": (0.0038, 0.006), "wedge.angle": (0.2, 0.6)},
+    ],
+    ids=["angle", "mass", "mass and angle"],
+)
+def test_the_best_wedge_is_that_of_points(variables: dict[str, tuple[float, float]]) -> None:
+    scene = solver.load_scene("platform-wedge").with_values({"wedge.mass": 0.0042})
+    found = optim.design(scene, variables=variables, harmonics=HARMONICS)
+    assert found.status is DesignStatus.OPTIMAL
+    _is_least(scene, found, (-1e-2, -1e-3, -1e-5, 1e-5, 1e-3, 1e-2))
