@@ -66,7 +66,7 @@ def alive(pid: int) -> bool:
     """Whether the process runs; one that ended and was not collected yet does not."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except FileNotFoundError:
+    except (FileNotFoundError, ProcessLookupError):  # it was there when the file was opened
         return False
 
 
