@@ -22,15 +22,26 @@ def _at(scene: Scene, hz: float) -> float:
     return found.max_abs if found.converged else math.nan
 
 
-def highest_by_points(scene: Scene, n: int) -> float:
-    """The highest max|x| in the band [m]: `n` solutions from nothing, then a search about their tops."""
-    grid = np.linspace(*BAND, n)
-    values = np.array([_at(scene, hz) for hz in grid])
+def highest_by_points(scene: Scene, n: int, finer: int = 1) -> float:
+    """The highest max|x| in the band [m] by solutions from nothing.
+
+    `n` of them over the band, `finer` in each interval of these that has a high end, since two peaks that hold
+    a design may be closer than the intervals are wide, and a search about the tops of all.
+    """
+    coarse = np.linspace(*BAND, n)
+    values = np.array([_at(scene, hz) for hz in coarse])
+    high = np.nan_to_num(values) >= 0.9 * np.nanmax(values)
+    between = [
+        np.linspace(*coarse[i : i + 2], finer + 1)[1:-1] for i in range(n - 1) if high[i] or high[i + 1]
+    ]
+    grid = np.concatenate([coarse, *between])
+    values = np.concatenate([values, [_at(scene, hz) for hz in grid[n:]]])
     assert np.isfinite(values).mean() > 0.95
-    values = np.nan_to_num(values)
+    order = np.argsort(grid)
+    grid, values = grid[order], np.nan_to_num(values[order])
     best = values.max()
-    for i in np.flatnonzero(values >= 0.9 * best):
-        if i in (0, n - 1) or values[i] < max(values[i - 1], values[i + 1]):
+    for i in np.flatnonzero(values >= 0.99 * best):
+        if i in (0, grid.size - 1) or values[i] < max(values[i - 1], values[i + 1]):
             continue
         top = minimize_scalar(
             lambda hz: -_at(scene, hz), bounds=(grid[i - 1], grid[i + 1]), method="bounded",
@@ -40,15 +51,15 @@ def highest_by_points(scene: Scene, n: int) -> float:
     return float(best)
 
 
-def _is_least(scene: Scene, found: optim.DesignResult, steps: tuple[float, ...], n: int = 121) -> None:
+def _is_least(scene: Scene, found: optim.DesignResult, steps: tuple[float, ...], *points: int) -> None:
     """Its peak is that of the points, and no point beside it is lower."""
     assert found.peak is not None
     values = {path: float(value) for path, value in found.optimum.items()}
-    here = highest_by_points(scene.with_values(values), n)
+    here = highest_by_points(scene.with_values(values), *points)
     assert found.peak.value == pytest.approx(here, rel=1e-6)
     for path, value in values.items():
         for step in steps:
-            beside = highest_by_points(scene.with_values({**values, path: value * (1.0 + step)}), n)
+            beside = highest_by_points(scene.with_values({**values, path: value * (1.0 + step)}), *points)
             assert beside >= here * (1.0 - 1e-6), (path, step)
 
 
@@ -56,7 +67,7 @@ def test_a_stiffer_face_is_better_up_to_its_bound() -> None:
     scene = solver.load_scene("platform-wedge").with_values({"wedge.mass": 0.0042})
     found = optim.design(scene, variables={"wedge.kt": (5e6, 8e7)}, harmonics=HARMONICS)
     assert found.status is DesignStatus.AT_BOUND
-    _is_least(scene, found, (-1e-3,), n=25)
+    _is_least(scene, found, (-1e-3,), 25)
 
 
 @pytest.mark.long
@@ -73,4 +84,4 @@ def test_the_best_wedge_is_that_of_points(variables: dict[str, tuple[float, floa
     scene = solver.load_scene("platform-wedge").with_values({"wedge.mass": 0.0042})
     found = optim.design(scene, variables=variables, harmonics=HARMONICS)
     assert found.status is DesignStatus.OPTIMAL
-    _is_least(scene, found, (-1e-2, -1e-3, -1e-5, 1e-5, 1e-3, 1e-2))
+    _is_least(scene, found, (-1e-2, -1e-3, -1e-5, 1e-5, 1e-3, 1e-2), 61, 10)
