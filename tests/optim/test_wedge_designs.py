@@ -25,8 +25,8 @@ def _at(scene: Scene, hz: float) -> float:
 def highest_by_points(scene: Scene, n: int, finer: int = 1) -> float:
     """The highest max|x| in the band [m] by solutions from nothing.
 
-    `n` of them over the band, `finer` in each interval of these that has a high end, since two peaks that hold
-    a design may be closer than the intervals are wide, and a search about the tops of all.
+    `n` of them over the band, `finer` in each interval of these that has a high end, since two peaks that
+    hold a design may be closer than the intervals are wide, and a search about the tops of all.
     """
     coarse = np.linspace(*BAND, n)
     values = np.array([_at(scene, hz) for hz in coarse])
