@@ -57,8 +57,6 @@ from solver.sensitivity.kernels.adjoint import (
     BY_PHASE,
     EXTREME_COLUMNS,
     PER_ELEMENT,
-    SIGN,
-    TAU,
     amplitude_slopes,
 )
 

@@ -1,7 +1,7 @@
 """The force of one contact under a motion that is given, with its derivatives by parameter paths.
 
-A rig that measures a hysteresis loop prescribes the slip motion, so the law alone is asked: its coefficients in
-closed form, and their derivatives by one evaluation for each path that acts.
+A rig that measures a hysteresis loop prescribes the slip motion, so the law alone is asked: its coefficients
+in closed form, and their derivatives by one evaluation for each path that acts.
 """
 
 from __future__ import annotations

@@ -67,7 +67,9 @@ class ObservedSensitivities(Sensitivities):
                 return found
         return self._workspace.solve(omega)
 
-    def observed(self, solution: Real, at_hz: float, quantity: Quantity, harmonic: int = 1) -> Observed | None:
+    def observed(
+        self, solution: Real, at_hz: float, quantity: Quantity, harmonic: int = 1
+    ) -> Observed | None:
         """Return a quantity of the observed motion at a solution; None where the balance is singular.
 
         Parameters
@@ -111,7 +113,9 @@ class ObservedSensitivities(Sensitivities):
             return np.array([tops[leads, AMPLITUDE]])
         at = np.flatnonzero(ks == harmonic)
         if not at.size or harmonic < 1:
-            raise SettingError("harmonic", harmonic, f"must be one of the harmonics kept, {ks[ks > 0].tolist()}")
+            raise SettingError(
+                "harmonic", harmonic, f"must be one of the harmonics kept, {ks[ks > 0].tolist()}"
+            )
         amplitude = complex(self._amplitudes.of(self._x)[at[0]])
         if quantity is Quantity.COMPLEX:
             turns[0, at[0]], turns[1, at[0]] = 1.0, -1j

@@ -1,9 +1,9 @@
 """The model of a response: point after point from the last solution of each, on the branch the data are on.
 
-Where every frequency has one response (`solver.continuation.branches.point_by_point.is_unique`) Newton's method
-from a neighbour or from the last parameters is enough. Elsewhere the branch is followed once through its folds,
-and of the solutions at a measured frequency that nearest to the data is taken; from there it is followed over
-the parameters.
+Where every frequency has one response (`solver.continuation.branches.point_by_point.is_unique`) Newton's
+method from a neighbour or from the last parameters is enough. Elsewhere the branch is followed once through
+its folds, and of the solutions at a measured frequency that nearest to the data is taken; from there it is
+followed over the parameters.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from optim.identify.data.measured import Model, Predicted
+from optim.identification.data.measured import Model, Predicted
 from optim.problem.variables import Real
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects, even_harmonics_reason

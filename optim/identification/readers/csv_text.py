@@ -1,4 +1,4 @@
-"""CSV: lines ``# key = value``, a line of column heads, then numbers, separated by commas, semicolons or tabs."""
+"""CSV: lines ``# key = value``, a line of column heads, then rows of numbers."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from optim.errors import DataError
-from optim.identify.data.table import Table
-from optim.identify.readers.columns import read_head, table_of
-from optim.identify.readers.registry import DataFormat
+from optim.identification.data.table import Table
+from optim.identification.readers.columns import read_head, table_of
+from optim.identification.readers.registry import DataFormat
 
 _SEPARATORS = (";", "\t", ",")
 
@@ -31,18 +31,16 @@ def read_csv(path: Path, paths: frozenset[str]) -> list[Table]:
     rows = {number: line for number, line in lines.items() if not line.startswith("#")}
     head = read_head(path.name, remarks, paths)
     if len(rows) < 2:
-        raise DataError(path.name, f"{len(rows)} lines", "must have a line of column heads and rows of numbers")
+        raise DataError(
+            path.name, f"{len(rows)} lines", "must have a line of column heads and rows of numbers"
+        )
     head_line = next(iter(rows))
     separator = next((one for one in _SEPARATORS if one in rows[head_line]), ",")
     heads = [text.strip().strip('"') for text in rows.pop(head_line).split(separator)]
     _check_heads(path.name, head_line, heads)
     numbers = np.array([_row(path.name, line, text, separator, heads) for line, text in rows.items()])
-    return [
-        table_of(
-            path.name, heads, list(numbers.T), head, paths, lines=np.array(list(rows), np.int64),
-            head_line=head_line,
-        )  # fmt: skip
-    ]
+    at = np.array(list(rows), np.int64)
+    return [table_of(path.name, heads, list(numbers.T), head, paths, lines=at, head_line=head_line)]
 
 
 def _check_heads(source: str, line: int, heads: list[str]) -> None:
@@ -51,7 +49,9 @@ def _check_heads(source: str, line: int, heads: list[str]) -> None:
         first = [float(text) for text in heads]
     except ValueError:
         return
-    raise DataError(source, first, "must be the names of the columns, such as frequency,amplitude [mm]", line=line)
+    raise DataError(
+        source, first, "must be the names of the columns, such as frequency,amplitude [mm]", line=line
+    )
 
 
 def _row(source: str, line: int, text: str, separator: str, heads: list[str]) -> list[float]:
@@ -75,6 +75,7 @@ def _number(source: str, line: int, column: str, cell: str) -> float:
 FORMAT = DataFormat(
     name="CSV",
     suffixes=(".csv", ".tsv", ".txt"),
-    help="Units in the heads, `amplitude [mm]`; conditions in lines `# shroud.N0 = 200` or in columns of that name.",
+    help="Units in the heads, `amplitude [mm]`; conditions in lines `# shroud.N0 = 200` or in columns of that "
+    "name; commas, semicolons or tabs between.",
     read=read_csv,
 )

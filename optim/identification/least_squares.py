@@ -1,18 +1,19 @@
 """Least squares over all runs, with noise that the fit tells, and outliers that weigh less.
 
 The noise of an observation is in proportion to what the model says, not to what was measured: small readings
-would else weigh too much, and amplitudes come out too low. Proportion and level are therefore found anew between
-rounds of Gauss-Newton (iteratively reweighted least squares). Outliers: Huber's loss with the level of the noise
-from the median of the residuals (Huber, Robust Statistics, 1981, sections 7.7 and 7.8).
+would else weigh too much, and amplitudes come out too low. Proportion and level are therefore found anew
+between rounds of Gauss-Newton (iteratively reweighted least squares). Outliers: Huber's loss with the level
+of the noise from the median of the residuals (Huber, Robust Statistics, 1981, sections 7.7 and 7.8).
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from optim.identify.evaluation import Fitted, Runs
+from optim.identification.evaluation import Fitted, Runs
 from optim.problem.variables import Real
 
 HUBER = 1.345  # standard deviations from which a residual weighs less: 95 % efficient without outliers
@@ -69,7 +70,8 @@ class LocalFit:
 
     def residuals(self, observations: Real) -> Real:
         """Return (predicted − measured)/sd of what counted."""
-        return ((self.fitted.values - observations) / self.sd)[self.active]
+        rest: Real = (self.fitted.values - observations) / self.sd
+        return np.asarray(rest[self.active], np.float64)
 
 
 def fit(runs: Runs, z: Real, noise: Noise, *, rounds: int = _MOST_ROUNDS) -> LocalFit:
@@ -101,7 +103,7 @@ def _level(runs: Runs, found: LocalFit, sd: Real, known: np.ndarray, *, robust: 
     rest = ((found.fitted.values - runs.observations) / sd)[counted]
     share = rest.size / max(rest.size - len(runs.unknowns), 1)
     if robust:
-        return max(_NORMAL * float(np.median(np.abs(rest))) * np.sqrt(share), LEAST_LEVEL)
+        return max(_NORMAL * float(np.median(np.abs(rest))) * math.sqrt(share), LEAST_LEVEL)
     return max(float(np.sqrt(np.mean(rest**2) * share)), LEAST_LEVEL)
 
 
@@ -126,7 +128,8 @@ def _search(runs: Runs, z: Real, sd: Real, robust: bool) -> LocalFit:
     def residuals(x: Real) -> Real:
         found = runs.at(x)
         data = (found.values[active] - target) / weights
-        return np.concatenate([np.where(found.reached[active], data, np.nan), runs.unknowns.prior_rows(x)[0]])
+        data = np.where(found.reached[active], data, np.nan)
+        return np.concatenate([data, runs.unknowns.prior_rows(x)[0]])
 
     def jacobian(x: Real) -> Real:
         rows = runs.at(x).jacobian[active] / weights[:, None]
@@ -140,7 +143,7 @@ def _search(runs: Runs, z: Real, sd: Real, robust: bool) -> LocalFit:
         ftol=1e-10, xtol=1e-10, gtol=1e-10, max_nfev=_MOST_EVALUATIONS,
     )  # fmt: skip
     return LocalFit(
-        fitted=runs.at(found.x), sd=sd, level=1.0, active=active, cost=float(found.cost),
+        fitted=runs.at(np.asarray(found.x)), sd=sd, level=1.0, active=active, cost=float(found.cost),
         converged=bool(found.status > 0),
     )  # fmt: skip
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,9 @@ from optim.problem.variables import (
 from solver.scene.scene import Scene
 
 UNKNOWNS, PRIORS = "unknowns", "priors"
-FIRMEST = 1e-6  # standard deviation of a prior relative to the width of the bounds, below which it is no unknown
+FIRMEST = (
+    1e-6  # standard deviation of a prior relative to the width of the bounds, below which it is no unknown
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,6 +99,11 @@ def _place(scene: Scene, variable: Variable) -> float:
     return variable.inside(value) if variable.low <= value <= variable.high else 0.5
 
 
+def _pair(bounds: Sequence[float]) -> Any:
+    """Return a list of two as a pair; anything else as it is, to be refused."""
+    return tuple(bounds) if isinstance(bounds, Sequence) and not isinstance(bounds, str) else bounds
+
+
 def read_unknowns(
     scene: Scene, unknowns: Mapping[str, Sequence[float]], scaling: Mapping[str, str] | None,
     priors: Mapping[str, Sequence[float]] | None,
@@ -115,7 +123,9 @@ def read_unknowns(
     """
     if not isinstance(unknowns, Mapping) or not unknowns:
         raise DesignError(UNKNOWNS, unknowns, "must name at least one parameter path with (low, high)")
-    variables = check_variables(scene, {k: tuple(v) for k, v in unknowns.items()}, scaling, key=UNKNOWNS)
+    variables = check_variables(
+        scene, {name: _pair(bounds) for name, bounds in unknowns.items()}, scaling, key=UNKNOWNS
+    )
     by_name = {variable.name: variable for variable in variables}
     known: dict[str, Prior] = {}
     for name, pair in (priors or {}).items():

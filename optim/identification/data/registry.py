@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import cache
 from importlib import import_module
 
-from optim.identify.data.measured import Column, DataKind
+from optim.identification.data.measured import Column, DataKind
 
-SHIPPED = ("optim.identify.data.response", "optim.identify.data.loop")
+SHIPPED = ("optim.identification.data.response", "optim.identification.data.loop")
 
 
 @cache

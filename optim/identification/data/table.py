@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
 from optim.errors import DataError
-from optim.identify.data.measured_units import Unit
+from optim.identification.data.measured_units import Unit
 from optim.problem.variables import Real
 from solver.errors import Place
 from solver.jit.fourier import Integer
@@ -99,7 +100,9 @@ def check_numbers(table: Table) -> None:
             raise DataError(table.source, len(values), wanted, column=name, place=table.place)
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
-            raise table.error(int(bad[0]), name, "must be a finite number: leave the whole row out if it is missing")
+            raise table.error(
+                int(bad[0]), name, "must be a finite number: leave the whole row out if it is missing"
+            )
 
 
 def check_sign(table: Table, column: str, *, positive: bool) -> None:
@@ -124,14 +127,14 @@ def check_monotone(table: Table, column: str) -> None:
 
 
 def runs_of(table: Table, paths: Sequence[str]) -> Iterator[Table]:
-    """Yield the rows of each run: those that follow each other under the same values of the columns `paths`."""
+    """Yield the rows of each run: those that follow each other under the same conditions, columns `paths`."""
     if not paths:
         yield table
         return
     values = np.column_stack([table.columns[path] for path in paths])
     changes = np.flatnonzero(np.any(np.diff(values, axis=0) != 0.0, axis=1)) + 1
     ends = [0, *changes.tolist(), len(table)]
-    for first, end in zip(ends[:-1], ends[1:], strict=True):
+    for first, end in pairwise(ends):
         kept = {name: column[first:end] for name, column in table.columns.items() if name not in paths}
         here = {path: float(values[first, i]) for i, path in enumerate(paths)}
         yield replace(

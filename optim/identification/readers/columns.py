@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from optim.errors import DataError
-from optim.identify.data.measured_units import Unit, known_units, split_head, unit_of
-from optim.identify.data.registry import known_columns, known_words
-from optim.identify.data.table import Table
+from optim.identification.data.measured_units import Unit, known_units, split_head, unit_of
+from optim.identification.data.registry import known_columns, known_words
+from optim.identification.data.table import Table
 from optim.problem.variables import Real
 from solver.errors import Place
 from solver.jit.fourier import Integer

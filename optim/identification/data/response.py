@@ -9,16 +9,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from optim.errors import DataError
-from optim.identify.data.measured import Column, DataKind, Measured, Model
-from optim.identify.data.measured_units import Dimension
-from optim.identify.data.response_model import ResponseModel
-from optim.identify.data.table import Table, check_monotone, check_sign
+from optim.identification.data.measured import Column, DataKind, Measured, Model
+from optim.identification.data.measured_units import Dimension
+from optim.identification.data.response_model import ResponseModel
+from optim.identification.data.table import Table, check_monotone, check_sign
 from optim.problem.variables import Real
 from solver.jit.fourier import Complex
 from solver.scene.scene import Scene
 from solver.sensitivity.observed import Quantity
 
-FLOOR = 0.01  # of the largest amplitude of a run, below which noise in proportion to amplitude falls no further
+FLOOR = (
+    0.01  # of the largest amplitude of a run, below which noise in proportion to amplitude falls no further
+)
 _FAR = 20.0  # ratio to the scene's band from which a frequency is taken for a wrong unit
 _MOST_DEGREES = 720.0
 _WORDS = {
@@ -94,7 +96,9 @@ class ResponseRun(Measured):
         m = self.frequency_hz.size
         if m <= most:
             return self
-        kept = np.unique(np.append(np.linspace(0, m - 1, most).round().astype(int), np.abs(self.data).argmax()))
+        kept = np.unique(
+            np.append(np.linspace(0, m - 1, most).round().astype(int), np.abs(self.data).argmax())
+        )
         return self._rows(kept)
 
     def under(self, conditions: Mapping[str, float], most: int) -> ResponseRun:
@@ -174,7 +178,8 @@ def _check_band(scene: Scene, table: Table) -> None:
     far = np.flatnonzero((frequencies < low / _FAR) | (frequencies > high * _FAR))
     if far.size:
         wanted = (
-            f"must be near the scene's band, {low:g} to {high:g} Hz: give the unit in the head of the column, "
+            f"must be near the scene's band, {low:g} to {high:g} Hz: give the unit in the head of the "
+            f"column, "
             "`frequency [kHz]`, `[rad/s]` or `[1/min]`"
         )
         raise table.error(int(far[0]), "frequency", wanted)
@@ -211,7 +216,9 @@ KIND = DataKind(
     help="Amplitude, or amplitude and phase, over frequency: stepped or slow sine sweeps.",
     columns=(
         Column("frequency", Dimension.FREQUENCY, "Of the excitation."),
-        Column("amplitude", Dimension.MOTION, "Of one harmonic of the motion, the first unless `harmonic` says."),
+        Column(
+            "amplitude", Dimension.MOTION, "Of one harmonic of the motion, the first unless `harmonic` says."
+        ),
         Column("phase", Dimension.ANGLE, "By which that harmonic is ahead of the excitation."),
         Column("real", Dimension.MOTION, "Real part of the same, x = Re(x̂ e^{iωt}) under a force F cos ωt."),
         Column("imag", Dimension.MOTION, "Its imaginary part."),

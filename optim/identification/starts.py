@@ -1,4 +1,4 @@
-"""Many starts: thinned runs rank places all over the bounds, the best are searched, the best of all is fitted."""
+"""Many starts: thinned runs rank places all over the bounds; from the best of them all runs are fitted."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optim.identify.evaluation import Fitted, Runs
-from optim.identify.least_squares import LocalFit, Noise, fit
+from optim.identification.evaluation import Fitted, Runs
+from optim.identification.least_squares import LocalFit, Noise, fit
 from optim.problem.variables import Real
 from solver.results.watch import OnProgress, ShouldStop
 

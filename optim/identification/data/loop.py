@@ -1,8 +1,8 @@
 """The kind `loop`: a hysteresis loop of one contact, its force over its motion, in a steady period.
 
 Motion and force become Fourier coefficients; the law is asked for the force under that motion, and what both
-have in common is the same band of harmonics, so that leaving out the higher ones biases nothing. Means are not
-compared: sensors drift, and the mean force of a contact that sticks depends on its history.
+have in common is the same band of harmonics, so that leaving out the higher ones biases nothing. Means are
+not compared: sensors drift, and the mean force of a contact that sticks depends on its history.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from optim.errors import DataError
-from optim.identify.data.measured import Column, DataKind, Measured, Model, Predicted
-from optim.identify.data.measured_units import Dimension
-from optim.identify.data.table import Table, check_monotone
+from optim.identification.data.measured import Column, DataKind, Measured, Model, Predicted
+from optim.identification.data.measured_units import Dimension
+from optim.identification.data.table import Table, check_monotone
 from optim.problem.variables import Real
 from solver.balance.balance import build
 from solver.balance.simplifications import Effects
@@ -83,7 +83,7 @@ class LoopRun(Measured):
         waves = fourier.basis(_angles(256), (values.size) // 2)[:, 1:] @ (values / self.scale)
         return np.full(values.size, float(np.abs(waves).max()))
 
-    def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> Model:
+    def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> Model:  # noqa: ARG002
         """As the base says; the harmonics of a loop are its own."""
         return _LoopModel(self, scene, tuple(paths))
 
@@ -157,7 +157,8 @@ def read_loop(scene: Scene, table: Table) -> Measured:
     highest = min(_HIGHEST, (len(table) - 1) // 3)
     basis = fourier.basis(tau, highest)
     motion, force = (
-        np.linalg.lstsq(basis, table.columns[name], rcond=None)[0] for name in ("motion", "force")
+        np.asarray(np.linalg.lstsq(basis, table.columns[name], rcond=None)[0], np.float64)
+        for name in ("motion", "force")
     )
     motion = _without_noise(motion)
     _check_turn(table, motion, force)
@@ -200,7 +201,9 @@ def _check_turn(table: Table, motion: Real, force: Real) -> None:
     area = math.pi * float(np.sum(np.arange(1, len(u) + 1) * (f[:, 0] * u[:, 1] - f[:, 1] * u[:, 0])))
     box = 4.0 * float(np.linalg.norm(u) * np.linalg.norm(f))
     if box == 0.0 or area < -_BACKWARD * box:
-        wanted = "must be a loop that dissipates, ∮ force d(motion) > 0: look at the signs of force and motion"
+        wanted = (
+            "must be a loop that dissipates, ∮ force d(motion) > 0: look at the signs of force and motion"
+        )
         raise table.refusal(f"{area:.4g} J", wanted)
 
 

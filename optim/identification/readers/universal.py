@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from optim.errors import DataError
-from optim.identify.data.measured_units import Dimension, unit_of
-from optim.identify.data.table import Table
-from optim.identify.readers.columns import read_head, table_of
-from optim.identify.readers.registry import DataFormat
+from optim.identification.data.measured_units import Dimension, unit_of
+from optim.identification.data.table import Table
+from optim.identification.readers.columns import read_head, table_of
+from optim.identification.readers.registry import DataFormat
 from solver.errors import MissingExtraError
 
 _FREQUENCY, _FORCE = 18, 13  # specific data types of an axis
@@ -38,7 +38,7 @@ def read_universal(path: Path, paths: frozenset[str]) -> list[Table]:
     try:
         file = pyuff.UFF(str(path))
         found = [file.read_sets(int(i)) for i, kind in enumerate(file.get_set_types()) if int(kind) == 58]
-    except Exception as error:  # noqa: BLE001 - pyuff raises whatever its parsing meets, and bare Exception
+    except Exception as error:
         raise DataError(path.name, str(error), "must be a universal file") from error
     tables = [_table(path, number, one, paths) for number, one in enumerate(found, start=1)]
     if not tables:
@@ -74,14 +74,16 @@ def _unit(source: str, one: Mapping[str, Any], plain: str) -> str:
     if label in ("", "NONE"):
         label = plain
     if unit_of(Dimension.MOTION, label) is None:
-        raise DataError(source, label, "must have a unit of a motion, such as m, mm/s or m/s2", column="ordinate")
+        raise DataError(
+            source, label, "must have a unit of a motion, such as m, mm/s or m/s2", column="ordinate"
+        )
     return label + ("/N" if one.get("orddenom_spec_data_type") == _FORCE else "")
 
 
 FORMAT = DataFormat(
     name="Universal file",
     suffixes=(".uff", ".unv", ".uf", ".58"),
-    help="Functions of data set 58 or 58b over the frequency, also per newton; conditions in the title lines; "
+    help="Functions of data set 58 or 58b over the frequency, also per newton; conditions in title lines; "
     "needs the extra `uff` (pyuff).",
     read=read_universal,
 )

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from optim.identify.data.measured_units import Dimension
-from optim.identify.data.table import Table
+from optim.identification.data.measured_units import Dimension
+from optim.identification.data.table import Table
 from optim.problem.variables import Real
 from solver.jit.fourier import Integer
 from solver.scene.scene import Scene

@@ -1,7 +1,7 @@
 """What the data tell: information matrix, covariance, standard errors, and directions they do not tell.
 
-All is in unknowns scaled to their bounds, 0 to 1. What a uniform distribution over the bounds is uncertain by,
-1/√12, is the measure: a direction along which the data leave more than that open, they do not tell.
+All is in unknowns scaled to their bounds, 0 to 1. What a uniform distribution over the bounds is uncertain
+by, 1/√12, is the measure: a direction along which the data leave more than that open, they do not tell.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optim.identify.evaluation import Runs
-from optim.identify.least_squares import HUBER, LocalFit
+from optim.identification.evaluation import Runs
+from optim.identification.least_squares import HUBER, LocalFit
 from optim.problem.variables import Real
 
 UNIFORM = 1.0 / math.sqrt(12.0)
@@ -47,10 +47,10 @@ class Information:
 
     def covariance(self) -> Real:
         """Return the covariance, (n, n); along what nothing tells, that of the bounds."""
-        return np.linalg.inv(self.total + np.eye(len(self.data)) * _least(self.total))
+        return np.asarray(np.linalg.inv(self.total + np.eye(len(self.data)) * _least(self.total)), np.float64)
 
     def weak(self) -> tuple[tuple[float, Real], ...]:
-        """Return the directions the data do not tell: (standard deviation along, unit vector), worst first."""
+        """Return the directions the data do not tell, (standard deviation, unit vector), worst first."""
         values, vectors = np.linalg.eigh(self.total)
         floor = max(_TINY * float(values[-1]), 1e-300)
         spread = 1.0 / np.sqrt(np.maximum(values, floor))

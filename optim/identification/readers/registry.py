@@ -9,12 +9,12 @@ from importlib import import_module
 from pathlib import Path
 
 from optim.errors import DataError
-from optim.identify.data.table import Table
+from optim.identification.data.table import Table
 
 SHIPPED = (
-    "optim.identify.readers.csv_text",
-    "optim.identify.readers.parquet",
-    "optim.identify.readers.universal",
+    "optim.identification.readers.csv_text",
+    "optim.identification.readers.parquet",
+    "optim.identification.readers.universal",
 )
 
 

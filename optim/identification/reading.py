@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from optim.errors import DataError
-from optim.identify.data.measured import DataKind, Measured
-from optim.identify.data.registry import data_kinds
-from optim.identify.data.table import Table, check_numbers, runs_of
-from optim.identify.readers.columns import Head, read_head, table_of
-from optim.identify.readers.registry import read_file
+from optim.identification.data.measured import DataKind, Measured
+from optim.identification.data.registry import data_kinds
+from optim.identification.data.table import Table, check_numbers, runs_of
+from optim.identification.readers.columns import Head, read_head, table_of
+from optim.identification.readers.registry import read_file
 from solver.errors import SettingError
 from solver.scene.scene import Scene
 
@@ -96,7 +96,7 @@ def _table_of(given: Mapping[str, Any], index: int, paths: frozenset[str]) -> Ta
     return table_of(source, heads, numbers, head, paths, place=place)
 
 
-def _numbers(source: str, name: str, values: Sequence[Any], place: tuple[str | int, ...]) -> np.ndarray:
+def _numbers(source: str, name: str, values: Any, place: tuple[str | int, ...]) -> np.ndarray:
     for row, value in enumerate(values):
         if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
             wanted = "must be a number: leave the whole row out if it is missing"

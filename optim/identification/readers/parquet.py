@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from optim.errors import DataError
-from optim.identify.data.table import Table
-from optim.identify.readers.columns import read_head, table_of
-from optim.identify.readers.registry import DataFormat
+from optim.identification.data.table import Table
+from optim.identification.readers.columns import read_head, table_of
+from optim.identification.readers.registry import DataFormat
 from optim.problem.variables import Real
 from solver.errors import MissingExtraError
 

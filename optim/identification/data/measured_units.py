@@ -44,7 +44,7 @@ class Unit:
 
 
 _PLAIN = {
-    Dimension.FREQUENCY: {"Hz": 1.0, "kHz": 1e3, "rad/s": 0.5 / math.pi, "1/min": 1.0 / 60.0, "rpm": 1.0 / 60.0},
+    Dimension.FREQUENCY: {"Hz": 1.0, "kHz": 1e3, "rad/s": 0.5 / math.pi, "1/min": 1.0 / 60.0},
     Dimension.LENGTH: _LENGTHS,
     Dimension.ANGLE: {"deg": 1.0, "°": 1.0, "rad": 180.0 / math.pi},
     Dimension.FORCE: {"N": 1.0, "mN": 1e-3, "kN": 1e3, "lbf": 4.4482216152605},

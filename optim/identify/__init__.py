@@ -1,1 +1,0 @@
-"""Identification: parameters of a scene from measured responses and hysteresis loops, with how sure they are."""
