@@ -149,7 +149,7 @@ def _search(runs: Runs, z: Real, sd: Real, robust: bool) -> LocalFit:
 
 
 def _huber(squares: Real, count: int) -> tuple[Real, Real, Real]:
-    """Return Huber's loss of squared residuals with two derivatives; behind the first `count` the plain one."""
+    """Return Huber's loss of squared residuals with two derivatives, from place `count` on the plain one."""
     value, slope, bend = squares.copy(), np.ones_like(squares), np.zeros_like(squares)
     far = np.flatnonzero(squares[:count] > HUBER**2)
     size = np.sqrt(squares[far])

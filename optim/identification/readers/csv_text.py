@@ -75,7 +75,7 @@ def _number(source: str, line: int, column: str, cell: str) -> float:
 FORMAT = DataFormat(
     name="CSV",
     suffixes=(".csv", ".tsv", ".txt"),
-    help="Units in the heads, `amplitude [mm]`; conditions in lines `# shroud.N0 = 200` or in columns of that "
-    "name; commas, semicolons or tabs between.",
+    help="Units in the heads, `amplitude [mm]`; conditions in lines `# shroud.N0 = 200` or in columns of "
+    "that name; commas, semicolons or tabs between.",
     read=read_csv,
 )

@@ -77,6 +77,8 @@ def join_words(arguments: Sequence[str]) -> list[str]:
 
 def _several(arguments: Sequence[str]) -> dict[str, int]:
     """How many words follow an option of a command each time, where that is more than one."""
+    if arguments and arguments[0] == "identify":
+        return {"--unknown": 3, "--prior": 3}
     if not arguments or arguments[0] not in ("design", "pareto", "submit"):
         return {}
     from optim.problem.keys import DesignKeys, FrontKeys, options
@@ -92,13 +94,13 @@ def _several(arguments: Sequence[str]) -> dict[str, int]:
     return {one.flag: one.several for one in options(model).values() if one.several > 1}
 
 
-def bounds(option: str, texts: Sequence[str]) -> dict[str, list[float]]:
-    """The variables of a design with their bounds."""
+def bounds(option: str, texts: Sequence[str], wanted: str = "LO HI") -> dict[str, list[float]]:
+    """Paths with two numbers each, such as the variables of a design with their bounds."""
     variables: dict[str, list[float]] = {}
     for text in texts:
         words = text.split()
         if len(words) != 3:
-            raise InputError(f"`{option}` takes PATH LO HI, for example {DISK_LOAD} 20 3000, got {text!r}")
+            raise InputError(f"`{option}` takes PATH {wanted}, for example {DISK_LOAD} 20 3000, got {text!r}")
         path, low, high = words
         if path in variables:
             raise InputError(f"`{option}` names {path!r} twice; keep one")
