@@ -51,9 +51,9 @@ def untold(
     return tuple(_one(scene, unknowns, z, direction, seen) for _, direction in known.weak())
 
 
-def strong_correlations(unknowns: Unknowns, covariance: Real) -> tuple[tuple[str, str, float], ...]:
+def strong_correlations(unknowns: Unknowns, known: Information) -> tuple[tuple[str, str, float], ...]:
     """Return pairs of unknowns whose correlation is above 0.95, though each may be told."""
-    spread = np.sqrt(np.diag(covariance))
+    covariance, spread = known.covariance(), known.standard_errors()
     told = [i for i in range(len(unknowns)) if spread[i] < UNIFORM]
     found = []
     for a, i in enumerate(told):

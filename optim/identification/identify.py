@@ -143,7 +143,7 @@ def _described(
     unknowns, z = runs.unknowns, best.fitted.z
     covariance = info.covariance()
     slopes, values = unknowns.slopes(z), unknowns.values(z)
-    estimates = _estimates(runs.scene, unknowns, z, covariance, info)
+    estimates = _estimates(runs.scene, unknowns, z, info)
     in_units = covariance * np.outer(slopes, slopes)
     spread = np.sqrt(np.diag(covariance))
     missing = untold(runs.scene, unknowns, z, info, best.fitted.states)
@@ -166,7 +166,7 @@ def _described(
         correlation=covariance / np.outer(spread, spread),
         noise=(math.nan if noise is None else noise) if level_known else best.level,
         reduced_chi2=info.reduced_chi2, misfit=_MISFIT_WORDS if bad else "", untold=missing,
-        correlated=strong_correlations(unknowns, covariance), candidates=(),
+        correlated=strong_correlations(unknowns, info), candidates=(),
         runs=_curves(runs, best, covariance), not_reached=left_out,
         uncertain=uncertain_table(here, unknowns, values, in_units, intervals, told=not missing),
         values=by_path, other_optima=tuple(others), starts=found.starts, agreeing=found.agreeing,
@@ -182,16 +182,15 @@ _MISFIT_WORDS = (
 
 
 def _estimates(
-    scene: Scene, unknowns: Unknowns, z: Real, covariance: Real, info: Information
+    scene: Scene, unknowns: Unknowns, z: Real, info: Information
 ) -> tuple[Estimate, ...]:  # fmt: skip
     """Return each unknown with its interval, which is symmetric in the scaled unknown."""
-    factor, found = info.quantile(), []
+    factor, found, errors = info.quantile(), [], info.standard_errors().tolist()
     for i, variable in enumerate(unknowns.variables):
-        sd = math.sqrt(float(covariance[i, i]))
-        told = sd < UNIFORM
+        sd, told = errors[i], errors[i] < UNIFORM
         value = variable.outside(float(z[i]))
         ends = [value + sign * factor * sd * variable.slope(value) for sign in (-1.0, 1.0)]
-        if variable.logarithmic:
+        if variable.logarithmic and told:
             stretch = math.exp(factor * sd * math.log(variable.high / variable.low))
             ends = [value / stretch, value * stretch]
         found.append(

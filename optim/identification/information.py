@@ -47,14 +47,24 @@ class Information:
 
     def covariance(self) -> Real:
         """Return the covariance, (n, n); along what nothing tells, that of the bounds."""
-        return np.asarray(np.linalg.inv(self.total + np.eye(len(self.data)) * _least(self.total)), np.float64)
+        spread, vectors = self._principal()
+        return np.asarray(vectors * np.minimum(spread, UNIFORM) ** 2 @ vectors.T)
+
+    def standard_errors(self) -> Real:
+        """Return the standard deviation of each unknown, (n,), large without end where nothing tells it."""
+        spread, vectors = self._principal()
+        return np.asarray(np.sqrt((vectors * spread) ** 2 @ np.ones(spread.size)))
+
+    def _principal(self) -> tuple[Real, Real]:
+        """Return standard deviations along the principal directions, worst first, and these as columns."""
+        values, vectors = np.linalg.eigh(self.total)
+        floor = max(_TINY * float(values[-1]), 1e-300)
+        return np.asarray(1.0 / np.sqrt(np.maximum(values, floor))), np.asarray(vectors, np.float64)
 
     def weak(self) -> tuple[tuple[float, Real], ...]:
         """Return the directions the data do not tell, (standard deviation, unit vector), worst first."""
-        values, vectors = np.linalg.eigh(self.total)
-        floor = max(_TINY * float(values[-1]), 1e-300)
-        spread = 1.0 / np.sqrt(np.maximum(values, floor))
-        return tuple((float(spread[i]), vectors[:, i]) for i in range(values.size) if spread[i] > UNIFORM)
+        spread, vectors = self._principal()
+        return tuple((float(spread[i]), vectors[:, i]) for i in range(spread.size) if spread[i] > UNIFORM)
 
     def quantile(self) -> float:
         """Return the factor of a standard error in a 95 % interval."""
@@ -63,11 +73,6 @@ class Information:
         from scipy.stats import t
 
         return float(t.ppf(0.975, self.degrees))
-
-
-def _least(total: Real) -> float:
-    """Return an information that matters only where there is none."""
-    return max(1e-6 / UNIFORM**2, _TINY * float(np.abs(np.diag(total)).max(initial=0.0)))
 
 
 def information(runs: Runs, found: LocalFit, *, robust: bool, level_known: bool) -> Information:

@@ -34,8 +34,8 @@ _EXAMPLE: dict[str, Any] = {
     "starts": 2,
     "data": [
         {
-            "frequency": [0.9, 1.0, 1.1, 1.2, 1.3],
-            "amplitude": [1.335, 2.009, 2.036, 1.335, 0.915],
+            "frequency": [1.0, 1.1, 1.2, 1.3, 1.4],
+            "amplitude": [1.93, 2.12, 1.77, 1.48, 1.25],
             "conditions": {"excitation.amplitude": 100.0, "damper.N0": 100.0},
         }
     ],
