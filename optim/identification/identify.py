@@ -11,14 +11,14 @@ import numpy as np
 
 from optim.errors import DataError, DesignError
 from optim.identification.data.response import ResponseRun
-from optim.identification.evaluation import Runs
+from optim.identification.fit.evaluation import Runs
+from optim.identification.fit.least_squares import LocalFit, Noise
+from optim.identification.fit.starts import MOST_STARTS, STARTS, Searched, search
 from optim.identification.identifiability import strong_correlations, untold
 from optim.identification.information import UNIFORM, Information, information
-from optim.identification.least_squares import LocalFit, Noise
 from optim.identification.next_measurement import rank, read_candidates
 from optim.identification.reading import Given, read_data
 from optim.identification.result import Estimate, Identification, IdentifyStatus, NotReached
-from optim.identification.starts import MOST_STARTS, STARTS, Searched, search
 from optim.identification.uncertain import clipped, uncertain_table
 from optim.identification.unknowns import Unknowns, read_unknowns
 from optim.problem.numbers import is_number

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optim.identification.evaluation import Runs
-from optim.identification.least_squares import HUBER, LocalFit
+from optim.identification.fit.evaluation import Runs
+from optim.identification.fit.least_squares import HUBER, LocalFit
 from optim.problem.variables import Real
 
 UNIFORM = 1.0 / math.sqrt(12.0)

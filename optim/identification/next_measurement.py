@@ -17,9 +17,9 @@ import numpy as np
 
 from optim.errors import DesignError
 from optim.identification.data.measured import Measured
-from optim.identification.evaluation import Runs
+from optim.identification.fit.evaluation import Runs
+from optim.identification.fit.least_squares import LocalFit
 from optim.identification.information import UNIFORM, Information
-from optim.identification.least_squares import LocalFit
 from optim.identification.unknowns import Unknowns
 from optim.problem.numbers import is_number
 from optim.problem.variables import Real

@@ -49,6 +49,7 @@ def _draw_responses(axes: Axes, runs: Sequence[Run]) -> None:
         order = np.argsort(run["x"])
         _draw(axes, run, colour, unit.per_metre, order, markers="o")
     axes.set_yscale("log")
+    style.plain_log(axes.yaxis)
     dofs = dict.fromkeys(run["dof"] for run in runs)
     style.label(axes, "frequency [Hz]", f"amplitude of {', '.join(dofs)} [{unit.name}]")
     _legend(axes, runs)

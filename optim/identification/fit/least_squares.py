@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optim.identification.evaluation import Fitted, Runs
+from optim.identification.fit.evaluation import Fitted, Runs
 from optim.problem.variables import Real
 
 HUBER = 1.345  # standard deviations from which a residual weighs less: 95 % efficient without outliers

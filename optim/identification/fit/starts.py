@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optim.identification.evaluation import Fitted, Runs
-from optim.identification.least_squares import LocalFit, Noise, fit
+from optim.identification.fit.evaluation import Fitted, Runs
+from optim.identification.fit.least_squares import LocalFit, Noise, fit
 from optim.problem.variables import Real
 from solver.results.watch import OnProgress, ShouldStop
 
