@@ -14,7 +14,7 @@ COMMANDS = (
     Entry("pareto", "commands.design.pareto", "Find the front of peak against resonance band."),
     Entry(
         "identify", "commands.identify.identify",
-        "Find parameters from measured responses and hysteresis loops, with how sure they are.",
+        "Find parameters from measured responses and hysteresis loops.",
     ),
     Entry(
         "sensitivities", "commands.sensitivities.sensitivities",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,7 +14,6 @@ from service.cli.options import shared as options
 from service.cli.options.numeric import amount, count
 from service.cli.output_files import Outputs
 from service.cli.progress import bar
-from service.errors import InputError
 from service.rendering.tables import identify as tables
 from service.rendering.tables.text import show
 from solver.scene.examples import DISK_LOAD
@@ -90,7 +88,7 @@ def identify(
     out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
-    """Find parameters of a scene from measured responses and hysteresis loops.
+    """Find parameters from measured responses and hysteresis loops.
 
     Least squares over whole responses, from many starts: estimates with 95 % intervals, what the data do not
     tell, and which measurement would tell most.
@@ -104,37 +102,16 @@ def identify(
 
     with bar("identify", "places") as on_progress:
         found = optim.identify(
-            scene, data, bounds, scaling=_words(scaling), priors=known, noise=noise, robust=robust,
-            candidates=_candidates(candidate), harmonics=harmonics, starts=starts, seed=seed,
-            on_progress=on_progress,
+            scene, data, bounds, scaling=inputs.words_by_path("--scaling", scaling or ()), priors=known,
+            noise=noise, robust=robust,
+            candidates=inputs.lists_by_path("--candidate", candidate) if candidate else None,
+            harmonics=harmonics, starts=starts, seed=seed, on_progress=on_progress,
         )  # fmt: skip
     outputs.write(found, found.plot if found.fitted else None)
     if problem is not None and found.fitted:
         _write(problem, name, inputs.settings(values), found)
     show(found.to_json(), tables.report, as_json=as_json)
     end(found.reached, found.status.value)
-
-
-def _words(texts: Sequence[str] | None) -> dict[str, str]:
-    """How unknowns are scaled."""
-    pairs = [text.partition("=") for text in texts or ()]
-    for (path, equals, how), text in zip(pairs, texts or (), strict=True):
-        if not equals or not path or not how:
-            raise InputError(f"`--scaling` takes PATH=HOW, for example shroud.kt=logarithmic, got {text!r}")
-    return {path.strip(): how.strip() for path, _, how in pairs}
-
-
-def _candidates(texts: Sequence[str] | None) -> dict[str, list[float]] | None:
-    """Values of conditions of measurements that could be made."""
-    if not texts:
-        return None
-    given: dict[str, list[float]] = {}
-    for text in texts:
-        path, equals, numbers = text.partition("=")
-        if not equals or not path.strip():
-            raise InputError(f"`--candidate` takes PATH=V,V,…, for example {DISK_LOAD}=100,400, got {text!r}")
-        given[path.strip()] = [inputs.part("--candidate", text, word) for word in numbers.split(",")]
-    return given
 
 
 def _write(file: Path, name: str, given: dict[str, float], found: Identification) -> None:

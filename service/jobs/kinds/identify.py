@@ -120,12 +120,16 @@ class IdentifyResult(ReachedResult):
     correlation: list[list[float]]
     noise: float | None
     reduced_chi2: float | None
+    misfit: str = Field(description="What residuals larger than the noise given say; else empty.")
     untold: list[Table]
+    correlated: list[Table]
     candidates: list[Table]
     runs: list[Table]
     not_reached: list[Table]
     uncertain: Table = Field(description="For the key `uncertain` of a robust design.")
+    other_optima: list[Table]
     starts: int
+    agreeing: int
     evaluations: int
     n_harmonics: int
     seconds: float
@@ -193,7 +197,7 @@ IDENTIFY = JobKind(
     result=IdentifyResult,
     view=KindView(
         result="estimates, intervals, what the data do not tell ([identification](identify.md))",
-        flags={"unknowns": "--unknowns", "priors": "--priors", "candidates": "--candidates"},
+        flags={"unknowns": "--unknown", "priors": "--prior", "candidates": "--candidate"},
         draw=draw,
     ),
 )
