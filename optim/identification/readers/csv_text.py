@@ -32,8 +32,9 @@ def read_csv(path: Path, paths: frozenset[str]) -> list[Table]:
     head = read_head(path.name, remarks, paths)
     if len(rows) < 2:
         raise DataError(
-            path.name, f"{len(rows)} lines", "must have a line of column heads and rows of numbers"
-        )
+            path.name, f"{len(rows)} lines", "must have a line of column heads and rows of numbers",
+            line=next(iter(rows), 1),
+        )  # fmt: skip
     head_line = next(iter(rows))
     separator = next((one for one in _SEPARATORS if one in rows[head_line]), ",")
     heads = [text.strip().strip('"') for text in rows.pop(head_line).split(separator)]

@@ -173,3 +173,11 @@ def test_bad_descriptions_are_told(data: list[Any], words: list[str]) -> None:
     with pytest.raises(DataError) as caught:
         read_data(SCENE, data, unknown=("damper.mu",))
     assert all(word in str(caught.value) for word in words), str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "line"), [("", 1), ("# damper.N0 = 100\n\nfrequency [Hz],amplitude [mm]\n", 3)]
+)
+def test_a_file_without_rows_is_told_with_its_line(tmp_path: Path, text: str, line: int) -> None:
+    with pytest.raises(DataError, match=rf"rig\.csv, line {line}: must have a line of column heads"):
+        read(tmp_path, text)
