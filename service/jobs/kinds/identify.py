@@ -196,7 +196,7 @@ IDENTIFY = JobKind(
     run=run,
     result=IdentifyResult,
     view=KindView(
-        result="estimates, intervals, what the data do not tell ([identification](identify.md))",
+        result="estimates, intervals, what the data do not tell ([identification](identification.md))",
         flags={"unknowns": "--unknown", "priors": "--prior", "candidates": "--candidate"},
         draw=draw,
     ),
