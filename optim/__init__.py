@@ -6,7 +6,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from optim.errors import DesignError
+    from optim.errors import DataError, DesignError
+    from optim.identification.identify import identify
+    from optim.identification.result import Identification, IdentifyStatus
     from optim.results.design import DesignResult, DesignStatus
     from optim.robust.result import RobustResult, RobustStatus
     from optim.robust.robust import robust_design
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from optim.studies.pareto_result import ParetoResult, ParetoStatus
 
 _HOME = {
+    "DataError": "errors", "identify": "identification.identify", "Identification": "identification.result",
+    "IdentifyStatus": "identification.result",
     "design": "search", "DesignResult": "results.design", "DesignStatus": "results.design",
     "DesignError": "errors", "CampbellDiagram": "studies.crossings", "CampbellStatus": "studies.crossings",
     "campbell_diagram": "studies.campbell", "forbidden_hz": "studies.campbell",
@@ -30,9 +34,12 @@ _HOME = {
 __all__ = [
     "CampbellDiagram",
     "CampbellStatus",
+    "DataError",
     "DesignError",
     "DesignResult",
     "DesignStatus",
+    "Identification",
+    "IdentifyStatus",
     "ParetoResult",
     "ParetoStatus",
     "RobustResult",
@@ -42,6 +49,7 @@ __all__ = [
     "campbell_diagram",
     "design",
     "forbidden_hz",
+    "identify",
     "pareto_front",
     "robust_design",
     "sensitivities",

@@ -27,6 +27,29 @@ class DesignError(Exception):
         super().__init__(f"`{self.name}` {wanted}, got {value!r}")
 
 
+class DataError(DesignError):
+    """Measured data that cannot be used; the message names the file, the line and what would be right.
+
+    Parameters
+    ----------
+    source : the file, or the place in a description.
+    value : what stands there.
+    wanted : what would be right.
+    line : of the file, counted from 1.
+    column : its name.
+    place : where the run stands in a description, ``("data", 0)``.
+    """
+
+    def __init__(
+        self, source: str, value: object, wanted: str, *, line: int | None = None, column: str = "",
+        place: Place = ("data",),
+    ) -> None:  # fmt: skip
+        where = source + (f", line {line}" if line is not None else "") + (f", `{column}`" if column else "")
+        super().__init__("data", value, wanted, place=place)
+        self.source, self.line, self.column = source, line, column
+        self.args = (f"{where}: {wanted}, got {value!r}",)
+
+
 def written(place: Place) -> str:
     """Return a place as text, ``cases[0].band``."""
     steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in place)

@@ -119,6 +119,8 @@ def check_variables(
     scene: Scene,
     variables: Mapping[str, tuple[float, float]] | None,
     scaling: Mapping[str, str] | None = None,
+    *,
+    key: str = "variables",
 ) -> tuple[Variable, ...]:
     """Return the design variables; without any, the N0 of the first contact whose load N1 is tied to.
 
@@ -127,6 +129,7 @@ def check_variables(
     scene : what is designed.
     variables : paths (several that share a value separated by commas) to (low, high).
     scaling : names of variables to ``linear``, ``logarithmic`` or ``auto``.
+    key : what the description calls them.
 
     Raises
     ------
@@ -138,7 +141,7 @@ def check_variables(
     if variables is None:
         variables = _default(scene)
     if not isinstance(variables, Mapping) or not variables:
-        raise DesignError("variables", variables, "must name at least one parameter path with (low, high)")
+        raise DesignError(key, variables, "must name at least one parameter path with (low, high)")
     scaling = {} if scaling is None else scaling
     for name in scaling:
         if name not in variables:
@@ -148,26 +151,26 @@ def check_variables(
     checked = []
     for name, bounds in variables.items():
         paths = tuple(part.strip() for part in str(name).split(","))
-        low, high = _bounds(name, bounds)
+        low, high = _bounds(key, name, bounds)
         for path in paths:
-            with at("variables", name):
-                _check_path(scene, path, low, high)
+            with at(key, name):
+                _check_path(scene, key, path, low, high)
             if path in taken:
                 wanted = f"must stand in one variable, it is in {taken[path]} too"
-                raise DesignError("variables", path, wanted, place=("variables", path))
+                raise DesignError(key, path, wanted, place=(key, path))
             taken[path] = name
         how = _scaling(name, scaling.get(name, Scaling.AUTO.value), low, high)
         checked.append(Variable(name=name, paths=paths, low=low, high=high, logarithmic=how))
     return tuple(checked)
 
 
-def _check_path(scene: Scene, path: str, low: float, high: float) -> None:
+def _check_path(scene: Scene, key: str, path: str, low: float, high: float) -> None:
     parameter = resolve(scene, path)
     if parameter.kind is Kind.FREQUENCY:
         wanted = "cannot be the frequency: the band of the scene is searched"
-        raise DesignError("variables", path, wanted)
-    parameter.check(f"variables.{path} (low)", low)
-    parameter.check(f"variables.{path} (high)", high)
+        raise DesignError(key, path, wanted)
+    parameter.check(f"{key}.{path} (low)", low)
+    parameter.check(f"{key}.{path} (high)", high)
 
 
 def _scaling(name: str, wanted: object, low: float, high: float) -> bool:
@@ -183,8 +186,8 @@ def _scaling(name: str, wanted: object, low: float, high: float) -> bool:
     )
 
 
-def _bounds(path: str, bounds: object) -> tuple[float, float]:
-    name = ("variables", path)
+def _bounds(key: str, path: str, bounds: object) -> tuple[float, float]:
+    name = (key, path)
     if not isinstance(bounds, Sequence) or isinstance(bounds, str) or len(bounds) != 2:
         raise DesignError(name, bounds, "must be two numbers, low and high")
     low, high = bounds

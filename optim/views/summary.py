@@ -12,6 +12,7 @@ from solver.views.parameter_units import parameter
 from solver.views.summary import Pairs, made
 
 if TYPE_CHECKING:
+    from optim.identification.result import Estimate, Identification
     from optim.results.design import DesignResult
     from optim.robust.result import RobustResult
     from optim.studies.crossings import CampbellDiagram
@@ -96,3 +97,26 @@ def of_sensitivities(result: SensitivityResult) -> Summary:
     pairs += [("warning", reason) for reason in unsettled([result.branch.peak_certificate])]
     pairs.append(("time", units.duration(result.seconds)))
     return made(f"{result.scene.name}, for 1 % more of each", pairs, result.status.value)
+
+
+def of_identification(result: Identification) -> Summary:
+    """The estimates with their intervals, and what the data do not tell."""
+    pairs: Pairs = [(one.name, estimate_words(one)) for one in result.estimates]
+    pairs += [("not told", one.words) for one in result.untold]
+    if not math.isnan(result.noise):
+        pairs.append(("noise", f"{100.0 * result.noise:.3g} %"))
+    if result.misfit:
+        pairs.append(("warning", result.misfit))
+    pairs.append(("time", units.duration(result.seconds)))
+    return made(f"{result.scene}, {len(result.runs)} runs", pairs, result.status.value)
+
+
+def estimate_words(one: Estimate) -> str:
+    """An estimate with its standard error and interval, or that the data do not tell it."""
+    if not one.told:
+        ends = " and ".join(parameter(one.name, end) for end in (one.low, one.high))
+        return f"not told by the data, between {ends}"
+    low, high = one.interval
+    edge = ", at its bound" if one.at_bound else ""
+    value = parameter(one.name, one.value)
+    return f"{value} ± {one.standard_error:.2g}, 95 % {low:.6g} to {high:.6g}{edge}"

@@ -13,6 +13,7 @@ from solver.views.parameter_units import parameter_unit
 from solver.views.to_dataset import attributes, column
 
 if TYPE_CHECKING:
+    from optim.identification.result import Identification
     from optim.problem.variables import Variable as DesignVariable
     from optim.results.design import DesignResult
     from optim.robust.result import RobustResult
@@ -134,3 +135,28 @@ def sensitivities_dataset(result: SensitivityResult) -> Dataset:
     }  # fmt: skip
     notes = attributes(result.status.value, result.scene)
     return Dataset(kind="sensitivities", rows=("parameter",), variables=variables, attributes=notes)
+
+
+def identification_dataset(result: Identification) -> Dataset:
+    """An unknown a row; beside it data, fit and standard deviation of the fit of every run."""
+    estimates = result.estimates
+    variables = {
+        "name": column("unknown", np.array([one.name for one in estimates], dtype=np.str_)),
+        "unit": column("unknown", np.array([one.unit for one in estimates], dtype=np.str_)),
+        "told": column("unknown", np.array([one.told for one in estimates], dtype=bool)),
+    }
+    for name, values in (
+        ("value", [one.value for one in estimates]),
+        ("standard_error", [one.standard_error for one in estimates]),
+        ("low", [one.interval[0] for one in estimates]),
+        ("high", [one.interval[1] for one in estimates]),
+    ):
+        variables[name] = column("unknown", np.array(values, dtype=np.float64), "", "in the unit of the row")
+    for i, run in enumerate(result.runs):
+        for key in ("x", "data", "fit", "fit_sd"):
+            values = [math.nan if value is None else value for value in run[key]]
+            variables[f"{key}_of_{i}"] = column(f"point_of_{i}", np.array(values, dtype=np.float64))
+    notes = attributes(
+        result.status.value, scene=None, name=result.scene, noise=result.noise, harmonics=result.harmonics
+    )
+    return Dataset(kind="identification", rows=("unknown",), variables=variables, attributes=notes)

@@ -13,6 +13,10 @@ COMMANDS = (
     Entry("design", "commands.design.design", "Find the best damper."),
     Entry("pareto", "commands.design.pareto", "Find the front of peak against resonance band."),
     Entry(
+        "identify", "commands.identify.identify",
+        "Find parameters from measured responses and hysteresis loops.",
+    ),
+    Entry(
         "sensitivities", "commands.sensitivities.sensitivities",
         "Say what matters: per cent of the peaks and the band for one per cent of each parameter.",
     ),

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from optim.criteria.table import criteria_table
+from optim.identification.data.columns_table import data_columns_table, data_formats_table
 from optim.problem.keyword_source import keyword_source
 from service.jobs.kinds.registry.table import placed
 from service.rendering.problem_table import problem_table
@@ -19,6 +20,7 @@ from solver.matrices.readers.table import formats_table
 
 TABLES: Mapping[str, Mapping[str, Callable[[], str]]] = {
     "design.md": {"keys": problem_table, "criteria": criteria_table},
+    "identification.md": {"columns": data_columns_table, "formats": data_formats_table},
     "laws.md": {"laws": laws_table},
     "matrices.md": {"formats": formats_table},
     "operations.md": {"settings": settings_table},

@@ -57,8 +57,6 @@ from solver.sensitivity.kernels.adjoint import (
     BY_PHASE,
     EXTREME_COLUMNS,
     PER_ELEMENT,
-    SIGN,
-    TAU,
     amplitude_slopes,
 )
 
@@ -149,6 +147,7 @@ class Sensitivities:
         self._wanted = (acts & (balance.system.jenkins == 1)).astype(np.int64)
         self._others = np.flatnonzero(acts & (balance.system.jenkins == 0))
         self._x, self._tops = np.zeros(n), np.zeros((2, EXTREME_COLUMNS))
+        self._turns = np.zeros((2, balance.system.ks.size), np.complex128)
         self._weights, self._pulls = np.zeros((2, nc, n)), np.zeros((2, nc * n))
         self._by = np.zeros((2, ne * PER_ELEMENT + BESIDES))
         self._seconds: Integer | None = None
@@ -207,7 +206,7 @@ class Sensitivities:
                 whole_motion(system, self._matrices, self._dampings, omega),
                 contact_forces(system, self._seconds, u),
             )
-            turn = self._tops[0, SIGN] * self._amplitudes.turn(self._tops[0, TAU])
+            turn = self._turns[0].copy()
             adjoint = Adjoint(w=self._weights[0].copy(), y=self._adjoint_motion(motion, 0), turn=turn)
             along = self._directions()
             responses = self._responses(u, omega, motion, contacts, along)
@@ -243,7 +242,7 @@ class Sensitivities:
         """Return the derivatives by ω and by the paths of each extreme that is max|x|; none if singular."""
         count = amplitude_slopes(
             self._workspace.system, self._workspace.linear, u, omega, self._workspace.point, self._wanted,
-            self._x, self._tops, self._weights, self._pulls, self._by,
+            self._x, self._tops, self._turns, self._weights, self._pulls, self._by,
         )  # fmt: skip
         return [self._one(u, omega, top) for top in range(count)]
 
@@ -350,8 +349,7 @@ class Sensitivities:
     def _adjoint_motion(self, motion: WholeMotion, top: int) -> Complex:
         """Return y = Z⁻ᵀ η, η the weights of the motion in the amplitude and the balance."""
         pulls = self._amplitudes.of(self._pulls[top].reshape(self._weights[top].shape)).conj()
-        turn = self._tops[top, SIGN] * self._amplitudes.turn(self._tops[top, TAU])
-        return motion.solve_transposed(motion.seen(turn, pulls))
+        return motion.solve_transposed(motion.seen(self._turns[top], pulls))
 
 
 def _level(balance: Balance) -> float:

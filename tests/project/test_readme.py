@@ -35,6 +35,7 @@ ADDRESS = "http://127.0.0.1:8000"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 # Pages whose lines need each other, or draw pictures: tests that run them.
 ELSEWHERE = {
+    "identification.md": "project/test_identification.py",
     "fe-disk.md": "project/test_fe_disk.py",
     "fe-example.md": "project/test_fe_example.py",
     "paper.md": "solver/published/test_paper_figures.py",

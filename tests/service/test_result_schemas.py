@@ -37,6 +37,15 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
         "accuracy",
         {"scene": "two-dof", "frequency_hz": 1.2, "harmonics": [1, 3], "samples": [16], "repeats": 1},
     ),
+    "identify": (
+        "identify",
+        {
+            **TWO,
+            "data": [{"frequency": [1.0, 1.2, 1.4], "amplitude": [1.93, 1.77, 1.25]}],
+            "unknowns": {"damper.mu": [0.1, 0.6]},
+            "starts": 1,
+        },
+    ),
     "march": ("march", {**MARCH, "history": True}),
     "a march that does not settle": ("march", {**MARCH, "max_periods": 1}),
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
+from optim.identification.result import Identification
 from optim.results.design import DesignResult
 from optim.robust.result import RobustResult
 from optim.studies.crossings import CampbellDiagram
@@ -11,6 +12,7 @@ from optim.studies.elasticities import SensitivityResult
 from optim.studies.pareto_result import ParetoResult
 from optim.views.plots.campbell import campbell_figure
 from optim.views.plots.designs import design_figure, robust_figure
+from optim.views.plots.identification import identification_figure
 from optim.views.plots.pareto import pareto_figure
 from optim.views.plots.shares import sensitivities_figure
 from solver.views.plots.curves import Response
@@ -37,6 +39,11 @@ def of_campbell(diagram: CampbellDiagram, ax: Into = None) -> Figure:
 def of_sensitivities(result: SensitivityResult, ax: Into = None) -> Figure:
     """Draw what matters most as bars."""
     return sensitivities_figure(result.to_json(), ax=ax)
+
+
+def of_identification(result: Identification, ax: Into = None) -> Figure:
+    """Draw data and fit."""
+    return identification_figure(result.to_json(), ax=ax)
 
 
 def of_front(result: ParetoResult, ax: Into = None) -> Figure:

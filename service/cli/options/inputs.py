@@ -77,6 +77,9 @@ def join_words(arguments: Sequence[str]) -> list[str]:
 
 def _several(arguments: Sequence[str]) -> dict[str, int]:
     """How many words follow an option of a command each time, where that is more than one."""
+    named = [word for word in arguments[:2] if word != "submit"][:1]
+    if named == ["identify"]:
+        return {"--unknown": 3, "--prior": 3}
     if not arguments or arguments[0] not in ("design", "pareto", "submit"):
         return {}
     from optim.problem.keys import DesignKeys, FrontKeys, options
@@ -92,18 +95,40 @@ def _several(arguments: Sequence[str]) -> dict[str, int]:
     return {one.flag: one.several for one in options(model).values() if one.several > 1}
 
 
-def bounds(option: str, texts: Sequence[str]) -> dict[str, list[float]]:
-    """The variables of a design with their bounds."""
+def bounds(option: str, texts: Sequence[str], wanted: str = "LO HI") -> dict[str, list[float]]:
+    """Paths with two numbers each, such as the variables of a design with their bounds."""
     variables: dict[str, list[float]] = {}
     for text in texts:
         words = text.split()
         if len(words) != 3:
-            raise InputError(f"`{option}` takes PATH LO HI, for example {DISK_LOAD} 20 3000, got {text!r}")
+            raise InputError(f"`{option}` takes PATH {wanted}, for example {DISK_LOAD} 20 3000, got {text!r}")
         path, low, high = words
         if path in variables:
             raise InputError(f"`{option}` names {path!r} twice; keep one")
         variables[path] = [part(option, text, low), part(option, text, high)]
     return variables
+
+
+def words_by_path(option: str, texts: Sequence[str]) -> dict[str, str]:
+    """Paths with a word each, PATH=WORD."""
+    words: dict[str, str] = {}
+    for text in texts:
+        path, _, word = (part.strip() for part in text.partition("="))
+        if not path or not word:
+            raise InputError(f"`{option}` takes PATH=WORD, for example {DISK_LOAD}=logarithmic, got {text!r}")
+        words[path] = word
+    return words
+
+
+def lists_by_path(option: str, texts: Sequence[str]) -> dict[str, list[float]]:
+    """Paths with numbers each, PATH=V,V,…"""
+    lists: dict[str, list[float]] = {}
+    for text in texts:
+        path, equals, numbers = text.partition("=")
+        if not equals or not path.strip():
+            raise InputError(f"`{option}` takes PATH=V,V,…, for example {DISK_LOAD}=100,400, got {text!r}")
+        lists[path.strip()] = [part(option, text, word) for word in numbers.split(",")]
+    return lists
 
 
 def settings(texts: Sequence[str] | None) -> dict[str, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, get_args, get_origin
 
@@ -70,7 +70,7 @@ class KeyOption:
         if isinstance(given, tuple):
             return list(given) if _is_pair(self.schema) else [list(given)]
         if kind == "object" and isinstance(given, list):
-            return inputs.settings(given)
+            return _by_path(self.flag, self.schema, given)
         return self._read(given) if isinstance(given, str) and kind in (None, "array", "object") else given
 
     def _read(self, text: str) -> Any:
@@ -78,6 +78,17 @@ class KeyOption:
             return json.loads(text)
         except ValueError as error:
             raise InputError(f"`{self.flag}` takes JSON, got {text!r}: {error}") from error
+
+
+def _by_path(flag: str, schema: Schema, texts: Sequence[str]) -> Mapping[str, Any]:
+    """What stands in a table of parameter paths: numbers, pairs, lists or words, as its schema says."""
+    # Paths of a given form stand under patternProperties.
+    known = [schema.get("additionalProperties"), *(schema.get("patternProperties") or {}).values()]
+    of_each: Schema = next((one for one in known if isinstance(one, Mapping)), {})
+    if of_each.get("type") == "array":
+        read = inputs.bounds if of_each.get("maxItems") == 2 else inputs.lists_by_path
+        return read(flag, texts)
+    return inputs.words_by_path(flag, texts) if "enum" in of_each else inputs.settings(texts)
 
 
 def key_options(kind: JobKind, local: Command | None) -> list[KeyOption]:

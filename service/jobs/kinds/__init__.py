@@ -7,6 +7,7 @@ import solver
 from service.jobs.kinds.accuracy import ACCURACY
 from service.jobs.kinds.campbell import CAMPBELL
 from service.jobs.kinds.design import DESIGN
+from service.jobs.kinds.identify import IDENTIFY
 from service.jobs.kinds.map import MAP
 from service.jobs.kinds.march import MARCH
 from service.jobs.kinds.mistuning import MISTUNING
@@ -37,6 +38,7 @@ SHIPPED = Registry(
         ACCURACY,
         CAMPBELL,
         MISTUNING,
+        IDENTIFY,
     ],
     warm_up,
 )

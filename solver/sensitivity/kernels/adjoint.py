@@ -39,7 +39,7 @@ AMPLITUDE, SIGN, TAU, EXTREME_COLUMNS = 0, 1, 2, 3
 @apart
 def amplitude_slopes(
     system: System, linear: Receptance, u: Real, omega: float, point: Evaluation, wanted: Integer, x: Real,
-    tops: Real, weights: Real, pulls: Real, by: Real,
+    tops: Real, turns: Complex, weights: Real, pulls: Real, by: Real,
 ) -> int:  # fmt: skip
     """Differentiate max|x| of the observed DOF at the solution (u, ω); λ of `system` is the frequency.
 
@@ -47,6 +47,7 @@ def amplitude_slopes(
     ----------
     wanted : (ne,) 1 for the elastic Coulomb contacts whose slopes are asked for.
     x : (n,) the observed motion; tops : (2, EXTREME_COLUMNS) the extremes that are max|x|; filled, as below.
+    turns : (2, nk) ξ e^{ikτ} of both, with which max|x| = Re Σ turn x̂.
     weights : (2, nc, n) w; pulls : (2, nt) λ.
     by : (2, ne·PER_ELEMENT + BESIDES) derivatives; those by level and phase are of a unit factor on all
         forces, and of the angle by which all that are not static turn.
@@ -55,30 +56,62 @@ def amplitude_slopes(
     -------
     How many extremes are max|x|: 2 where max x = −min x but for rounding; 0 where the balance is singular.
     """
-    receptance(system, omega, linear)
-    if not math.isfinite(evaluate(system, linear, u, omega, 0.0, point)):
+    if not observe(system, linear, u, omega, point, x, tops):
         return 0
-    observed_motion(system, linear, u, point, x)
-    high, at_high, low, at_low = extremes(system, x)
-    tops[0, AMPLITUDE], tops[0, SIGN], tops[0, TAU] = high, 1.0, at_high
-    tops[1, AMPLITUDE], tops[1, SIGN], tops[1, TAU] = -low, -1.0, at_low
+    high, low = tops[0, AMPLITUDE], -tops[1, AMPLITUDE]
     # Without a mean and even harmonics both extremes are the same by symmetry.
     both = system.ks[0] == 0 and abs(high + low) <= SAME_HEIGHT * max(high, -low)
     if not both and -low > high:
         for column in range(EXTREME_COLUMNS):
             tops[0, column], tops[1, column] = tops[1, column], tops[0, column]
-    _transpose(system, linear, point)
-    if factorise(system, linear, point, u, 0.0, 0.0) == 0.0:
-        return 0
     count = 2 if both else 1
     for top in range(count):
-        _fill_weights(system, linear, tops[top, SIGN], tops[top, TAU], pulls[top])
-        step_back(system, point, pulls[top])
-        _fill_pull(system, point, weights[top], pulls[top])
-        _by_linear_part(system, linear, u, point, tops[top], pulls[top], by[top])
-        _by_forces(system, point, weights[top], by[top])
+        for i in range(system.ks.size):
+            angle = system.ks[i] * tops[top, TAU]
+            turns[top, i] = tops[top, SIGN] * complex(math.cos(angle), math.sin(angle))
+    good = slopes_along(system, linear, u, omega, point, wanted, count, turns, weights, pulls, by)
+    return count if good else 0
+
+
+@apart
+def observe(
+    system: System, linear: Receptance, u: Real, omega: float, point: Evaluation, x: Real, tops: Real
+) -> bool:
+    """Fill the observed motion x (n,) at the solution (u, ω) and its extremes, the highest first, in `tops`.
+
+    `tops` is (2, EXTREME_COLUMNS), as `amplitude_slopes` has it. Returns whether the contacts have a force.
+    """
+    receptance(system, omega, linear)
+    if not math.isfinite(evaluate(system, linear, u, omega, 0.0, point)):
+        return False
+    observed_motion(system, linear, u, point, x)
+    high, at_high, low, at_low = extremes(system, x)
+    tops[0, AMPLITUDE], tops[0, SIGN], tops[0, TAU] = high, 1.0, at_high
+    tops[1, AMPLITUDE], tops[1, SIGN], tops[1, TAU] = -low, -1.0, at_low
+    return True
+
+
+@apart
+def slopes_along(
+    system: System, linear: Receptance, u: Real, omega: float, point: Evaluation, wanted: Integer, count: int,
+    turns: Complex, weights: Real, pulls: Real, by: Real,
+) -> bool:  # fmt: skip
+    """Differentiate Re Σ turn_k x̂_k of the observed motion, for each of `count` rows of `turns` (·, nk).
+
+    The point is that of `observe`, just evaluated; what is filled is as `amplitude_slopes` has it. Returns
+    whether the balance is regular there. A and ∂F/∂U are transposed afterwards.
+    """
+    _transpose(system, linear, point)
+    if factorise(system, linear, point, u, 0.0, 0.0) == 0.0:
+        return False
+    for row in range(count):
+        _fill_weights(system, linear, turns[row], pulls[row])
+        step_back(system, point, pulls[row])
+        _fill_pull(system, point, weights[row], pulls[row])
+        _by_linear_part(system, linear, u, point, turns[row], pulls[row], by[row])
+        _by_forces(system, point, weights[row], by[row])
     _by_contacts(system, u, omega, point, wanted, count, weights, by)
-    return count
+    return True
 
 
 @apart
@@ -101,14 +134,13 @@ def _transpose(system: System, linear: Receptance, point: Evaluation) -> None:
 
 
 @compiled
-def _fill_weights(system: System, linear: Receptance, sign: float, tau: float, z: Real) -> None:
-    """Fill z (nt,) with −ξ Bᵀ e(τ)."""
+def _fill_weights(system: System, linear: Receptance, turns: Complex, z: Real) -> None:
+    """Fill z (nt,) with −Bᵀ turn, of ξ e(τ) for an extreme."""
     n = coefficient_count(system.ks)
     for i in range(system.ks.size):
         here, k = cosine_position(system.ks, i), system.ks[i]
-        turn = sign * complex(math.cos(k * tau), math.sin(k * tau))
         for d in range(system.owner.size):
-            weight = -turn * linear.B[0, i, d]
+            weight = -turns[i] * linear.B[0, i, d]
             z[d * n + here] = weight.real
             if k > 0:
                 z[d * n + here + 1] = weight.imag
@@ -152,16 +184,15 @@ def _fill_pulled(system: System, linear: Receptance, i: int, pull: Real, pulled:
 
 @apart
 def _by_linear_part(
-    system: System, linear: Receptance, u: Real, point: Evaluation, top: Real, pull: Real, by: Real
+    system: System, linear: Receptance, u: Real, point: Evaluation, turns: Complex, pull: Real, by: Real
 ) -> None:
     """Fill the slopes by ω, and by level and phase of the excitation."""
     nc, n = system.owner.size, coefficient_count(system.ks)
-    sign, tau = top[SIGN], top[TAU]
     by_omega, level, phase = 0.0, 0.0, 0.0
     pulled = np.empty(nc, np.complex128)
     for i in range(system.ks.size):
         here, k = cosine_position(system.ks, i), system.ks[i]
-        turn = sign * complex(math.cos(k * tau), math.sin(k * tau))
+        turn = turns[i]
         driven = turn * linear.x_linear[0, i]
         by_omega += (turn * linear.x_linear[1, i]).real
         for c in range(nc):

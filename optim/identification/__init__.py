@@ -1,0 +1,1 @@
+"""Identification: parameters of a scene from measurements, with how sure they are."""

@@ -1,0 +1,1 @@
+"""Measured data: kinds with their columns and models, and the formats of files."""

@@ -1,0 +1,140 @@
+"""What every kind of data is to the fit: observations, their noise, and a model with derivatives."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from optim.identification.data.measured_units import Dimension
+from optim.identification.data.table import Table
+from optim.problem.variables import Real
+from solver.jit.fourier import Integer
+from solver.scene.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Predicted:
+    """What a model says of every observation of a run.
+
+    Attributes
+    ----------
+    values : (n,) array
+        In the order of `Measured.observations`; NaN where the point was not reached.
+    slopes : (n, n_paths) array
+        Derivatives by the parameter paths.
+    reached : (n,) array of bool
+        Whether the response of the observation's point was found.
+    states : mapping
+        Contact to the state codes it had, (n_points,); -1 where not reached.
+    """
+
+    values: Real
+    slopes: Real
+    reached: np.ndarray
+    states: Mapping[str, Integer] = field(default_factory=dict)
+
+
+class Model(ABC):
+    """The responses of a run over parameter values; keeps solutions to start the next from."""
+
+    @abstractmethod
+    def evaluate(self, values: Mapping[str, float]) -> Predicted:
+        """Return observations and derivatives for values of the paths."""
+
+    unique: bool = True
+    """Whether every point has one response, as far as is known; False where branches had to be told apart."""
+
+    def forget(self) -> None:  # noqa: B027 - most models keep nothing
+        """Look for solutions and their branches anew in the next evaluation."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured(ABC):
+    """One run: rows measured under the same conditions.
+
+    Attributes
+    ----------
+    source : str
+        The file, or the place in a description.
+    conditions : mapping
+        Parameter path to value.
+    """
+
+    source: str
+    conditions: Mapping[str, float]
+
+    @property
+    @abstractmethod
+    def observations(self) -> Real:
+        """The measured numbers, (n,)."""
+
+    @property
+    @abstractmethod
+    def given_noise(self) -> Real | None:
+        """Standard deviation of each observation if the data say it, (n,)."""
+
+    @abstractmethod
+    def noise_shape(self, values: Real) -> Real:
+        """Return what the noise of each observation is in proportion to, (n,), where `values` are true."""
+
+    @abstractmethod
+    def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> Model:
+        """Return its model in a scene, with derivatives by parameter paths."""
+
+    @abstractmethod
+    def thinned(self, most: int) -> Measured:
+        """Return the run with at most so many points, for a first look."""
+
+    @abstractmethod
+    def under(self, conditions: Mapping[str, float], most: int) -> Measured:
+        """Return a run that could be measured: the same points, at most so many, under other conditions."""
+
+    @abstractmethod
+    def to_json(self, fitted: Real, sd: Real) -> dict[str, object]:
+        """Return data, fit and standard deviation of the fit, (n,) each, as curves for people."""
+
+    @property
+    def words(self) -> str:
+        """The run in a few words: conditions, or the file."""
+        told = ", ".join(f"{path} = {value:.6g}" for path, value in self.conditions.items())
+        return told or self.source
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of a kind of data."""
+
+    name: str
+    dimension: Dimension
+    help: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataKind:
+    """A kind of measured data: what files and descriptions of it have, and how it is read.
+
+    Attributes
+    ----------
+    name : str
+        Its word, ``kind`` of a head.
+    help : str
+        A sentence of Markdown.
+    columns : tuple of Column
+        Those it knows.
+    marks : tuple of tuples of str
+        Columns of which all those of one group tell the kind.
+    words : mapping
+        What its head may say besides, each with its meaning.
+    read : callable
+        From a scene and the table of one run, checked for numbers, to the run.
+    """
+
+    name: str
+    help: str
+    columns: tuple[Column, ...]
+    marks: tuple[tuple[str, ...], ...]
+    words: Mapping[str, str]
+    read: Callable[[Scene, Table], Measured]

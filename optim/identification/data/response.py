@@ -1,0 +1,237 @@
+"""The kind `response`: amplitudes over frequency under one set of conditions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from optim.errors import DataError
+from optim.identification.data.measured import Column, DataKind, Measured, Model
+from optim.identification.data.measured_units import Dimension
+from optim.identification.data.response_model import ResponseModel
+from optim.identification.data.table import Table, check_monotone, check_sign
+from optim.problem.variables import Real
+from solver.jit.fourier import Complex
+from solver.scene.scene import Scene
+from solver.sensitivity.observed import Quantity
+
+FLOOR = (
+    0.01  # of the largest amplitude of a run, below which noise in proportion to amplitude falls no further
+)
+_FAR = 20.0  # ratio to the scene's band from which a frequency is taken for a wrong unit
+_MOST_DEGREES = 720.0
+_WORDS = {
+    "dof": "Degree of freedom that was measured; the one the scene observes.",
+    "harmonic": "Which harmonic the amplitude is of; 1.",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResponseRun(Measured):
+    """A response over frequency.
+
+    Attributes
+    ----------
+    frequency_hz : (m,) array
+        In the order of the sweep.
+    data : (m,) array
+        Displacements [m]; complex of `Quantity.COMPLEX`, with the phase of an excitation of phase 0.
+    sd : (m,) array or None
+        Standard deviation of each, of a complex one of its real and its imaginary part [m].
+    quantity : Quantity
+        What was measured.
+    harmonic : int
+        Of an amplitude or a complex one.
+    dof : str
+        Where.
+    """
+
+    frequency_hz: Real
+    data: Real | Complex
+    sd: Real | None
+    quantity: Quantity
+    harmonic: int
+    dof: str
+
+    @property
+    def parts(self) -> int:
+        """Observations of a point."""
+        return 2 if self.quantity is Quantity.COMPLEX else 1
+
+    @property
+    def observations(self) -> Real:
+        """Amplitudes, or real and imaginary part of each point in turn, (n,) [m]."""
+        if self.quantity is Quantity.COMPLEX:
+            return np.column_stack([self.data.real, self.data.imag]).ravel()
+        return np.asarray(self.data.real)
+
+    @property
+    def given_noise(self) -> Real | None:
+        """As the base says."""
+        return None if self.sd is None else np.repeat(self.sd, self.parts)
+
+    def sizes(self, values: Real) -> Real:
+        """Return the amplitude of each point, (m,), of observations."""
+        return np.asarray(np.linalg.norm(values.reshape(-1, self.parts), axis=1))
+
+    def noise_shape(self, values: Real) -> Real:
+        """The amplitude, but no less than `FLOOR` of the largest."""
+        sizes = self.sizes(values)
+        return np.repeat(np.maximum(sizes, FLOOR * float(np.nanmax(sizes))), self.parts)
+
+    def model(self, scene: Scene, paths: Sequence[str], harmonics: int) -> Model:
+        """As the base says."""
+        observe = scene.observe.model_copy(update={"dof": self.dof})
+        here = scene.model_copy(update={"observe": observe}) if self.dof != scene.observe.dof else scene
+        return ResponseModel(
+            here, self.conditions, paths, frequency_hz=self.frequency_hz, quantity=self.quantity,
+            harmonic=self.harmonic, harmonics=harmonics, near=self.observations.reshape(-1, self.parts),
+        )  # fmt: skip
+
+    def thinned(self, most: int) -> ResponseRun:
+        """Points evenly taken, the highest always."""
+        m = self.frequency_hz.size
+        if m <= most:
+            return self
+        kept = np.unique(
+            np.append(np.linspace(0, m - 1, most).round().astype(int), np.abs(self.data).argmax())
+        )
+        return self._rows(kept)
+
+    def under(self, conditions: Mapping[str, float], most: int) -> ResponseRun:
+        """As the base says, with nothing known of the amplitudes."""
+        kept = np.unique(np.linspace(0, self.frequency_hz.size - 1, most).round().astype(int))
+        run = self._rows(kept)
+        nothing = np.full(kept.size, np.nan) * (1j if self.parts == 2 else 1.0)
+        return replace(run, conditions={**self.conditions, **conditions}, data=nothing, sd=None)
+
+    def _rows(self, kept: np.ndarray) -> ResponseRun:
+        return replace(
+            self, frequency_hz=self.frequency_hz[kept], data=self.data[kept],
+            sd=None if self.sd is None else self.sd[kept],
+        )  # fmt: skip
+
+    def to_json(self, fitted: Real, sd: Real) -> dict[str, object]:
+        """Amplitudes over frequency; of complex data with phases [deg]."""
+        size = self.sizes(fitted)
+        parts = fitted.reshape(-1, self.parts)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            along = np.where(size[:, None] > 0.0, parts / size[:, None], 1.0)
+        spread = np.sqrt(np.sum((along * sd.reshape(-1, self.parts)) ** 2, axis=1))
+        told: dict[str, object] = {
+            "kind": KIND.name, "source": self.source, "conditions": dict(self.conditions), "dof": self.dof,
+            "quantity": self.quantity.value, "x": self.frequency_hz.tolist(),
+            "data": np.abs(self.data).tolist(), "fit": _listed(size), "fit_sd": _listed(spread),
+        }  # fmt: skip
+        if self.parts == 2:
+            told["phase_deg"] = np.degrees(np.angle(self.data)).tolist()
+            told["fit_phase_deg"] = _listed(np.degrees(np.arctan2(parts[:, 1], parts[:, 0])))
+        return told
+
+
+def read_response(scene: Scene, table: Table) -> Measured:
+    """Read the table of one run.
+
+    Raises
+    ------
+    DataError
+        What is wrong, with its line.
+    """
+    table.need(2, "points")
+    check_sign(table, "frequency", positive=True)
+    check_monotone(table, "frequency")
+    frequencies = table.columns["frequency"]
+    _check_band(scene, table)
+    quantity, column, data = _data(table)
+    here = scene.with_values(dict(table.conditions))
+    unit = table.units.get(column)
+    if unit is not None and (unit.order or unit.per_force):
+        if quantity in (Quantity.MAX_ABS, Quantity.HALF_PEAK_TO_PEAK):
+            wanted = "must be a displacement: velocities and accelerations do for `amplitude`, `real`, `imag`"
+            raise DataError(table.source, column, wanted, column=column, place=table.place)
+        spin = 2.0j * math.pi * frequencies * table.number("harmonic", 1.0)
+        factor = (here.value("excitation.amplitude") if unit.per_force else 1.0) / spin**unit.order
+        data = data * (factor if quantity is Quantity.COMPLEX else np.abs(factor))
+    sd = table.columns.get("sd")
+    if sd is not None:
+        check_sign(table, "sd", positive=True)
+        if unit is not None and (unit.order or unit.per_force):
+            sd = sd * np.abs(factor)
+    if quantity is Quantity.COMPLEX:
+        data = data * np.exp(1j * here.value("excitation.phase") * table.number("harmonic", 1.0))
+    dof = table.words.get("dof", scene.observe.dof)
+    if scene.seen(dof) is None:
+        raise table.refusal(dof, f"`dof` must be one of {', '.join(scene.dofs)}")
+    return ResponseRun(
+        source=table.source, conditions=dict(table.conditions), frequency_hz=frequencies, data=data, sd=sd,
+        quantity=quantity, harmonic=int(table.number("harmonic", 1.0)), dof=dof,
+    )  # fmt: skip
+
+
+def _check_band(scene: Scene, table: Table) -> None:
+    """Refuse frequencies far from those the scene is looked at over: another unit, most likely."""
+    low, high = scene.observe.band
+    frequencies = table.columns["frequency"]
+    far = np.flatnonzero((frequencies < low / _FAR) | (frequencies > high * _FAR))
+    if far.size:
+        wanted = (
+            f"must be near the scene's band, {low:g} to {high:g} Hz: give the unit in the head of the "
+            f"column, "
+            "`frequency [kHz]`, `[rad/s]` or `[1/min]`"
+        )
+        raise table.error(int(far[0]), "frequency", wanted)
+
+
+def _data(table: Table) -> tuple[Quantity, str, Real | Complex]:
+    """Return what was measured, the column that says so, and its numbers."""
+    columns = table.columns
+    has = [group for group in KIND.marks if all(name in columns for name in group)]
+    measured = {name for group in has for name in group} - {"frequency"}
+    if len(has) != 1:
+        wanted = "must have one of: amplitude (and phase), real and imag, max_abs, half_peak_to_peak"
+        raise table.refusal(", ".join(sorted(measured)) or ", ".join(columns), wanted)
+    if "real" in measured:
+        return Quantity.COMPLEX, "real", columns["real"] + 1j * columns["imag"]
+    (name,) = measured
+    check_sign(table, name, positive=False)
+    if "phase" not in columns:
+        return Quantity(name), name, columns[name]
+    if name != "amplitude":
+        raise table.refusal(f"phase beside {name}", "a phase goes with `amplitude`")
+    far = np.flatnonzero(np.abs(columns["phase"]) > _MOST_DEGREES)
+    if far.size:
+        raise table.error(int(far[0]), "phase", f"must be from -{_MOST_DEGREES:g} to {_MOST_DEGREES:g} deg")
+    return Quantity.COMPLEX, name, columns[name] * np.exp(1j * np.radians(columns["phase"]))
+
+
+def _listed(values: Real) -> list[float | None]:
+    return [float(value) if math.isfinite(value) else None for value in values]
+
+
+KIND = DataKind(
+    name="response",
+    help="Amplitude, or amplitude and phase, over frequency: stepped or slow sine sweeps.",
+    columns=(
+        Column("frequency", Dimension.FREQUENCY, "Of the excitation."),
+        Column(
+            "amplitude", Dimension.MOTION, "Of one harmonic of the motion, the first unless `harmonic` says."
+        ),
+        Column("phase", Dimension.ANGLE, "By which that harmonic is ahead of the excitation."),
+        Column("real", Dimension.MOTION, "Real part of the same, x = Re(x̂ e^{iωt}) under a force F cos ωt."),
+        Column("imag", Dimension.MOTION, "Its imaginary part."),
+        Column("max_abs", Dimension.MOTION, "Largest displacement of the period, as `solve` has it."),
+        Column("half_peak_to_peak", Dimension.MOTION, "Half the range of the displacement."),
+        Column("sd", Dimension.MOTION, "Standard deviation of each point, if it is known."),
+    ),
+    marks=(
+        ("frequency", "amplitude"),
+        ("frequency", "real", "imag"),
+        ("frequency", "max_abs"),
+        ("frequency", "half_peak_to_peak"),
+    ),
+    words=_WORDS,
+    read=read_response,
+)

@@ -1,0 +1,1 @@
+"""The fit: predictions of all runs, least squares, and where to start."""

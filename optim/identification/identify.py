@@ -1,0 +1,238 @@
+"""Identification of parameters from measured responses and hysteresis loops: `identify`."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from optim.errors import DataError, DesignError
+from optim.identification.data.response import ResponseRun
+from optim.identification.fit.evaluation import Runs
+from optim.identification.fit.least_squares import LocalFit, Noise
+from optim.identification.fit.starts import MOST_STARTS, STARTS, Searched, search
+from optim.identification.identifiability import strong_correlations, untold
+from optim.identification.information import UNIFORM, Information, information
+from optim.identification.next_measurement import rank, read_candidates
+from optim.identification.reading import Given, read_data
+from optim.identification.result import Estimate, Identification, IdentifyStatus, NotReached
+from optim.identification.uncertain import clipped, uncertain_table
+from optim.identification.unknowns import Unknowns, read_unknowns
+from optim.problem.numbers import is_number
+from optim.problem.variables import Real
+from solver.balance.balance import check_harmonics
+from solver.balance.parameter import resolve
+from solver.results.watch import OnProgress, ShouldStop
+from solver.scene.scene import Scene
+
+_BOUND = 1e-6  # scaled distance from a bound within which an estimate lies on it
+_IMPLAUSIBLE = 200.0  # ratio of measured to computed amplitudes, over a whole run, that is a wrong unit
+_MISFIT = 2.0  # reduced χ² of given noise above which the model does not describe the data
+
+
+def identify(
+    scene: Scene,
+    data: Sequence[Given],
+    unknowns: Mapping[str, Sequence[float]],
+    *,
+    scaling: Mapping[str, str] | None = None,
+    priors: Mapping[str, Sequence[float]] | None = None,
+    noise: float | None = None,
+    robust: bool = False,
+    candidates: Mapping[str, Sequence[float]] | None = None,
+    harmonics: int = 11,
+    starts: int = STARTS,
+    seed: int = 0,
+    on_progress: OnProgress = None,
+    should_stop: ShouldStop = None,
+) -> Identification:
+    """Find parameters of a scene from measurements, with how sure they are.
+
+    Parameters
+    ----------
+    scene : what was measured; its values are one of the starts.
+    data : files or tables, see `optim.identification.reading.read_data`.
+    unknowns : parameter path (several that share a value separated by commas) to (low, high).
+    scaling : unknown to ``linear``, ``logarithmic`` or ``auto``: logarithmic from a ratio of the bounds of 5.
+    priors : unknown to (mean, standard deviation), what was known before.
+    noise : standard deviation relative to the amplitude (of a loop, to its largest force), for data that do
+    not
+        say their own; found from what the fit leaves over if left out.
+    robust : let outliers weigh less (Huber's loss).
+    candidates : parameter path to values, conditions of measurements that could be made next; levels and
+    loads
+        around those measured if left out.
+    harmonics : highest harmonic kept.
+    starts : places within the bounds that are tried.
+    seed : of those places.
+    on_progress : called with (share done, evaluations).
+    should_stop : asked now and then; True ends it with the status STOPPED.
+
+    Returns
+    -------
+    The estimates; whatever happened, its status says what they are worth.
+
+    Raises
+    ------
+    DataError
+        Data that cannot be used: file, line and what would be right.
+    DesignError, SettingError
+        Bad unknowns, priors, candidates or settings.
+    """
+    begun = time.perf_counter()
+    known = read_unknowns(scene, unknowns, scaling, priors)
+    _check_settings(noise, starts, seed, harmonics)
+    measured = read_data(scene, data, known.paths)
+    conditions = read_candidates(scene, measured, known, candidates)
+    runs = Runs(scene, measured, known, harmonics)
+    told = Noise(level=noise, robust=robust)
+    found = search(runs, told, starts=starts, seed=seed, on_progress=on_progress, should_stop=should_stop)
+    if found.best is None:
+        stopped = should_stop is not None and should_stop()
+        status = IdentifyStatus.STOPPED if stopped else IdentifyStatus.NO_START
+        return _nothing(scene, status, found, runs, harmonics, time.perf_counter() - begun)
+    _check_plausible(runs, found.best)
+    level_known = found.best.level == 1.0
+    info = information(runs, found.best, robust=robust, level_known=level_known)
+    result = _described(runs, found, found.best, info, level_known=level_known, noise=noise)
+    ranked = rank(runs, found.best, info, conditions)
+    return replace(result, candidates=ranked, seconds=time.perf_counter() - begun)
+
+
+def _check_settings(noise: float | None, starts: int, seed: int, harmonics: int) -> None:
+    if noise is not None and not (is_number(noise) and 0.0 < noise < 1.0):
+        raise DesignError(
+            "noise", noise, "must be a relative standard deviation between 0 and 1, 0.02 for 2 %"
+        )
+    for name, value, least, most in (("starts", starts, 1, MOST_STARTS), ("seed", seed, 0, 2**53)):
+        whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+        if not whole or not least <= value <= most:
+            raise DesignError(name, value, f"must be a whole number from {least} to {most}")
+    check_harmonics(harmonics)
+
+
+def _check_plausible(runs: Runs, best: LocalFit) -> None:
+    """Refuse runs that are larger or smaller than anything within the bounds: a wrong unit, most likely."""
+    for run, part in zip(runs.runs, runs.slices, strict=True):
+        reached = best.active[part]
+        if not reached.any():
+            continue
+        seen = float(np.abs(runs.observations[part][reached]).max())
+        computed = float(np.abs(best.fitted.values[part][reached]).max())
+        ratio = seen / computed if computed > 0.0 else math.inf
+        if not 1.0 / _IMPLAUSIBLE < ratio < _IMPLAUSIBLE:
+            unit = "displacements [m]" if isinstance(run, ResponseRun) else "forces [N]"
+            wanted = (
+                f"must be {unit} such as the scene has under {run.words}, at most {computed:.3g} with the "
+                f"best "
+                "values within the bounds: give the unit in the head of the column, `amplitude [mm]`, and "
+                "look at "
+                "the excitation"
+            )
+            size = seen / (1.0 if isinstance(run, ResponseRun) else run.scale)  # type: ignore[attr-defined]
+            raise DataError(run.source, float(f"{size:.4g}"), wanted)
+
+
+def _described(
+    runs: Runs, found: Searched, best: LocalFit, info: Information, *, level_known: bool, noise: float | None
+) -> Identification:
+    """Return everything but the candidates."""
+    unknowns, z = runs.unknowns, best.fitted.z
+    covariance = info.covariance()
+    slopes, values = unknowns.slopes(z), unknowns.values(z)
+    estimates = _estimates(runs.scene, unknowns, z, info)
+    in_units = covariance * np.outer(slopes, slopes)
+    spread = np.sqrt(np.diag(covariance))
+    missing = untold(runs.scene, unknowns, z, info, best.fitted.states)
+    left_out = _not_reached(runs, best)
+    status = IdentifyStatus.UNTOLD if missing else IdentifyStatus.KNOWN
+    if left_out:
+        status = IdentifyStatus.LEFT_OUT
+    if not best.converged:
+        status = IdentifyStatus.NOT_CONVERGED
+    by_path = unknowns.by_path(z)
+    here = runs.scene.with_values(by_path)
+    intervals = clipped(unknowns, np.array([one.interval for one in estimates]))
+    bad = level_known and info.reduced_chi2 > _MISFIT
+    others = [
+        {**dict(zip(unknowns.names, unknowns.values(z_other).tolist(), strict=True)), "misfit": ratio}
+        for z_other, ratio in found.others
+    ]
+    return Identification(
+        scene=runs.scene.name, status=status, estimates=estimates, covariance=in_units,
+        correlation=covariance / np.outer(spread, spread),
+        noise=(math.nan if noise is None else noise) if level_known else best.level,
+        reduced_chi2=info.reduced_chi2, misfit=_MISFIT_WORDS if bad else "", untold=missing,
+        correlated=strong_correlations(unknowns, info), candidates=(),
+        runs=_curves(runs, best, covariance), not_reached=left_out,
+        uncertain=uncertain_table(here, unknowns, values, in_units, intervals, told=not missing),
+        values=by_path, other_optima=tuple(others), starts=found.starts, agreeing=found.agreeing,
+        evaluations=runs.evaluations, harmonics=runs.harmonics, seconds=0.0,
+    )  # fmt: skip
+
+
+_MISFIT_WORDS = (
+    "The residuals are larger than the noise given: the model does not describe the data, or the noise is "
+    "larger. "
+    "Intervals are too narrow then. Look at the fit; leave `noise` out to judge by what is left over."
+)
+
+
+def _estimates(
+    scene: Scene, unknowns: Unknowns, z: Real, info: Information
+) -> tuple[Estimate, ...]:  # fmt: skip
+    """Return each unknown with its interval, which is symmetric in the scaled unknown."""
+    factor, found, errors = info.quantile(), [], info.standard_errors().tolist()
+    for i, variable in enumerate(unknowns.variables):
+        sd, told = errors[i], errors[i] < UNIFORM
+        value = variable.outside(float(z[i]))
+        ends = [value + sign * factor * sd * variable.slope(value) for sign in (-1.0, 1.0)]
+        if variable.logarithmic and told:
+            stretch = math.exp(factor * sd * math.log(variable.high / variable.low))
+            ends = [value / stretch, value * stretch]
+        found.append(
+            Estimate(
+                name=variable.name, unit=resolve(scene, variable.paths[0]).unit, value=value,
+                standard_error=sd * variable.slope(value) if told else math.nan,
+                interval=(ends[0], ends[1]) if told else (variable.low, variable.high), told=told,
+                at_bound=not _BOUND < z[i] < 1.0 - _BOUND, low=variable.low, high=variable.high,
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def _curves(runs: Runs, best: LocalFit, covariance: Real) -> tuple[dict[str, object], ...]:
+    """Return data, fit and standard deviation of the fit of each run."""
+    rows = np.where(np.isfinite(best.fitted.jacobian), best.fitted.jacobian, 0.0)
+    spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", rows, covariance, rows), 0.0))
+    return tuple(
+        run.to_json(best.fitted.values[part], spread[part])
+        for run, part in zip(runs.runs, runs.slices, strict=True)
+    )
+
+
+def _not_reached(runs: Runs, best: LocalFit) -> tuple[NotReached, ...]:
+    """Return the points that do not count, of each run that has any."""
+    found = []
+    for run, part in zip(runs.runs, runs.slices, strict=True):
+        lost = ~best.active[part]
+        if lost.any():
+            places = run.frequency_hz[lost[:: run.parts]].tolist() if isinstance(run, ResponseRun) else []
+            found.append(NotReached(run=run.words, at=tuple(places)))
+    return tuple(found)
+
+
+def _nothing(
+    scene: Scene, status: IdentifyStatus, found: Searched, runs: Runs, harmonics: int, seconds: float
+) -> Identification:
+    """Return that there is no fit, and why."""
+    empty = np.zeros((0, 0))
+    return Identification(
+        scene=scene.name, status=status, estimates=(), covariance=empty, correlation=empty, noise=math.nan,
+        reduced_chi2=math.nan, misfit="", untold=(), correlated=(), candidates=(), runs=(), not_reached=(),
+        uncertain={}, values={}, other_optima=(), starts=found.starts, agreeing=0,
+        evaluations=runs.evaluations, harmonics=harmonics, seconds=seconds,
+    )  # fmt: skip

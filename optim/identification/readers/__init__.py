@@ -1,0 +1,1 @@
+"""Formats of files with measured data, one a module."""

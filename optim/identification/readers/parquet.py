@@ -1,0 +1,60 @@
+"""Parquet: columns as in CSV; conditions in columns, or in the metadata of the file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from optim.errors import DataError
+from optim.identification.data.table import Table
+from optim.identification.readers.columns import read_head, table_of
+from optim.identification.readers.registry import DataFormat
+from optim.problem.variables import Real
+from solver.errors import MissingExtraError
+
+
+def read_parquet(path: Path, paths: frozenset[str]) -> list[Table]:
+    """Read a file.
+
+    Raises
+    ------
+    MissingExtraError
+        pyarrow is not installed.
+    DataError
+        What is wrong, with its row.
+    """
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError as error:
+        raise MissingExtraError("pyarrow", "parquet") from error
+    try:
+        found = pq.read_table(path)
+    except (OSError, pa.ArrowException) as error:
+        raise DataError(path.name, str(error), "must be a Parquet file") from error
+    metadata = found.schema.metadata or {}
+    told = {
+        number: f"{key.decode('utf-8', 'replace')} = {value.decode('utf-8', 'replace')}"
+        for number, (key, value) in enumerate(metadata.items(), start=1)
+        if len(value) <= 200
+    }
+    head = read_head(path.name, told, paths)
+    columns = [_numbers(path.name, name, found.column(name).to_pylist()) for name in found.column_names]
+    return [table_of(path.name, found.column_names, columns, head, paths)]
+
+
+def _numbers(source: str, name: str, cells: list[object]) -> Real:
+    for row, cell in enumerate(cells):
+        if isinstance(cell, bool) or not isinstance(cell, (int, float)):
+            wanted = "must be a number: leave the whole row out if it is missing"
+            raise DataError(f"{source}, row {row}", cell, wanted, column=name)
+    return np.array(cells, dtype=np.float64)
+
+
+FORMAT = DataFormat(
+    name="Parquet",
+    suffixes=(".parquet",),
+    help="Columns named as in CSV; conditions in columns, or in the metadata of the file; needs pyarrow.",
+    read=read_parquet,
+)

@@ -1,0 +1,141 @@
+"""From files and tables to runs: conditions split, kinds told, numbers checked against the scene."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from optim.errors import DataError
+from optim.identification.data.measured import DataKind, Measured
+from optim.identification.data.registry import data_kinds
+from optim.identification.data.table import Table, check_numbers, runs_of
+from optim.identification.readers.columns import Head, read_head, table_of
+from optim.identification.readers.registry import read_file
+from solver.errors import SettingError
+from solver.scene.scene import Scene
+
+MOST_RUNS = 200
+MOST_POINTS = 100_000
+_CONDITIONS, _UNITS = "conditions", "units"
+_WITH_HEAD = re.compile(r"^(?P<file>.+?):(?P<pairs>[A-Za-z_][\w.@-]*=[^=,]+(?:,[A-Za-z_][\w.@-]*=[^=,]+)*)$")
+
+Given = str | Path | Mapping[str, Any]
+
+
+def read_data(scene: Scene, data: Sequence[Given], unknown: Sequence[str] = ()) -> tuple[Measured, ...]:
+    """Read the runs of files and tables.
+
+    Parameters
+    ----------
+    scene : what was measured.
+    data : files, ``rig.csv`` or ``rig.uff:shroud.N0=200,dof=tip`` with conditions for all its rows; or tables
+        ``{"frequency": […], "amplitude": […], "conditions": {path: value}, "units": {"amplitude": "mm"}}``.
+    unknown : paths that are looked for, which no condition may set.
+
+    Raises
+    ------
+    DataError
+        What is wrong: the file and line, or the place in a table, and what would be right.
+    """
+    if isinstance(data, (str, Path, Mapping)) or not isinstance(data, Sequence) or not data:
+        raise DataError("data", data, "must list files or tables, at least one")
+    paths = frozenset(scene.parameter_paths())
+    runs: list[Measured] = []
+    for index, given in enumerate(data):
+        for table in _tables(given, index, paths):
+            runs += _runs(scene, table, paths, frozenset(unknown))
+    points = sum(run.observations.size for run in runs)
+    if len(runs) > MOST_RUNS or points > MOST_POINTS:
+        wanted = f"must be at most {MOST_RUNS} runs and {MOST_POINTS} numbers"
+        raise DataError("data", f"{len(runs)} runs, {points} numbers", wanted)
+    return tuple(runs)
+
+
+def _tables(given: Given, index: int, paths: frozenset[str]) -> list[Table]:
+    place = ("data", index)
+    if isinstance(given, Mapping):
+        return [_table_of(given, index, paths)]
+    if not isinstance(given, (str, Path)):
+        raise DataError(f"data[{index}]", given, "must be a file or a table", place=place)
+    match = _WITH_HEAD.match(str(given))
+    file = Path(match["file"] if match else given)
+    pairs = dict(enumerate(match["pairs"].split(","), start=1)) if match else {}
+    head = read_head(f"{file.name}:{match['pairs']}" if match else "", pairs, paths)
+    tables = read_file(file, paths)
+    return [
+        replace(
+            table, conditions={**table.conditions, **head.conditions}, words={**table.words, **head.words},
+            place=place,
+        )
+        for table in tables
+    ]  # fmt: skip
+
+
+def _table_of(given: Mapping[str, Any], index: int, paths: frozenset[str]) -> Table:
+    """Return the table of a description, in the words of files."""
+    source, place = f"data[{index}]", ("data", index)
+    columns = {key: value for key, value in given.items() if isinstance(value, (list, tuple, np.ndarray))}
+    conditions, units = given.get(_CONDITIONS, {}), given.get(_UNITS, {})
+    for key, value in ((_CONDITIONS, conditions), (_UNITS, units)):
+        if not isinstance(value, Mapping):
+            raise DataError(source, value, f"`{key}` must be a table", place=(*place, key))
+    words = {key: given[key] for key in given if key not in (*columns, _CONDITIONS, _UNITS)}
+    pairs = [*conditions.items(), *words.items()]
+    head: Head = read_head(source, dict(enumerate((f"{key} = {value}" for key, value in pairs), 1)), paths)
+    lost = [key for key in (*conditions, *words) if key not in head.conditions and key not in head.words]
+    if lost:
+        wanted = "must be a column (a list), `conditions`, `units`, or a word such as dof or contact"
+        raise DataError(source, lost[0], wanted, place=place)
+    heads = [f"{name} [{units[name]}]" if name in units else name for name in columns]
+    numbers = [_numbers(source, name, values, place) for name, values in columns.items()]
+    return table_of(source, heads, numbers, head, paths, place=place)
+
+
+def _numbers(source: str, name: str, values: Any, place: tuple[str | int, ...]) -> np.ndarray:
+    for row, value in enumerate(values):
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+            wanted = "must be a number: leave the whole row out if it is missing"
+            raise DataError(f"{source}, row {row}", value, wanted, column=name, place=(*place, name))
+    return np.array(values, dtype=np.float64)
+
+
+def _runs(scene: Scene, table: Table, paths: frozenset[str], unknown: frozenset[str]) -> list[Measured]:
+    """Read a table as runs of equal conditions."""
+    check_numbers(table)
+    varied = [name for name in table.columns if name in paths]
+    for path in (*varied, *table.conditions):
+        if path in unknown:
+            raise table.refusal(path, "must not be a condition of the data: it is looked for")
+    kind = _kind(table, varied)
+    runs = []
+    for run in runs_of(table, varied):
+        try:
+            scene.with_values(dict(run.conditions))
+        except SettingError as error:
+            raise run.refusal(error.value, f"condition: {error}") from error
+        runs.append(kind.read(scene, run))
+    return runs
+
+
+def _kind(table: Table, varied: Sequence[str]) -> DataKind:
+    """Return the kind a table says, or that its columns tell."""
+    kinds = {kind.name: kind for kind in data_kinds()}
+    word = table.words.get("kind")
+    if word is not None and word not in kinds:
+        raise table.refusal(word, f"`kind` must be one of {', '.join(kinds)}")
+    names = [name for name in table.columns if name not in varied]
+    told = [kind for kind in kinds.values() if any(set(group) <= set(names) for group in kind.marks)]
+    fitting = [kinds[word]] if word is not None else told
+    if len(fitting) != 1 or fitting[0] not in told:
+        groups = [" + ".join(group) for kind in (fitting or kinds.values()) for group in kind.marks]
+        raise table.refusal(", ".join(names), f"must have the columns {' or '.join(groups)}")
+    kind = fitting[0]
+    foreign = [name for name in names if name not in {column.name for column in kind.columns}]
+    if foreign:
+        raise table.refusal(", ".join(foreign), f"are no columns of the kind `{kind.name}`: leave them out")
+    return kind

@@ -1,0 +1,57 @@
+"""What people read of an identification, given as the JSON object a program reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from service.rendering.tables.text import print_pairs, print_table
+from solver.results import units
+
+_CANDIDATES = 5  # shown, the most telling
+
+
+def report(found: Mapping[str, Any]) -> None:
+    """The estimates, what the data do not tell, and which measurement would tell most."""
+    title = f"{found['scene']}, {len(found['runs'])} runs, {found['n_harmonics']} harmonics"
+    rows = [_row(one) for one in found["estimates"]]
+    print_table(title, ("parameter", "estimate", "± error", "95 % interval", ""), rows, right="12")
+    pairs: list[tuple[str, str]] = []
+    if found["noise"] is not None:
+        pairs.append(("noise", f"{100.0 * found['noise']:.3g} %"))
+    if found["misfit"]:
+        pairs.append(("warning", f"{found['misfit']} (reduced chi² {found['reduced_chi2']:.3g})"))
+    pairs += [("not told", one["words"]) for one in found["untold"]]
+    for one in found["correlated"]:
+        names = " and ".join(one["names"])
+        pairs.append(("hardly apart", f"{names}, correlation {one['correlation']:+.3f}"))
+    pairs += [("not reached", _lost(one)) for one in found["not_reached"]]
+    for one in found["other_optima"]:
+        values = ", ".join(f"{name} = {value:.5g}" for name, value in one.items() if name != "misfit")
+        pairs.append(("another optimum", f"{values}; misfit {one['misfit']:.3g} times as large"))
+    for place, one in enumerate(found["candidates"][:_CANDIDATES]):
+        if one["gain"] is not None:
+            pairs.append(("measure next" if place == 0 else "  or", _candidate(one)))
+    pairs.append(("starts", f"{found['starts']}, of the best {found['agreeing']} ended at the same place"))
+    pairs.append(("time", units.duration(found["seconds"])))
+    print_pairs("", pairs)
+
+
+def _row(one: Mapping[str, Any]) -> tuple[str, ...]:
+    if not one["told"]:
+        low, high = one["bounds"]
+        return one["name"], "not told", "", f"{low:.6g} to {high:.6g} {one['unit']}", "its bounds"
+    low, high = one["interval"]
+    value = f"{one['value']:.6g} {one['unit']}".rstrip()
+    words = "at a bound" if one["at_bound"] else ""
+    return one["name"], value, f"{one['standard_error']:.2g}", f"{low:.6g} to {high:.6g}", words
+
+
+def _lost(one: Mapping[str, Any]) -> str:
+    places = ", ".join(f"{at:.6g}" for at in one["at"])
+    return f"{one['run']}: no response found at {places} Hz; these points do not count"
+
+
+def _candidate(one: Mapping[str, Any]) -> str:
+    conditions = ", ".join(f"{path} = {value:.4g}" for path, value in one["conditions"].items())
+    return f"{conditions}: error of {one['tells']} times {one['factor']:.2g} (gain {one['gain']:.3g})"

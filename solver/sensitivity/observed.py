@@ -1,0 +1,125 @@
+"""What a measuring chain sees of a periodic response, with exact derivatives by any number of parameters.
+
+A measurement is a linear functional Re Σ turn_k x̂_k of the observed motion, or is one to first order: an
+amplitude |x̂_k| with turn = conj(x̂_k)/|x̂_k|, an extreme with turn = ξ e^{ikτ} because its place is stationary.
+Each costs one adjoint solve with the factorisation they share (`solver.sensitivity.kernels.adjoint`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from solver.balance.workspace import PointSolution, Workspace
+from solver.errors import SettingError
+from solver.jit.fourier import Complex, Integer, Real
+from solver.sensitivity.gradient import Sensitivities
+from solver.sensitivity.kernels.adjoint import AMPLITUDE, SIGN, TAU, observe, slopes_along
+
+TWO_PI = 2.0 * math.pi
+
+
+class Quantity(Enum):
+    """What is measured of the motion; the value is the word a user writes."""
+
+    AMPLITUDE = "amplitude"
+    COMPLEX = "complex"
+    MAX_ABS = "max_abs"
+    HALF_PEAK_TO_PEAK = "half_peak_to_peak"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observed:
+    """What is measured at a solution.
+
+    Attributes
+    ----------
+    values : (1,) array, of a complex amplitude (2,) its real and imaginary part [m].
+    slopes : (1 or 2, n_paths) array, their derivatives at a fixed frequency [m per unit of each].
+    states : (n_contacts,) array of state codes, see `solver.response.contact_response.state_of`.
+    """
+
+    values: Real
+    slopes: Real
+    states: Integer
+
+
+class ObservedSensitivities(Sensitivities):
+    """Measured quantities at points of one frequency response, with derivatives by parameter paths.
+
+    Parameters and errors are those of `Sensitivities`.
+    """
+
+    @property
+    def workspace(self) -> Workspace:
+        """The arrays it works in, which solve too."""
+        return self._workspace
+
+    def solve(self, at_hz: float, guesses: tuple[Real, ...]) -> PointSolution:
+        """Solve at a frequency by Newton's method from each guess in turn, and at last from nothing."""
+        omega = TWO_PI * at_hz
+        for guess in guesses:
+            found = self._workspace.solve_from(omega, guess)
+            if found.converged:
+                return found
+        return self._workspace.solve(omega)
+
+    def observed(
+        self, solution: Real, at_hz: float, quantity: Quantity, harmonic: int = 1
+    ) -> Observed | None:
+        """Return a quantity of the observed motion at a solution; None where the balance is singular.
+
+        Parameters
+        ----------
+        solution : (n_unknowns,) slip motions [m], converged.
+        at_hz : their frequency [Hz].
+        quantity : what is measured.
+        harmonic : whose amplitude, of `Quantity.AMPLITUDE` and `Quantity.COMPLEX`; a kept one.
+
+        Raises
+        ------
+        SettingError
+            A harmonic that the balance does not keep.
+        """
+        u, omega = np.ascontiguousarray(solution, dtype=np.float64), TWO_PI * at_hz
+        space = self._workspace
+        if not observe(space.system, space.linear, u, omega, space.point, self._x, self._tops):
+            return None
+        states = self._point.states.copy()
+        values = self._aim(quantity, harmonic)
+        good = slopes_along(
+            space.system, space.linear, u, omega, space.point, self._wanted, values.size, self._turns,
+            self._weights, self._pulls, self._by,
+        )  # fmt: skip
+        if not good:
+            return None
+        slopes = np.array([self._one(u, omega, row)[1] for row in range(values.size)])
+        return Observed(values=values, slopes=slopes.reshape(values.size, -1), states=states)
+
+    def _aim(self, quantity: Quantity, harmonic: int) -> Real:
+        """Fill the turns of a quantity of the motion just observed; return its values."""
+        turns, tops, ks = self._turns, self._tops, self.balance.system.ks
+        turns[:] = 0.0
+        if quantity in (Quantity.MAX_ABS, Quantity.HALF_PEAK_TO_PEAK):
+            rows: Complex = tops[:, SIGN, None] * np.exp(1j * np.outer(tops[:, TAU], ks))
+            if quantity is Quantity.HALF_PEAK_TO_PEAK:
+                turns[0] = 0.5 * (rows[0] + rows[1])
+                return np.array([0.5 * float(tops[:, AMPLITUDE].sum())])
+            leads = int(tops[1, AMPLITUDE] > tops[0, AMPLITUDE])
+            turns[0] = rows[leads]
+            return np.array([tops[leads, AMPLITUDE]])
+        at = np.flatnonzero(ks == harmonic)
+        if not at.size or harmonic < 1:
+            raise SettingError(
+                "harmonic", harmonic, f"must be one of the harmonics kept, {ks[ks > 0].tolist()}"
+            )
+        amplitude = complex(self._amplitudes.of(self._x)[at[0]])
+        if quantity is Quantity.COMPLEX:
+            turns[0, at[0]], turns[1, at[0]] = 1.0, -1j
+            return np.array([amplitude.real, amplitude.imag])
+        size = abs(amplitude)
+        turns[0, at[0]] = amplitude.conjugate() / size if size > 0.0 else 1.0
+        return np.array([size])
