@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
     from solver.marching.march import march
     from solver.marching.start import MarchStart
+    from solver.modes.nonlinear_mode import nonlinear_mode
+    from solver.modes.results import NonlinearMode, NonlinearModeStatus
     from solver.response.power_balance import PowerBalance, power_balance
     from solver.response.solution import Solution, SolutionStatus
     from solver.response.solve import solve
@@ -100,7 +102,8 @@ _HOME = {
     "worst_friction_work": "response.worst_wear", "worst_wear": "response.worst_wear",
     "worst_slopes": "response.wear_nonsmooth", "Stretch": "continuation.segment",
     "joined": "continuation.segment", "LawParameter": "contacts.laws.history.definition",
-    "register_law": "contacts.laws.history.register",
+    "register_law": "contacts.laws.history.register", "NonlinearMode": "modes.results",
+    "NonlinearModeStatus": "modes.results", "nonlinear_mode": "modes.nonlinear_mode",
 }  # fmt: skip
 
 __all__ = [
@@ -139,6 +142,8 @@ __all__ = [
     "MistunedDisk",
     "MistuningStatus",
     "MistuningStudy",
+    "NonlinearMode",
+    "NonlinearModeStatus",
     "Peak",
     "PeakGradient",
     "PeakHessian",
@@ -185,6 +190,7 @@ __all__ = [
     "mistuned",
     "mistuning_study",
     "motion",
+    "nonlinear_mode",
     "peak_gradient",
     "plan",
     "power_balance",
