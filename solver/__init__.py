@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
     from solver.marching.march import march
     from solver.marching.start import MarchStart
+    from solver.modes.gradient import ModeGradient, mode_gradient
     from solver.modes.nonlinear_mode import nonlinear_mode
     from solver.modes.results import NonlinearMode, NonlinearModeStatus
     from solver.response.power_balance import PowerBalance, power_balance
@@ -103,6 +104,7 @@ _HOME = {
     "worst_slopes": "response.wear_nonsmooth", "Stretch": "continuation.segment",
     "joined": "continuation.segment", "LawParameter": "contacts.laws.history.definition",
     "register_law": "contacts.laws.history.register", "NonlinearMode": "modes.results",
+    "ModeGradient": "modes.gradient", "mode_gradient": "modes.gradient",
     "NonlinearModeStatus": "modes.results", "nonlinear_mode": "modes.nonlinear_mode",
 }  # fmt: skip
 
@@ -142,6 +144,7 @@ __all__ = [
     "MistunedDisk",
     "MistuningStatus",
     "MistuningStudy",
+    "ModeGradient",
     "NonlinearMode",
     "NonlinearModeStatus",
     "Peak",
@@ -189,6 +192,7 @@ __all__ = [
     "march",
     "mistuned",
     "mistuning_study",
+    "mode_gradient",
     "motion",
     "nonlinear_mode",
     "peak_gradient",

@@ -15,12 +15,14 @@ from solver.balance.simplifications import Effects
 from solver.contacts.kernels.system import DENSE, MODES
 from solver.errors import SettingError
 from solver.jit.fourier import Real
+from solver.linear.assembly import linear_model
 from solver.modes.corrector import Corrected
 from solver.modes.curve import End, walk
 from solver.modes.equations import Equations
 from solver.modes.records import collect
 from solver.modes.results import NonlinearMode, NonlinearModeStatus
 from solver.modes.start import LinearMode, begin, equilibrium, linear_modes, slopes_at_rest
+from solver.scene.cyclic.annulus import written_out
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -123,14 +125,20 @@ def check_amplitudes(amplitudes: Sequence[float]) -> tuple[float, float]:
     return low, high
 
 
-def pose(scene: Scene, mode: int, nodal_diameter: int | None, harmonics: int) -> ModeProblem:
-    """Return the equations of a mode and where it begins; errors as `nonlinear_mode`."""
+def pose(
+    scene: Scene, mode: int, nodal_diameter: int | None, harmonics: int, *, whole: bool = False
+) -> ModeProblem:  # fmt: skip
+    """Return the equations of a mode and where it begins; errors as `nonlinear_mode`.
+
+    Parameters
+    ----------
+    whole : keep whole matrices whatever the damping is.
+    """
     if check_harmonics(harmonics) < 1:
         raise SettingError("harmonics", harmonics, "must be from 1: a mode needs harmonic 1")
-    if isinstance(mode, bool) or not isinstance(mode, (int, np.integer)) or mode < 1:
-        raise SettingError("mode", mode, "must be a whole number from 1, 1 the slowest mode")
     scene = at_nodal_diameter(scene, nodal_diameter)
-    equations = Equations(_balance(scene, harmonics, whole=False))
+    check_mode(scene, mode)
+    equations = Equations(_balance(scene, harmonics, whole=whole))
     found = _begin(equations, mode)
     if equations.structure.is_diagonal and not found[0].moves_contacts:
         # The modes kept are those that contacts or forces see.
@@ -153,8 +161,6 @@ def _begin(equations: Equations, mode: int) -> tuple[LinearMode, Real]:
     guess = 1.0
     nc = equations.balance.n_ports
     modes = linear_modes(equations.balance, np.zeros((nc, nc), np.complex128))
-    if mode > len(modes):
-        raise SettingError("mode", mode, f"must be from 1 to {len(modes)}, as many as the structure has")
     guess = max(modes[mode - 1].omega, 1e-3 * modes[-1].omega)
     rest = equilibrium(equations, guess)
     slopes = None if rest is None else slopes_at_rest(equations, rest, guess)
@@ -163,6 +169,15 @@ def _begin(equations: Equations, mode: int) -> tuple[LinearMode, Real]:
             "scene", equations.balance.scene.name, "must have an equilibrium under its constant forces"
         )
     return linear_modes(equations.balance, slopes)[mode - 1], rest
+
+
+def check_mode(scene: Scene, mode: int) -> None:
+    """Raise SettingError unless the structure has a mode of that number."""
+    most = int(np.count_nonzero(linear_model(written_out(scene)).free))
+    whole = isinstance(mode, (int, np.integer)) and not isinstance(mode, bool)
+    if not whole or not 1 <= mode <= most:
+        wanted = f"must be a whole number from 1, the slowest, to {most}, as many as the structure has"
+        raise SettingError("mode", mode, wanted)
 
 
 def at_nodal_diameter(scene: Scene, nodal_diameter: int | None) -> Scene:

@@ -111,7 +111,9 @@ def collect(
         contact_forces=np.array([row.forces for row in rows]).reshape(n, balance.n_ports, size),
         dof_motions=np.array([row.dofs for row in rows]).reshape(n, len(scene.dofs), size),
         forcing=np.array([row.forcing for row in rows], dtype=np.float64),
-        newton_iterations=sum(point.iterations for point in points), rejected_steps=rejected,
+        points=tuple(point.state for point in points),
+        whole_matrices=balance.effects.whole_matrices, rejected_steps=rejected,
+        newton_iterations=sum(point.iterations for point in points),
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
 

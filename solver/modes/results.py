@@ -12,6 +12,7 @@ import numpy as np
 from solver.errors import SettingError
 from solver.jit import fourier
 from solver.jit.fourier import Complex, Integer, Real
+from solver.modes.corrector import State
 from solver.response.contact_response import ContactState, state_of
 from solver.results.base import Drawn
 from solver.results.views import Views
@@ -67,6 +68,8 @@ class NonlinearMode(Drawn):
         Coefficients of every DOF [m], of one sector if cyclic. Harmonic 1 lags the excitation's by 90°.
     forcing : (n,) array
         |Qᴴ f| of the scene's own excitation and the mass-normalised mode Q_1 / a [N/√kg].
+    points : tuple of State
+        The unknowns of every point, for `solver.mode_gradient`; `whole_matrices` says of which equations.
     """
 
     VIEWS: ClassVar = Views("solver.views", "of_mode", "mode_dataset", "of_mode")
@@ -88,6 +91,8 @@ class NonlinearMode(Drawn):
     contact_forces: Real
     dof_motions: Real
     forcing: Real
+    points: tuple[State, ...]
+    whole_matrices: bool
     newton_iterations: int
     rejected_steps: int
     seconds: float

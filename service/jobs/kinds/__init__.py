@@ -10,6 +10,7 @@ from service.jobs.kinds.design import DESIGN
 from service.jobs.kinds.map import MAP
 from service.jobs.kinds.march import MARCH
 from service.jobs.kinds.mistuning import MISTUNING
+from service.jobs.kinds.modes import MODES
 from service.jobs.kinds.pareto import PARETO
 from service.jobs.kinds.peaks import PEAKS
 from service.jobs.kinds.solve import SOLVE
@@ -37,6 +38,7 @@ SHIPPED = Registry(
         ACCURACY,
         CAMPBELL,
         MISTUNING,
+        MODES,
     ],
     warm_up,
 )
