@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from solver.marching.march import march
     from solver.marching.start import MarchStart
     from solver.modes.gradient import ModeGradient, mode_gradient
+    from solver.modes.limit_cycles import LimitCycle, LimitCycles, limit_cycles
     from solver.modes.nonlinear_mode import nonlinear_mode
+    from solver.modes.performance import PerformanceCurve, performance_curve
     from solver.modes.results import NonlinearMode, NonlinearModeStatus
     from solver.response.power_balance import PowerBalance, power_balance
     from solver.response.solution import Solution, SolutionStatus
@@ -104,6 +106,9 @@ _HOME = {
     "worst_slopes": "response.wear_nonsmooth", "Stretch": "continuation.segment",
     "joined": "continuation.segment", "LawParameter": "contacts.laws.history.definition",
     "register_law": "contacts.laws.history.register", "NonlinearMode": "modes.results",
+    "PerformanceCurve": "modes.performance", "performance_curve": "modes.performance",
+    "LimitCycle": "modes.limit_cycles", "LimitCycles": "modes.limit_cycles",
+    "limit_cycles": "modes.limit_cycles",
     "ModeGradient": "modes.gradient", "mode_gradient": "modes.gradient",
     "NonlinearModeStatus": "modes.results", "nonlinear_mode": "modes.nonlinear_mode",
 }  # fmt: skip
@@ -134,6 +139,8 @@ __all__ = [
     "Issue",
     "LawParameter",
     "LeastPeak",
+    "LimitCycle",
+    "LimitCycles",
     "MapStatus",
     "MarchStart",
     "Mark",
@@ -152,6 +159,7 @@ __all__ = [
     "PeakHessian",
     "PeakKind",
     "PeakTrack",
+    "PerformanceCurve",
     "Plan",
     "PowerBalance",
     "Predictor",
@@ -187,6 +195,7 @@ __all__ = [
     "hysteresis_loop",
     "joined",
     "least_peak",
+    "limit_cycles",
     "load",
     "load_scene",
     "march",
@@ -196,6 +205,7 @@ __all__ = [
     "motion",
     "nonlinear_mode",
     "peak_gradient",
+    "performance_curve",
     "plan",
     "power_balance",
     "progress_bar",

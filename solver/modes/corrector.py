@@ -14,7 +14,8 @@ TOLERANCE = 1e-9  # of motions relative to the largest, and of the equations bes
 _FINE = 1e-13  # below it nothing is left but rounding; between the two, steps go on as long as they help
 MOST_ITERATIONS = 14
 _CANCELLED = 1e-3  # as in `solver.balance.kernels.residual`: a share of |A| |F| a residual is relative to
-_LEAST_PART = 1.0 / 64.0  # of a Newton step, before it is given up
+_LEAST_PART = 1.0 / 32.0  # of a Newton step, before it is given up
+_PATIENCE, _HOPE = 3, 0.1  # Newton steps along an arc within which the residual has to fall to this share
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,13 +65,10 @@ def scales(y: Real, size: int) -> Real:
 def relative_residual(at: Evaluated, y: Real, a: float, size: int) -> float:
     """Return the largest residual, each relative to what it is a difference of."""
     r = np.abs(at.residual)
-    motion = max(np.abs(y[:size]).max(initial=0.0), 1e-300)
-    moved = np.max(r[:size] / np.maximum(motion, _CANCELLED * at.rough), initial=0.0)
+    motion = max(float(np.abs(y[:size]).max(initial=0.0)), 1e-300)
+    moved = float(np.max(r[:size] / np.maximum(motion, _CANCELLED * at.rough), initial=0.0))
     q = max(math.hypot(y[size], y[size + 1]), a)
-    lag = float(np.linalg.norm(at.x)) or 1.0
-    phase = float(np.linalg.norm(at.jacobian[size + 2, :])) * motion
-    aside = [r[size] / q, r[size + 1] / q, r[size + 2] / max(phase, 1e-300) if lag else 0.0, r[size + 3]]
-    return float(max(moved, *aside))
+    return float(max(moved, r[size] / q, r[size + 1] / q, r[size + 2] / max(at.lag, 1e-300), r[size + 3]))
 
 
 def step(J: Real, rhs: Real, columns: Real, *, least_squares: bool) -> Real | None:
@@ -102,19 +100,21 @@ def correct(
     """
     start, size = guess, equations.size
     state, at = guess, equations.evaluate(guess.y, guess.log_amplitude, guess.phase, guess.mode)
-    iterations, norm = 0, math.inf
+    iterations, norm = 0, _left(at, state, size)
+    norms = [norm]
     while at is not None:
-        a = math.exp(state.log_amplitude)
-        norm = relative_residual(at, state.y, a, size)
         if norm <= _FINE or iterations >= most:
             break
+        if border is not None and len(norms) > _PATIENCE and norm > _HOPE * norms[-1 - _PATIENCE]:
+            break  # a shorter step costs less
         move = _newton_step(at, state, start, border, size)
         if move is None:
             break
-        new, there = _damped(equations, state, move, norm)
-        if norm <= TOLERANCE and _left(there, new, size) > 0.1 * norm:
+        left, new, there = _damped(equations, state, move, norm)
+        if norm <= TOLERANCE and left > 0.1 * norm:
             break
-        state, at, iterations = new, there, iterations + 1
+        state, at, norm, iterations = new, there, left, iterations + 1
+        norms.append(norm)
     if norm <= TOLERANCE:
         return Corrected(state=state, at=at, converged=True, iterations=iterations, residual=norm)
     return Corrected(state=state, at=at, converged=False, iterations=iterations, residual=norm)
@@ -145,7 +145,7 @@ def _newton_step(
 
 def _damped(
     equations: Equations, state: State, move: tuple[Real, float], norm: float
-) -> tuple[State, Evaluated | None]:
+) -> tuple[float, State, Evaluated | None]:
     """Return the point after the largest part of a step that does not make the residual grow much.
 
     At a change of state the residual has a kink, over which a whole step may lead to and fro.
@@ -158,7 +158,7 @@ def _damped(
         new = State(y=y, log_amplitude=log_amplitude, mode=state.mode, phase=state.phase)
         at = equations.evaluate(y, log_amplitude, state.phase, state.mode)
         if at is not None:
-            found = relative_residual(at, y, math.exp(log_amplitude), equations.size)
+            found = _left(at, new, equations.size)
             if found < best[0]:
                 best = (found, new, at)
             if found <= (1.0 - 0.25 * part) * norm:
@@ -166,7 +166,7 @@ def _damped(
             if norm <= TOLERANCE or (best[0] < norm and found > best[0]):
                 break
         part *= 0.5
-    return best[1], best[2]
+    return best
 
 
 def carried_anew(equations: Equations, found: Corrected) -> Corrected:

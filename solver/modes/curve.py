@@ -145,6 +145,11 @@ def _by_shape(state: State, change: Real, size: int) -> Real:
     return found
 
 
+def tangent_of(equations: Equations, point: Corrected) -> Real | None:
+    """Return the tangent at a point toward larger amplitudes, as `_tangent`."""
+    return _tangent(equations, point, None)
+
+
 def _tangent(equations: Equations, found: Corrected, before: Real | None) -> Real | None:
     """Return the unit tangent, onward from `before`; None if it is not unique.
 

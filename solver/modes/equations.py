@@ -44,6 +44,7 @@ class Evaluated:
     jacobian : (m, m); `by_log_amplitude` (m,) is that by ln a.
     x : (nk, N) motion of all coordinates; forces : (r, n) forces at the leading ports less the shift.
     rough : (r n,) size that a residual of each motion is rounding of.
+    lag : size that the residual of the phase is relative to.
     unheld : bool
         Nothing holds a part where it is: its mean is left alone.
     """
@@ -54,6 +55,7 @@ class Evaluated:
     x: Complex
     forces: Real
     rough: Real
+    lag: float
     unheld: bool
     dynamics: Dynamics
 
@@ -93,12 +95,17 @@ class Equations:
         """Return forces (nc, n) as those along the leading motions, (r, n)."""
         return forces if self.span is None else np.asarray(self.span.T @ forces)
 
-    def slopes(self) -> Real:
-        """Return dF/dw less the shift where last evaluated, (r, n, r, n)."""
+    def port_slopes(self) -> Real:
+        """Return dF/dU of all ports less the shift where last evaluated, (nc, nc, n, n)."""
         nc, n = self.balance.n_ports, self.n
         rows, columns, blocks = self._blocks
         G = np.zeros((nc, nc, n, n))
         G[rows, columns] = self.point.G[blocks]
+        return G
+
+    def slopes(self) -> Real:
+        """Return dF/dw less the shift where last evaluated, (r, n, r, n)."""
+        G = self.port_slopes()
         if self.span is not None:
             G = np.einsum("cr,cdij,ds->rsij", self.span, G, self.span, optimize=True)
         return np.asarray(G.transpose(0, 2, 1, 3))
@@ -175,7 +182,8 @@ class Equations:
         rough = np.repeat(reach, np.where(s.ks > 0, 2, 1)) * np.abs(forces).max(initial=0.0)
         return Evaluated(
             residual=residual, jacobian=J, by_log_amplitude=by_log_amplitude, x=x, forces=forces,
-            rough=np.tile(rough, self.r), unheld=bool(self.point.counts[UNHELD]), dynamics=dynamics,
+            rough=np.concatenate([rough] * self.r) if self.r else rough[:0],
+            lag=float(np.linalg.norm(phase) * np.linalg.norm(x[first])), unheld=bool(self.point.counts[UNHELD]), dynamics=dynamics,
         )  # fmt: skip
 
     def _functionals(

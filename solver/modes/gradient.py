@@ -217,7 +217,13 @@ class ModeSensitivities:
         pushes = pushes - (np.swapaxes(dL, 1, 2).conj() @ forces.T[:, :, None])[:, :, 0]
         moved = (dL @ x[:, :, None])[:, :, 0]
         # The stiffness moved into the structure stays where the contacts were: its force follows L x.
-        stiff = balance.system.shift[:, None] * moved.T
+        extra = balance.system.shift[:, None] * moved.T
+        led = moved[:, balance.system.leading]
+        if equations.span is not None:
+            # The other ports no longer follow from the leading ones as they did.
+            off = equations.amplitudes.coefficients(moved.T - equations.span @ led.T)
+            turned = np.einsum("cdij,dj->ci", equations.port_slopes(), off)
+            extra = extra + equations.amplitudes.of(turned)
         L = model.ports_at(model.diameters(s.ks))
-        pushes = pushes - (np.swapaxes(L, 1, 2).conj() @ stiff.T[:, :, None])[:, :, 0]
-        return pushes, moved[:, balance.system.leading]
+        pushes = pushes - (np.swapaxes(L, 1, 2).conj() @ extra.T[:, :, None])[:, :, 0]
+        return pushes, led

@@ -16,6 +16,7 @@ from solver.views.parameter_units import parameter
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
     from solver.marching.result import MarchResult
+    from solver.modes.performance import PerformanceCurve
     from solver.modes.results import NonlinearMode
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
@@ -158,6 +159,19 @@ def of_mode(found: NonlinearMode) -> Summary:
     of = "" if found.nodal_diameter is None else f", nodal diameter {found.nodal_diameter}"
     title = f"{found.scene.name}, mode {found.mode}{of}, {found.n_harmonics} harmonics"
     return made(title, pairs, found.status.value)
+
+
+def of_performance(curve: PerformanceCurve) -> Summary:
+    """The least peak over the loads, and the range of the curve."""
+    pairs: Pairs = []
+    load, peak = curve.least
+    if math.isfinite(peak):
+        pairs.append(("least peak", f"{units.length(peak)} with {load:.4g} times the loads"))
+    if curve.excitation.size:
+        low, high = float(curve.excitation.min()), float(curve.excitation.max())
+        pairs.append(("excitation", f"from {low:.3g} to {high:.3g} times the scene's"))
+    title = f"{curve.mode.scene.name}, mode {curve.mode.mode}"
+    return made(title, pairs, curve.mode.status.value)
 
 
 def of_plan(found: Plan) -> Summary:

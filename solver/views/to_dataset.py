@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from solver.continuation.branch import Branch
     from solver.jit.fourier import Real
     from solver.marching.result import MarchResult
+    from solver.modes.performance import PerformanceCurve
     from solver.modes.results import NonlinearMode
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
@@ -284,6 +285,19 @@ def mode_dataset(found: NonlinearMode) -> Dataset:
         nodal_diameter=found.nodal_diameter,
     )  # fmt: skip
     return Dataset(kind="modes", rows=("point",), variables=variables, attributes=notes)
+
+
+def performance_dataset(curve: PerformanceCurve) -> Dataset:
+    """A point of the mode a row: factor on the excitation or on the loads, and the peak with it."""
+    variables = {
+        "excitation": column("point", curve.excitation, "", "factor on every force"),
+        "peak": column("point", curve.peak, "m", AMPLITUDE),
+        "frequency": column("point", curve.frequency_hz, "Hz", "of the peak"),
+        "load": column("point", curve.load, "", "factor on every load, the excitation as it is"),
+        "peak_at_load": column("point", curve.peak_at_load, "m", "the peak then"),
+    }
+    notes = attributes(curve.mode.status.value, curve.mode.scene, mode_number=curve.mode.mode)
+    return Dataset(kind="performance", rows=("point",), variables=variables, attributes=notes)
 
 
 def plan_dataset(found: Plan) -> Dataset:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from solver.results import units
 from solver.views.plots import style
 from solver.views.plots.style import Into
 
@@ -40,4 +41,25 @@ def mode_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
         left.set_title(f"{answer['scene']}, mode {answer['mode']}{of}")
         if linear.any():
             right.legend()
+    return page
+
+
+def performance_figure(answer: Mapping[str, Any], *, dof: str = "x", ax: Into = None) -> Figure:
+    """The resonance peak over the factor on the loads; on the excitation where loads do not scale.
+
+    Parameters
+    ----------
+    answer : the JSON of `solver.PerformanceCurve`.
+    dof : name of the observed DOF.
+    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    """
+    over = "load" if answer["scales"] else "excitation"
+    places = np.array(answer[over], dtype=np.float64)
+    heights = np.array(answer["peak_at_load" if answer["scales"] else "peak"], dtype=np.float64)
+    good = np.isfinite(places) & (places > 0.0)
+    unit = units.length_unit(float(heights[good].min(initial=1.0)))
+    with style.styled():
+        page, (axes,) = style.figure(5.0, 3.3, into=ax)
+        axes.loglog(places[good], heights[good] * unit.per_metre, color=style.BLUE, label="one mode")
+        style.label(axes, f"factor on the {over}", f"peak of max |{dof}| [{unit.name}]")
     return page
