@@ -183,7 +183,9 @@ class Equations:
         return Evaluated(
             residual=residual, jacobian=J, by_log_amplitude=by_log_amplitude, x=x, forces=forces,
             rough=np.concatenate([rough] * self.r) if self.r else rough[:0],
-            lag=float(np.linalg.norm(phase) * np.linalg.norm(x[first])), unheld=bool(self.point.counts[UNHELD]), dynamics=dynamics,
+            lag=float(np.linalg.norm(phase) * np.linalg.norm(x[first])),
+            unheld=bool(self.point.counts[UNHELD]),
+            dynamics=dynamics,
         )  # fmt: skip
 
     def _functionals(

@@ -133,6 +133,22 @@ class LimitCycles(Piece):
             return math.inf if self.aero_damping < 0.0 else 0.0
         return disturbance / max(bounds) if bounds else 0.0
 
+    def to_json(self) -> dict[str, Any]:
+        """Return them as one JSON object."""
+        return {
+            "aero_damping": self.aero_damping,
+            "most_damping": self.most_damping if math.isfinite(self.most_damping) else None,
+            "most_at": self.most_at if math.isfinite(self.most_at) else None,
+            "cycles": [
+                {
+                    "amplitude": cycle.amplitude, "frequency": cycle.frequency_hz,
+                    "max_abs": cycle.max_abs, "damping_slope": cycle.damping_slope,
+                    "stable": cycle.stable, "growth": growth_from(cycle),
+                }
+                for cycle in self.cycles
+            ],
+        }  # fmt: skip
+
 
 def limit_cycles(found: NonlinearMode, aero_damping: float = 0.0, *, stability: bool = True) -> LimitCycles:
     """Return the limit cycles of a mode that gas feeds, each solved with all harmonics.
@@ -270,19 +286,3 @@ def _most_damping(equations: Equations, found: NonlinearMode) -> tuple[float, fl
     if point.converged and float(point.state.y[-1]) >= best[0]:
         return float(point.state.y[-1]), math.exp(top)
     return best
-
-
-def cycles_json(found: LimitCycles) -> dict[str, Any]:
-    """Return limit cycles as one JSON object."""
-    return {
-        "aero_damping": found.aero_damping,
-        "most_damping": found.most_damping,
-        "most_at": found.most_at,
-        "cycles": [
-            {
-                "amplitude": cycle.amplitude, "frequency": cycle.frequency_hz, "max_abs": cycle.max_abs,
-                "damping_slope": cycle.damping_slope, "stable": cycle.stable, "growth": growth_from(cycle),
-            }
-            for cycle in found.cycles
-        ],
-    }  # fmt: skip

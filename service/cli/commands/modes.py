@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
+import typer
+
 from service.cli.failures import end
 from service.cli.options import inputs
 from service.cli.options import shared as options
@@ -22,6 +24,13 @@ Diameter = Annotated[
         "--nodal-diameter", "N", "Of a disk, negative for a backward wave; the engine order's if left out."
     ),
 ]
+Performance = Annotated[
+    bool, typer.Option("--performance", help="Resonance peaks over excitation and load, from the one mode.")
+]
+Aero = Annotated[
+    float | None,
+    amount("--aero", "ZETA", "Aerodynamic damping ratio, below 0 if it feeds: lists the limit cycles."),
+]
 
 
 def modes(
@@ -30,6 +39,8 @@ def modes(
     stop: Largest,
     mode: Mode = 1,
     nodal_diameter: Diameter = None,
+    performance: Performance = False,
+    aero: Aero = None,
     values: options.Values = None,
     harmonics: options.Harmonics = 11,
     plot: options.Plot = None,
@@ -49,6 +60,11 @@ def modes(
             scene, mode, amplitudes=(start, stop), nodal_diameter=nodal_diameter, harmonics=harmonics,
             on_progress=on_progress,
         )  # fmt: skip
-    outputs.write(found, found.plot if found.amplitude.size else None)
-    show(found.to_json(), tables.report, as_json=as_json)
+    curve = solver.performance_curve(found) if performance else None
+    drawn = found if curve is None else curve
+    answer = found.to_json() | ({} if curve is None else {"performance": curve.to_json()})
+    if aero is not None:
+        answer["limit_cycles"] = solver.limit_cycles(found, aero).to_json()
+    outputs.write(drawn, drawn.plot if found.amplitude.size else None)
+    show(answer, tables.report, as_json=as_json)
     end(found.completed, found.status.value)

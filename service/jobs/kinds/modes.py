@@ -10,6 +10,7 @@ from pydantic import ConfigDict, Field
 import solver
 from service.jobs.common.scenes import (
     HarmonicRequest,
+    Number,
     PositiveNumber,
     refusal,
     require,
@@ -18,7 +19,7 @@ from service.jobs.common.scenes import (
 )
 from service.jobs.common.sizes import balance_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import Curve, EndedResult
+from service.jobs.kinds.registry.results import Curve, EndedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, SettingError, pointer
@@ -43,6 +44,10 @@ class ModesRequest(HarmonicRequest):
         Modal amplitudes [√kg m] (`from` in the body).
     nodal_diameter : int or None
         Of a cyclic structure.
+    performance : bool
+        Peaks over excitation and load too.
+    aero_damping : float or None
+        Damping ratio of the gas, for the limit cycles.
     """
 
     model_config = ConfigDict(validate_by_alias=True, json_schema_extra={"examples": [_EXAMPLE]})
@@ -54,6 +59,12 @@ class ModesRequest(HarmonicRequest):
     to: PositiveNumber = Field(description="Largest modal amplitude [√kg m].")
     nodal_diameter: Annotated[int, Field(strict=True, ge=-10_000, le=10_000)] | None = Field(
         default=None, description="Of a disk, negative for a backward wave; that of the engine order."
+    )
+    performance: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="Resonance peaks over excitation and load too, from the one mode."
+    )
+    aero_damping: Annotated[Number, Field(ge=-10.0, le=10.0)] | None = Field(
+        default=None, description="Aerodynamic damping ratio, below 0 if it feeds: the limit cycles too."
     )
 
 
@@ -76,6 +87,8 @@ class ModesResult(EndedResult):
     newton_iterations: int
     rejected_steps: int
     seconds: float
+    performance: Table | None = None
+    limit_cycles: Table | None = None
 
 
 def resolve(request: ModesRequest, source: SceneSource) -> Resolved:
@@ -89,6 +102,8 @@ def resolve(request: ModesRequest, source: SceneSource) -> Resolved:
         stop=request.to,
         nodal_diameter=request.nodal_diameter,
         harmonics=request.harmonics,
+        performance=request.performance,
+        aero_damping=request.aero_damping,
     )
 
 
@@ -121,7 +136,12 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
         on_progress=progress,
         should_stop=should_stop,
     )
-    return JobOutput.of(found, reached=found.completed)
+    answer = found.to_json()
+    if spec["performance"]:
+        answer["performance"] = solver.performance_curve(found).to_json()
+    if spec["aero_damping"] is not None:
+        answer["limit_cycles"] = solver.limit_cycles(found, spec["aero_damping"]).to_json()
+    return JobOutput(result=answer, shortfall=None if found.completed else found.status.value)
 
 
 def draw(result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
@@ -142,6 +162,7 @@ MODES = JobKind(
     result=ModesResult,
     view=KindView(
         result="frequency and damping ratio over the amplitude ([modes](modes.md))",
+        flags={"aero_damping": "--aero"},
         draw=draw,
     ),
 )

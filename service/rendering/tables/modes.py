@@ -23,6 +23,46 @@ def report(found: Mapping[str, Any]) -> None:
     pairs = [("points", f"{count}, {found['newton_iterations']} Newton iterations")]
     pairs.append(("time", units.duration(found["seconds"])))
     print_pairs("" if count else title, pairs)
+    if found.get("performance"):
+        _performance(found["performance"], found["dof"])
+    if found.get("limit_cycles"):
+        _cycles(found["limit_cycles"], found["dof"])
+
+
+def _performance(curve: Mapping[str, Any], dof: str) -> None:
+    """Peaks over the excitation and, where they scale, over the loads."""
+    heads = ["× excitation", f"peak of |{dof}|", "at [Hz]", "× load", f"peak of |{dof}|"]
+    rows = []
+    for i in _thinned(len(curve["excitation"])):
+        row = [
+            f"{curve['excitation'][i]:.4g}",
+            units.length(curve["peak"][i]),
+            f"{curve['frequency'][i]:.6g}",
+        ]
+        known = curve["scales"]
+        row += [f"{curve['load'][i]:.4g}", units.length(curve["peak_at_load"][i])] if known else ["", ""]
+        rows.append(row)
+    print_table("Peaks of this mode alone", heads, rows, right="01234")
+    if curve["least"] is not None:
+        best = curve["least"]
+        print_pairs(
+            "", [("least peak", f"{units.length(best['peak'])} with {best['load']:.4g} times the loads")]
+        )
+
+
+def _cycles(found: Mapping[str, Any], dof: str) -> None:
+    """Limit cycles, and the most the damper holds."""
+    pairs = []
+    if found["most_damping"] is not None:
+        at = f"at a = {found['most_at']:.4g} √kg m"
+        pairs.append(("most that is held", f"ζ = {found['most_damping']:.5g} {at}"))
+    for cycle in found["cycles"]:
+        name = "stable cycle" if cycle["stable"] else "unstable cycle"
+        size = f"a = {cycle['amplitude']:.6g} √kg m, max |{dof}| {units.length(cycle['max_abs'])}"
+        pairs.append((name, f"{size}, {cycle['frequency']:.6g} Hz"))
+    if not found["cycles"]:
+        pairs.append(("limit cycles", "none between these amplitudes"))
+    print_pairs(f"Aerodynamic damping ratio {found['aero_damping']:g}", pairs)
 
 
 def _row(found: Mapping[str, Any], i: int) -> list[str]:
