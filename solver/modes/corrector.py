@@ -12,10 +12,10 @@ from solver.modes.equations import Equations, Evaluated
 
 TOLERANCE = 1e-9  # of motions relative to the largest, and of the equations beside them
 _FINE = 1e-13  # below it nothing is left but rounding; between the two, steps go on as long as they help
-MOST_ITERATIONS = 14
+MOST_ITERATIONS = 20
 _CANCELLED = 1e-3  # as in `solver.balance.kernels.residual`: a share of |A| |F| a residual is relative to
 _LEAST_PART = 1.0 / 32.0  # of a Newton step, before it is given up
-_PATIENCE, _HOPE = 3, 0.1  # Newton steps along an arc within which the residual has to fall to this share
+_PATIENCE, _HOPE = 8, 0.9  # Newton steps along an arc within which the residual has to fall to this share
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,7 +1,11 @@
 """Continuation of a nonlinear mode over the amplitude: pseudo-arc-length in (ln a, ln ω, ζ, shape).
 
 The contact forces are piecewise smooth, so the tangent jumps where a contact begins to slip or to open. Where
-no step over such a kink ends well though it is short, one at a given larger amplitude is tried.
+no step over such a kink ends well though it is short, a leap to a given larger amplitude is tried.
+
+Where a multiple of ω meets another frequency of the structure, the curve may lead over into that mode, which
+then moves in a higher harmonic: the one ζ of all harmonics takes its damping away. That is no longer the mode
+that was asked for, so points whose harmonic 1 has too little of a² are leapt over in the same way.
 """
 
 from __future__ import annotations
@@ -20,7 +24,12 @@ from solver.modes.equations import Equations
 FIRST_STEP, LARGEST_STEP, LEAST_STEP = 0.1, 0.4, 1e-4
 _SHARPNESS = 4.0  # weight of changes of ln ω and ζ beside those of ln a
 _EASY, _HARD = 5, 9  # Newton steps
-_JUMPS = (0.02, 0.06, 0.15, 0.3)  # of ln a, over what no short step passes
+_JUMPS = (0.02, 0.06, 0.15, 0.3, 0.6, 1.0)  # of ln a, over what no short step passes
+LEAST_SHARE = 0.9  # of a² that harmonic 1 has
+_RESOLVED = 0.05  # step over which a curve may bend as it will: a kink is no farther from a point
+_BENT = 0.1  # relative change of ζ off the tangent, over a longer step: chords are off by a quarter of it
+_FAINT = 1e-4  # damping ratio below which changes of it are not looked at
+_PURE = 0.99  # share of harmonic 1 in a shape that leaps begin with
 _FARTHEST = 2.0  # ln a below the first amplitude, where a curve that turned back is left
 
 
@@ -45,73 +54,114 @@ class Walked:
 
 def walk(
     equations: Equations, first: Corrected, high: float, *, turns: bool, most_points: int,
-    largest: float = LARGEST_STEP, ended: Callable[[End], None],
+    least_share: float = LEAST_SHARE, ended: Callable[[End], None],
 ) -> Iterator[Walked]:  # fmt: skip
     """Yield the points of a curve from a converged first one to ln a = `high`.
 
     Parameters
     ----------
+    least_share : of a² that harmonic 1 has at every point; 0 follows the curve wherever it leads.
     turns : the motion may begin at any instant; its phase is then fixed anew at every point.
     ended : is told how the curve ended, before the last point is yielded or after it.
     """
     point, low = first, first.state.log_amplitude
+    farthest = purest = first
     yield Walked(point=point, rejected=0)
-    tangent = _tangent(equations, point, None)
-    size = FIRST_STEP
+    tangent, size = _tangent(equations, point, None), FIRST_STEP
     for _ in range(most_points):
         if point.state.log_amplitude >= high:
             ended(End.REACHED)
             return
-        if tangent is None:
-            ended(End.STOPPED)
-            return
         here = _with_phase(equations, point) if turns else point
-        found, size, rejected = _advance(equations, here, tangent, size, high, largest)
+        found, rejected, before = None, 0, tangent
+        if tangent is not None and point.state.log_amplitude > low - _FARTHEST:
+            found, size, rejected = _advance(equations, here, tangent, size, high)
+        if found is None or share_of_first(equations, found) < least_share:
+            # From there on toward larger amplitudes.
+            back = tuple(
+                _with_phase(equations, each) if turns else each for each in (point, farthest, purest)
+            )
+            found, size, before = _leap(equations, back, high, least_share), _RESOLVED, None
         if found is None:
-            ended(End.STOPPED)
+            turned = point.state.log_amplitude <= low - _FARTHEST
+            ended(End.TURNED_BACK if turned else End.STOPPED)
             return
-        tangent = _tangent(equations, found, tangent)
-        point = found
-        if point.state.log_amplitude < low - _FARTHEST:
-            ended(End.TURNED_BACK)
-            return
+        tangent, point = _tangent(equations, found, before), found
+        if point.state.log_amplitude > farthest.state.log_amplitude:
+            farthest = point
+        if share_of_first(equations, point) > _PURE:
+            purest = point
         yield Walked(point=point, rejected=rejected)
     ended(End.REACHED if point.state.log_amplitude >= high else End.TOO_LONG)
 
 
+def share_of_first(equations: Equations, found: Corrected) -> float:
+    """Return the share of a² that harmonic 1 has."""
+    if found.at is None:
+        return 0.0
+    s, x = equations.structure, found.at.x
+    alone = np.zeros_like(x)
+    alone[s.first] = x[s.first]
+    return s.squared_amplitude(alone) / s.squared_amplitude(x)
+
+
 def _advance(
-    equations: Equations, here: Corrected, tangent: Real, size: float, high: float, largest: float
+    equations: Equations, here: Corrected, tangent: Real, size: float, high: float
 ) -> tuple[Corrected | None, float, int]:
     """Return the next point (None if there is none), the next step size, and how many were rejected."""
     rejected = 0
     while size >= LEAST_STEP:
         left = high - here.state.log_amplitude
-        if size * tangent[-1] >= left:
-            found = _step(equations, here, tangent, left / tangent[-1], high)
+        last = size * tangent[-1] >= left
+        guess = _ahead(here.state, tangent, left / tangent[-1] if last else size, equations)
+        if last:
+            found = correct(equations, replace(guess, log_amplitude=high))
         else:
-            found = _step(equations, here, tangent, size, None)
+            found = correct(equations, guess, _border(here.state, tangent, equations.size))
         if found.converged and _is_near(here, found, size, equations.size):
+            if size > _RESOLVED and _bends(guess, found.state):
+                size = max(0.4 * size, _RESOLVED)
+                continue
             if found.iterations <= _EASY:
-                size = min(1.6 * size, largest)
+                size = min(1.6 * size, LARGEST_STEP)
             elif found.iterations >= _HARD:
                 size = max(0.5 * size, LEAST_STEP)
             return carried_anew(equations, found), size, rejected
         rejected, size = rejected + 1, 0.4 * size
-    for jump in _JUMPS:
-        to = min(here.state.log_amplitude + jump, high)
-        found = correct(equations, _ahead(here.state, tangent, to - here.state.log_amplitude, equations))
-        if found.converged and _is_near(here, found, jump, equations.size):
-            return carried_anew(equations, found), 0.02, rejected
-        rejected += 1
     return None, size, rejected
 
 
-def _step(equations: Equations, here: Corrected, tangent: Real, size: float, to: float | None) -> Corrected:
-    """Return the point a step along the tangent leads to, or that at the amplitude `to`."""
-    guess = _ahead(here.state, tangent, size, equations)
-    if to is not None:
-        return correct(equations, replace(guess, log_amplitude=to))
-    return correct(equations, guess, _border(here.state, tangent, equations.size))
+def _leap(
+    equations: Equations, points: tuple[Corrected, ...], high: float, least_share: float
+) -> Corrected | None:
+    """Return a point at a larger amplitude than any of `points`, from the shape of one of them; None if none.
+
+    That is over a kink where no short step ends well, past another mode that moves in a higher harmonic, or
+    where the branch of a sticking contact that once slipped leads back: its force depends on the history, and
+    there is one for each.
+    """
+    farthest = max(point.state.log_amplitude for point in points)
+    for jump in _JUMPS:
+        to = min(farthest + jump, high)
+        for here in points:
+            rise, y = to - here.state.log_amplitude, here.state.y.copy()
+            y[: equations.size + 2] *= math.exp(rise)
+            found = correct(equations, replace(here.state, y=y, log_amplitude=to), most=40)
+            if not found.converged or share_of_first(equations, found) < least_share:
+                continue
+            if _is_near(here, found, rise, equations.size):
+                return carried_anew(equations, found)
+    return None
+
+
+def _bends(guess: State, found: State) -> bool:
+    """Return whether damping or frequency left the tangent so far that the step should be a shorter one.
+
+    Between points the curve is taken as straight, by `solver.performance_curve` and by the eye.
+    """
+    zeta, omega = float(found.y[-1]), float(found.y[-2])
+    off = abs(zeta - float(guess.y[-1])) > _BENT * max(abs(zeta), _FAINT)
+    return off or abs(omega - float(guess.y[-2])) > 0.2 * _BENT * omega
 
 
 def _ahead(state: State, tangent: Real, size: float, equations: Equations) -> State:

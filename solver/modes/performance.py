@@ -93,10 +93,15 @@ class PerformanceCurve(Drawn):
             "peak": self.peak.tolist(),
             "frequency": self.frequency_hz.tolist(),
             "scales": self.scales,
-            "load": self.load.tolist() if self.scales else None,
-            "peak_at_load": self.peak_at_load.tolist() if self.scales else None,
+            "load": _numbers(self.load) if self.scales else None,
+            "peak_at_load": _numbers(self.peak_at_load) if self.scales else None,
             "least": {"load": load, "peak": peak} if known else None,
         }
+
+
+def _numbers(values: Real) -> list[float | None]:
+    """Return floats that JSON can carry: without damping no load is large enough."""
+    return [float(value) if math.isfinite(value) else None for value in values]
 
 
 def performance_curve(found: NonlinearMode) -> PerformanceCurve:
@@ -132,14 +137,12 @@ def performance_curve(found: NonlinearMode) -> PerformanceCurve:
 
 def with_loads(scene: Scene, factor: float) -> Scene:
     """Return the scene with the given normal loads of all contacts times a factor."""
-    values: dict[str, float] = {}
+    changed = []
     for contact in scene.contacts:
-        if contact.load is None:
-            continue
-        values[f"{contact.name}.N0"] = factor * scene.value(f"{contact.name}.N0")
-        if getattr(contact, "N1", None) is not None:
-            values[f"{contact.name}.N1"] = factor * scene.value(f"{contact.name}.N1")
-    return scene.with_values(values)
+        given = {key: getattr(contact, key, None) for key in ("N0", "N1")}
+        scaled = {key: factor * value for key, value in given.items() if value is not None}
+        changed.append(contact.model_copy(update=scaled))
+    return scene.model_copy(update={"contacts": tuple(changed)})
 
 
 def grows_together(found: NonlinearMode) -> bool:

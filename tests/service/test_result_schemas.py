@@ -53,6 +53,8 @@ SOMETIMES = {
     "stopped",
     "note",
     "branches",
+    "performance",
+    "limit_cycles",
 }
 
 

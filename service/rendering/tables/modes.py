@@ -39,7 +39,7 @@ def _performance(curve: Mapping[str, Any], dof: str) -> None:
             units.length(curve["peak"][i]),
             f"{curve['frequency'][i]:.6g}",
         ]
-        known = curve["scales"]
+        known = curve["scales"] and curve["load"][i] is not None
         row += [f"{curve['load'][i]:.4g}", units.length(curve["peak_at_load"][i])] if known else ["", ""]
         rows.append(row)
     print_table("Peaks of this mode alone", heads, rows, right="01234")
