@@ -31,6 +31,7 @@ from solver.scene.scene import Scene
 
 PERIOD = 2.0 * math.pi
 _NEUTRAL = 1e-3  # distance from 1 of the multiplier of a shift in time, which is rounding of the period
+_MOST_COORDINATES = 200  # of a whole structure whose multipliers are computed unasked
 _CLOSE = 1e-10  # of ln a, at the amplitude of most damping
 
 
@@ -144,13 +145,16 @@ class LimitCycles(Piece):
                     "amplitude": cycle.amplitude, "frequency": cycle.frequency_hz,
                     "max_abs": cycle.max_abs, "damping_slope": cycle.damping_slope,
                     "stable": cycle.stable, "growth": growth_from(cycle),
+                    "by_slope": cycle.multipliers is None,
                 }
                 for cycle in self.cycles
             ],
         }  # fmt: skip
 
 
-def limit_cycles(found: NonlinearMode, aero_damping: float = 0.0, *, stability: bool = True) -> LimitCycles:
+def limit_cycles(
+    found: NonlinearMode, aero_damping: float = 0.0, *, stability: bool | None = None
+) -> LimitCycles:  # fmt: skip
     """Return the limit cycles of a mode that gas feeds, each solved with all harmonics.
 
     Parameters
@@ -158,7 +162,8 @@ def limit_cycles(found: NonlinearMode, aero_damping: float = 0.0, *, stability: 
     found : of `solver.nonlinear_mode`.
     aero_damping : damping ratio ζ_aero of the gas, as the matrix 2 ζ_aero ω M; below 0 it feeds the mode. 0:
         what the scene itself says of the gas.
-    stability : Floquet multipliers too; of a disk they are of all its sectors.
+    stability : Floquet multipliers too; of a disk they are of all its sectors. Left out, they are computed of
+        structures of at most 200 coordinates: of more they take minutes.
 
     Raises
     ------
@@ -172,18 +177,30 @@ def limit_cycles(found: NonlinearMode, aero_damping: float = 0.0, *, stability: 
     if not problem.turns:
         names = [c.name for c in found.scene.contacts if c.load is not None and c.load.amplitude != 0.0]
         raise SettingError("N1", names, "must be 0: a limit cycle has no phase that a load could follow")
+    missing = _missing(found.scene, stability)
     surplus = found.damping_ratio + aero_damping
     cycles = []
     for i in range(len(found.points) - 1):
         if surplus[i] == 0.0 or surplus[i] * surplus[i + 1] < 0.0:
             solved = _at_damping(problem.equations, found, i, -aero_damping)
             if solved is not None:
-                cycles.append(_cycle(problem, solved, found.scene, aero_damping, stability=stability))
+                cycles.append(_cycle(problem, solved, found.scene, aero_damping, missing))
     most, at = _most_damping(problem.equations, found)
     return LimitCycles(
         aero_damping=float(aero_damping), cycles=tuple(cycles), most_damping=most, most_at=at,
         scales=bool(found.points) and grows_together(found),
     )  # fmt: skip
+
+
+def _missing(scene: Scene, stability: bool | None) -> str:
+    """Return why no multipliers are computed; empty if they are."""
+    if stability is False:
+        return "not asked for"
+    sectors = scene.structure.sector_count if scene.structure.has_sectors else 1
+    size = sectors * len(scene.dofs)
+    if stability is None and size > _MOST_COORDINATES:
+        return f"left out: {size} coordinates take minutes; `stability=True` computes them"
+    return ""
 
 
 def _between(found: NonlinearMode, i: int, share: float) -> State:
@@ -218,12 +235,12 @@ def _slope(equations: Equations, point: Corrected) -> float:
 
 
 def _cycle(
-    problem: ModeProblem, point: Corrected, scene: Scene, aero_damping: float, *, stability: bool
+    problem: ModeProblem, point: Corrected, scene: Scene, aero_damping: float, missing: str
 ) -> LimitCycle:
     record = Recorder(problem.equations, turns=True).of(point)
     omega = float(point.state.y[-2])
-    multipliers, unknown = None, "not asked for"
-    if stability:
+    multipliers, unknown = None, missing
+    if not missing:
         multipliers, unknown = _multipliers(scene, omega, record, 2.0 * aero_damping * omega)
     return LimitCycle(
         amplitude=math.exp(point.state.log_amplitude), frequency_hz=omega / PERIOD, max_abs=record.max_abs,

@@ -58,6 +58,8 @@ def _cycles(found: Mapping[str, Any], dof: str) -> None:
         pairs.append(("most that is held", f"ζ = {found['most_damping']:.5g} {at}"))
     for cycle in found["cycles"]:
         name = "stable cycle" if cycle["stable"] else "unstable cycle"
+        # Without multipliers nothing is known of other modes.
+        name += " (by the slope)" if cycle["by_slope"] else ""
         size = f"a = {cycle['amplitude']:.6g} √kg m, max |{dof}| {units.length(cycle['max_abs'])}"
         pairs.append((name, f"{size}, {cycle['frequency']:.6g} Hz"))
     if not found["cycles"]:

@@ -104,3 +104,13 @@ def test_loads_that_move_and_numbers_that_are_none_are_refused() -> None:
         solver.limit_cycles(found, -0.01)
     with pytest.raises(solver.SettingError, match="aero_damping"):
         solver.limit_cycles(found, math.nan)
+
+
+def test_a_disk_of_many_coordinates_says_that_multipliers_are_left_out() -> None:
+    found = solver.nonlinear_mode(
+        solver.load_scene("fe-disk"), amplitudes=(1e-6, 1e-4), harmonics=3, errors=False
+    )
+    cycles = solver.limit_cycles(found, -0.02).cycles
+    assert cycles
+    assert all(cycle.multipliers is None and "stability=True" in cycle.unknown for cycle in cycles)
+    assert cycles[0].stable == cycles[0].attracts
