@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from solver.modes.limit_cycles import LimitCycle, LimitCycles, limit_cycles
     from solver.modes.nonlinear_mode import nonlinear_mode
     from solver.modes.performance import PerformanceCurve, performance_curve
+    from solver.modes.phase_resonance import PhaseResonance, phase_resonance
     from solver.modes.results import NonlinearMode, NonlinearModeStatus
     from solver.response.power_balance import PowerBalance, power_balance
     from solver.response.solution import Solution, SolutionStatus
@@ -110,6 +111,7 @@ _HOME = {
     "LimitCycle": "modes.limit_cycles", "LimitCycles": "modes.limit_cycles",
     "limit_cycles": "modes.limit_cycles",
     "ModeGradient": "modes.gradient", "mode_gradient": "modes.gradient",
+    "PhaseResonance": "modes.phase_resonance", "phase_resonance": "modes.phase_resonance",
     "NonlinearModeStatus": "modes.results", "nonlinear_mode": "modes.nonlinear_mode",
 }  # fmt: skip
 
@@ -160,6 +162,7 @@ __all__ = [
     "PeakKind",
     "PeakTrack",
     "PerformanceCurve",
+    "PhaseResonance",
     "Plan",
     "PowerBalance",
     "Predictor",
@@ -206,6 +209,7 @@ __all__ = [
     "nonlinear_mode",
     "peak_gradient",
     "performance_curve",
+    "phase_resonance",
     "plan",
     "power_balance",
     "progress_bar",

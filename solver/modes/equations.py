@@ -117,17 +117,29 @@ class Equations:
     def evaluate(self, y: Real, log_amplitude: float, phase: Complex, mode: int) -> Evaluated | None:
         """Return the equations at y; None where a contact law failed or Z is singular."""
         w, q = y[: self.size].reshape(self.r, self.n), complex(y[self.size], y[self.size + 1])
-        omega, zeta = float(y[-2]), float(y[-1])
+        omega, last = float(y[-2]), float(y[-1])
         if not omega > 0.0 or not self.contacts(w, omega):
             return None
         try:
-            dynamics = self.structure.at(omega, zeta, mode)
+            dynamics = self.structure.at(omega, self.damping(last), mode)
         except np.linalg.LinAlgError:
             return None
         forces = self.shifted_forces(w)
         phi, by_omega = self._pushes(forces, omega, q, dynamics)
-        x = dynamics.solve(phi)
+        x = dynamics.solve(phi + self.driven(last, log_amplitude))
         return self._assemble(w, q, forces, x, by_omega, dynamics, log_amplitude, phase)
+
+    def damping(self, last: float) -> float:
+        """Return ζ from the last unknown."""
+        return last
+
+    def driven(self, _last: float, _log_amplitude: float) -> Complex | float:
+        """Return the force on the coordinates that the last unknown stands for, (nk, N) or 0."""
+        return 0.0
+
+    def by_last(self, x: Complex, dynamics: Dynamics, _log_amplitude: float) -> Complex:
+        """Return the derivative of the forces on the coordinates by the last unknown, (nk, N)."""
+        return -self.structure.times(dynamics.by_zeta, x)
 
     def _pushes(self, forces: Real, omega: float, q: complex, dynamics: Dynamics) -> tuple[Complex, Complex]:
         """Return φ − Lᴴ F + ρ M b q, (nk, N), and its derivative by ω."""
@@ -170,7 +182,7 @@ class Equations:
         changes[0] = 0.0
         changes[0, first] = dynamics.rho * dynamics.b
         changes[1] = by_omega - s.times(dynamics.by_omega, x)
-        changes[2] = -s.times(dynamics.by_zeta, x)
+        changes[2] = self.by_last(x, dynamics, log_amplitude)
         changes = np.array([dynamics.solve(each) for each in changes])
         seen = (s.contact @ changes[..., None])[..., 0]  # (3, nk, r)
         for column, value in ((0, seen[0]), (1, 1j * seen[0]), (2, seen[1]), (3, seen[2])):

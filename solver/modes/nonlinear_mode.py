@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
 MOST_POINTS = 2000
-_STATUS = {
+STATUS = {
     End.REACHED: NonlinearModeStatus.COMPLETED, End.NOT_BEGUN: NonlinearModeStatus.NOT_BEGUN,
     End.STOPPED: NonlinearModeStatus.STOPPED, End.TURNED_BACK: NonlinearModeStatus.TURNED_BACK,
     End.TOO_LONG: NonlinearModeStatus.TOO_LONG, End.CANCELLED: NonlinearModeStatus.CANCELLED,
@@ -102,7 +102,7 @@ def nonlinear_mode(
                 end.append(End.CANCELLED)
                 break
     return collect(
-        equations, points, mode=int(mode), turns=problem.turns, errors=errors, status=_STATUS[end[-1]],
+        equations, points, mode=int(mode), turns=problem.turns, errors=errors, status=STATUS[end[-1]],
         rejected=rejected, begun=begun,
     )  # fmt: skip
 
@@ -126,23 +126,25 @@ def check_amplitudes(amplitudes: Sequence[float]) -> tuple[float, float]:
 
 
 def pose(
-    scene: Scene, mode: int, nodal_diameter: int | None, harmonics: int, *, whole: bool = False
+    scene: Scene, mode: int, nodal_diameter: int | None, harmonics: int, *, whole: bool = False,
+    kind: type[Equations] = Equations,
 ) -> ModeProblem:  # fmt: skip
     """Return the equations of a mode and where it begins; errors as `nonlinear_mode`.
 
     Parameters
     ----------
     whole : keep whole matrices whatever the damping is.
+    kind : what is asked of a motion.
     """
     if check_harmonics(harmonics) < 1:
         raise SettingError("harmonics", harmonics, "must be from 1: a mode needs harmonic 1")
     scene = at_nodal_diameter(scene, nodal_diameter)
     check_mode(scene, mode)
-    equations = Equations(_balance(scene, harmonics, whole=whole))
+    equations = kind(_balance(scene, harmonics, whole=whole))
     found = _begin(equations, mode)
     if equations.structure.is_diagonal and not found[0].moves_contacts:
         # The modes kept are those that contacts or forces see.
-        equations = Equations(_balance(scene, harmonics, whole=True))
+        equations = kind(_balance(scene, harmonics, whole=True))
         found = _begin(equations, mode)
     loads = [contact.load for contact in equations.balance.scene.contacts]
     turns = not any(load is not None and load.amplitude != 0.0 for load in loads)
