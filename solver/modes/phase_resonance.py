@@ -1,10 +1,10 @@
 """Phase resonance: the forced responses whose harmonic 1 lags the excitation by a quarter of a period.
 
-The equations are those of the extended periodic motion (`solver.modes.equations`) with the excitation f in place
-of the artificial damping, Z_1 x_1 + Lᴴ F_1 = p f, at a given modal amplitude a: what a test with a controlled
-phase and amplitude measures (S. Peter, R. I. Leine, Mech. Syst. Signal Process. 96 (2017) 139).
-The force is written as p = z c a with c = 2ω₀²/|φᴴ f| of the linear mode
-φ, so that the last unknown z is the damping ratio that one mode alone would have.
+The equations are those of the extended periodic motion (`solver.modes.equations`) with the excitation f in
+place of the artificial damping, Z_1 x_1 + Lᴴ F_1 = p f, at a given modal amplitude a: what a test with a
+controlled phase and amplitude measures (S. Peter, R. I. Leine, Mech. Syst. Signal Process. 96 (2017) 139).
+The force is written as p = z c a with c = 2ω₀²/|φᴴ f| of the linear mode φ, so that the last unknown z is the
+damping ratio that one mode alone would have.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 
@@ -52,9 +52,9 @@ class Driven(Equations):
             return None
         return replace(at, by_log_amplitude=at.by_log_amplitude + y[-1] * at.jacobian[:, -1])
 
-    def damping(self, last: float) -> float:
+    def damping(self, _last: float) -> float:
         """Return ζ: none but the structure's own."""
-        return 0.0 * last
+        return 0.0
 
     def driven(self, last: float, log_amplitude: float) -> Complex | float:
         """Return p f."""
@@ -161,8 +161,7 @@ def phase_resonance(
     low, high = (math.log(each) for each in check_amplitudes(amplitudes))
     check_no_line(scene)
     problem = pose(scene, mode, nodal_diameter, harmonics, kind=Driven)
-    equations = problem.equations
-    assert isinstance(equations, Driven)
+    equations = cast(Driven, problem.equations)
     shape, force = coordinates_of(equations, problem.mode), equations.structure.force
     along = abs(complex(np.vdot(shape, force)))
     size = float(np.linalg.norm(shape) * np.linalg.norm(force))

@@ -47,7 +47,7 @@ def modes(
     out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
-    """Follow a mode's frequency and damping ratio over its amplitude, without excitation.
+    """Follow a mode's frequency and damping over its amplitude.
 
     The modal amplitude a is mass-normalised: a² = Σ Q_kᴴ M Q_k over the harmonics, of one sector of a disk.
     """
