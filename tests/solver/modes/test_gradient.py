@@ -92,7 +92,8 @@ def test_shipped_disks(name: str) -> None:
 @pytest.mark.long
 def test_a_place_of_a_damper_in_space() -> None:
     scene = solver.load_scene("platform-wedge")
-    _check(scene, ["wedge.angle", "speed", "wedge.mass"], amplitudes=(1e-3, 1.3e-3), harmonics=3)
+    # At 1.294e-3 √kg m the curve folds: a step aside from a point beyond falls back on the branch before.
+    _check(scene, ["wedge.angle", "speed", "wedge.mass"], amplitudes=(1e-3, 1.28e-3), harmonics=3)
 
 
 def test_an_unknown_path_is_named() -> None:
