@@ -22,6 +22,12 @@ if TYPE_CHECKING:
     from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
     from solver.marching.march import march
     from solver.marching.start import MarchStart
+    from solver.modes.gradient import ModeGradient, mode_gradient
+    from solver.modes.limit_cycles import LimitCycle, LimitCycles, limit_cycles
+    from solver.modes.nonlinear_mode import nonlinear_mode
+    from solver.modes.performance import PerformanceCurve, performance_curve
+    from solver.modes.phase_resonance import PhaseResonance, phase_resonance
+    from solver.modes.results import NonlinearMode, NonlinearModeStatus
     from solver.response.power_balance import PowerBalance, power_balance
     from solver.response.solution import Solution, SolutionStatus
     from solver.response.solve import solve
@@ -100,7 +106,13 @@ _HOME = {
     "worst_friction_work": "response.worst_wear", "worst_wear": "response.worst_wear",
     "worst_slopes": "response.wear_nonsmooth", "Stretch": "continuation.segment",
     "joined": "continuation.segment", "LawParameter": "contacts.laws.history.definition",
-    "register_law": "contacts.laws.history.register",
+    "register_law": "contacts.laws.history.register", "NonlinearMode": "modes.results",
+    "PerformanceCurve": "modes.performance", "performance_curve": "modes.performance",
+    "LimitCycle": "modes.limit_cycles", "LimitCycles": "modes.limit_cycles",
+    "limit_cycles": "modes.limit_cycles",
+    "ModeGradient": "modes.gradient", "mode_gradient": "modes.gradient",
+    "PhaseResonance": "modes.phase_resonance", "phase_resonance": "modes.phase_resonance",
+    "NonlinearModeStatus": "modes.results", "nonlinear_mode": "modes.nonlinear_mode",
 }  # fmt: skip
 
 __all__ = [
@@ -129,6 +141,8 @@ __all__ = [
     "Issue",
     "LawParameter",
     "LeastPeak",
+    "LimitCycle",
+    "LimitCycles",
     "MapStatus",
     "MarchStart",
     "Mark",
@@ -139,11 +153,16 @@ __all__ = [
     "MistunedDisk",
     "MistuningStatus",
     "MistuningStudy",
+    "ModeGradient",
+    "NonlinearMode",
+    "NonlinearModeStatus",
     "Peak",
     "PeakGradient",
     "PeakHessian",
     "PeakKind",
     "PeakTrack",
+    "PerformanceCurve",
+    "PhaseResonance",
     "Plan",
     "PowerBalance",
     "Predictor",
@@ -179,13 +198,18 @@ __all__ = [
     "hysteresis_loop",
     "joined",
     "least_peak",
+    "limit_cycles",
     "load",
     "load_scene",
     "march",
     "mistuned",
     "mistuning_study",
+    "mode_gradient",
     "motion",
+    "nonlinear_mode",
     "peak_gradient",
+    "performance_curve",
+    "phase_resonance",
     "plan",
     "power_balance",
     "progress_bar",

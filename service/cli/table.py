@@ -38,6 +38,7 @@ COMMANDS = (
         "campbell", "commands.campbell.campbell",
         "Find the speeds at which orders of the running speed meet resonances.",
     ),
+    Entry("modes", "commands.modes.modes", "Follow a mode's frequency and damping over its amplitude."),
     Entry("mistuning", "commands.mistuning.mistuning", "Study disks whose blades are not quite equal."),
     Entry(
         "schema", "commands.schema.schema",

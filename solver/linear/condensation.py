@@ -30,7 +30,7 @@ CANCELLED = 1e-3  # a relative residual of 1e-11 of this share of what cancels i
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reduced:
     """The linear part in the form the loops take; see `solver.contacts.kernels.system.System` for the
-    shapes."""
+    sizes. `shapes` the loops do without."""
 
     which: Integer
     shift: Real
@@ -45,6 +45,7 @@ class Reduced:
     contact_duals: Complex
     observe_modes: Complex
     modal_forces: Complex
+    shapes: Complex  # (ns, n, nm) the modes in the coordinates of the matrices
     K: Complex
     C: Complex
     M: Complex
@@ -216,6 +217,7 @@ def _projected(
         "contact_duals": _contiguous(contact_duals[:, :, seen]),
         "observe_modes": _contiguous(observe_modes[:, seen]),
         "modal_forces": _contiguous(modal_forces[:, seen]),
+        "shapes": _contiguous(found.right[:, :, seen]),
     }
 
 
@@ -233,6 +235,7 @@ def _no_modes(n_structures: int, n_harmonics: int, n_contacts: int) -> dict[str,
         "contact_duals": np.zeros((n_structures, n_contacts, 0), np.complex128),
         "observe_modes": np.zeros((n_structures, 0), np.complex128),
         "modal_forces": np.zeros((n_harmonics, 0), np.complex128),
+        "shapes": np.zeros((n_structures, 0, 0), np.complex128),
     }
 
 

@@ -16,6 +16,8 @@ from solver.views.parameter_units import parameter
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
     from solver.marching.result import MarchResult
+    from solver.modes.performance import PerformanceCurve
+    from solver.modes.results import NonlinearMode
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
     from solver.studies.blades import BladeAmplitudes, BladePeaks
@@ -143,6 +145,33 @@ def of_mistuning(study: MistuningStudy) -> Summary:
     pairs.append(("time", units.duration(study.seconds)))
     title = f"{len(study.disks)} disks of {study.scene}, spread {study.spread:g} of {', '.join(study.of)}"
     return made(title, pairs, study.status.value)
+
+
+def of_mode(found: NonlinearMode) -> Summary:
+    """Frequency and damping ratio at both ends, and where it damps most."""
+    pairs: Pairs = []
+    if found.amplitude.size:
+        best = int(np.argmax(found.damping_ratio))
+        for name, i in (("smallest", 0), ("most damping", best), ("largest", -1)):
+            at = f"a = {found.amplitude[i]:.4g} √kg m"
+            pairs.append((name, f"{found.frequency_hz[i]:.6g} Hz, ζ = {found.damping_ratio[i]:.5g} at {at}"))
+    pairs += [("points", str(found.amplitude.size)), ("time", units.duration(found.seconds))]
+    of = "" if found.nodal_diameter is None else f", nodal diameter {found.nodal_diameter}"
+    title = f"{found.scene.name}, mode {found.mode}{of}, {found.n_harmonics} harmonics"
+    return made(title, pairs, found.status.value)
+
+
+def of_performance(curve: PerformanceCurve) -> Summary:
+    """The least peak over the loads, and the range of the curve."""
+    pairs: Pairs = []
+    load, peak = curve.least
+    if math.isfinite(peak):
+        pairs.append(("least peak", f"{units.length(peak)} with {load:.4g} times the loads"))
+    if curve.excitation.size:
+        low, high = float(curve.excitation.min()), float(curve.excitation.max())
+        pairs.append(("excitation", f"from {low:.3g} to {high:.3g} times the scene's"))
+    title = f"{curve.mode.scene.name}, mode {curve.mode.mode}"
+    return made(title, pairs, curve.mode.status.value)
 
 
 def of_plan(found: Plan) -> Summary:

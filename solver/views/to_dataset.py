@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from solver.continuation.branch import Branch
     from solver.jit.fourier import Real
     from solver.marching.result import MarchResult
+    from solver.modes.performance import PerformanceCurve
+    from solver.modes.results import NonlinearMode
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
     from solver.scene.scene import Scene
@@ -258,6 +260,44 @@ def mistuning_dataset(study: MistuningStudy) -> Dataset:
         tuned_peak=study.tuned.largest, scene_name=study.scene,
     )  # fmt: skip
     return Dataset(kind="mistuning", rows=("disk",), variables=variables, attributes=notes)
+
+
+def mode_dataset(found: NonlinearMode) -> Dataset:
+    """A point a row: amplitude, frequency, damping ratio, the states of the contacts and the mode shape."""
+    names = np.array(found.contact_names, dtype=np.str_)
+    states = [[state.value for state in found.contact_states(i).values()] for i in range(len(found.states))]
+    shape = (len(states), names.size)
+    variables = {
+        "amplitude": column("point", found.amplitude, "√kg m", "a² = Σ Q_kᴴ M Q_k"),
+        "frequency": column("point", found.frequency_hz, "Hz"),
+        "damping_ratio": column("point", found.damping_ratio),
+        "frequency_error": column("point", found.frequency_error, "Hz", "estimate by more harmonics"),
+        "damping_error": column("point", found.damping_error, "", "estimate by more harmonics"),
+        "max_abs": column("point", found.max_abs, "m", AMPLITUDE),
+        "forcing": column("point", found.forcing, "N/√kg", "|Qᴴ f| of the excitation, mode normalised"),
+        "contact": column("contact", names),
+        "state": Variable(dims=("point", "contact"), values=np.array(states, np.str_).reshape(shape)),
+        "dof": column("dof", np.array(found.scene.dofs, dtype=np.str_)),
+        **harmonics(found.dof_motions, ("point", "dof", "harmonic"), "motion", "m"),
+    }
+    notes = attributes(
+        found.status.value, found.scene, mode_number=found.mode, harmonics=found.n_harmonics,
+        nodal_diameter=found.nodal_diameter,
+    )  # fmt: skip
+    return Dataset(kind="modes", rows=("point",), variables=variables, attributes=notes)
+
+
+def performance_dataset(curve: PerformanceCurve) -> Dataset:
+    """A point of the mode a row: factor on the excitation or on the loads, and the peak with it."""
+    variables = {
+        "excitation": column("point", curve.excitation, "", "factor on every force"),
+        "peak": column("point", curve.peak, "m", AMPLITUDE),
+        "frequency": column("point", curve.frequency_hz, "Hz", "of the peak"),
+        "load": column("point", curve.load, "", "factor on every load, the excitation as it is"),
+        "peak_at_load": column("point", curve.peak_at_load, "m", "the peak then"),
+    }
+    notes = attributes(curve.mode.status.value, curve.mode.scene, mode_number=curve.mode.mode)
+    return Dataset(kind="performance", rows=("point",), variables=variables, attributes=notes)
 
 
 def plan_dataset(found: Plan) -> Dataset:

@@ -29,6 +29,7 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
         "mistuning",
         {"scene": "bladed-disk", "of": "tip", "samples": 2, "harmonics": 1, "from": 740, "to": 780},
     ),
+    "modes": ("modes", {**TWO, "from": 0.1, "to": 3.0}),
     "design": ("design", TWO),
     "a design that misses its goal": ("design", {**TWO, "limit": 1.0, "max_band_hz": 1e-6}),
     "robust design": ("design", {**TWO, "uncertain": {"damper.mu": [0.28, 0.32]}, "samples": 3}),
@@ -61,6 +62,8 @@ SOMETIMES = {
     "stopped",
     "note",
     "branches",
+    "performance",
+    "limit_cycles",
 }
 
 

@@ -11,6 +11,7 @@ from service.jobs.kinds.identify import IDENTIFY
 from service.jobs.kinds.map import MAP
 from service.jobs.kinds.march import MARCH
 from service.jobs.kinds.mistuning import MISTUNING
+from service.jobs.kinds.modes import MODES
 from service.jobs.kinds.pareto import PARETO
 from service.jobs.kinds.peaks import PEAKS
 from service.jobs.kinds.solve import SOLVE
@@ -39,6 +40,7 @@ SHIPPED = Registry(
         CAMPBELL,
         MISTUNING,
         IDENTIFY,
+        MODES,
     ],
     warm_up,
 )

@@ -155,7 +155,9 @@ def growth_of(multipliers: Complex) -> Growth:
     return Growth.FOLD if largest.real > 0.0 else Growth.PERIOD_DOUBLING
 
 
-def scene_monodromy(scene: Scene, frequency_hz: float, motions: Motions) -> Monodromy:
+def scene_monodromy(
+    scene: Scene, frequency_hz: float, motions: Motions, *, mass_damping: float = 0.0
+) -> Monodromy:  # fmt: skip
     """Return the monodromy matrix of a scene in a periodic motion, of all sectors if it is cyclic.
 
     Parameters
@@ -163,6 +165,7 @@ def scene_monodromy(scene: Scene, frequency_hz: float, motions: Motions) -> Mono
     scene : with the values of the motion.
     frequency_hz : excitation frequency [Hz].
     motions : (ports, 2H + 1) full coefficients of the relative motions of every contact [m].
+    mass_damping : what the damping has besides, in units of the mass [1/s]; below 0 it feeds the motion.
     """
     whole = annulus(scene) if scene.structure.has_sectors else scene
     model = linear_model(whole)
@@ -179,7 +182,7 @@ def scene_monodromy(scene: Scene, frequency_hz: float, motions: Motions) -> Mono
             "domain, and stability is one in time"
         )
         raise SettingError("scene", scene.name, wanted)
-    structure = Structure(M=M, C=C.real, K=K.real)
+    structure = Structure(M=M, C=C.real + mass_damping * M.real, K=K.real)
     return monodromy(structure, elements, PERIOD * frequency_hz)
 
 

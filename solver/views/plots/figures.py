@@ -8,6 +8,8 @@ from matplotlib.figure import Figure
 
 from solver.continuation.branch import Branch
 from solver.marching.result import MarchResult
+from solver.modes.performance import PerformanceCurve
+from solver.modes.results import NonlinearMode
 from solver.response.solution import Solution
 from solver.response.stability.floquet import Stability
 from solver.scene.scene import Scene
@@ -18,6 +20,7 @@ from solver.studies.peaks.results import PeakTrack
 from solver.views.plots.accuracy import accuracy_figure
 from solver.views.plots.curves import Response
 from solver.views.plots.disks import blades_figure, mistuning_figure
+from solver.views.plots.modes import mode_figure, performance_figure
 from solver.views.plots.motion import Motion, motion_figure
 from solver.views.plots.multipliers import multipliers_figure
 from solver.views.plots.responses import Demands, response_figure
@@ -68,6 +71,16 @@ def of_accuracy(study: AccuracyStudy, ax: Into = None) -> Figure:
 def of_mistuning(study: MistuningStudy, ax: Into = None) -> Figure:
     """Draw the magnifications and the worst disk."""
     return mistuning_figure(study.to_json(), ax=ax)
+
+
+def of_mode(found: NonlinearMode, ax: Into = None) -> Figure:
+    """Draw frequency and damping ratio over the amplitude."""
+    return mode_figure(found.to_json(), ax=ax)
+
+
+def of_performance(curve: PerformanceCurve, ax: Into = None) -> Figure:
+    """Draw the peak over the load, or over the excitation."""
+    return performance_figure(curve.to_json(), dof=curve.mode.scene.observe.dof, ax=ax)
 
 
 def of_amplitudes(blades: BladeAmplitudes, ax: Into = None) -> Figure:

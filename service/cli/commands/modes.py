@@ -1,0 +1,70 @@
+"""`stickslip modes`: frequency and damping ratio of a mode over its amplitude."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from service.cli.failures import end
+from service.cli.options import inputs
+from service.cli.options import shared as options
+from service.cli.options.numeric import amount, count
+from service.cli.output_files import Outputs
+from service.cli.progress import bar
+from service.rendering.tables import modes as tables
+from service.rendering.tables.text import show
+
+Mode = Annotated[int, count("--mode", "N", "Which mode, 1 the slowest, contacts as they are at rest.")]
+Smallest = Annotated[float, amount("--from", "A", "Smallest modal amplitude [√kg m].")]
+Largest = Annotated[float, amount("--to", "B", "Largest modal amplitude [√kg m].")]
+Diameter = Annotated[
+    int | None,
+    count(
+        "--nodal-diameter", "N", "Of a disk, negative for a backward wave; the engine order's if left out."
+    ),
+]
+Performance = Annotated[
+    bool, typer.Option("--performance", help="Resonance peaks over excitation and load, from the one mode.")
+]
+Aero = Annotated[
+    float | None,
+    amount("--aero", "ZETA", "Aerodynamic damping ratio, below 0 if it feeds: lists the limit cycles."),
+]
+
+
+def modes(
+    name: options.Scene,
+    start: Smallest,
+    stop: Largest,
+    mode: Mode = 1,
+    nodal_diameter: Diameter = None,
+    performance: Performance = False,
+    aero: Aero = None,
+    values: options.Values = None,
+    harmonics: options.Harmonics = 11,
+    plot: options.Plot = None,
+    out: options.Out = None,
+    as_json: options.Json = False,
+) -> None:
+    """Follow a mode's frequency and damping over its amplitude.
+
+    The modal amplitude a is mass-normalised: a² = Σ Q_kᴴ M Q_k over the harmonics, of one sector of a disk.
+    """
+    import solver
+
+    outputs = Outputs.asked(plot, out)
+    scene = inputs.scene(name, values)
+    with bar("modes") as on_progress:
+        found = solver.nonlinear_mode(
+            scene, mode, amplitudes=(start, stop), nodal_diameter=nodal_diameter, harmonics=harmonics,
+            on_progress=on_progress,
+        )  # fmt: skip
+    curve = solver.performance_curve(found) if performance else None
+    drawn = found if curve is None else curve
+    answer = found.to_json() | ({} if curve is None else {"performance": curve.to_json()})
+    if aero is not None:
+        answer["limit_cycles"] = solver.limit_cycles(found, aero).to_json()
+    outputs.write(drawn, drawn.plot if found.amplitude.size else None)
+    show(answer, tables.report, as_json=as_json)
+    end(found.completed, found.status.value)

@@ -1,0 +1,168 @@
+"""The kind `modes`: frequency and damping ratio of a mode over its amplitude."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import ConfigDict, Field
+
+import solver
+from service.jobs.common.scenes import (
+    HarmonicRequest,
+    Number,
+    PositiveNumber,
+    refusal,
+    require,
+    resolve_scene,
+    resolved,
+)
+from service.jobs.common.sizes import balance_issues
+from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
+from service.jobs.kinds.registry.results import Curve, EndedResult, Table
+from service.jobs.outputs import JobOutput, Progress, ShouldStop
+from service.jobs.registry import JobKind, Resolved, SceneSource
+from solver.errors import Issue, SettingError, pointer
+from solver.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_EXAMPLE: dict[str, Any] = {"scene": "two-dof", "mode": 1, "from": 0.01, "to": 100}
+_POINTS = 200  # a curve seldom has more
+_MOST_MODES = 100_000
+
+
+class ModesRequest(HarmonicRequest):
+    """A nonlinear mode, in the words of the command.
+
+    Attributes
+    ----------
+    mode : int
+        Number of the mode, 1 the slowest.
+    from_, to : float
+        Modal amplitudes [√kg m] (`from` in the body).
+    nodal_diameter : int or None
+        Of a cyclic structure.
+    performance : bool
+        Peaks over excitation and load too.
+    aero_damping : float or None
+        Damping ratio of the gas, for the limit cycles.
+    """
+
+    model_config = ConfigDict(validate_by_alias=True, json_schema_extra={"examples": [_EXAMPLE]})
+
+    mode: Annotated[int, Field(strict=True, ge=1, le=_MOST_MODES)] = Field(
+        default=1, description="Which mode, 1 the slowest, contacts as they are at rest."
+    )
+    from_: PositiveNumber = Field(alias="from", description="Smallest modal amplitude [√kg m].")
+    to: PositiveNumber = Field(description="Largest modal amplitude [√kg m].")
+    nodal_diameter: Annotated[int, Field(strict=True, ge=-10_000, le=10_000)] | None = Field(
+        default=None, description="Of a disk, negative for a backward wave; that of the engine order."
+    )
+    performance: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="Resonance peaks over excitation and load too, from the one mode."
+    )
+    aero_damping: Annotated[Number, Field(ge=-10.0, le=10.0)] | None = Field(
+        default=None, description="Aerodynamic damping ratio, below 0 if it feeds: the limit cycles too."
+    )
+
+
+class ModesResult(EndedResult):
+    """Frequency and damping ratio over the amplitude, and what the contacts do."""
+
+    scene: str
+    mode: int
+    nodal_diameter: int | None
+    amplitude: Curve
+    frequency: Curve
+    damping_ratio: Curve
+    frequency_error: Curve
+    damping_error: Curve
+    dof: str
+    max_abs: Curve
+    contacts: list[str]
+    states: list[list[str]]
+    n_harmonics: int
+    newton_iterations: int
+    rejected_steps: int
+    seconds: float
+    performance: Table | None = None
+    limit_cycles: Table | None = None
+
+
+def resolve(request: ModesRequest, source: SceneSource) -> Resolved:
+    """Look up the scene; check amplitudes, mode, nodal diameter and the size."""
+    scene = resolve_scene(request, source)
+    require(_issues(request, scene) or balance_issues("/harmonics", scene, request.harmonics, _POINTS))
+    return resolved(
+        scene,
+        mode=request.mode,
+        start=request.from_,
+        stop=request.to,
+        nodal_diameter=request.nodal_diameter,
+        harmonics=request.harmonics,
+        performance=request.performance,
+        aero_damping=request.aero_damping,
+    )
+
+
+def _issues(request: ModesRequest, scene: Scene) -> list[Issue]:
+    """Everything wrong with the mode for the scene."""
+    # Loaded here: it brings the compiled loops along, which a service that only lists does not need.
+    from solver.modes.nonlinear_mode import at_nodal_diameter, check_mode
+
+    issues: list[Issue] = []
+    if request.from_ >= request.to:
+        words = f"`to` must be above `from` = {request.from_!r} √kg m, got {request.to!r}"
+        issues.append(refusal("/to", words))
+    if request.harmonics < 1:
+        issues.append(refusal("/harmonics", f"`harmonics` must be from 1, got {request.harmonics!r}"))
+    try:
+        check_mode(at_nodal_diameter(scene, request.nodal_diameter), request.mode)
+    except SettingError as error:
+        issues.append(refusal(pointer(error.name), str(error)))
+    return issues
+
+
+def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
+    """Follow the mode."""
+    found = solver.nonlinear_mode(
+        Scene.from_dict(spec["scene"]),
+        spec["mode"],
+        amplitudes=(spec["start"], spec["stop"]),
+        nodal_diameter=spec["nodal_diameter"],
+        harmonics=spec["harmonics"],
+        on_progress=progress,
+        should_stop=should_stop,
+    )
+    answer = found.to_json()
+    if spec["performance"]:
+        answer["performance"] = solver.performance_curve(found).to_json()
+    if spec["aero_damping"] is not None:
+        answer["limit_cycles"] = solver.limit_cycles(found, spec["aero_damping"]).to_json()
+    return JobOutput(result=answer, shortfall=None if found.completed else found.status.value)
+
+
+def draw(result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
+    """Frequency and damping ratio over the amplitude."""
+    from solver.views.plots.modes import mode_figure
+
+    if not result["amplitude"]:
+        raise NothingToDrawError("no point of the mode was found")
+    return mode_figure(result)
+
+
+MODES = JobKind(
+    name="modes",
+    summary="Frequency and damping ratio of a mode over its amplitude.",
+    request=ModesRequest,
+    resolve=resolve,
+    run=run,
+    result=ModesResult,
+    view=KindView(
+        result="frequency and damping ratio over the amplitude ([modes](modes.md))",
+        flags={"aero_damping": "--aero"},
+        draw=draw,
+    ),
+)

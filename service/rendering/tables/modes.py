@@ -1,0 +1,87 @@
+"""What people read of a nonlinear mode, given as the JSON object a program reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from service.rendering.tables.text import print_pairs, print_table
+from solver.results import units
+
+_MOST_ROWS = 40
+
+
+def report(found: Mapping[str, Any]) -> None:
+    """Amplitude, frequency, damping ratio and states of the contacts, a point a row, thinned to a page."""
+    of = "" if found["nodal_diameter"] is None else f", nodal diameter {found['nodal_diameter']}"
+    title = f"{found['scene']}, mode {found['mode']}{of}, {found['n_harmonics']} harmonics"
+    count = len(found["amplitude"])
+    if count:
+        rows = [_row(found, i) for i in _thinned(count)]
+        heads = ["a [√kg m]", f"max |{found['dof']}|", "frequency [Hz]", "damping ratio", "contacts"]
+        print_table(title, heads, rows, right="0123")
+    pairs = [("points", f"{count}, {found['newton_iterations']} Newton iterations")]
+    pairs.append(("time", units.duration(found["seconds"])))
+    print_pairs("" if count else title, pairs)
+    if found.get("performance"):
+        _performance(found["performance"], found["dof"])
+    if found.get("limit_cycles"):
+        _cycles(found["limit_cycles"], found["dof"])
+
+
+def _performance(curve: Mapping[str, Any], dof: str) -> None:
+    """Peaks over the excitation and, where they scale, over the loads."""
+    heads = ["× excitation", f"peak of |{dof}|", "at [Hz]", "× load", f"peak of |{dof}|"]
+    rows = []
+    for i in _thinned(len(curve["excitation"])):
+        row = [
+            f"{curve['excitation'][i]:.4g}",
+            units.length(curve["peak"][i]),
+            f"{curve['frequency'][i]:.6g}",
+        ]
+        known = curve["scales"] and curve["load"][i] is not None
+        row += [f"{curve['load'][i]:.4g}", units.length(curve["peak_at_load"][i])] if known else ["", ""]
+        rows.append(row)
+    print_table("Peaks of this mode alone", heads, rows, right="01234")
+    if curve["least"] is not None:
+        best = curve["least"]
+        print_pairs(
+            "", [("least peak", f"{units.length(best['peak'])} with {best['load']:.4g} times the loads")]
+        )
+
+
+def _cycles(found: Mapping[str, Any], dof: str) -> None:
+    """Limit cycles, and the most the damper holds."""
+    pairs = []
+    if found["most_damping"] is not None:
+        at = f"at a = {found['most_at']:.4g} √kg m"
+        pairs.append(("most that is held", f"ζ = {found['most_damping']:.5g} {at}"))
+    for cycle in found["cycles"]:
+        name = "stable cycle" if cycle["stable"] else "unstable cycle"
+        # Without multipliers nothing is known of other modes.
+        name += " (by the slope)" if cycle["by_slope"] else ""
+        size = f"a = {cycle['amplitude']:.6g} √kg m, max |{dof}| {units.length(cycle['max_abs'])}"
+        pairs.append((name, f"{size}, {cycle['frequency']:.6g} Hz"))
+    if not found["cycles"]:
+        pairs.append(("limit cycles", "none between these amplitudes"))
+    print_pairs(f"Aerodynamic damping ratio {found['aero_damping']:g}", pairs)
+
+
+def _row(found: Mapping[str, Any], i: int) -> list[str]:
+    names, states = found["contacts"], found["states"][i]
+    same = len(set(states)) == 1
+    said = states[0] if same else ", ".join(f"{n}: {s}" for n, s in zip(names, states, strict=True))
+    return [
+        f"{found['amplitude'][i]:.4g}",
+        units.length(found["max_abs"][i]),
+        f"{found['frequency'][i]:.6g}",
+        f"{found['damping_ratio'][i]:.5g}",
+        said if states else "none",
+    ]
+
+
+def _thinned(count: int) -> list[int]:
+    """Some points, the first and the last among them."""
+    if count <= _MOST_ROWS:
+        return list(range(count))
+    return sorted({round(k * (count - 1) / (_MOST_ROWS - 1)) for k in range(_MOST_ROWS)})

@@ -1,0 +1,188 @@
+"""Newton's method for the extended periodic motion: at an amplitude, or along an arc."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.jit.fourier import Complex, Real
+from solver.modes.equations import Equations, Evaluated
+
+TOLERANCE = 1e-9  # of motions relative to the largest, and of the equations beside them
+_FINE = 1e-13  # below it nothing is left but rounding; between the two, steps go on as long as they help
+MOST_ITERATIONS = 20
+_CANCELLED = 1e-3  # as in `solver.balance.kernels.residual`: a share of |A| |F| a residual is relative to
+_LEAST_PART = 1.0 / 32.0  # of a Newton step, before it is given up
+_PATIENCE, _HOPE = 8, 0.9  # Newton steps along an arc within which the residual has to fall to this share
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class State:
+    """A point of a nonlinear mode.
+
+    Attributes
+    ----------
+    y : (m,) unknowns of `solver.modes.equations`.
+    log_amplitude : ln a.
+    mode : number of the mode of the structure that is carried in q.
+    phase : (N,) the force that harmonic 1 lags by a quarter of a period.
+    """
+
+    y: Real
+    log_amplitude: float
+    mode: int
+    phase: Complex
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Corrected:
+    """Where Newton's method ended.
+
+    Attributes
+    ----------
+    state : the last point; `at` the equations there (None where they have no value).
+    residual : relative, see `relative_residual`.
+    """
+
+    state: State
+    at: Evaluated | None
+    converged: bool
+    iterations: int
+    residual: float
+
+
+def scales(y: Real, size: int) -> Real:
+    """Return what the unknowns are counted in, (m,): the largest motion, |q|, ω, and 1 of ζ."""
+    found = np.ones(y.size)
+    found[:size] = np.abs(y[:size]).max(initial=0.0) or 1.0
+    found[size : size + 2] = math.hypot(y[size], y[size + 1]) or 1.0
+    found[-2] = abs(y[-2])
+    return found
+
+
+def relative_residual(at: Evaluated, y: Real, a: float, size: int) -> float:
+    """Return the largest residual, each relative to what it is a difference of."""
+    r = np.abs(at.residual)
+    motion = max(float(np.abs(y[:size]).max(initial=0.0)), 1e-300)
+    moved = float(np.max(r[:size] / np.maximum(motion, _CANCELLED * at.rough), initial=0.0))
+    q = max(math.hypot(y[size], y[size + 1]), a)
+    return float(max(moved, r[size] / q, r[size + 1] / q, r[size + 2] / max(at.lag, 1e-300), r[size + 3]))
+
+
+def step(J: Real, rhs: Real, columns: Real, *, least_squares: bool) -> Real | None:
+    """Solve J δ = rhs in units `columns` of the unknowns, rows brought to one size; None if singular."""
+    scaled = J * columns
+    rows = np.abs(scaled).max(axis=1)
+    rows[rows == 0.0] = 1.0
+    scaled /= rows[:, None]
+    if not np.all(np.isfinite(scaled)):
+        return None
+    if least_squares:
+        found = np.linalg.lstsq(scaled, rhs / rows, rcond=1e-12)[0]
+    else:
+        try:
+            found = np.linalg.solve(scaled, rhs / rows)
+        except np.linalg.LinAlgError:
+            return None
+    return columns * found if np.all(np.isfinite(found)) else None
+
+
+def correct(
+    equations: Equations, guess: State, border: Real | None = None, *, most: int = MOST_ITERATIONS
+) -> Corrected:
+    """Solve from a guess: at its amplitude, or along the plane through it whose normal is `border`.
+
+    Parameters
+    ----------
+    border : (m + 1,) row over the unknowns and ln a; None: the amplitude is kept.
+    """
+    start, size = guess, equations.size
+    state, at = guess, equations.evaluate(guess.y, guess.log_amplitude, guess.phase, guess.mode)
+    iterations, norm = 0, _left(at, state, size)
+    norms = [norm]
+    while at is not None:
+        if norm <= _FINE or iterations >= most:
+            break
+        if border is not None and len(norms) > _PATIENCE and norm > _HOPE * norms[-1 - _PATIENCE]:
+            break  # a shorter step costs less
+        move = _newton_step(at, state, start, border, size)
+        if move is None:
+            break
+        left, new, there = _damped(equations, state, move, norm)
+        if norm <= TOLERANCE and left > 0.1 * norm:
+            break
+        state, at, norm, iterations = new, there, left, iterations + 1
+        norms.append(norm)
+    if norm <= TOLERANCE:
+        return Corrected(state=state, at=at, converged=True, iterations=iterations, residual=norm)
+    return Corrected(state=state, at=at, converged=False, iterations=iterations, residual=norm)
+
+
+def _left(at: Evaluated | None, state: State, size: int) -> float:
+    """Return the relative residual; infinite where there is none."""
+    if at is None:
+        return math.inf
+    return relative_residual(at, state.y, math.exp(state.log_amplitude), size)
+
+
+def _newton_step(
+    at: Evaluated, state: State, start: State, border: Real | None, size: int
+) -> tuple[Real, float] | None:
+    """Return the Newton step of the unknowns and of ln a."""
+    columns = scales(state.y, size)
+    if border is None:
+        found = step(at.jacobian, -at.residual, columns, least_squares=at.unheld)
+        return None if found is None else (found, 0.0)
+    m = state.y.size
+    J = np.empty((m + 1, m + 1))
+    J[:m, :m], J[:m, m], J[m] = at.jacobian, at.by_log_amplitude, border
+    behind = border[:m] @ (start.y - state.y) + border[m] * (start.log_amplitude - state.log_amplitude)
+    found = step(J, np.append(-at.residual, behind), np.append(columns, 1.0), least_squares=at.unheld)
+    return None if found is None else (found[:m], float(found[m]))
+
+
+def _damped(
+    equations: Equations, state: State, move: tuple[Real, float], norm: float
+) -> tuple[float, State, Evaluated | None]:
+    """Return the point after the largest part of a step that does not make the residual grow much.
+
+    At a change of state the residual has a kink, over which a whole step may lead to and fro.
+    """
+    best: tuple[float, State, Evaluated | None] = (math.inf, state, None)
+    part = 1.0
+    while part >= _LEAST_PART:
+        y = state.y + part * move[0]
+        log_amplitude = state.log_amplitude + part * move[1]
+        new = State(y=y, log_amplitude=log_amplitude, mode=state.mode, phase=state.phase)
+        at = equations.evaluate(y, log_amplitude, state.phase, state.mode)
+        if at is not None:
+            found = _left(at, new, equations.size)
+            if found < best[0]:
+                best = (found, new, at)
+            if found <= (1.0 - 0.25 * part) * norm:
+                break
+            if norm <= TOLERANCE or (best[0] < norm and found > best[0]):
+                break
+        part *= 0.5
+    return best
+
+
+def carried_anew(equations: Equations, found: Corrected) -> Corrected:
+    """Return the same point with q that of the mode nearest to singular there."""
+    if found.at is None:
+        return found
+    state = found.state
+    omega, zeta = float(state.y[-2]), float(state.y[-1])
+    mode = equations.structure.nearest(omega, zeta)
+    if mode == state.mode:
+        return found
+    y = state.y.copy()
+    q = complex(np.vdot(equations.structure.carried[:, mode], found.at.x[equations.structure.first]))
+    y[equations.size], y[equations.size + 1] = q.real, q.imag
+    new = State(y=y, log_amplitude=state.log_amplitude, mode=mode, phase=state.phase)
+    at = equations.evaluate(y, new.log_amplitude, new.phase, mode)
+    if at is None:
+        return found
+    return Corrected(state=new, at=at, converged=True, iterations=found.iterations, residual=found.residual)

@@ -1,0 +1,238 @@
+"""The extended periodic motion as equations: contacts, one carried mode, ω and ζ at a given amplitude.
+
+Krack, Comput. Struct. 154 (2015) 59, doi:10.1016/j.compstruc.2015.03.008: [−k²ω²M + ikω(C − 2ζωM) + K] x_k +
+Lᴴ F_k = 0 with the contact forces of the whole period, condensed on the contacts as the balance is. The
+unknowns are y = [w, Re q, Im q, ω, ζ]: w the motions of the leading ports, (r, n) coefficients, and q the
+part of a mode in harmonic 1 (`solver.modes.structure`). The equations are
+
+  w − L x = 0,   q − (M b)ᴴ x_1 = 0,   Re gᴴ x_1 = 0,   ½ ln(Σ_k≥1 x_kᴴ M x_k / a²) = 0,
+
+with x_k = Z_k⁻¹ (φ_k − Lᴴ F_k). `g` fixes the phase: harmonic 1 lags a force g by a quarter of a period.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.balance.balance import Balance
+from solver.balance.kernels.residual import evaluate
+from solver.balance.kernels.slopes import take_slopes
+from solver.contacts.kernels.system import (
+    UNHELD,
+    by_reference,
+    evaluation_by_value,
+    new_evaluation,
+    new_receptance,
+)
+from solver.jit.fourier import Complex, Real
+from solver.modes.structure import Dynamics, Structure, structure_of
+from solver.sensitivity.gradient import Amplitudes
+
+BESIDES = 4  # unknowns beside the motions: Re q, Im q, ω, ζ
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evaluated:
+    """The equations at one point.
+
+    Attributes
+    ----------
+    residual : (m,) in the order of the unknowns; [m, √kg m, …, 1].
+    jacobian : (m, m); `by_log_amplitude` (m,) is that by ln a.
+    x : (nk, N) motion of all coordinates; forces : (r, n) forces at the leading ports less the shift.
+    rough : (r n,) size that a residual of each motion is rounding of.
+    lag : size that the residual of the phase is relative to.
+    unheld : bool
+        Nothing holds a part where it is: its mean is left alone.
+    """
+
+    residual: Real
+    jacobian: Real
+    by_log_amplitude: Real
+    x: Complex
+    forces: Real
+    rough: Real
+    lag: float
+    unheld: bool
+    dynamics: Dynamics
+
+
+class Equations:
+    """The extended periodic motion of a balance, whose λ is the frequency."""
+
+    def __init__(self, balance: Balance) -> None:
+        self.balance = balance
+        self.structure: Structure = structure_of(balance)
+        self.amplitudes = Amplitudes(balance)
+        system = balance.system
+        self._system = by_reference(system)
+        self._linear = new_receptance(self._system)
+        self._point = new_evaluation(self._system)
+        self.point = evaluation_by_value(self._point)
+        self.n = balance.n_coefficients
+        self.r = balance.n_leading
+        self.size = self.r * self.n
+        self.span = system.span if system.span.shape[1] else None
+        self._blocks = _block_places(balance)
+
+    def motions(self, w: Real) -> Real:
+        """Return the motions of all ports, (nc, n), of those of the leading ones (r, n)."""
+        return w if self.span is None else np.asarray(self.span @ w)
+
+    def contacts(self, w: Real, omega: float) -> bool:
+        """Evaluate the contact forces at w (r, n) into `point`; False where a law failed."""
+        u = np.ascontiguousarray(self.motions(w).reshape(-1))
+        norm = evaluate(self._system, self._linear, u, omega, 0.0, self._point)
+        if not math.isfinite(norm):
+            return False
+        take_slopes(self._system, self._point)
+        return True
+
+    def lead(self, forces: Real) -> Real:
+        """Return forces (nc, n) as those along the leading motions, (r, n)."""
+        return forces if self.span is None else np.asarray(self.span.T @ forces)
+
+    def port_slopes(self) -> Real:
+        """Return dF/dU of all ports less the shift where last evaluated, (nc, nc, n, n)."""
+        nc, n = self.balance.n_ports, self.n
+        rows, columns, blocks = self._blocks
+        G = np.zeros((nc, nc, n, n))
+        G[rows, columns] = self.point.G[blocks]
+        return G
+
+    def slopes(self) -> Real:
+        """Return dF/dw less the shift where last evaluated, (r, n, r, n)."""
+        G = self.port_slopes()
+        if self.span is not None:
+            G = np.einsum("cr,cdij,ds->rsij", self.span, G, self.span, optimize=True)
+        return np.asarray(G.transpose(0, 2, 1, 3))
+
+    def shifted_forces(self, w: Real) -> Real:
+        """Return the forces along the leading motions less the shift, (r, n)."""
+        return self.lead(self.point.F - self.balance.system.shift[:, None] * self.motions(w))
+
+    def evaluate(self, y: Real, log_amplitude: float, phase: Complex, mode: int) -> Evaluated | None:
+        """Return the equations at y; None where a contact law failed or Z is singular."""
+        w, q = y[: self.size].reshape(self.r, self.n), complex(y[self.size], y[self.size + 1])
+        omega, last = float(y[-2]), float(y[-1])
+        if not omega > 0.0 or not self.contacts(w, omega):
+            return None
+        try:
+            dynamics = self.structure.at(omega, self.damping(last), mode)
+        except np.linalg.LinAlgError:
+            return None
+        forces = self.shifted_forces(w)
+        phi, by_omega = self._pushes(forces, omega, q, dynamics)
+        x = dynamics.solve(phi + self.driven(last, log_amplitude))
+        return self._assemble(w, q, forces, x, by_omega, dynamics, log_amplitude, phase)
+
+    def damping(self, last: float) -> float:
+        """Return ζ from the last unknown."""
+        return last
+
+    def driven(self, _last: float, _log_amplitude: float) -> Complex | float:
+        """Return the force on the coordinates that the last unknown stands for, (nk, N) or 0."""
+        return 0.0
+
+    def by_last(self, x: Complex, dynamics: Dynamics, _log_amplitude: float) -> Complex:
+        """Return the derivative of the forces on the coordinates by the last unknown, (nk, N)."""
+        return -self.structure.times(dynamics.by_zeta, x)
+
+    def _pushes(self, forces: Real, omega: float, q: complex, dynamics: Dynamics) -> tuple[Complex, Complex]:
+        """Return φ − Lᴴ F + ρ M b q, (nk, N), and its derivative by ω."""
+        s, hat = self.structure, self.amplitudes
+        # Along an engine-order line loads and constant forces follow ω.
+        moved = hat.of(self.lead(self.point.dF_dp))
+        phi = -(s.back @ hat.of(forces).T[:, :, None])[:, :, 0]
+        by_omega = -(s.back @ moved.T[:, :, None])[:, :, 0]
+        if s.ks[0] == 0:
+            phi[0] += s.constant * (s.level @ omega ** np.arange(3))
+            by_omega[0] += s.constant * (s.level[1] + 2.0 * omega * s.level[2])
+        phi[s.first] += dynamics.rho * dynamics.b * q
+        return phi, by_omega
+
+    def _assemble(
+        self, w: Real, q: complex, forces: Real, x: Complex, by_omega: Complex, dynamics: Dynamics,
+        log_amplitude: float, phase: Complex,
+    ) -> Evaluated:  # fmt: skip
+        """Put residual and Jacobian together."""
+        s, hat, size = self.structure, self.amplitudes, self.size
+        first, moved = s.first, (s.contact @ x[:, :, None])[:, :, 0]
+        mass = s.times(s.mass, x)
+        squared = max(float(np.vdot(x, mass).real), 1e-300)
+        residual = np.empty(size + BESIDES)
+        residual[:size] = (w - hat.coefficients(moved.T)).reshape(-1)
+        off = q - np.vdot(dynamics.b, x[first])
+        residual[size], residual[size + 1] = off.real, off.imag
+        residual[size + 2] = np.vdot(phase, x[first]).real
+        residual[size + 3] = 0.5 * math.log(squared) - log_amplitude
+
+        J = np.zeros((size + BESIDES, size + BESIDES))
+        A = dynamics.receptance()
+        slopes = self.slopes()
+        dF = hat.of(slopes.transpose(0, 2, 3, 1)).transpose(0, 3, 1, 2).reshape(self.r, len(s.ks), size)
+        answered = np.einsum("kcd,dkj->ckj", A, dF)
+        J[:size, :size] = hat.coefficients(answered.transpose(0, 2, 1)).transpose(0, 2, 1).reshape(size, size)
+        J[np.arange(size), np.arange(size)] += 1.0
+
+        changes = np.empty((3, *x.shape), np.complex128)  # of x by Re q, ω, ζ
+        changes[0] = 0.0
+        changes[0, first] = dynamics.rho * dynamics.b
+        changes[1] = by_omega - s.times(dynamics.by_omega, x)
+        changes[2] = self.by_last(x, dynamics, log_amplitude)
+        changes = np.array([dynamics.solve(each) for each in changes])
+        seen = (s.contact @ changes[..., None])[..., 0]  # (3, nk, r)
+        for column, value in ((0, seen[0]), (1, 1j * seen[0]), (2, seen[1]), (3, seen[2])):
+            J[:size, size + column] = -hat.coefficients(value.T).reshape(-1)
+        self._functionals(J, x, mass, squared, phase, dF, changes, dynamics)
+        by_log_amplitude = np.zeros(size + BESIDES)
+        by_log_amplitude[-1] = -1.0
+        reach = np.abs(A).max(axis=(1, 2)) if self.r else np.zeros(len(s.ks))
+        rough = np.repeat(reach, np.where(s.ks > 0, 2, 1)) * np.abs(forces).max(initial=0.0)
+        return Evaluated(
+            residual=residual, jacobian=J, by_log_amplitude=by_log_amplitude, x=x, forces=forces,
+            rough=np.concatenate([rough] * self.r) if self.r else rough[:0],
+            lag=float(np.linalg.norm(phase) * np.linalg.norm(x[first])),
+            unheld=bool(self.point.counts[UNHELD]),
+            dynamics=dynamics,
+        )  # fmt: skip
+
+    def _functionals(
+        self, J: Real, x: Complex, mass: Complex, squared: float, phase: Complex, dF: Complex,
+        changes: Complex, dynamics: Dynamics,
+    ) -> None:  # fmt: skip
+        """Fill the rows of q, of the phase and of the amplitude, each a sum cᴴ x over the harmonics."""
+        s, size = self.structure, self.size
+        rows = np.zeros((3, *x.shape), np.complex128)
+        rows[0, s.first], rows[1, s.first], rows[2] = dynamics.b, phase, mass / squared
+        by_w = np.empty((3, size), np.complex128)
+        for i, row in enumerate(rows):
+            pull = np.einsum("kn,kna->ka", dynamics.solve_adjoint(row).conj(), s.back)
+            by_w[i] = -np.einsum("ka,akj->j", pull, dF)
+        by_rest = np.einsum("ikn,jkn->ij", rows.conj(), changes)  # (3, 3)
+        by = np.empty((3, size + BESIDES), np.complex128)
+        by[:, :size] = by_w
+        by[:, size], by[:, size + 1] = by_rest[:, 0], 1j * by_rest[:, 0]
+        by[:, size + 2 :] = by_rest[:, 1:]
+        J[size], J[size + 1] = -by[0].real, -by[0].imag
+        J[size, size] += 1.0
+        J[size + 1, size + 1] += 1.0
+        J[size + 2], J[size + 3] = by[1].real, by[2].real
+
+
+def _block_places(balance: Balance) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return row port, column port and number of every block of dF_dU."""
+    system = balance.system
+    places = [
+        (first + a, first + b, block + a * m + b)
+        for first, m, block in zip(
+            system.first_port[:-1], np.diff(system.first_port), system.first_block[:-1], strict=True
+        )
+        for a in range(m)
+        for b in range(m)
+    ]
+    found = np.array(places, dtype=np.int64).reshape(-1, 3)
+    return found[:, 0], found[:, 1], found[:, 2]

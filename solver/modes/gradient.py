@@ -1,0 +1,229 @@
+"""Derivatives of ω(a) and ζ(a) by parameter paths, at a given amplitude: one adjoint for each of the two.
+
+Of the equations r(y, p) = 0 of `solver.modes.equations`, dy/dp = −(∂r/∂y)⁻¹ ∂r/∂p: with Jᵀ λ the unit row of
+ω or ζ, dω/dp = −λ·∂r/∂p. A parameter changes the contact forces, the matrices, the places of the contacts or
+the constant forces, and through x = Z⁻¹ (φ − Lᴴ F) every equation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, cast
+
+import numpy as np
+
+from solver.balance.kernels.residual import contact_values
+from solver.balance.parameter import Kind, Parameter
+from solver.balance.parameter_derivatives import contact_slopes, resolved
+from solver.balance.speed_line import check_no_line
+from solver.contacts.kernels.laws import law_force
+from solver.errors import SettingError
+from solver.jit.fourier import Complex, Real
+from solver.linear.assembly import linear_model, structure_derivative
+from solver.linear.condensation import term_amplitudes
+from solver.modes.corrector import State, scales
+from solver.modes.equations import Equations, Evaluated
+from solver.modes.nonlinear_mode import pose
+from solver.modes.results import NonlinearMode
+from solver.results.told import Piece
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class ModeGradient(Piece):
+    """How frequency and damping ratio change with parameters, the amplitude held.
+
+    Attributes
+    ----------
+    paths : tuple of str
+        Parameter paths.
+    frequency_hz, damping_ratio : (n, n_paths) array
+        Derivatives at n points of a nonlinear mode, [Hz] and [1] per unit of each parameter; NaN where the
+        equations are singular, at a turning point.
+    """
+
+    UNITS: ClassVar = {"frequency_hz": "Hz per unit", "damping_ratio": "1 per unit"}
+
+    paths: tuple[str, ...]
+    frequency_hz: Real
+    damping_ratio: Real
+
+
+def mode_gradient(
+    found: NonlinearMode, paths: Sequence[str], *, points: Sequence[int] | None = None
+) -> ModeGradient:
+    """Return the derivatives of frequency and damping ratio by parameter paths at points of a mode.
+
+    Parameters
+    ----------
+    found : of `solver.nonlinear_mode`.
+    paths : parameter paths of its scene; groups too.
+    points : numbers of points; all if left out.
+
+    Raises
+    ------
+    SettingError
+        An unknown path, or one that calls for even harmonics the mode left out; a point it has not.
+    """
+    chosen = range(len(found.points)) if points is None else points
+    for i in chosen:
+        if not 0 <= i < len(found.points):
+            raise SettingError("points", i, f"must be from 0 to {len(found.points) - 1}")
+    problem = pose(found.scene, found.mode, None, found.n_harmonics, whole=found.whole_matrices)
+    sensitivities = ModeSensitivities(problem.equations, paths, turns=problem.turns)
+    rows = [sensitivities.at(found.points[i]) for i in chosen]
+    both = np.array(rows, dtype=np.float64).reshape(len(rows), 2, len(tuple(paths)))
+    return ModeGradient(
+        paths=tuple(paths), frequency_hz=both[:, 0] / (2.0 * math.pi), damping_ratio=both[:, 1]
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Change:
+    """What a parameter changes: the forces on the coordinates, the motions and the squared amplitude."""
+
+    pushes: Complex
+    moved: Complex | None = None
+    amplitude: float = 0.0
+    phase: complex = 0.0
+
+
+class ModeSensitivities:
+    """Derivatives of ω and ζ at points of one mode.
+
+    Parameters
+    ----------
+    equations : of the mode.
+    paths : parameter paths.
+    turns : the motion may begin at any instant.
+    """
+
+    def __init__(self, equations: Equations, paths: Sequence[str], *, turns: bool) -> None:
+        self._equations, self._turns = equations, turns
+        balance = equations.balance
+        check_no_line(balance.scene)
+        self._parameters = resolved(balance, paths)
+        self._slopes, self._loads = contact_slopes(balance, self._parameters)
+
+    def at(self, state: State) -> tuple[Real, Real]:
+        """Return the derivatives of ω [rad/s] and ζ by the paths at a point."""
+        equations, count = self._equations, len(self._parameters)
+        at = equations.evaluate(state.y, state.log_amplitude, state.phase, state.mode)
+        nothing = np.full(count, math.nan)
+        if at is None:
+            return nothing, nothing
+        columns = scales(state.y, equations.size)
+        scaled = at.jacobian * columns
+        rows = np.abs(scaled).max(axis=1)
+        units = np.zeros((state.y.size, 2))
+        units[-2, 0], units[-1, 1] = columns[-2], columns[-1]
+        try:
+            adjoint = np.linalg.lstsq((scaled / rows[:, None]).T, units, rcond=1e-13)[0] / rows[:, None]
+        except np.linalg.LinAlgError:
+            return nothing, nothing
+        changes = np.array([self._residual(i, state, at) for i in range(count)]).reshape(count, -1)
+        found = -changes @ adjoint
+        return found[:, 0], found[:, 1]
+
+    def _residual(self, i: int, state: State, at: Evaluated) -> Real:
+        """Return ∂r/∂p of path i."""
+        equations, s = self._equations, self._equations.structure
+        hat, size = equations.amplitudes, equations.size
+        change = self._change(i, state, at)
+        dx = at.dynamics.solve(change.pushes)
+        moved = (s.contact @ dx[:, :, None])[:, :, 0]
+        if change.moved is not None:
+            moved = moved + change.moved
+        mass = s.times(s.mass, at.x)
+        squared = float(np.vdot(at.x, mass).real)
+        residual = np.empty(state.y.size)
+        residual[:size] = -hat.coefficients(moved.T).reshape(-1)
+        off = -np.vdot(at.dynamics.b, dx[s.first])
+        residual[size], residual[size + 1] = off.real, off.imag
+        residual[size + 2] = (np.vdot(state.phase, dx[s.first]) + change.phase).real
+        residual[size + 3] = float(np.vdot(mass, dx).real) / squared + 0.5 * change.amplitude / squared
+        return residual
+
+    def _change(self, i: int, state: State, at: Evaluated) -> _Change:
+        """Return what path i changes."""
+        parameter, s = self._parameters[i], self._equations.structure
+        if parameter.kind is Kind.STRUCTURE:
+            return self._of_structure(parameter, state, at)
+        pushes = np.zeros(at.x.shape, np.complex128)
+        system = self._equations.balance.system
+        if parameter.kind is Kind.LEVEL:
+            if s.ks[0] == 0 and not system.constant_mean:
+                level = self._equations.balance.scene.value("excitation.amplitude") or 1.0
+                pushes[0] = s.constant / level
+            return _Change(pushes=pushes)
+        if parameter.kind is Kind.FORCE_PHASE:
+            turned = 0.0 if self._turns else np.vdot(1j * state.phase, at.x[s.first])
+            return _Change(pushes=pushes, phase=complex(turned))
+        hat, equations = self._equations.amplitudes, self._equations
+        dF = equations.lead(self._force_slopes(i, state))
+        return _Change(pushes=-(s.back @ hat.of(dF).T[:, :, None])[:, :, 0])
+
+    def _force_slopes(self, i: int, state: State) -> Real:
+        """Return ∂F/∂p of every port, (nc, n), by path i."""
+        equations = self._equations
+        system, n, point = equations.balance.system, equations.n, equations.point
+        w = state.y[: equations.size].reshape(equations.r, n)
+        motions = np.ascontiguousarray(equations.motions(w))
+        table, load, _, _ = contact_values(system, float(state.y[-2]), 0.0)
+        found = np.zeros((equations.balance.n_ports, n))
+        for e in np.flatnonzero(np.any(self._slopes[i] != 0.0, axis=1)):
+            begin, end = int(system.first_port[e]), int(system.first_port[e + 1])
+            blocks = slice(int(system.first_block[e]), int(system.first_block[e + 1]))
+            law_force(
+                system.laws[e], motions[begin:end], system.ks, load[e], system.load_ks, table[e],
+                self._slopes[i, e], self._loads[i, e], system.cos_table, system.sin_table, point.segments,
+                point.F[begin:end], point.dF_dU[blocks], point.dF_dp[begin:end],
+            )  # fmt: skip
+            found[begin:end] = point.dF_dp[begin:end]
+        return found
+
+    def _of_structure(self, parameter: Parameter, state: State, at: Evaluated) -> _Change:
+        """Return what a parameter of the structure, of bodies or of places changes."""
+        s, scene, ks = self._equations.structure, self._equations.balance.scene, self._equations.structure.ks
+        model, d = linear_model(scene), structure_derivative(scene, parameter.name)
+        diameters = model.diameters(ks)
+        dK, dC, dM = d.at(model, diameters, s.moving)
+        omega, zeta = float(state.y[-2]), float(state.y[-1])
+        k = ks.astype(np.float64)[:, None, None]
+        x = (s.shapes @ at.x[:, :, None])[:, :, 0]
+        dZ = dK + 1j * k * omega * dC - ((k * omega) ** 2 + 2j * k * zeta * omega**2) * dM
+        pushes = -(dZ @ x[:, :, None])[:, :, 0]
+        moved = None
+        if d.contact_here is not None and d.contact_next is not None:
+            pushes, moved = self._of_places(parameter, pushes, x)
+        if d.forces and ks[0] == 0:
+            pushes[0] += term_amplitudes(d.forces, x.shape[1], ks)[0]
+        back = np.swapaxes(s.shapes, 1, 2).conj()
+        whole = np.where(s.moving[:, None, None], dM, 0.0)
+        amplitude = float(np.vdot(x, (whole @ x[:, :, None])[:, :, 0]).real)
+        return _Change(pushes=(back @ pushes[:, :, None])[:, :, 0], moved=moved, amplitude=amplitude)
+
+    def _of_places(self, parameter: Parameter, pushes: Complex, x: Complex) -> tuple[Complex, Complex]:
+        """Return the pushes with those of moved contacts, and the motions ∂L x of the leading ports."""
+        equations, s = self._equations, self._equations.structure
+        balance = equations.balance
+        model = linear_model(balance.scene)
+        d = structure_derivative(balance.scene, parameter.name)
+        here, beyond = cast(Real, d.contact_here), cast(Real, d.contact_next)
+        turn = model.turns(model.diameters(s.ks))[:, None, None]
+        dL = here + beyond * turn
+        forces = equations.amplitudes.of(equations.point.F)
+        pushes = pushes - (np.swapaxes(dL, 1, 2).conj() @ forces.T[:, :, None])[:, :, 0]
+        moved = (dL @ x[:, :, None])[:, :, 0]
+        # The stiffness moved into the structure stays where the contacts were: its force follows L x.
+        extra = balance.system.shift[:, None] * moved.T
+        led = moved[:, balance.system.leading]
+        if equations.span is not None:
+            # The other ports no longer follow from the leading ones as they did.
+            off = equations.amplitudes.coefficients(moved.T - equations.span @ led.T)
+            turned = np.einsum("cdij,dj->ci", equations.port_slopes(), off)
+            extra = extra + equations.amplitudes.of(turned)
+        L = model.ports_at(model.diameters(s.ks))
+        pushes = pushes - (np.swapaxes(L, 1, 2).conj() @ extra.T[:, :, None])[:, :, 0]
+        return pushes, led

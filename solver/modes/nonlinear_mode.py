@@ -1,0 +1,202 @@
+"""The nonlinear mode of a scene: the function users call, from checked settings to the result."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.balance.balance import Balance, build, check_harmonics
+from solver.balance.simplifications import Effects
+from solver.contacts.kernels.system import DENSE, MODES
+from solver.errors import SettingError
+from solver.jit.fourier import Real
+from solver.linear.assembly import linear_model
+from solver.modes.corrector import Corrected
+from solver.modes.curve import End, walk
+from solver.modes.equations import Equations
+from solver.modes.records import collect
+from solver.modes.results import NonlinearMode, NonlinearModeStatus
+from solver.modes.start import LinearMode, begin, equilibrium, linear_modes, slopes_at_rest
+from solver.scene.cyclic.annulus import written_out
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+MOST_POINTS = 2000
+STATUS = {
+    End.REACHED: NonlinearModeStatus.COMPLETED, End.NOT_BEGUN: NonlinearModeStatus.NOT_BEGUN,
+    End.STOPPED: NonlinearModeStatus.STOPPED, End.TURNED_BACK: NonlinearModeStatus.TURNED_BACK,
+    End.TOO_LONG: NonlinearModeStatus.TOO_LONG, End.CANCELLED: NonlinearModeStatus.CANCELLED,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModeProblem:
+    """A scene made ready: its equations, the linear mode it begins with, and whether it may begin any time.
+
+    Attributes
+    ----------
+    rest : (r, n) the equilibrium at the leading ports.
+    turns : no load varies with a phase of its own: the motion may begin at any instant.
+    """
+
+    equations: Equations
+    mode: LinearMode
+    rest: Real
+    turns: bool
+
+
+def nonlinear_mode(
+    scene: Scene, mode: int = 1, *, amplitudes: Sequence[float], nodal_diameter: int | None = None,
+    harmonics: int = 11, errors: bool = True, most_points: int = MOST_POINTS,
+    on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> NonlinearMode:  # fmt: skip
+    """Follow a mode over its amplitude by the extended periodic motion concept.
+
+    [−k²ω²M + ikω(C − 2ζωM) + K] q_k + F_k(q) = 0, k = 0 … H (Krack, Comput. Struct. 154 (2015) 59,
+    doi:10.1016/j.compstruc.2015.03.008): the artificial damping −2ζωM keeps the motion periodic, so ζ(a) is
+    what the structure and its contacts dissipate. Constant forces stay, all others are left out.
+
+    Parameters
+    ----------
+    scene : what vibrates; its loads and constant forces count, its excitation gives the phase alone.
+    mode : number of the mode, 1 the slowest, of the structure with its contacts as they are at rest.
+    amplitudes : smallest and largest modal amplitude a [√kg m], a² = Σ_k≥1 Q_kᴴ M Q_k.
+    nodal_diameter : of a cyclic structure, from −sectors/2 to sectors/2, negative for a wave that travels
+        backward; that of the scene's engine order if left out.
+    harmonics : highest harmonic kept.
+    errors : estimate what more harmonics would change, for about as much time again.
+    most_points : of the curve.
+    on_progress : is told the share of ln a that is done and the number of points.
+    should_stop : is asked at every point whether to stop there.
+
+    Raises
+    ------
+    SettingError
+        A mode, amplitudes, nodal diameter or harmonics that cannot be, each with what would be right.
+    """
+    begun = time.perf_counter()
+    low, high = (math.log(each) for each in check_amplitudes(amplitudes))
+    if isinstance(most_points, bool) or not isinstance(most_points, int) or most_points < 1:
+        raise SettingError("most_points", most_points, "must be a whole number from 1")
+    problem = pose(scene, mode, nodal_diameter, harmonics)
+    equations = problem.equations
+    first = begin(equations, problem.mode, problem.rest, low, turns=problem.turns)
+    points: list[Corrected] = []
+    rejected, end = 0, [End.NOT_BEGUN]
+    if first.converged:
+        walked = walk(equations, first, high, turns=problem.turns, most_points=most_points, ended=end.append)
+        for each in walked:
+            points.append(each.point)
+            rejected += each.rejected
+            if on_progress is not None:
+                done = (each.point.state.log_amplitude - low) / (high - low)
+                on_progress(min(max(done, 0.0), 1.0), len(points))
+            if should_stop is not None and should_stop():
+                end.append(End.CANCELLED)
+                break
+    return collect(
+        equations, points, mode=int(mode), turns=problem.turns, errors=errors, status=STATUS[end[-1]],
+        rejected=rejected, begun=begun,
+    )  # fmt: skip
+
+
+def check_amplitudes(amplitudes: Sequence[float]) -> tuple[float, float]:
+    """Return smallest and largest amplitude.
+
+    Raises
+    ------
+    SettingError
+        Not two finite numbers with 0 < smallest < largest.
+    """
+    wanted = "must be two numbers, 0 < smallest < largest [√kg m]"
+    try:
+        low, high = (float(each) for each in amplitudes)
+    except (TypeError, ValueError):
+        raise SettingError("amplitudes", amplitudes, wanted) from None
+    if not (0.0 < low < high < math.inf):
+        raise SettingError("amplitudes", tuple(amplitudes), wanted)
+    return low, high
+
+
+def pose(
+    scene: Scene, mode: int, nodal_diameter: int | None, harmonics: int, *, whole: bool = False,
+    kind: type[Equations] = Equations,
+) -> ModeProblem:  # fmt: skip
+    """Return the equations of a mode and where it begins; errors as `nonlinear_mode`.
+
+    Parameters
+    ----------
+    whole : keep whole matrices whatever the damping is.
+    kind : what is asked of a motion.
+    """
+    if check_harmonics(harmonics) < 1:
+        raise SettingError("harmonics", harmonics, "must be from 1: a mode needs harmonic 1")
+    scene = at_nodal_diameter(scene, nodal_diameter)
+    check_mode(scene, mode)
+    equations = kind(_balance(scene, harmonics, whole=whole))
+    found = _begin(equations, mode)
+    if equations.structure.is_diagonal and not found[0].moves_contacts:
+        # The modes kept are those that contacts or forces see.
+        equations = kind(_balance(scene, harmonics, whole=True))
+        found = _begin(equations, mode)
+    loads = [contact.load for contact in equations.balance.scene.contacts]
+    turns = not any(load is not None and load.amplitude != 0.0 for load in loads)
+    return ModeProblem(equations=equations, mode=found[0], rest=found[1], turns=turns)
+
+
+def _balance(scene: Scene, harmonics: int, *, whole: bool) -> Balance:
+    balance = build(scene, harmonics=harmonics, effects=Effects(whole_matrices=True) if whole else None)
+    if balance.system.form not in (MODES, DENSE):
+        return build(scene, harmonics=harmonics, effects=Effects(whole_matrices=True))
+    return balance
+
+
+def _begin(equations: Equations, mode: int) -> tuple[LinearMode, Real]:
+    """Return the linear mode about the equilibrium, and that."""
+    guess = 1.0
+    nc = equations.balance.n_ports
+    modes = linear_modes(equations.balance, np.zeros((nc, nc), np.complex128))
+    guess = max(modes[mode - 1].omega, 1e-3 * modes[-1].omega)
+    rest = equilibrium(equations, guess)
+    slopes = None if rest is None else slopes_at_rest(equations, rest, guess)
+    if rest is None or slopes is None:
+        raise SettingError(
+            "scene", equations.balance.scene.name, "must have an equilibrium under its constant forces"
+        )
+    return linear_modes(equations.balance, slopes)[mode - 1], rest
+
+
+def check_mode(scene: Scene, mode: int) -> None:
+    """Raise SettingError unless the structure has a mode of that number."""
+    most = int(np.count_nonzero(linear_model(written_out(scene)).free))
+    whole = isinstance(mode, (int, np.integer)) and not isinstance(mode, bool)
+    if not whole or not 1 <= mode <= most:
+        wanted = f"must be a whole number from 1, the slowest, to {most}, as many as the structure has"
+        raise SettingError("mode", mode, wanted)
+
+
+def at_nodal_diameter(scene: Scene, nodal_diameter: int | None) -> Scene:
+    """Return a cyclic scene whose harmonic 1 is of a nodal diameter; the scene itself for None."""
+    if nodal_diameter is None:
+        return scene
+    if not scene.structure.has_sectors:
+        wanted = "must be left out: the structure has no sectors"
+        raise SettingError("nodal_diameter", nodal_diameter, wanted)
+    n = scene.structure.sector_count
+    good = isinstance(nodal_diameter, (int, np.integer)) and not isinstance(nodal_diameter, bool)
+    if not good or abs(nodal_diameter) > n // 2:
+        wanted = f"must be a whole number from {-(n // 2)} to {n // 2}, half the sectors"
+        raise SettingError("nodal_diameter", nodal_diameter, wanted)
+    order = int(nodal_diameter) % n
+    changed = tuple(
+        force.model_copy(update={"engine_order": order}) if force.engine_order is not None else force
+        for force in scene.excitation
+    )
+    return scene.model_copy(update={"excitation": changed})

@@ -1,0 +1,178 @@
+"""The damper performance curve from one nonlinear mode: peak over excitation against load over excitation.
+
+Where one mode carries the resonance, its amplitude a under a harmonic force obeys
+
+    |ω(a)² − Ω² + 2iζ(a)ω(a)Ω| a = |Qᴴ f|        (Q the mass-normalised mode),
+
+of which the largest a is at Ω = ω √(1 − 2ζ²), with |Qᴴ f| = 2ζ √(1 − ζ²) ω² a: the force of every point of
+the curve in closed form (synthesis of a single nonlinear mode, after M. Krack, L. Panning-von Scheidt,
+J. Wallaschek). Coulomb friction is
+homogeneous: forces, loads and motions grow together, so one curve serves every load and every excitation.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from solver.errors import SettingError
+from solver.jit.fourier import Real
+from solver.modes.nonlinear_mode import pose
+from solver.modes.results import NonlinearMode
+from solver.results.base import Drawn
+from solver.results.views import Views
+from solver.scene.bodies.kinematics import static_forces
+from solver.scene.scene import Scene
+
+_SAME = 1e-9  # relative difference of forces that are proportional
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class PerformanceCurve(Drawn):
+    """Resonance peaks of one mode over the excitation, or over the loads; n points along the mode's curve.
+
+    Attributes
+    ----------
+    mode : NonlinearMode
+        It is of.
+    excitation : (n,) array
+        Factor on every force of the scene's excitation at which its response has this peak.
+    peak : (n,) array
+        max|x| of the observed DOF there [m].
+    frequency_hz : (n,) array
+        Where the peak is.
+    scales : bool
+        Whether forces, loads and motions grow together here; only then are `load` and `peak_at_load` known.
+    load : (n,) array
+        Factor on every load, the excitation as it is, of the same performance; NaN if not known.
+    peak_at_load : (n,) array
+        The peak then [m]. NaN if not known.
+    """
+
+    VIEWS: ClassVar = Views("solver.views", "of_performance", "performance_dataset", "of_performance")
+
+    mode: NonlinearMode
+    excitation: Real
+    peak: Real
+    frequency_hz: Real
+    scales: bool
+    load: Real
+    peak_at_load: Real
+
+    def at_excitation(self, factor: float) -> tuple[float, float]:
+        """Return the highest peak [m] and its frequency [Hz] at a factor on the excitation; NaN if beyond.
+
+        Between points both go along straight lines over logarithms.
+        """
+        return _highest(self.excitation, self.peak, self.frequency_hz, factor)
+
+    def at_load(self, factor: float) -> tuple[float, float]:
+        """Return the same at a factor on every load, the excitation as it is; NaN where it is not known."""
+        if not self.scales:
+            return math.nan, math.nan
+        return _highest(self.load, self.peak_at_load, self.frequency_hz, factor)
+
+    @property
+    def least(self) -> tuple[float, float]:
+        """Factor on the loads at which the peak is least, and that peak [m]; NaN where it is not known."""
+        if not self.scales or not self.load.size:
+            return math.nan, math.nan
+        tops = [self.at_load(float(load))[0] for load in self.load]
+        best = int(np.nanargmin(tops))
+        return float(self.load[best]), float(tops[best])
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the curve as one JSON object."""
+        load, peak = self.least
+        known = self.scales and bool(self.load.size)
+        return {
+            "excitation": self.excitation.tolist(),
+            "peak": self.peak.tolist(),
+            "frequency": self.frequency_hz.tolist(),
+            "scales": self.scales,
+            "load": _numbers(self.load) if self.scales else None,
+            "peak_at_load": _numbers(self.peak_at_load) if self.scales else None,
+            "least": {"load": load, "peak": peak} if known else None,
+        }
+
+
+def _numbers(values: Real) -> list[float | None]:
+    """Return floats that JSON can carry: without damping no load is large enough."""
+    return [float(value) if math.isfinite(value) else None for value in values]
+
+
+def performance_curve(found: NonlinearMode) -> PerformanceCurve:
+    """Return the resonance peaks that one nonlinear mode stands for, over excitation and load.
+
+    An approximation: other modes and higher harmonics of the force are left out, and a response far from the
+    mode's own frequency. `solver.track_peak` over ``excitation.amplitude`` is the exact answer.
+
+    Raises
+    ------
+    SettingError
+        The excitation's first harmonic does not drive the mode.
+    """
+    forcing = found.forcing
+    if forcing.size and not np.all(forcing > 1e-12 * max(float(forcing.max()), 1e-300)):
+        scene = found.scene
+        wanted = "must have a force of harmonic 1 that drives the mode"
+        raise SettingError("excitation", [force.place for force in scene.excitation], wanted)
+    omega, zeta = 2.0 * math.pi * found.frequency_hz, found.damping_ratio
+    # Of ζ above 1/√2 there is no peak but at rest, of ζ ≤ 0 none is bounded.
+    damped = np.clip(zeta, 0.0, math.sqrt(0.5))
+    factor = 2.0 * damped * np.sqrt(1.0 - damped**2) * omega**2 * found.amplitude / forcing
+    with np.errstate(divide="ignore"):
+        load = 1.0 / factor
+    scales = bool(found.points) and grows_together(found)
+    unknown = np.full(load.size, math.nan)
+    return PerformanceCurve(
+        mode=found, excitation=factor, peak=found.max_abs,
+        frequency_hz=found.frequency_hz * np.sqrt(1.0 - 2.0 * damped**2), scales=scales,
+        load=load if scales else unknown, peak_at_load=found.max_abs * load if scales else unknown,
+    )  # fmt: skip
+
+
+def with_loads(scene: Scene, factor: float) -> Scene:
+    """Return the scene with the given normal loads of all contacts times a factor."""
+    changed = []
+    for contact in scene.contacts:
+        given = {key: getattr(contact, key, None) for key in ("N0", "N1")}
+        scaled = {key: factor * value for key, value in given.items() if value is not None}
+        changed.append(contact.model_copy(update=scaled))
+    return scene.model_copy(update={"contacts": tuple(changed)})
+
+
+def grows_together(found: NonlinearMode) -> bool:
+    """Return whether contact forces double where loads and motions do, at the last point of a mode."""
+    if static_forces(found.scene) or any(force.harmonic == 0 for force in found.scene.excitation):
+        return False
+    state = found.points[-1]
+    forces = []
+    for factor in (1.0, 2.0):
+        scene = with_loads(found.scene, factor)
+        equations = pose(scene, found.mode, None, found.n_harmonics, whole=found.whole_matrices).equations
+        w = factor * state.y[: equations.size].reshape(equations.r, equations.n)
+        if not equations.contacts(w, float(state.y[-2])):
+            return False
+        forces.append(equations.point.F / factor)
+    size = float(np.abs(forces[0]).max(initial=0.0))
+    return bool(np.abs(forces[1] - forces[0]).max(initial=0.0) <= _SAME * size)
+
+
+def _highest(places: Real, heights: Real, frequencies: Real, at: float) -> tuple[float, float]:
+    """Return the highest of a curve's crossings of a place, which it may pass several times."""
+    if not at > 0.0:
+        return math.nan, math.nan
+    best, where = math.nan, math.nan
+    for i in range(places.size - 1):
+        one, other = places[i], places[i + 1]
+        if not (0.0 < one < math.inf and 0.0 < other < math.inf) or (one - at) * (other - at) > 0.0:
+            continue
+        share = 0.0 if one == other else math.log(at / one) / math.log(other / one)
+        height = heights[i] ** (1.0 - share) * heights[i + 1] ** share
+        if not best >= height:
+            best, where = height, (1.0 - share) * frequencies[i] + share * frequencies[i + 1]
+    return float(best), float(where)

@@ -1,0 +1,198 @@
+"""Phase resonance: the forced responses whose harmonic 1 lags the excitation by a quarter of a period.
+
+The equations are those of the extended periodic motion (`solver.modes.equations`) with the excitation f in
+place of the artificial damping, Z_1 x_1 + Lᴴ F_1 = p f, at a given modal amplitude a: what a test with a
+controlled phase and amplitude measures (S. Peter, R. I. Leine, Mech. Syst. Signal Process. 96 (2017) 139).
+The force is written as p = z c a with c = 2ω₀²/|φᴴ f| of the linear mode φ, so that the last unknown z is the
+damping ratio that one mode alone would have.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar, cast
+
+import numpy as np
+
+from solver.balance.balance import Balance
+from solver.balance.speed_line import check_no_line
+from solver.errors import SettingError
+from solver.jit.fourier import Complex, Integer, Real
+from solver.modes.corrector import Corrected
+from solver.modes.curve import End, walk
+from solver.modes.equations import Equations, Evaluated
+from solver.modes.nonlinear_mode import MOST_POINTS, STATUS, check_amplitudes, pose
+from solver.modes.records import Recorder
+from solver.modes.results import NonlinearModeStatus
+from solver.modes.start import begin, coordinates_of
+from solver.modes.structure import Dynamics
+from solver.response.contact_response import ContactState, state_of
+from solver.results.told import Piece
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+_FAINT = 1e-9  # share of the excitation along a mode below which it does not drive it
+
+
+class Driven(Equations):
+    """The responses to the excitation at a given amplitude; the last unknown is z, see the module."""
+
+    def __init__(self, balance: Balance) -> None:
+        super().__init__(balance)
+        self.unit = 1.0  # c, set when the linear mode is known
+
+    def evaluate(self, y: Real, log_amplitude: float, phase: Complex, mode: int) -> Evaluated | None:
+        """Return the equations at y: the force grows with a."""
+        at = super().evaluate(y, log_amplitude, phase, mode)
+        if at is None:
+            return None
+        return replace(at, by_log_amplitude=at.by_log_amplitude + y[-1] * at.jacobian[:, -1])
+
+    def damping(self, _last: float) -> float:
+        """Return ζ: none but the structure's own."""
+        return 0.0
+
+    def driven(self, last: float, log_amplitude: float) -> Complex | float:
+        """Return p f."""
+        return last * self._force(log_amplitude)
+
+    def by_last(self, _x: Complex, _dynamics: Dynamics, log_amplitude: float) -> Complex:
+        """Return p f / z."""
+        return self._force(log_amplitude)
+
+    def _force(self, log_amplitude: float) -> Complex:
+        s = self.structure
+        force = np.zeros((s.ks.size, s.force.size), np.complex128)
+        force[s.first] = self.unit * math.exp(log_amplitude) * s.force
+        return force
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class PhaseResonance(Piece):
+    """Responses in phase resonance over the amplitude; n points along the curve.
+
+    Attributes
+    ----------
+    scene : Scene
+        As it was solved: with the engine order of the nodal diameter.
+    mode : int
+        Number of the linear mode it begins with.
+    status : NonlinearModeStatus
+        How the curve ended.
+    amplitude : (n,) array
+        Modal amplitude a [√kg m].
+    frequency_hz : (n,) array
+        Of the excitation [Hz].
+    excitation : (n,) array
+        Factor on the scene's excitation that this response takes; below 0 it lags by 270°.
+    max_abs : (n,) array
+        max|x| of the observed DOF [m].
+    states : (n, n_contacts) array
+        What each contact does over the period, see `contact_states`.
+    residual : (n,) array
+        Relative residual of the equations.
+    seconds : float
+        What it took.
+    """
+
+    UNITS: ClassVar = {"amplitude": "√kg m", "frequency_hz": "Hz", "max_abs": "m", "seconds": "s"}
+
+    scene: Scene
+    mode: int
+    status: NonlinearModeStatus
+    amplitude: Real
+    frequency_hz: Real
+    excitation: Real
+    max_abs: Real
+    states: Integer
+    residual: Real
+    seconds: float
+
+    @property
+    def completed(self) -> bool:
+        """Whether the curve reaches the amplitude asked for."""
+        return self.status is NonlinearModeStatus.COMPLETED
+
+    def contact_states(self, i: int) -> dict[str, ContactState]:
+        """What each contact does at point i."""
+        names = [contact.name for contact in self.scene.contacts]
+        return {name: state_of(int(code)) for name, code in zip(names, self.states[i], strict=True)}
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the curve as one JSON object."""
+        return {
+            "scene": self.scene.name,
+            "mode": self.mode,
+            "completed": self.completed,
+            "status": self.status.value,
+            "amplitude": self.amplitude.tolist(),
+            "frequency": self.frequency_hz.tolist(),
+            "excitation": self.excitation.tolist(),
+            "max_abs": self.max_abs.tolist(),
+            "states": [[state_of(int(code)).value for code in row] for row in self.states],
+            "seconds": self.seconds,
+        }
+
+
+def phase_resonance(
+    scene: Scene, mode: int = 1, *, amplitudes: Sequence[float], nodal_diameter: int | None = None,
+    harmonics: int = 11, most_points: int = MOST_POINTS,
+) -> PhaseResonance:  # fmt: skip
+    """Follow the responses in phase resonance over their amplitude: frequency and force that they take.
+
+    Every point is a response to the scene's excitation times a factor, exact but for the harmonics left out:
+    |x| of harmonic 1 lags the excitation by 90°. Unlike `nonlinear_mode` nothing artificial is added.
+
+    Parameters
+    ----------
+    scene, mode, amplitudes, nodal_diameter, harmonics, most_points : as of `nonlinear_mode`.
+
+    Raises
+    ------
+    SettingError
+        As `nonlinear_mode`; or an excitation that does not drive the mode, has harmonics beyond the first,
+        or follows the speed along an engine-order line.
+    """
+    begun = time.perf_counter()
+    low, high = (math.log(each) for each in check_amplitudes(amplitudes))
+    check_no_line(scene)
+    problem = pose(scene, mode, nodal_diameter, harmonics, kind=Driven)
+    equations = cast(Driven, problem.equations)
+    shape, force = coordinates_of(equations, problem.mode), equations.structure.force
+    along = abs(complex(np.vdot(shape, force)))
+    size = float(np.linalg.norm(shape) * np.linalg.norm(force))
+    alone = all(each.harmonic in (0, 1) for each in scene.excitation)
+    if not alone or not along > _FAINT * size:
+        wanted = "must have a force of harmonic 1 that drives the mode, and none of a higher harmonic"
+        raise SettingError("excitation", [each.place for each in scene.excitation], wanted)
+    equations.unit = 2.0 * problem.mode.omega**2 / along
+    first = begin(equations, problem.mode, problem.rest, low, turns=False)
+    points: list[Corrected] = []
+    end = [End.NOT_BEGUN]
+    if first.converged:
+        walked = walk(equations, first, high, turns=False, most_points=most_points, ended=end.append)
+        points = [each.point for each in walked]
+    return _collect(equations, points, mode=int(mode), status=STATUS[end[-1]], begun=begun)
+
+
+def _collect(
+    equations: Driven, points: list[Corrected], *, mode: int, status: NonlinearModeStatus, begun: float
+) -> PhaseResonance:
+    """Return the result of a curve."""
+    scene, n = equations.balance.scene, len(points)
+    recorder = Recorder(equations, turns=False)
+    rows = [recorder.of(point) for point in points]
+    amplitude = np.exp(np.array([point.state.log_amplitude for point in points], dtype=np.float64))
+    y = np.array([point.state.y[-2:] for point in points], dtype=np.float64).reshape(n, 2)
+    return PhaseResonance(
+        scene=scene, mode=mode, status=status, amplitude=amplitude, frequency_hz=y[:, 0] / (2.0 * math.pi),
+        excitation=y[:, 1] * equations.unit * amplitude,
+        max_abs=np.array([row.max_abs for row in rows], dtype=np.float64),
+        states=np.array([row.states for row in rows], dtype=np.int64).reshape(n, len(scene.contacts)),
+        residual=np.array([point.residual for point in points], dtype=np.float64),
+        seconds=time.perf_counter() - begun,
+    )  # fmt: skip

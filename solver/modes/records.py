@@ -1,0 +1,127 @@
+"""The points of a nonlinear mode as arrays, each begun where harmonic 1 lags the excitation by 90 degrees."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.balance.kernels.output import extremes
+from solver.contacts.kernels.system import System, by_reference
+from solver.jit.fourier import Complex, Integer, Real, to_full
+from solver.linear.assembly import linear_model
+from solver.modes.corrector import Corrected
+from solver.modes.equations import Equations
+from solver.modes.error_estimate import Wider
+from solver.modes.results import NonlinearMode, NonlinearModeStatus
+from solver.modes.start import phase_of
+from solver.scene.scene import Scene
+
+_FAINT = 1e-9  # share of the excitation along a mode below which it gives no phase
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Record:
+    """What a point of a curve gives; see `solver.modes.results.NonlinearMode`."""
+
+    motions: Real
+    forces: Real
+    dofs: Real
+    max_abs: float
+    states: Integer
+    forcing: float
+
+
+class Recorder:
+    """Makes records of the points of a curve.
+
+    Parameters
+    ----------
+    turns : the motion may begin at any instant: it is made to begin in the phase of the excitation.
+    """
+
+    def __init__(self, equations: Equations, *, turns: bool) -> None:
+        self._equations, self._turns = equations, turns
+        self._force = phase_of(equations)
+        self._system: System = by_reference(equations.balance.system)
+        model = linear_model(equations.balance.scene)
+        self._shapes = np.asarray(model.shapes @ equations.structure.shapes, dtype=np.complex128)
+
+    def of(self, point: Corrected) -> Record:
+        """Return the record of a converged point."""
+        equations, s, hat = self._equations, self._equations.structure, self._equations.amplitudes
+        if point.at is None:
+            raise ValueError("a point without a value is none of a curve")
+        w = point.state.y[: equations.size].reshape(equations.r, equations.n)
+        equations.contacts(w, float(point.state.y[-2]))
+        turns = self._angles(point.at.x)
+        x = np.asarray(point.at.x * turns[:, None])
+        top = equations.balance.highest_harmonic
+
+        def turned(coefficients: Real) -> Real:
+            return to_full(hat.coefficients(hat.of(coefficients) * turns), s.ks, top)
+
+        moved = (self._shapes @ x[:, :, None])[:, :, 0]
+        observed = hat.coefficients(np.einsum("kn,kn->k", s.observe, x))
+        high, _, low, _ = extremes(self._system, observed)
+        forcing = abs(complex(np.vdot(s.force, x[s.first]))) / math.exp(point.state.log_amplitude)
+        return Record(
+            motions=turned(equations.motions(w)), forces=turned(equations.point.F),
+            dofs=to_full(hat.coefficients(moved.T), s.ks, top), max_abs=max(high, -low),
+            states=equations.point.states.copy(), forcing=forcing,
+        )  # fmt: skip
+
+    def _angles(self, x: Complex) -> Complex:
+        """Return e^{ikα} of each harmonic that brings the motion into the phase of the excitation."""
+        s = self._equations.structure
+        seen = complex(np.vdot(self._force, x[s.first]))
+        size = float(np.linalg.norm(self._force) * np.linalg.norm(x[s.first]))
+        if not self._turns or abs(seen) <= _FAINT * size:
+            return np.ones(s.ks.size, np.complex128)
+        turn = -1j * abs(seen) / seen
+        return np.asarray(turn ** s.ks.astype(np.float64))
+
+
+def collect(
+    equations: Equations, points: Sequence[Corrected], *, mode: int, turns: bool, errors: bool,
+    status: NonlinearModeStatus, rejected: int, begun: float,
+) -> NonlinearMode:  # fmt: skip
+    """Return the result of a curve; arguments as `solver.modes.nonlinear_mode` has them."""
+    balance = equations.balance
+    scene, n, size = balance.scene, len(points), 2 * balance.highest_harmonic + 1
+    recorder = Recorder(equations, turns=turns)
+    rows = [recorder.of(point) for point in points]
+    y = np.array([point.state.y[-2:] for point in points], dtype=np.float64).reshape(n, 2)
+    error = np.full((n, 2), math.nan)
+    if errors and points:
+        wider = Wider(equations)
+        error = np.array([wider.estimate(point) for point in points])
+    logs = np.array([point.state.log_amplitude for point in points], dtype=np.float64)
+    return NonlinearMode(
+        scene=scene, mode=mode, nodal_diameter=diameter_of(scene), n_harmonics=balance.n_harmonics,
+        status=status, amplitude=np.exp(logs), frequency_hz=y[:, 0] / (2.0 * math.pi),
+        damping_ratio=y[:, 1], frequency_error=error[:, 0], damping_error=error[:, 1],
+        max_abs=np.array([row.max_abs for row in rows], dtype=np.float64),
+        states=np.array([row.states for row in rows], dtype=np.int64).reshape(n, len(scene.contacts)),
+        residual=np.array([point.residual for point in points], dtype=np.float64),
+        contact_motions=np.array([row.motions for row in rows]).reshape(n, balance.n_ports, size),
+        contact_forces=np.array([row.forces for row in rows]).reshape(n, balance.n_ports, size),
+        dof_motions=np.array([row.dofs for row in rows]).reshape(n, len(scene.dofs), size),
+        forcing=np.array([row.forcing for row in rows], dtype=np.float64),
+        points=tuple(point.state for point in points),
+        whole_matrices=balance.effects.whole_matrices, rejected_steps=rejected,
+        newton_iterations=sum(point.iterations for point in points),
+        seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def diameter_of(scene: Scene) -> int | None:
+    """Return the nodal diameter of harmonic 1, negative for a wave that travels backward."""
+    if not scene.structure.has_sectors:
+        return None
+    n = scene.structure.sector_count
+    folded = scene.engine_order % n
+    return folded if folded <= n // 2 else folded - n

@@ -1,0 +1,203 @@
+"""Where a nonlinear mode begins: the linear mode about the equilibrium, contacts as they are there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from solver.balance.balance import Balance
+from solver.contacts.kernels.system import UNHELD
+from solver.jit.fourier import Complex, Real, cosine_position
+from solver.linear.assembly import linear_model
+from solver.matrices.normal_modes import hermitian, undamped_modes
+from solver.modes.corrector import Corrected, State, carried_anew, correct, step
+from solver.modes.equations import Equations
+
+_MOST = 60  # Newton steps to the equilibrium
+_LEAST = 1e-10  # relative motion of a contact below which a mode does not move it
+_RUNGS = 6  # decades below the first amplitude from which the mode is walked up, if it must
+_DECADE = math.log(10.0)
+_MOST_AT_FIRST = 40
+
+
+class LinearMode:
+    """A mode of the structure with the contacts' slopes at rest.
+
+    Attributes
+    ----------
+    omega : natural frequency [rad/s]; zeta : damping ratio ψᴴ C ψ / 2ω.
+    shape : (n,) mass-normalised, in the coordinates of the matrices.
+    ports : (nc,) motions of the contacts.
+    """
+
+    def __init__(self, omega: float, zeta: float, shape: Complex, ports: Complex) -> None:
+        self.omega, self.zeta, self.shape, self.ports = omega, zeta, shape, ports
+
+    @property
+    def moves_contacts(self) -> bool:
+        """Whether any contact takes part."""
+        largest = float(np.abs(self.shape).max(initial=0.0))
+        return bool(np.any(np.abs(self.ports) > _LEAST * largest))
+
+
+def linear_modes(balance: Balance, slopes: Complex) -> list[LinearMode]:
+    """Return the modes of harmonic 1 with stiffness `slopes` (nc, nc) at the ports, slowest first.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The mass matrix is not positive definite.
+    """
+    model = linear_model(balance.scene)
+    one = np.array([1], dtype=np.int64)
+    diameters = model.diameters(one)
+    (K,), (C,), (M,) = model.at(diameters, one > 0)
+    if model.line is None:
+        (M,) = model.inertia(diameters, one)
+    L = model.ports_at(diameters)[0]
+    free = np.ix_(model.free, model.free)
+    tied = hermitian((K + L.conj().T @ slopes @ L)[free])
+    found = undamped_modes(tied, hermitian(M[free]))
+    modes = []
+    for square, column in zip(found.omega2, found.phi.T, strict=True):
+        omega = math.sqrt(max(float(square), 0.0))
+        shape = np.zeros(M.shape[0], np.complex128)
+        shape[model.free] = column
+        lost = float(np.vdot(shape, C @ shape).real)
+        zeta = lost / (2.0 * omega) if omega > 0.0 else 0.0
+        modes.append(LinearMode(omega, zeta, shape, L @ shape))
+    return modes
+
+
+def equilibrium(equations: Equations, omega: float) -> Real | None:
+    """Return the motions of the leading ports at rest under constant forces, (r, n); None if not found."""
+    w, s, n = np.zeros((equations.r, equations.n)), equations.structure, equations.n
+    if s.ks[0] != 0 or equations.size == 0:
+        return w
+    still = s.at(omega, 0.0, s.nearest(omega, 0.0))
+    A = still.receptance()[0].real
+    free = still.solve(_constant(equations, omega))[0]
+    free = (s.contact[0] @ free).real
+    for _ in range(_MOST):
+        if not equations.contacts(w, omega):
+            return None
+        residual = w[:, 0] - free + A @ equations.shifted_forces(w)[:, 0]
+        size = max(np.abs(w[:, 0]).max(initial=0.0), np.abs(free).max(initial=0.0), 1e-300)
+        if np.abs(residual).max(initial=0.0) <= 1e-12 * size:
+            break
+        J = np.eye(equations.r) + A @ equations.slopes()[:, 0, :, 0]
+        move = step(J, -residual, np.ones(equations.r), least_squares=bool(equations.point.counts[UNHELD]))
+        if move is None:
+            return None
+        w = w.copy()
+        w[:, 0] += move
+    return w if n else None
+
+
+def _constant(equations: Equations, omega: float) -> Complex:
+    s = equations.structure
+    phi = np.zeros((s.ks.size, s.constant.size), np.complex128)
+    phi[0] = s.constant * (s.level @ omega ** np.arange(3))
+    return phi
+
+
+def slopes_at_rest(equations: Equations, w: Real, omega: float) -> Complex | None:
+    """Return the slopes of the port forces of harmonic 1 by its motions, (nc, nc), without the shift."""
+    if not equations.contacts(w, omega):
+        return None
+    balance, ks = equations.balance, equations.structure.ks
+    here = int(cosine_position(ks, equations.structure.first))
+    nc = balance.n_ports
+    G = np.zeros((nc, nc), np.complex128)
+    rows, columns, blocks = equations._blocks
+    block = equations.point.dF_dU[blocks]
+    # A force that is no function of the phase answers a cosine and a sine alike; the mean of both else.
+    G[rows, columns] = 0.5 * (block[:, here, here] + block[:, here + 1, here + 1])
+    return G
+
+
+def phase_of(equations: Equations) -> Complex:
+    """Return the force (N,) that harmonic 1 lags by a quarter of a period: the excitation's first harmonic.
+
+    Where there is none it is a force along the observed motion.
+    """
+    s = equations.structure
+    force = s.force if np.any(s.force) else s.observe[s.first].conj()
+    return np.asarray(force / (np.abs(force).max() or 1.0))
+
+
+def coordinates_of(equations: Equations, mode: LinearMode) -> Complex:
+    """Return a linear mode in the coordinates of the structure, (N,)."""
+    s = equations.structure
+    if not s.is_diagonal:
+        return mode.shape
+    model = linear_model(equations.balance.scene)
+    one = np.array([1], dtype=np.int64)
+    (M,) = model.plain(model.diameters(one))[2]
+    return np.asarray(s.shapes[s.first].conj().T @ (M @ mode.shape))
+
+
+def first_state(
+    equations: Equations, mode: LinearMode, rest: Real, log_amplitude: float, *, turns: bool,
+) -> State:  # fmt: skip
+    """Return a guess at an amplitude: the equilibrium and the linear mode, in the phase of the equations.
+
+    Parameters
+    ----------
+    rest : (r, n) the equilibrium.
+    turns : the motion may begin at any instant: the phase is then one in which the mode is seen.
+    """
+    s, a = equations.structure, math.exp(log_amplitude)
+    x = coordinates_of(equations, mode)
+    force = phase_of(equations)
+    seen = complex(np.vdot(force, x))
+    if abs(seen) > 1e-9 * np.linalg.norm(force) * np.linalg.norm(x):
+        x = x * (-1j * abs(seen) / seen)
+    phase = force
+    if turns:
+        phase = 1j * (s.mass[s.first] * x if s.is_diagonal else s.mass[s.first] @ x)
+    number = s.nearest(mode.omega, mode.zeta)
+    q = a * complex(np.vdot(s.carried[:, number], x))
+    moved = a * (s.contact[s.first] @ x)
+    w, here = rest.copy(), int(cosine_position(s.ks, s.first))
+    if equations.size:
+        w[:, here], w[:, here + 1] = moved.real, -moved.imag
+    y = np.concatenate([w.reshape(-1), [q.real, q.imag, mode.omega, mode.zeta]])
+    return State(y=y, log_amplitude=log_amplitude, mode=number, phase=phase / np.linalg.norm(phase))
+
+
+def begin(equations: Equations, mode: LinearMode, rest: Real, low: float, *, turns: bool) -> Corrected:
+    """Solve at the first amplitude, ln a = `low`; where that fails, from a smaller one upward."""
+
+    def guess(at: float) -> State:
+        return first_state(equations, mode, rest, at, turns=turns)
+
+    found = correct(equations, guess(low), most=_MOST_AT_FIRST)
+    spent = found.iterations
+    for rung in range(1, _RUNGS + 1):
+        if found.converged:
+            break
+        found = correct(equations, guess(low - rung * _DECADE), most=_MOST_AT_FIRST)
+        spent += found.iterations
+    while found.converged and found.state.log_amplitude < low:
+        found = _raised(equations, found, rest, low)
+        spent += found.iterations
+    return replace(found, iterations=spent)
+
+
+def _raised(equations: Equations, found: Corrected, rest: Real, low: float) -> Corrected:
+    """Return the next point on the way up to ln a = `low`, a third of a decade on, or less if it must."""
+    rise = min(_DECADE / 3.0, low - found.state.log_amplitude)
+    size, better = equations.size, found
+    while rise > _DECADE / 100.0:
+        y, still = found.state.y.copy(), rest.reshape(-1)
+        y[:size] = still + (y[:size] - still) * math.exp(rise)
+        y[size : size + 2] *= math.exp(rise)
+        guess = replace(found.state, y=y, log_amplitude=found.state.log_amplitude + rise)
+        better = correct(equations, guess, most=_MOST_AT_FIRST)
+        if better.converged:
+            return carried_anew(equations, better)
+        rise *= 0.5
+    return better

@@ -1,0 +1,191 @@
+"""The linear part of a nonlinear mode: Z_k(ω, ζ) = K + ikωC − (k²ω² + 2ikζω²) M of every kept harmonic.
+
+Z_1 is singular at a mode of the structure without contacts, where a large amplitude leads: friction then
+weighs little beside inertia. One mode b of the free structure is therefore carried as an unknown of its own,
+q = (M b)ᴴ x_1, and stiffened by ρ: with Z' = Z_1 + ρ (M b)(M b)ᴴ the same motion is x_1 = Z'⁻¹ (φ + ρ M b q),
+and Z' is regular there. ρ = −iω_b² has the sign of the term in ζ, so the two do not cancel while ζ is larger
+than that of the structure alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.balance.balance import Balance
+from solver.contacts.kernels.system import DENSE
+from solver.jit.fourier import Complex, Flags, Integer, Real
+from solver.linear.assembly import linear_model
+from solver.linear.condensation import reduce_model
+from solver.linear.contact_table import port_stiffnesses
+from solver.matrices.normal_modes import hermitian, undamped_modes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Structure:
+    """What Z_k is made of, in modes (diagonals, (nk, N)) or as matrices ((nk, N, N)); N coordinates.
+
+    Attributes
+    ----------
+    ks : (nk,) harmonics kept; `first` is the place of harmonic 1, `moving` says which are not the mean.
+    turns : (nk,) k, but 1 of the mean, whose C and M are its own.
+    K, C, M : stiffness, damping and inertia of each harmonic, as the balance has them.
+    mass : the mass of each harmonic, 0 of the mean; in modes 1.
+    contact : (nk, r, N) motions of the leading ports; back : (nk, N, r) what their forces push.
+    constant : (N,) constant force on the mean; level : (3,) its factor by 1, ω, ω².
+    force : (N,) the excitation of harmonic 1.
+    observe : (nk, N).
+    shapes : (nk, n, N) the coordinates in those of the matrices.
+    modes : (N, m) modes of the structure alone that may be carried, M b of them in `carried`.
+    squares : (m,) their ω² [rad²/s²].
+    """
+
+    ks: Integer
+    first: int
+    moving: Flags
+    turns: Real
+    K: Complex
+    C: Complex
+    M: Complex
+    mass: Complex
+    contact: Complex
+    back: Complex
+    constant: Complex
+    level: Real
+    force: Complex
+    observe: Complex
+    shapes: Complex
+    modes: Complex
+    carried: Complex
+    squares: Real
+
+    @property
+    def is_diagonal(self) -> bool:
+        """Whether the coordinates are modes that damping leaves apart."""
+        return self.K.ndim == 2
+
+    def times(self, matrix: Complex, x: Complex) -> Complex:
+        """Return matrix @ x of each harmonic, x (nk, N)."""
+        if matrix.ndim == 2:
+            return matrix * x
+        return np.asarray((matrix @ x[:, :, None])[:, :, 0])
+
+    def at(self, omega: float, zeta: float, mode: int) -> Dynamics:
+        """Return Z of all harmonics with mode number `mode` stiffened; raises LinAlgError if singular."""
+        shape = (-1, 1) if self.is_diagonal else (-1, 1, 1)
+        k = self.turns.reshape(shape)
+        drag = 2j * k * self.mass
+        Z = self.K + 1j * k * omega * self.C - (k * omega) ** 2 * self.M - zeta * omega**2 * drag
+        by_omega = 1j * k * self.C - 2.0 * k**2 * omega * self.M - 2.0 * zeta * omega * drag
+        b = self.carried[:, mode]
+        rho = -1j * self.squares[mode]
+        if self.is_diagonal:
+            Z[self.first] += rho * (b * b.conj())
+            if not np.all(Z):
+                raise np.linalg.LinAlgError("Z is singular")
+            inverse = np.asarray(1.0 / Z, np.complex128)
+        else:
+            Z[self.first] += rho * np.outer(b, b.conj())
+            inverse = np.asarray(np.linalg.inv(Z), np.complex128)
+        return Dynamics(
+            of=self, inverse=inverse, by_omega=by_omega, by_zeta=-(omega**2) * drag, b=b, rho=rho,
+        )  # fmt: skip
+
+    def nearest(self, omega: float, zeta: float) -> int:
+        """Return the mode of the structure alone that is nearest to singular at (ω, ζ)."""
+        if self.squares.size == 1:
+            return 0
+        i = self.first
+        K, C, M, mass = self.K[i], self.C[i], self.M[i], self.mass[i]
+        if self.is_diagonal:
+            Z = K + 1j * omega * C - omega**2 * M - 2j * zeta * omega**2 * mass
+            return int(np.argmin(np.abs(Z)))
+        Z = K + 1j * omega * C - omega**2 * M - 2j * zeta * omega**2 * mass
+        own = np.einsum("am,ab,bm->m", self.modes.conj(), Z, self.modes)
+        return int(np.argmin(np.abs(own)))
+
+    def squared_amplitude(self, x: Complex) -> float:
+        """Return Σ x_kᴴ M x_k over the harmonics that move [kg m²]."""
+        return float(np.vdot(x, self.times(self.mass, x)).real)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Dynamics:
+    """Z of all harmonics at (ω, ζ), with one mode stiffened; see the module."""
+
+    of: Structure
+    inverse: Complex
+    by_omega: Complex
+    by_zeta: Complex
+    b: Complex
+    rho: complex
+
+    def solve(self, phi: Complex) -> Complex:
+        """Return Z⁻¹ φ, (nk, N)."""
+        return self.of.times(self.inverse, phi)
+
+    def solve_adjoint(self, eta: Complex) -> Complex:
+        """Return Z⁻ᴴ η, (nk, N)."""
+        if self.inverse.ndim == 2:
+            return self.inverse.conj() * eta
+        return np.asarray((np.swapaxes(self.inverse, 1, 2).conj() @ eta[:, :, None])[:, :, 0])
+
+    def receptance(self) -> Complex:
+        """Return L Z⁻¹ Lᴴ of the leading ports, (nk, r, r)."""
+        if self.inverse.ndim == 2:
+            return np.asarray((self.of.contact * self.inverse[:, None, :]) @ self.of.back)
+        return np.asarray(self.of.contact @ (self.inverse @ self.of.back))
+
+
+def structure_of(balance: Balance) -> Structure:
+    """Return the linear part of a balance in modes or as matrices (`Effects.whole_matrices`).
+
+    Poles do not carry the term in ζ: a balance of that form has to be built with whole matrices.
+    """
+    system, scene = balance.system, balance.scene
+    ks, which = system.ks, system.which
+    moving, first = ks > 0, int(np.flatnonzero(ks == 1)[0])
+    led = system.leading
+    dense = system.form == DENSE
+    if dense:
+        model = linear_model(scene)
+        K, C, M = system.K[which], system.C[which], system.M[which]
+        mass = model.plain(model.diameters(ks))[2] * moving[:, None, None] + 0j
+        contact, back = system.L[which][:, led], system.L[which][:, led].conj()
+        forces, observe = system.forces, np.broadcast_to(system.observe, (ks.size, system.observe.size))
+        n = observe.shape[1]
+        shapes = np.broadcast_to(np.eye(n, dtype=np.complex128), (ks.size, n, n))
+        squares: Real
+        modes, carried, squares = _carried(K[first], mass[first], model.free)
+    else:
+        values = np.asarray(system.eigenvalues[which].real, np.complex128)
+        moves = np.asarray(moving[:, None], np.complex128)
+        # Of the mean only the stiffness counts: in modes it is written with k = 0.
+        K, C = values, np.asarray(system.dampings[which] * moves, np.complex128)
+        M = mass = np.broadcast_to(moves, values.shape)
+        contact, back = system.contact_modes[which][:, led], system.contact_duals[which][:, led]
+        forces, observe = system.modal_forces, system.observe_modes[which]
+        model = linear_model(scene)
+        shapes = reduce_model(model, ks, port_stiffnesses(scene, model)).shapes[which]
+        modes = carried = np.eye(values.shape[1], dtype=np.complex128)
+        sizes = np.abs(values[first].real)
+        squares = np.maximum(sizes, 1e-12 * sizes.max(initial=1.0))
+    constant = forces[0] if ks[0] == 0 else np.zeros(forces.shape[1], np.complex128)
+    row = system.level[1 if system.constant_mean else 0]
+    return Structure(
+        ks=ks, first=first, moving=moving, turns=np.maximum(ks, 1).astype(np.float64), K=K, C=C, M=M,
+        mass=mass, contact=np.ascontiguousarray(contact), back=np.ascontiguousarray(np.swapaxes(back, 1, 2)),
+        constant=constant, level=row, force=forces[first], observe=observe, shapes=shapes, modes=modes,
+        carried=carried, squares=squares,
+    )  # fmt: skip
+
+
+def _carried(K: Complex, M: Complex, free: Flags) -> tuple[Complex, Complex, Real]:
+    """Return modes b of Hermitian parts, M b, and ω²; coordinates without inertia stay at rest."""
+    rows = np.ix_(free, free)
+    found = undamped_modes(hermitian(K[rows]), hermitian(M[rows]))
+    modes = np.zeros((K.shape[0], found.mu.size), np.complex128)
+    modes[free] = found.phi
+    squares = np.maximum(np.abs(found.omega2), 1e-12 * np.abs(found.omega2).max(initial=1.0))
+    return modes, M @ modes, squares

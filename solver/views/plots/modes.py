@@ -1,0 +1,65 @@
+"""A nonlinear mode: frequency and damping ratio over the amplitude, where contacts slip."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from solver.results import units
+from solver.views.plots import style
+from solver.views.plots.style import Into
+
+_AMPLITUDE = "modal amplitude a [√kg m]"
+_STUCK = ("stuck", "separated", "closed")
+
+
+def mode_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
+    """Frequency beside damping ratio; the part in which every contact sticks or is open is thin.
+
+    Parameters
+    ----------
+    answer : the JSON of `solver.NonlinearMode`, with at least one point.
+    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    """
+    amplitude = np.array(answer["amplitude"])
+    linear = np.array([all(one in _STUCK for one in row) for row in answer["states"]], dtype=bool)
+    with style.styled():
+        page, (left, right) = style.figure(8.0, 3.3, columns=2, into=ax)
+        for axes, key, words in (
+            (left, "frequency", "frequency [Hz]"), (right, "damping_ratio", "damping ratio ζ"),
+        ):  # fmt: skip
+            values = np.array(answer[key])
+            axes.semilogx(amplitude, values, color=style.BLUE)
+            axes.semilogx(
+                np.where(linear, amplitude, np.nan), values, color=style.SKY, linewidth=2.6, label="linear"
+            )
+            style.label(axes, _AMPLITUDE, words)
+        of = "" if answer["nodal_diameter"] is None else f", nodal diameter {answer['nodal_diameter']}"
+        left.set_title(f"{answer['scene']}, mode {answer['mode']}{of}")
+        if linear.any():
+            right.legend()
+    return page
+
+
+def performance_figure(answer: Mapping[str, Any], *, dof: str = "x", ax: Into = None) -> Figure:
+    """The resonance peak over the factor on the loads; on the excitation where loads do not scale.
+
+    Parameters
+    ----------
+    answer : the JSON of `solver.PerformanceCurve`.
+    dof : name of the observed DOF.
+    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    """
+    over = "load" if answer["scales"] else "excitation"
+    places = np.array(answer[over], dtype=np.float64)
+    heights = np.array(answer["peak_at_load" if answer["scales"] else "peak"], dtype=np.float64)
+    good = np.isfinite(places) & (places > 0.0)
+    unit = units.length_unit(float(heights[good].min(initial=1.0)))
+    with style.styled():
+        page, (axes,) = style.figure(5.0, 3.3, into=ax)
+        axes.loglog(places[good], heights[good] * unit.per_metre, color=style.BLUE, label="one mode")
+        style.label(axes, f"factor on the {over}", f"peak of max |{dof}| [{unit.name}]")
+    return page
