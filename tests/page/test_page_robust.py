@@ -89,7 +89,7 @@ def test_a_study_that_falls_short_says_so(profile: Profile, site: Site) -> None:
     page = visit(context, site, "?scene=two-dof")
     page.fill("#low", "2000")
     page.click("#study")
-    expect(page.locator("#study-status")).to_contain_text("0 < from < to")
+    expect(page.locator("#settings-wrong")).to_contain_text("0 < from < to")
     page.fill("#low", "99.9")
     page.fill("#high", "1e200")
     page.click("#study")

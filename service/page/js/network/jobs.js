@@ -19,6 +19,7 @@ const freshKey = () =>
 export async function run(kind, body, view, priority = 0) {
   forget(kind);
   const mine = begin(kind);
+  tell("job-begun", kind);
   view.waiting?.();
   const key = freshKey();
   try {
@@ -30,6 +31,8 @@ export async function run(kind, body, view, priority = 0) {
   } catch (error) {
     refused(kind, error, view, mine);
     return false;
+  } finally {
+    if (watching.get(kind) === mine) tell("job-over", kind);
   }
 }
 
@@ -38,6 +41,7 @@ export async function resume(kind, view) {
   const id = state.jobs[kind];
   if (!id) return;
   const mine = begin(kind);
+  tell("job-begun", kind);
   view.waiting?.();
   try {
     await follow(kind, id, view, mine);
@@ -49,6 +53,8 @@ export async function resume(kind, view) {
       list();
       view.gone?.();
     } else refused(kind, error, view, mine);
+  } finally {
+    if (watching.get(kind) === mine) tell("job-over", kind);
   }
 }
 
@@ -74,6 +80,7 @@ function refused(kind, error, view, mine) {
 
 async function follow(kind, id, view, { signal }) {
   const first = await patiently(() => request(`/v1/jobs/${id}`, { signal }));
+  if (typeof first.request.scene === "string" && first.request.scene !== state.scene) return ofAnotherScene(kind, first, view);
   enter(kind, first);
   view.submitted?.(first);
   const job = ["successful", "failed", "dismissed"].includes(first.status)
@@ -96,10 +103,21 @@ async function follow(kind, id, view, { signal }) {
     throw error;
   });
   if (signal.aborted) return false;
-  if (results) view.result(results.result, results.sweeps, job);
+  if (results) {
+    view.result(results.result, results.sweeps, job);
+    tell("computed", { kind, request: first.request, result: results.result });
+  }
   if (job.status === "failed") view.failed(job.error?.detail ?? "The job failed.", job.error?.issues ?? []);
   tell("job-ended", job);
   return job.status === "successful";
+}
+
+// A job that a link names beside another scene: its values are not for this one.
+function ofAnotherScene(kind, job, view) {
+  delete state.jobs[kind];
+  write();
+  view.failed(`The ${kind} of the link is of the scene ${job.scene}, not of ${state.scene}: it is left out.`, []);
+  return false;
 }
 
 function enter(kind, job) {

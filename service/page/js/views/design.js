@@ -22,7 +22,7 @@ export function startDesign() {
 export const designView = {
   waiting: () => say("design-status", "The search waits for a worker."),
   progress: ({ progress }) => say("design-status", `Searching: ${percent(progress)}.`),
-  result(result, _sweeps) {
+  result(result, _sweeps, job) {
     say("design-status", `Found in ${seconds(result.seconds)} with ${result.evaluations} responses. ${result.status}`);
     const values = Object.entries(result.optimum ?? {});
     const others = (result.basins ?? []).slice(1).map((b) => Object.entries(b.values).map(([p, v]) => `${quantity(p, v)}: ${length(b.peak)}`).join(", "));
@@ -41,7 +41,7 @@ export const designView = {
         ...(result.looked_at?.length ? [["looked at", `${result.looked_at.length} designs over the whole range`]] : []),
         ...(others.length ? [["other local optima", others.join("; ")]] : []),
       ]),
-      values.length ? el("button", { type: "button", onclick: () => load(Object.fromEntries(values)) }, "Load this design") : null,
+      values.length ? el("button", { type: "button", onclick: () => load(Object.fromEntries(values), job.request) }, "Load this design") : null,
     );
     if (values.length) tell("optimum", { values: Object.fromEntries(values), peak: result.peak });
   },
@@ -62,12 +62,18 @@ function furtherOf({ rows }) {
 const heldIn = ({ held_by: held, peaks }) =>
   held && new Set((peaks ?? []).map((peak) => peak.case)).size > 1 ? ` (of ${held.case})` : "";
 
-// Sets the values of a design beside those set before.
-export function load(values) {
-  const set = { ...state.set };
-  for (const path of Object.keys(values)) delete set[path];
-  putAll({ ...set, ...values });
-  byId("live").scrollIntoView({ block: "nearest" });
+// Sets the values of a design with those it was computed with: of no other scene, and beside no other values.
+export function load(values, { scene, set = {} }) {
+  if (scene !== state.scene) return tell("notice", `This design is of the scene ${scene}, and ${state.scene} is shown: choose ${scene} first.`);
+  const own = { ...set };
+  for (const [names, value] of Object.entries(values)) {
+    for (const path of names.split(",").map((name) => name.trim())) {
+      delete own[path];
+      own[path] = value;
+    }
+  }
+  putAll(own);
+  return undefined;
 }
 
 async function plan() {

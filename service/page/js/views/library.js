@@ -105,11 +105,21 @@ function actions(sweep, name) {
   const file = (words, type, below = "") =>
     button(words, () => saveFrom(`/v1/sweeps/${sweep.id}${below}`, type, `sweep-${sweep.id}.${words.toLowerCase()}`));
   const same = current.body?.name === sweep.scene;
-  const use = same ? el("button", { type: "button", "aria-label": `Load ${name}`, onclick: () => load(valuesOf(sweep)) }, "Load") : null;
+  const take = same ? el("button", { type: "button", "aria-label": `Load ${name}`, onclick: () => use(sweep) }, "Load") : null;
   const forms = [file("CSV", "text/csv"), file("npz", "application/x-npz"), file("Parquet", "application/vnd.apache.parquet"),
     file("SVG", "image/svg+xml", "/plot.svg"), file("PNG", "image/png", "/plot.png"), button("TOML", () => tomlOf(sweep))];
   const more = el("details", {}, el("summary", { "aria-label": `Files of ${name}` }, "Files"), el("span", { class: "row tight" }, forms));
-  return el("span", { class: "row tight" }, use, more);
+  return el("span", { class: "row tight" }, take, more);
+}
+
+// The values of a sweep with all that its job had set.
+async function use(sweep) {
+  try {
+    const { request: asked } = await request(`/v1/jobs/${sweep.job}`);
+    load(Object.fromEntries(Object.entries(valuesOf(sweep)).filter(([path]) => path !== sweep.parameter)), { scene: sweep.scene, set: asked.set });
+  } catch (error) {
+    tell("notice", error.message);
+  }
 }
 
 // The scene of a sweep with its values, and the command that computes the same.

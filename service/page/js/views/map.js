@@ -9,6 +9,7 @@ import { warnings } from "../base/words.js";
 
 let plot = null;
 let last = null;
+let request = null;
 let optimum = null;
 
 export function startMap() {
@@ -17,7 +18,7 @@ export function startMap() {
     file: "map",
     height: 380,
     onPick: ({ x, y }) => {
-      load({ [last.parameter_path]: y });
+      load({ [last.parameter_path]: y }, request);
       tell("point", x);
     },
   });
@@ -36,7 +37,8 @@ export function startMap() {
 export const mapView = {
   waiting: () => say("map-status", "The map waits for a worker."),
   progress: ({ progress, points }) => say("map-status", `Map: ${percent(progress)}, ${points} points.`),
-  result(result) {
+  result(result, _sweeps, job) {
+    ({ request } = job);
     last = result;
     draw();
     const count = result.parameter.length * result.frequency.length;
