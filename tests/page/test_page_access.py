@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 from page_site import Site, Watch, opened
+from page_visits import with_all
 
 expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
@@ -27,12 +28,15 @@ CUT_OFF = """() => [...document.querySelectorAll("button, label, dd, p, h2, svg.
   .filter((node) => node.getBoundingClientRect().right > innerWidth + 1)
   .map((node) => node.outerHTML.slice(0, 120))
 """
-FOCUSABLE = "a[href], summary, button:not([disabled]), select, input:not([tabindex='-1']), [tabindex='0']"
+FOCUSABLE = (
+    "a[href], summary, button:not([disabled], [tabindex='-1']), select, textarea, "
+    "input:not([tabindex='-1']), [tabindex='0']"
+)
 
 
 def visit(context: BrowserContext, site: Site, words: str = "?scene=two-dof") -> Page:
     page = context.new_page()
-    page.goto(f"{site.url}/{words}")
+    page.goto(f"{site.url}/{with_all(words)}")
     page.locator("html[data-ready]").wait_for(state="attached")
     expect(page.locator("#live-status")).to_contain_text("peak")
     return page
@@ -93,7 +97,7 @@ def test_by_keyboard_alone(profile: Profile, site: Site, studied: str) -> None:
 def tab_through(page: Page) -> int:
     """How many elements Tab reaches, each with a visible outline."""
     page.evaluate("document.activeElement.blur(); window.scrollTo(0, 0); window.__seen = new Set()")
-    for _ in range(400):
+    for _ in range(800):
         page.keyboard.press("Tab")
         more = page.evaluate(NEXT)
         if not more:

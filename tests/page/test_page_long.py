@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 from page_matrices import ANSYS, place
 from page_site import Site, opened
-from page_visits import BAD_SCENE
+from page_visits import BAD_SCENE, with_all
 from PIL import Image
 
 from benchmarks.page import OPENED, SLIDE
@@ -42,7 +42,7 @@ def keep(view: Page | Locator, file: Path) -> None:
 
 
 def studied(page: Page, site: Site, words: str = "") -> None:
-    page.goto(f"{site.url}/{words}")
+    page.goto(f"{site.url}/{with_all(words)}")
     page.locator("html[data-ready][data-live]").wait_for(state="attached")
     page.click("#study")
     expect(page.locator("#study-status")).to_have_text("Everything is there.", timeout=300_000)
@@ -60,6 +60,8 @@ def test_every_view_of_the_bladed_disk(browser: Browser, site: Site, tmp_path: P
         page.mouse.move(0, 0)
         for view in VIEWS:
             keep(page.locator(f"#{view}"), where / f"{view}.png")
+        page.click("#library-filter summary")
+        page.check("#filter-intermediate")
         page.fill("#filter-contact", "shroud")
         page.fill("#filter-N0_min", "60")
         page.press("#filter-N0_min", "Enter")

@@ -10,6 +10,7 @@ import httpx
 import pytest
 from launch import COMMAND
 from page_site import Site, Watch, opened
+from page_visits import with_all
 
 expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
 
@@ -27,7 +28,7 @@ LONG_MAP: dict[str, Any] = {
 
 def visit(context: BrowserContext, site: Site, words: str = "") -> Page:
     page = context.new_page()
-    page.goto(f"{site.url}/{words}")
+    page.goto(f"{site.url}/{with_all(words)}")
     page.locator("html[data-ready]").wait_for(state="attached")
     return page
 
@@ -77,7 +78,7 @@ def test_another_scene_in_the_middle_of_a_study_begins_anew(profile: Profile, si
     expect(page.locator("#live-status")).to_contain_text("0.1016 mm")
     expect(page.locator("#jobs-list")).to_have_text("None yet.")
     expect(page.locator("#study-status")).to_have_text("")
-    assert page.url.endswith("?scene=bladed-disk&contact=shroud&range=20:3000")
+    assert page.url.endswith("?scene=bladed-disk&contact=shroud&range=20:3000&tab=all")
     for job in httpx.get(f"{site.url}/v1/jobs").json()["items"]:
         if job["status"] in ("accepted", "running"):
             httpx.delete(f"{site.url}/v1/jobs/{job['id']}")

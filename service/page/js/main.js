@@ -1,4 +1,4 @@
-// The page of stickslip: one scene, one button, everything that is known of it.
+// The page of stickslip: projects, scenes and runs at the left, one scene with its answer and views beside them.
 
 import { read, state, write } from "./base/address.js";
 import { Problem, patiently } from "./network/api.js";
@@ -28,23 +28,44 @@ import { startStudy } from "./views/study.js";
 import { startTheme } from "./base/theme.js";
 import { saveToml } from "./base/toml.js";
 import { VIEWS } from "./views.js";
+import { startComparison } from "./workbench/comparison.js";
+import { listProjects, startProjects } from "./workbench/projects.js";
+import { listRuns, startRuns } from "./workbench/runs.js";
+import { startTabs, tabOf } from "./workbench/tabs.js";
 
 const FIRST = "bladed-disk";
 let states = { states: null, at: null };
-
-function sections() {
-  const links = [...document.querySelectorAll("main > section")].slice(2).map((section) =>
-    el("li", {}, el("a", { href: `#${section.id}` }, section.querySelector("h2").dataset.short ?? section.querySelector("h2").textContent)));
-  show(byId("sections"), links);
-}
+let sceneNames = [];
 
 async function scenes() {
   const known = await listScenes();
   show(byId("scene"), known.map(({ name, shipped }) => el("option", { value: name }, shipped ? name : `${name} (stored)`)));
   if (!known.some(({ name }) => name === state.scene)) {
+    const wanted = state.scene;
     state.scene = known.some(({ name }) => name === FIRST) ? FIRST : known[0].name;
+    if (wanted) missing(wanted);
   }
   byId("scene").value = state.scene;
+  sceneNames = known;
+  sceneList();
+}
+
+// What a link wanted of a scene that is not there is not for the one shown instead.
+function missing(wanted) {
+  tell("notice", `There is no scene ${wanted} at this service: ${state.scene} is shown instead.`);
+  Object.assign(state, { set: {}, contact: "", variable: "", range: null, at: null });
+}
+
+function sceneList() {
+  show(byId("scene-list"), sceneNames.map(({ name, shipped }) => el("li", {},
+    el("button", { type: "button", "aria-current": name === state.scene ? "true" : undefined, onclick: () => choose(name) }, shipped ? name : `${name} (stored)`))));
+}
+
+async function choose(name) {
+  if (name === state.scene) return;
+  byId("scene").value = name;
+  await change(name);
+  byId("scene-list").querySelector("[aria-current]")?.focus();
 }
 
 async function open() {
@@ -74,7 +95,35 @@ async function change(name) {
   for (const kind of new Set([...Object.keys(VIEWS), ...Object.keys(state.jobs)])) forget(kind);
   Object.assign(state, { scene: name, set: {}, contact: "", variable: "", range: null, at: null, jobs: {} });
   tell("scene-left");
+  sceneList();
   await open().catch(failed);
+}
+
+// A run as it was computed: its scene, its values, its result in its view.
+async function openRun({ id, kind, request }) {
+  if (request.scene !== state.scene) {
+    byId("scene").value = request.scene;
+    await change(request.scene);
+  }
+  const [range] = Object.values(request.variables ?? {});
+  Object.assign(state, { set: { ...request.set }, harmonics: request.harmonics ?? state.harmonics });
+  const [path] = Object.keys(request.variables ?? {});
+  const varied = path ?? (request.from === undefined ? "" : request.parameter);
+  if (varied && !varied.includes(",") && Object.keys(request.variables ?? {}).length < 2) {
+    [state.contact, state.variable] = varied.split(".");
+    state.range = range ?? [request.from, request.to];
+  }
+  if (kind === "march") state.at = request.frequency_hz;
+  forget(kind);
+  state.jobs[kind] = id;
+  fillSettings();
+  write();
+  tell("scene-contact");
+  tell("values");
+  tell("settled");
+  tell("tab", tabOf(kind));
+  if (VIEWS[kind]) await resume(kind, VIEWS[kind]);
+  tell("runs-changed");
 }
 
 // The frequency response alone, where it is too large to be followed live.
@@ -95,6 +144,8 @@ function controls() {
   byId("edit-scene").addEventListener("click", editCurrent);
   byId("save-toml").addEventListener("click", () => saveToml(`${state.scene}.toml`));
   byId("share").addEventListener("click", share);
+  // Beside the views where there is room, folded above them where there is not.
+  byId("rail").open = matchMedia("(min-width: 70rem)").matches;
 }
 
 // Files that were chosen or dropped: a scene is opened, anything else is taken for matrices.
@@ -142,6 +193,8 @@ async function begin() {
     await patiently(open);
     await patiently(offerOthers);
     await openLibrary();
+    await listProjects();
+    await listRuns();
   } catch (error) {
     failed(error);
   }
@@ -153,7 +206,10 @@ function start() {
   startTheme();
   startNotices();
   read();
-  sections();
+  startTabs();
+  startProjects();
+  startRuns();
+  startComparison();
   startJobs();
   startDesign();
   startLive();
@@ -174,6 +230,7 @@ function start() {
     drawScene();
   });
   on("sweep-wanted", sweepAlone);
+  on("open-run", (found) => openRun(found).catch(failed));
   on("contact", fillSettings);
   on("scene-stored", async (name) => {
     await scenes().catch(failed);

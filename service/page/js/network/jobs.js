@@ -4,12 +4,17 @@ import { Problem, patiently, post, request } from "./api.js";
 import { state, write } from "../base/address.js";
 import { byId, el, show } from "../base/dom.js";
 import { tell } from "../base/events.js";
-import { percent } from "../base/format.js";
+import { timing } from "../base/timing.js";
 import { watch } from "./stream.js";
 
 const WORDS = { accepted: "waits", running: "runs", successful: "done", failed: "failed", dismissed: "stopped" };
+const ENDED = ["successful", "failed", "dismissed"];
+const TICK_MS = 1000;
 const shown = new Map();
 const watching = new Map();
+
+// What is computed while a project is open belongs to it.
+const inProject = () => (state.project ? { project: state.project } : {});
 
 // A key that no other request has; also where a page that did not come over TLS has no `randomUUID`.
 const freshKey = () =>
@@ -24,7 +29,7 @@ export async function run(kind, body, view, priority = 0) {
   const key = freshKey();
   try {
     const headers = { "Idempotency-Key": key };
-    const job = await patiently(() => post("/v1/jobs", { kind, priority, ...body }, { headers, signal: mine.signal }));
+    const job = await patiently(() => post("/v1/jobs", { kind, priority, ...body, ...inProject() }, { headers, signal: mine.signal }));
     state.jobs[kind] = job.id;
     write();
     return await follow(kind, job.id, view, mine);
@@ -83,16 +88,7 @@ async function follow(kind, id, view, { signal }) {
   if (typeof first.request.scene === "string" && first.request.scene !== state.scene) return ofAnotherScene(kind, first, view);
   enter(kind, first);
   view.submitted?.(first);
-  const job = ["successful", "failed", "dismissed"].includes(first.status)
-    ? first
-    : await watch(id, {
-        signal,
-        onProgress: (news) => {
-          enter(kind, { ...first, ...news });
-          view.progress?.(news);
-        },
-        onPoints: (news) => view.points?.(news),
-      });
+  const job = ENDED.includes(first.status) ? first : await watched(kind, first, view, signal);
   enter(kind, job);
   if (job.status === "dismissed") {
     view.failed("The job was stopped.", []);
@@ -110,6 +106,29 @@ async function follow(kind, id, view, { signal }) {
   if (job.status === "failed") view.failed(job.error?.detail ?? "The job failed.", job.error?.issues ?? []);
   tell("job-ended", job);
   return job.status === "successful";
+}
+
+// Follows a job to its end; the time it takes is told every second, also while nothing else is new.
+async function watched(kind, first, view, signal) {
+  let now = first;
+  const report = () => {
+    enter(kind, now);
+    if (now.status === "running") view.progress?.({ ...now, took: timing(now) });
+  };
+  const clock = setInterval(() => now.status === "running" && report(), TICK_MS);
+  try {
+    return await watch(first.id, {
+      signal,
+      onProgress: (news) => {
+        const started = now.started ?? (news.status === "running" ? new Date().toISOString() : null);
+        now = { ...now, ...news, started };
+        report();
+      },
+      onPoints: (news) => view.points?.(news),
+    });
+  } finally {
+    clearInterval(clock);
+  }
 }
 
 // A job that a link names beside another scene: its values are not for this one.
@@ -138,7 +157,7 @@ function list() {
       { class: "row" },
       el("span", { class: "job-name" }, name),
       el("progress", { class: "bar", max: 1, value: done, "aria-label": `Progress of ${name}` }),
-      el("span", {}, `${WORDS[job.status]}${job.status === "running" ? ` ${percent(job.progress)}` : ""}${job.result_of ? ", was stored" : ""}`),
+      el("span", {}, `${WORDS[job.status]}${timing(job)}${job.result_of ? ", was stored" : ""}`),
       stop,
     );
   });

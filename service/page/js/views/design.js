@@ -4,7 +4,7 @@ import { Problem, patiently, post } from "../network/api.js";
 import { state } from "../base/address.js";
 import { byId, el, facts, say, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { length, number, percent, quantity, seconds } from "../base/format.js";
+import { length, number, quantity, seconds } from "../base/format.js";
 import { putAll } from "./live.js";
 import { asked } from "../scene/scenes.js";
 
@@ -21,7 +21,7 @@ export function startDesign() {
 
 export const designView = {
   waiting: () => say("design-status", "The search waits for a worker."),
-  progress: ({ progress }) => say("design-status", `Searching: ${percent(progress)}.`),
+  progress: ({ took }) => say("design-status", `Searching:${took}.`),
   result(result, _sweeps, job) {
     say("design-status", `Found in ${seconds(result.seconds)} with ${result.evaluations} responses. ${result.status}`);
     const values = Object.entries(result.optimum ?? {});

@@ -4,7 +4,7 @@ import { chart } from "../charts/chart.js";
 import { load } from "./design.js";
 import { byId, el, say, show, table } from "../base/dom.js";
 import { on } from "../base/events.js";
-import { length, lengthUnit, number, percent, quantity, seconds } from "../base/format.js";
+import { length, lengthUnit, number, quantity, seconds } from "../base/format.js";
 
 const FAR_APART = 8;
 let plot = null;
@@ -28,7 +28,7 @@ export function startFront() {
 
 export const frontView = {
   waiting: () => say("front-status", "The front waits for a worker."),
-  progress: ({ progress }) => say("front-status", `Front: ${percent(progress)}.`),
+  progress: ({ took }) => say("front-status", `Front:${took}.`),
   result(result, _sweeps, job) {
     ({ request } = job);
     points = [...result.points].sort((a, b) => a.band_hz - b.band_hz);

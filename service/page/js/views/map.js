@@ -2,7 +2,7 @@
 
 import { byId, el, facts, say, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { length, number, percent, quantity, seconds, withUnit } from "../base/format.js";
+import { length, number, quantity, seconds, withUnit } from "../base/format.js";
 import { heatmap, shadeStrip } from "../charts/heatmap.js";
 import { load } from "./design.js";
 import { warnings } from "../base/words.js";
@@ -36,7 +36,7 @@ export function startMap() {
 
 export const mapView = {
   waiting: () => say("map-status", "The map waits for a worker."),
-  progress: ({ progress, points }) => say("map-status", `Map: ${percent(progress)}, ${points} points.`),
+  progress: ({ took, points }) => say("map-status", `Map:${took}; ${points} points.`),
   result(result, _sweeps, job) {
     ({ request } = job);
     last = result;
