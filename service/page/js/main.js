@@ -28,6 +28,7 @@ import { startStudy } from "./views/study.js";
 import { startTheme } from "./base/theme.js";
 import { saveToml } from "./base/toml.js";
 import { VIEWS } from "./views.js";
+import { startPanel } from "./design/panel.js";
 import { startComparison } from "./workbench/comparison.js";
 import { listProjects, startProjects } from "./workbench/projects.js";
 import { listRuns, startRuns } from "./workbench/runs.js";
@@ -224,6 +225,7 @@ function start() {
   startRenewal();
   startAnswer();
   startStudy();
+  startPanel();
   controls();
   on("states", (found) => {
     states = found;

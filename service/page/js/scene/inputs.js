@@ -2,7 +2,7 @@
 
 import { state } from "../base/address.js";
 import { number, quantity } from "../base/format.js";
-import { givenByScene, variable } from "./scenes.js";
+import { givenByScene, variable, variables } from "./scenes.js";
 
 const USUAL_HARMONICS = 11;
 const WITHOUT_HARMONICS = ["accuracy", "march"];
@@ -36,6 +36,8 @@ function changedRange(request) {
   const asked = rangeOf(request);
   if (!asked || asked[0] === "frequency" || !state.range) return [];
   const [path, [low, high]] = asked;
+  // What the form above does not offer it does not change either.
+  if (!variables().includes(path)) return [];
   if (path !== variable()) return [`${path} varied, now ${variable() || "nothing"}`];
   const [from, to] = state.range;
   if (same(low, from) && same(high, to)) return [];

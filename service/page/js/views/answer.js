@@ -108,6 +108,17 @@ function certificate({ reached, status, optimality, warnings = [] }) {
   return ["Certificate", reached ? (warnings.length ? "optimal, with warnings" : "optimal") : "not reached", `${status}${residual}${doubts}`, "answer-certificate"];
 }
 
+// In spite of what is not known: the worst case of the best nominal design, and of this one.
+function robustFigures({ aim, nominal, robust }) {
+  const [was, is] = [nominal, robust].map((side) => side?.worst?.peak ?? null);
+  const { name, perMetre } = lengthUnit(Math.max(was ?? 0, is ?? 0));
+  const text = (value) => (value === null ? null : number(value * perMetre));
+  return [
+    ["Worst peak", is === null ? "–" : `${arrow(text(was), text(is))} ${name}`, robust?.worst?.scenario?.words ? `with ${robust.worst.scenario.words}; before: the nominal design` : aim, "answer-peak"],
+    ["Peak, all nominal", robust?.peak ? length(robust.peak.value) : "–", robust?.peak ? `at ${number(robust.peak.at, 5)} Hz` : "", "answer-nominal"],
+  ];
+}
+
 function figures() {
   const { result, request } = designed;
   const was = known() && !request.cases ? before.found : null;
@@ -115,5 +126,6 @@ function figures() {
     const from = request.set?.[path] ?? givenByScene(path);
     return [path, quantity(path, value), from === undefined || from === null ? "" : `from ${quantity(path, from)}`];
   });
+  if ("aim" in result) return [...loads, ...robustFigures(result), certificate(result)];
   return [...loads, peakFigure(result, was), bandFigure(result, was), errorFigure(result), certificate(result)];
 }

@@ -7,6 +7,7 @@ import { on, tell } from "../base/events.js";
 import { length, number, quantity, seconds } from "../base/format.js";
 import { putAll } from "./live.js";
 import { asked } from "../scene/scenes.js";
+import { basinsOf, conditionsOf, limitsOf, robustOf } from "./held.js";
 
 let token = 0;
 
@@ -23,9 +24,15 @@ export const designView = {
   waiting: () => say("design-status", "The search waits for a worker."),
   progress: ({ took }) => say("design-status", `Searching:${took}.`),
   result(result, _sweeps, job) {
-    say("design-status", `Found in ${seconds(result.seconds)} with ${result.evaluations} responses. ${result.status}`);
+    const use = (found) => load(found, job.request);
     const values = Object.entries(result.optimum ?? {});
-    const others = (result.basins ?? []).slice(1).map((b) => Object.entries(b.values).map(([p, v]) => `${quantity(p, v)}: ${length(b.peak)}`).join(", "));
+    const button = values.length ? el("button", { type: "button", onclick: () => use(result.optimum) }, "Load this design") : null;
+    if ("aim" in result) {
+      say("design-status", result.status);
+      show(byId("design-facts"), facts(values.map(([path, v]) => [path, el("strong", {}, quantity(path, v))])), robustOf(result), button);
+      return;
+    }
+    say("design-status", `Found in ${seconds(result.seconds)} with ${result.evaluations} responses. ${result.status}`);
     show(
       byId("design-facts"),
       facts([
@@ -39,9 +46,8 @@ export const designView = {
         ...furtherOf(result).map(({ quantity: name, value, unit, what }) => [name, `${unit === "m" ? length(value) : `${number(value)} ${unit}`}: ${what}`]),
         ["held by", `${(result.active ?? []).join(", ") || "nothing"}${heldIn(result)}`],
         ...(result.looked_at?.length ? [["looked at", `${result.looked_at.length} designs over the whole range`]] : []),
-        ...(others.length ? [["other local optima", others.join("; ")]] : []),
       ]),
-      values.length ? el("button", { type: "button", onclick: () => load(Object.fromEntries(values), job.request) }, "Load this design") : null,
+      button, limitsOf(result), basinsOf(result, use), conditionsOf(result),
     );
     if (values.length) tell("optimum", { values: Object.fromEntries(values), peak: result.peak });
   },

@@ -4,6 +4,7 @@ import { saveText, svgText } from "../base/exports.js";
 import { byId } from "../base/dom.js";
 import { commands } from "../base/toml.js";
 import { state } from "../base/address.js";
+import { opened } from "../workbench/projects.js";
 
 const CHARTS = [["response", "Frequency response"], ["map", "Map"], ["front", "Peak against band"]];
 const FACTS = [["design-facts", "What holds the design"], ["response-facts", "Frequency response"], ["plan-facts", "Effects in use and left out"]];
@@ -36,9 +37,11 @@ export function reportText({ request, result }, figures, changed) {
   const values = Object.entries(request.set ?? {}).map(([path, value]) => `${path} = ${value}`).join(", ");
   const rows = figures.map(([name, value, more]) => `<tr><th scope="row">${escaped(name)}</th><td><strong>${escaped(value)}</strong></td><td>${escaped(more ?? "")}</td></tr>`);
   const again = [...commands(`${state.scene}.toml`), `stickslip report ${state.jobs.design ?? "JOB"} --out report.html --url ${location.origin}`];
+  const project = opened();
   return [
     `<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>${escaped(title)}</title><style>${STYLE}</style></head><body>`,
     `<h1>${escaped(title)}</h1>`,
+    project ? `<p>Project ${escaped(project.name)}${project.notes ? `: ${escaped(project.notes)}` : ""}</p>` : "",
     `<p>${escaped(new Date().toLocaleString())}. ${escaped(result.status)} Scene ${escaped(state.scene)}${values ? ` with ${escaped(values)}` : ""}, ${request.harmonics ?? 11} harmonics.</p>`,
     changed.length ? `<p class="stale">Stale when it was saved: computed for ${escaped(changed.join("; "))}.</p>` : "",
     `<table>${rows.join("\n")}</table>`,

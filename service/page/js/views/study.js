@@ -13,7 +13,8 @@ import { campbellBody } from "./studies.js";
 
 // The most wanted first.
 const PRIORITY = { sweep: 6, design: 5, map: 4, accuracy: 3, campbell: 3, pareto: 2 };
-const NOT_ASKED_AGAIN = ["kind", "fresh", "priority", "scene", "set", "harmonics"];
+const NOT_ASKED_AGAIN = ["kind", "fresh", "priority", "scene", "set", "harmonics", "project", "name", "notes", "tags"];
+const OF_THE_FORM = ["variables", "parameter", "from", "to", "steps", "frequencies", "ridge", "speeds_rpm", "orders", "band_hz"];
 let studies = 0;
 
 export function startStudy() {
@@ -64,11 +65,11 @@ function study() {
   });
 }
 
-// One study again, with what is set now. A problem that the form can not say, as of several variables, stays as it was.
+// One study again, with what is set now. A problem that the form can not say, as of several variables or with limits, stays as it was.
 function renew(kind) {
   if (!readSettings()) return;
   const before = computedFor(kind);
   const own = Object.fromEntries(Object.entries(before ?? {}).filter(([key]) => !NOT_ASKED_AGAIN.includes(key)));
-  const several = Object.keys(before?.variables ?? {}).length > 1 || before?.cases;
-  begin(kind, several ? { ...asked(), ...own } : bodyOf(kind));
+  const further = Object.keys(before?.variables ?? {}).length > 1 || (kind === "design" && Object.keys(own).some((key) => !OF_THE_FORM.includes(key) || key === "speeds_rpm"));
+  begin(kind, further ? { ...asked(), ...own } : bodyOf(kind));
 }
