@@ -13,7 +13,9 @@ export function zoomed(self, x) {
   const [low, high] = self.window ?? self.whole;
   const { y } = self.shown;
   const log = self.log ?? y.log ?? false;
-  self.sayLog?.(log);
+  // What has values below nothing, such as a loop, has no logarithms.
+  const signed = self.shown.series.some((line) => line.y.some((value) => value !== null && value < 0));
+  self.sayLog?.(log, signed);
   // A frame that was made for the whole of the other kind of axis is not one for this.
   const free = self.window || log !== (y.log ?? false);
   return [{ ...x, low, high }, free ? { ...y, log, low: log ? undefined : y.low, high: undefined, zero: !log && y.zero } : { ...y, log }];
@@ -43,7 +45,10 @@ export function zoomButtons(self, label) {
     self.log = log.getAttribute("aria-pressed") !== "true";
     self.repaint();
   } }, "log");
-  self.sayLog = (is) => log.setAttribute("aria-pressed", String(is));
+  self.sayLog = (is, signed) => {
+    log.setAttribute("aria-pressed", String(is));
+    log.hidden = signed && !is;
+  };
   const button = (sign, words, act) => el("button", { type: "button", "aria-label": `${label}: ${words}`, title: words, onclick: act }, sign);
   return [
     log,
