@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import BrowserContext, Page
 
 Profile = tuple["BrowserContext", Watch]
-LONG_MS = 300_000
+LONG_MS = 120_000
 
 
 def fill(page: Page, row: str, **values: str) -> None:
@@ -180,3 +180,4 @@ def test_from_nothing_to_a_compared_named_and_reported_design(profile: Profile, 
     text = Path(taken.value.path()).read_text(encoding="utf-8")
     assert "shroud.N0" in text
     assert "Stage 3" in text
+    assert "with a narrow band" in text

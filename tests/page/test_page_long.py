@@ -23,7 +23,18 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.long
 
 COLOURS = 256
-VIEWS = ("structure", "live", "response", "design", "map", "front", "point", "accuracy", "campbell")
+VIEWS = (
+    "structure",
+    "live",
+    "response",
+    "problem",
+    "design",
+    "map",
+    "front",
+    "point",
+    "accuracy",
+    "campbell",
+)
 
 
 def folder(tmp_path: Path) -> Path:
@@ -72,6 +83,8 @@ def test_every_view_of_the_bladed_disk(browser: Browser, site: Site, tmp_path: P
         page.locator("#library-table").evaluate("node => { node.style.maxHeight = '18rem'; }")
         page.locator("#library-table").evaluate("node => { node.style.overflowY = 'hidden'; }")
         keep(page.locator("#library"), where / "library.png")
+        page.set_viewport_size({"width": 1400, "height": 900})
+        page.click("#tab-response")
         page.evaluate("window.scrollTo(0, 0)")
         keep(page, where / "page.png")
         file = {"name": "mine.toml", "mimeType": "application/toml", "buffer": BAD_SCENE.encode()}
@@ -101,7 +114,8 @@ def test_the_two_masses_in_the_dark(browser: Browser, site: Site, tmp_path: Path
     where.mkdir(parents=True, exist_ok=True)
     with opened(browser, site, color_scheme="dark") as (context, _):
         page = context.new_page()
-        studied(page, site, "?scene=two-dof")
+        page.set_viewport_size({"width": 1400, "height": 900})
+        studied(page, site, "?scene=two-dof&tab=response")
         keep(page, where / "dark.png")
 
 

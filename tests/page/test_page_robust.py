@@ -63,7 +63,12 @@ def test_a_reload_goes_on_watching_and_two_tabs_do_not_disturb_each_other(
     expect(page.locator("#live-status")).to_contain_text("2.35 m")
     twin = visit(context, site, f"?scene=two-dof&map={job}")
     expect(twin.locator("#map-status")).to_contain_text("%")
-    page.get_by_role("button", name="Stop map of two-dof").click()
+    stop = page.get_by_role("button", name="Stop map of two-dof")
+    stop.focus()
+    said = page.inner_text("#jobs-list")
+    expect(page.locator("#jobs-list")).not_to_have_text(said)
+    expect(stop).to_be_focused()
+    stop.click()
     for tab in (page, twin):
         expect(tab.locator("#jobs-list")).to_contain_text("stopped")
         expect(tab.locator("#map-status")).to_contain_text("The job was stopped.")

@@ -144,24 +144,32 @@ function enter(kind, job) {
   list();
 }
 
+// A row stays the node it is while its job goes on: its button keeps the focus, and a press on it is a click.
+const lines = new Map();
+
 function list() {
+  for (const [kind, { id }] of lines) if (shown.get(kind)?.id !== id) lines.delete(kind);
   const rows = [...shown].map(([kind, job]) => {
-    const active = job.status === "accepted" || job.status === "running";
-    const name = `${kind} of ${job.scene ?? "a scene"}`;
-    const stop = active
-      ? el("button", { type: "button", "aria-label": `Stop ${name}`, onclick: () => dismiss(job.id) }, "Stop")
-      : null;
-    const done = active ? job.progress : 1;
-    return el(
-      "li",
-      { class: "row" },
-      el("span", { class: "job-name" }, name),
-      el("progress", { class: "bar", max: 1, value: done, "aria-label": `Progress of ${name}` }),
-      el("span", {}, `${WORDS[job.status]}${timing(job)}${job.result_of ? ", was stored" : ""}`),
-      stop,
-    );
+    if (!lines.has(kind)) lines.set(kind, line(kind, job));
+    const { node, bar, words, stop } = lines.get(kind);
+    const active = !ENDED.includes(job.status);
+    bar.value = active ? job.progress : 1;
+    words.textContent = `${WORDS[job.status]}${timing(job)}${job.result_of ? ", was stored" : ""}`;
+    stop.hidden = !active;
+    return node;
   });
-  show(byId("jobs-list"), rows.length ? el("ul", { class: "plain" }, rows) : el("p", { class: "note" }, "None yet."));
+  const host = byId("jobs-list");
+  const seen = [...(host.querySelector("ul")?.children ?? [])];
+  if (rows.length && rows.length === seen.length && rows.every((row, i) => row === seen[i])) return;
+  show(host, rows.length ? el("ul", { class: "plain" }, rows) : el("p", { class: "note" }, "None yet."));
+}
+
+function line(kind, job) {
+  const name = `${kind} of ${job.scene ?? "a scene"}`;
+  const bar = el("progress", { class: "bar", max: 1, value: 0, "aria-label": `Progress of ${name}` });
+  const words = el("span", {});
+  const stop = el("button", { type: "button", "aria-label": `Stop ${name}`, onclick: () => dismiss(job.id) }, "Stop");
+  return { id: job.id, bar, words, stop, node: el("li", { class: "row" }, el("span", { class: "job-name" }, name), bar, words, stop) };
 }
 
 async function dismiss(id) {

@@ -4,6 +4,7 @@ import { saveText, svgText } from "../base/exports.js";
 import { byId } from "../base/dom.js";
 import { commands } from "../base/toml.js";
 import { state } from "../base/address.js";
+import { request as ask } from "../network/api.js";
 import { opened } from "../workbench/projects.js";
 
 const CHARTS = [["response", "Frequency response"], ["map", "Map"], ["front", "Peak against band"]];
@@ -32,7 +33,11 @@ function drawn(name) {
 
 const part = (title, body) => (body ? `<h2>${escaped(title)}</h2>\n${body}\n` : "");
 
-export function reportText({ request, result }, figures, changed) {
+// What is said of the run: whose it is, its name, notes and tags.
+const aboutRun = (run) => (run
+  ? [run.owner && `by ${run.owner}`, run.name, run.tags.join(", "), run.notes].filter(Boolean).map((words) => `<p>${escaped(words)}</p>`) : []);
+
+export function reportText({ request, result }, figures, changed, run = null) {
   const title = `Damper of ${state.scene}`;
   const values = Object.entries(request.set ?? {}).map(([path, value]) => `${path} = ${value}`).join(", ");
   const rows = figures.map(([name, value, more]) => `<tr><th scope="row">${escaped(name)}</th><td><strong>${escaped(value)}</strong></td><td>${escaped(more ?? "")}</td></tr>`);
@@ -42,6 +47,7 @@ export function reportText({ request, result }, figures, changed) {
     `<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>${escaped(title)}</title><style>${STYLE}</style></head><body>`,
     `<h1>${escaped(title)}</h1>`,
     project ? `<p>Project ${escaped(project.name)}${project.notes ? `: ${escaped(project.notes)}` : ""}</p>` : "",
+    ...aboutRun(run),
     `<p>${escaped(new Date().toLocaleString())}. ${escaped(result.status)} Scene ${escaped(state.scene)}${values ? ` with ${escaped(values)}` : ""}, ${request.harmonics ?? 11} harmonics.</p>`,
     changed.length ? `<p class="stale">Stale when it was saved: computed for ${escaped(changed.join("; "))}.</p>` : "",
     `<table>${rows.join("\n")}</table>`,
@@ -52,4 +58,8 @@ export function reportText({ request, result }, figures, changed) {
   ].join("\n");
 }
 
-export const saveReport = (...given) => saveText(reportText(...given), `report-${state.scene}.html`, "text/html");
+export async function saveReport(...given) {
+  // Without a word of its run a report is still one: a run in the bin or a service away keeps nobody from it.
+  const run = await ask(`/v1/runs/${state.jobs.design}`).catch(() => null);
+  saveText(reportText(...given, run), `report-${state.scene}.html`, "text/html");
+}
