@@ -52,6 +52,15 @@ def studied(browser: Browser, site: Site) -> str:
         return page.url.removeprefix(f"{site.url}/")
 
 
+def unfold(page: Page) -> None:
+    """Open all that is folded away, with a row in each list of the design problem and the forms of the rail."""
+    page.evaluate("for (const node of document.querySelectorAll('details')) node.open = true")
+    for one in ("variables", "cases", "uncertain"):
+        page.click(f"#problem-{one}-add")
+    page.click("#project-new")
+    expect(page.locator("#runs-list .run-form").first).to_be_visible()
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_nothing_serious(browser: Browser, site: Site, studied: str, scheme: str) -> None:
     with opened(browser, site, color_scheme=scheme) as (context, _):
@@ -59,6 +68,7 @@ def test_axe_finds_nothing_serious(browser: Browser, site: Site, studied: str, s
         expect(page.locator("#front-facts tbody tr").first).to_be_visible()
         page.click("#edit-scene")
         expect(page.locator("#editor form")).to_be_visible()
+        unfold(page)
         found = axe.Axe().run(page).response["violations"]
         serious = [
             f"{one['id']}: {node['target']} {node['failureSummary']}"
@@ -114,6 +124,7 @@ def test_zoomed_and_narrow_nothing_is_cut_off(
         page = visit(context, site, studied)
         page.set_viewport_size({"width": width, "height": height})
         expect(page.locator("#front-facts tbody tr").first).to_be_visible()
+        unfold(page)
         wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
         assert wide <= 0
         page.locator("#study").scroll_into_view_if_needed()
