@@ -53,7 +53,7 @@ def studied(browser: Browser, site: Site) -> str:
 
 
 def unfold(page: Page) -> None:
-    """Open all that is folded away, with a row in each list of the design problem and the forms of the rail."""
+    """Open all that is folded away, with a row in each list of the problem and the forms of the rail."""
     page.evaluate("for (const node of document.querySelectorAll('details')) node.open = true")
     for one in ("variables", "cases", "uncertain"):
         page.click(f"#problem-{one}-add")

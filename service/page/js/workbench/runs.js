@@ -41,6 +41,8 @@ export function startRuns() {
     chosen = [];
     draw();
   });
+  byId("runs-list").addEventListener("pointerdown", () => { pressed = true; });
+  for (const end of ["pointerup", "pointercancel"]) document.addEventListener(end, () => { pressed = false; });
   document.addEventListener("visibilitychange", () => later(0));
 }
 
@@ -119,8 +121,11 @@ function values({ id }) {
 export const titleOf = (run) => run.name || `${run.kind} of ${run.scene ?? "a scene"}`;
 
 let seen = "";
+// A button that is being pressed is not drawn anew under the pointer: the press would be no click.
+let pressed = false;
 
 function draw() {
+  if (pressed) return;
   const host = byId("runs-list");
   const now = JSON.stringify([items, chosen, [...open], requests.size, state.jobs]);
   // What is being typed in stays; the same list is not drawn anew under the focus.
