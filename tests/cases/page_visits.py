@@ -33,8 +33,13 @@ band = [300.0, 900.0]
 """
 
 
+def with_all(words: str) -> str:
+    """The words of an address, of a page with every card under one another unless they name a tab."""
+    return words if "tab=" in words else f"{words}{'&' if words else '?'}tab=all"
+
+
 def visit(context: BrowserContext, site: Site, words: str = "") -> Page:
     page = context.new_page()
-    page.goto(f"{site.url}/{words}")
+    page.goto(f"{site.url}/{with_all(words)}")
     page.locator("html[data-ready]").wait_for(state="attached")
     return page

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 from page_site import Site, Watch, opened
+from page_visits import with_all
 
 expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
@@ -27,12 +28,15 @@ CUT_OFF = """() => [...document.querySelectorAll("button, label, dd, p, h2, svg.
   .filter((node) => node.getBoundingClientRect().right > innerWidth + 1)
   .map((node) => node.outerHTML.slice(0, 120))
 """
-FOCUSABLE = "a[href], summary, button:not([disabled]), select, input:not([tabindex='-1']), [tabindex='0']"
+FOCUSABLE = (
+    "a[href], summary, button:not([disabled], [tabindex='-1']), select, textarea, "
+    "input:not([tabindex='-1']), [tabindex='0']"
+)
 
 
 def visit(context: BrowserContext, site: Site, words: str = "?scene=two-dof") -> Page:
     page = context.new_page()
-    page.goto(f"{site.url}/{words}")
+    page.goto(f"{site.url}/{with_all(words)}")
     page.locator("html[data-ready]").wait_for(state="attached")
     expect(page.locator("#live-status")).to_contain_text("peak")
     return page
@@ -48,6 +52,15 @@ def studied(browser: Browser, site: Site) -> str:
         return page.url.removeprefix(f"{site.url}/")
 
 
+def unfold(page: Page) -> None:
+    """Open all that is folded away, with a row in each list of the problem and the forms of the rail."""
+    page.evaluate("for (const node of document.querySelectorAll('details')) node.open = true")
+    for one in ("variables", "cases", "uncertain"):
+        page.click(f"#problem-{one}-add")
+    page.click("#project-new")
+    expect(page.locator("#runs-list .run-form").first).to_be_visible()
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_nothing_serious(browser: Browser, site: Site, studied: str, scheme: str) -> None:
     with opened(browser, site, color_scheme=scheme) as (context, _):
@@ -55,6 +68,7 @@ def test_axe_finds_nothing_serious(browser: Browser, site: Site, studied: str, s
         expect(page.locator("#front-facts tbody tr").first).to_be_visible()
         page.click("#edit-scene")
         expect(page.locator("#editor form")).to_be_visible()
+        unfold(page)
         found = axe.Axe().run(page).response["violations"]
         serious = [
             f"{one['id']}: {node['target']} {node['failureSummary']}"
@@ -93,7 +107,7 @@ def test_by_keyboard_alone(profile: Profile, site: Site, studied: str) -> None:
 def tab_through(page: Page) -> int:
     """How many elements Tab reaches, each with a visible outline."""
     page.evaluate("document.activeElement.blur(); window.scrollTo(0, 0); window.__seen = new Set()")
-    for _ in range(400):
+    for _ in range(800):
         page.keyboard.press("Tab")
         more = page.evaluate(NEXT)
         if not more:
@@ -110,6 +124,7 @@ def test_zoomed_and_narrow_nothing_is_cut_off(
         page = visit(context, site, studied)
         page.set_viewport_size({"width": width, "height": height})
         expect(page.locator("#front-facts tbody tr").first).to_be_visible()
+        unfold(page)
         wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
         assert wide <= 0
         page.locator("#study").scroll_into_view_if_needed()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 from page_matrices import ANSYS, place
 from page_site import Site, opened
-from page_visits import BAD_SCENE
+from page_visits import BAD_SCENE, with_all
 from PIL import Image
 
 from benchmarks.page import OPENED, SLIDE
@@ -23,7 +23,18 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.long
 
 COLOURS = 256
-VIEWS = ("structure", "live", "response", "design", "map", "front", "point", "accuracy", "campbell")
+VIEWS = (
+    "structure",
+    "live",
+    "response",
+    "problem",
+    "design",
+    "map",
+    "front",
+    "point",
+    "accuracy",
+    "campbell",
+)
 
 
 def folder(tmp_path: Path) -> Path:
@@ -42,7 +53,7 @@ def keep(view: Page | Locator, file: Path) -> None:
 
 
 def studied(page: Page, site: Site, words: str = "") -> None:
-    page.goto(f"{site.url}/{words}")
+    page.goto(f"{site.url}/{with_all(words)}")
     page.locator("html[data-ready][data-live]").wait_for(state="attached")
     page.click("#study")
     expect(page.locator("#study-status")).to_have_text("Everything is there.", timeout=300_000)
@@ -60,6 +71,8 @@ def test_every_view_of_the_bladed_disk(browser: Browser, site: Site, tmp_path: P
         page.mouse.move(0, 0)
         for view in VIEWS:
             keep(page.locator(f"#{view}"), where / f"{view}.png")
+        page.click("#library-filter summary")
+        page.check("#filter-intermediate")
         page.fill("#filter-contact", "shroud")
         page.fill("#filter-N0_min", "60")
         page.press("#filter-N0_min", "Enter")
@@ -70,6 +83,8 @@ def test_every_view_of_the_bladed_disk(browser: Browser, site: Site, tmp_path: P
         page.locator("#library-table").evaluate("node => { node.style.maxHeight = '18rem'; }")
         page.locator("#library-table").evaluate("node => { node.style.overflowY = 'hidden'; }")
         keep(page.locator("#library"), where / "library.png")
+        page.set_viewport_size({"width": 1400, "height": 900})
+        page.click("#tab-response")
         page.evaluate("window.scrollTo(0, 0)")
         keep(page, where / "page.png")
         file = {"name": "mine.toml", "mimeType": "application/toml", "buffer": BAD_SCENE.encode()}
@@ -99,7 +114,8 @@ def test_the_two_masses_in_the_dark(browser: Browser, site: Site, tmp_path: Path
     where.mkdir(parents=True, exist_ok=True)
     with opened(browser, site, color_scheme="dark") as (context, _):
         page = context.new_page()
-        studied(page, site, "?scene=two-dof")
+        page.set_viewport_size({"width": 1400, "height": 900})
+        studied(page, site, "?scene=two-dof&tab=response")
         keep(page, where / "dark.png")
 
 

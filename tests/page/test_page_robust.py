@@ -10,6 +10,7 @@ import httpx
 import pytest
 from launch import COMMAND
 from page_site import Site, Watch, opened
+from page_visits import with_all
 
 expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
 
@@ -27,7 +28,7 @@ LONG_MAP: dict[str, Any] = {
 
 def visit(context: BrowserContext, site: Site, words: str = "") -> Page:
     page = context.new_page()
-    page.goto(f"{site.url}/{words}")
+    page.goto(f"{site.url}/{with_all(words)}")
     page.locator("html[data-ready]").wait_for(state="attached")
     return page
 
@@ -62,7 +63,12 @@ def test_a_reload_goes_on_watching_and_two_tabs_do_not_disturb_each_other(
     expect(page.locator("#live-status")).to_contain_text("2.35 m")
     twin = visit(context, site, f"?scene=two-dof&map={job}")
     expect(twin.locator("#map-status")).to_contain_text("%")
-    page.get_by_role("button", name="Stop map of two-dof").click()
+    stop = page.get_by_role("button", name="Stop map of two-dof")
+    stop.focus()
+    said = page.inner_text("#jobs-list")
+    expect(page.locator("#jobs-list")).not_to_have_text(said)
+    expect(stop).to_be_focused()
+    stop.click()
     for tab in (page, twin):
         expect(tab.locator("#jobs-list")).to_contain_text("stopped")
         expect(tab.locator("#map-status")).to_contain_text("The job was stopped.")
@@ -77,7 +83,7 @@ def test_another_scene_in_the_middle_of_a_study_begins_anew(profile: Profile, si
     expect(page.locator("#live-status")).to_contain_text("0.1016 mm")
     expect(page.locator("#jobs-list")).to_have_text("None yet.")
     expect(page.locator("#study-status")).to_have_text("")
-    assert page.url.endswith("?scene=bladed-disk&contact=shroud&range=20:3000")
+    assert page.url.endswith("?scene=bladed-disk&contact=shroud&range=20:3000&tab=all")
     for job in httpx.get(f"{site.url}/v1/jobs").json()["items"]:
         if job["status"] in ("accepted", "running"):
             httpx.delete(f"{site.url}/v1/jobs/{job['id']}")
@@ -89,7 +95,7 @@ def test_a_study_that_falls_short_says_so(profile: Profile, site: Site) -> None:
     page = visit(context, site, "?scene=two-dof")
     page.fill("#low", "2000")
     page.click("#study")
-    expect(page.locator("#study-status")).to_contain_text("0 < from < to")
+    expect(page.locator("#settings-wrong")).to_contain_text("0 < from < to")
     page.fill("#low", "99.9")
     page.fill("#high", "1e200")
     page.click("#study")

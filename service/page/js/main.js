@@ -1,72 +1,84 @@
-// The page of stickslip: one scene, one button, everything that is known of it.
+// The page of stickslip: projects, scenes and runs at the left, one scene with its answer and views beside them.
 
 import { read, state, write } from "./base/address.js";
 import { Problem, patiently } from "./network/api.js";
-import { byId, el, say, show } from "./base/dom.js";
-import { designView, startDesign } from "./views/design.js";
+import { byId, el, show } from "./base/dom.js";
+import { startAnswer } from "./views/answer.js";
+import { startDesign } from "./views/design.js";
 import { edit, editCurrent, openText } from "./scene/editor.js";
 import { on, tell } from "./base/events.js";
-import { frontView, startFront } from "./views/front.js";
-import { unitOf } from "./base/format.js";
+import { startFront } from "./views/front.js";
 import { loadLaws } from "./scene/laws.js";
 import { forget, resume, run, startJobs } from "./network/jobs.js";
 import { openLibrary, startLibrary } from "./views/library.js";
 import { showResponse, startLive } from "./views/live.js";
-import { mapView, startMap } from "./views/map.js";
+import { startMap } from "./views/map.js";
 import { openMatrices } from "./scene/matrices.js";
 import { SCENES } from "./scene/matrix_files.js";
 import { startNotices } from "./base/notices.js";
 import { offerOthers, startOthers } from "./views/others.js";
-import { referee, startPoint } from "./views/point.js";
+import { startPoint } from "./views/point.js";
+import { startRenewal } from "./views/renewal.js";
 import { startResponse, sweepView } from "./views/response.js";
-import { asked, chooseVariable, current, defaultRange, listScenes, loadScene, shownScene, variable, variables, variedContacts } from "./scene/scenes.js";
+import { asked, current, listScenes, loadScene, shownScene, variedContacts } from "./scene/scenes.js";
+import { fillSettings, startSettings } from "./scene/settings.js";
 import { contactTable, drawStructure } from "./scene/structure.js";
-import { accuracyView, campbellBody, campbellView, startStudies } from "./views/studies.js";
+import { startStudies } from "./views/studies.js";
+import { startStudy } from "./views/study.js";
 import { startTheme } from "./base/theme.js";
 import { saveToml } from "./base/toml.js";
 import { VIEWS } from "./views.js";
+import { startPanel } from "./design/panel.js";
+import { startComparison } from "./workbench/comparison.js";
+import { listProjects, startProjects } from "./workbench/projects.js";
+import { listRuns, startRuns } from "./workbench/runs.js";
+import { startTabs, tabOf } from "./workbench/tabs.js";
 
 const FIRST = "bladed-disk";
 let states = { states: null, at: null };
-let studies = 0;
-
-function sections() {
-  const links = [...document.querySelectorAll("main > section")].slice(1).map((section) =>
-    el("li", {}, el("a", { href: `#${section.id}` }, section.querySelector("h2").dataset.short ?? section.querySelector("h2").textContent)));
-  show(byId("sections"), links);
-}
+let sceneNames = [];
 
 async function scenes() {
   const known = await listScenes();
   show(byId("scene"), known.map(({ name, shipped }) => el("option", { value: name }, shipped ? name : `${name} (stored)`)));
   if (!known.some(({ name }) => name === state.scene)) {
+    const wanted = state.scene;
     state.scene = known.some(({ name }) => name === FIRST) ? FIRST : known[0].name;
+    if (wanted) missing(wanted);
   }
   byId("scene").value = state.scene;
+  sceneNames = known;
+  sceneList();
+}
+
+// What a link wanted of a scene that is not there is not for the one shown instead.
+function missing(wanted) {
+  tell("notice", `There is no scene ${wanted} at this service: ${state.scene} is shown instead.`);
+  Object.assign(state, { set: {}, contact: "", variable: "", range: null, at: null });
+}
+
+function sceneList() {
+  show(byId("scene-list"), sceneNames.map(({ name, shipped }) => el("li", {},
+    el("button", { type: "button", "aria-current": name === state.scene ? "true" : undefined, onclick: () => choose(name) }, shipped ? name : `${name} (stored)`))));
+}
+
+async function choose(name) {
+  if (name === state.scene) return;
+  byId("scene").value = name;
+  await change(name);
+  byId("scene-list").querySelector("[aria-current]")?.focus();
 }
 
 async function open() {
   await loadScene(state.scene);
   const names = variedContacts().map((c) => c.name);
   if (!names.includes(state.contact)) Object.assign(state, { contact: names[0] ?? "", variable: "" });
-  fillDesign();
+  fillSettings();
   write();
   states = { states: null, at: null };
   drawScene();
   tell("scene");
   for (const [kind, view] of Object.entries(VIEWS)) if (view) resume(kind, view);
-}
-
-function fillDesign() {
-  const path = variable();
-  show(byId("variable"), variables().map((each) => el("option", { value: each }, each)));
-  byId("variable").value = path;
-  byId("variable-unit").textContent = unitOf(path);
-  byId("study").disabled = !path;
-  if (!path) say("study-status", "The scene has no contact to design.");
-  state.range ??= path ? defaultRange() : null;
-  if (state.range) [byId("low").value, byId("high").value] = state.range.map(String);
-  byId("harmonics").value = String(state.harmonics);
 }
 
 let drawn = "";
@@ -83,42 +95,36 @@ function drawScene() {
 async function change(name) {
   for (const kind of new Set([...Object.keys(VIEWS), ...Object.keys(state.jobs)])) forget(kind);
   Object.assign(state, { scene: name, set: {}, contact: "", variable: "", range: null, at: null, jobs: {} });
-  studies += 1;
-  say("study-status", "");
+  tell("scene-left");
+  sceneList();
   await open().catch(failed);
 }
 
-// The one button: every study of the scene, the most wanted first.
-function study() {
-  const [low, high] = [byId("low").valueAsNumber, byId("high").valueAsNumber];
-  const harmonics = byId("harmonics").valueAsNumber;
-  if (!(low > 0 && high > low)) return say("study-status", "The range of the variable must have 0 < from < to.", true);
-  if (!(harmonics >= 1 && harmonics <= 200)) return say("study-status", "Harmonics must be a whole number from 1 to 200.", true);
-  Object.assign(state, { range: [low, high], harmonics, at: null });
+// A run as it was computed: its scene, its values, its result in its view.
+async function openRun({ id, kind, request }) {
+  if (request.scene !== state.scene) {
+    byId("scene").value = request.scene;
+    await change(request.scene);
+  }
+  const [range] = Object.values(request.variables ?? {});
+  Object.assign(state, { set: { ...request.set }, harmonics: request.harmonics ?? state.harmonics });
+  const [path] = Object.keys(request.variables ?? {});
+  const varied = path ?? (request.from === undefined ? "" : request.parameter);
+  if (varied && !varied.includes(",") && Object.keys(request.variables ?? {}).length < 2) {
+    [state.contact, state.variable] = varied.split(".");
+    state.range = range ?? [request.from, request.to];
+  }
+  if (kind === "march") state.at = request.frequency_hz;
+  forget(kind);
+  state.jobs[kind] = id;
+  fillSettings();
   write();
-  const body = asked();
-  const { scene, set } = body;
-  const path = variable();
-  // Peaks are followed where every contact is plain friction; a map without them is for all laws.
-  const tracked = current.body.contacts.every((contact) => (contact.law ?? "coulomb") === "coulomb");
-  const ranged = { parameter: path, from: low, to: high };
-  say("study-status", "The jobs are under way: response, design, map, front, accuracy, Campbell diagram.");
-  const all = [
-    run("sweep", body, sweepView, 6).then(async (done) => done && (await referee(5))),
-    run("design", { ...body, variables: { [path]: [low, high] } }, designView, 5),
-    run("map", { ...body, ...ranged, steps: 60, frequencies: 400, ridge: tracked }, mapView, 4),
-    run("accuracy", { scene, set }, accuracyView, 3),
-    run("campbell", { ...body, ...campbellBody() }, campbellView, 3),
-    run("pareto", { ...body, variables: { [path]: [low, high] } }, frontView, 2),
-  ];
-  const mine = (studies += 1);
-  Promise.all(all).then((done) => {
-    const short = done.filter((each) => !each).length;
-    if (mine !== studies) return;
-    if (short) say("study-status", `${short} of ${all.length} studies did not come to their end: each says why.`, true);
-    else say("study-status", "Everything is there.");
-  });
-  return undefined;
+  tell("scene-contact");
+  tell("values");
+  tell("settled");
+  tell("tab", tabOf(kind));
+  if (VIEWS[kind]) await resume(kind, VIEWS[kind]);
+  tell("runs-changed");
 }
 
 // The frequency response alone, where it is too large to be followed live.
@@ -129,15 +135,6 @@ async function sweepAlone() {
 
 function controls() {
   byId("scene").addEventListener("change", () => change(byId("scene").value));
-  byId("study").addEventListener("click", study);
-  byId("variable").addEventListener("change", () => {
-    chooseVariable(byId("variable").value);
-    state.range = null;
-    fillDesign();
-    write();
-    tell("scene-contact");
-    tell("values");
-  });
   byId("open-file").addEventListener("click", () => byId("file").click());
   byId("file").addEventListener("change", async () => {
     await take([...byId("file").files]);
@@ -148,6 +145,8 @@ function controls() {
   byId("edit-scene").addEventListener("click", editCurrent);
   byId("save-toml").addEventListener("click", () => saveToml(`${state.scene}.toml`));
   byId("share").addEventListener("click", share);
+  // Beside the views where there is room, folded above them where there is not.
+  byId("rail").open = matchMedia("(min-width: 70rem)").matches;
 }
 
 // Files that were chosen or dropped: a scene is opened, anything else is taken for matrices.
@@ -195,6 +194,8 @@ async function begin() {
     await patiently(open);
     await patiently(offerOthers);
     await openLibrary();
+    await listProjects();
+    await listRuns();
   } catch (error) {
     failed(error);
   }
@@ -206,7 +207,10 @@ function start() {
   startTheme();
   startNotices();
   read();
-  sections();
+  startTabs();
+  startProjects();
+  startRuns();
+  startComparison();
   startJobs();
   startDesign();
   startLive();
@@ -217,13 +221,19 @@ function start() {
   startStudies();
   startOthers();
   startLibrary();
+  startSettings();
+  startRenewal();
+  startAnswer();
+  startStudy();
+  startPanel();
   controls();
   on("states", (found) => {
     states = found;
     drawScene();
   });
   on("sweep-wanted", sweepAlone);
-  on("contact", fillDesign);
+  on("open-run", (found) => openRun(found).catch(failed));
+  on("contact", fillSettings);
   on("scene-stored", async (name) => {
     await scenes().catch(failed);
     byId("scene").value = name;

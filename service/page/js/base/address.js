@@ -1,7 +1,8 @@
 // What is seen, in the address: a reload goes on, and a link shows another the same.
 
 // Every other word is the name of a kind of job, with the id of its job.
-const WORDS = ["scene", "contact", "variable", "set", "harmonics", "at", "range", "compare"];
+const WORDS = ["scene", "contact", "variable", "set", "harmonics", "at", "range", "compare", "tab", "project"];
+export const FIRST_TAB = "response";
 const KIND = /^[a-z][a-z0-9-]{0,31}$/;
 const ID = /^[0-9a-f-]{36}$/;
 
@@ -15,6 +16,8 @@ export const state = {
   at: null,
   jobs: {},
   compare: [],
+  tab: "",
+  project: "",
 };
 
 export function read() {
@@ -28,6 +31,8 @@ export function read() {
   const range = (words.get("range") ?? "").split(":").map(Number);
   state.range = range.length === 2 && range.every((end) => end > 0) ? range : null;
   state.compare = (words.get("compare") ?? "").split(",").filter((id) => ID.test(id));
+  state.tab = words.get("tab") ?? "";
+  state.project = ID.test(words.get("project") ?? "") ? words.get("project") : "";
   state.jobs = {};
   for (const [kind, id] of words) {
     if (!WORDS.includes(kind) && KIND.test(kind) && ID.test(id)) state.jobs[kind] = id;
@@ -46,6 +51,8 @@ export function write() {
   if (state.at !== null) words.set("at", Number(state.at.toPrecision(9)));
   for (const [kind, id] of Object.entries(state.jobs)) words.set(kind, id);
   if (state.compare.length) words.set("compare", state.compare.join(","));
+  if (state.tab && state.tab !== FIRST_TAB) words.set("tab", state.tab);
+  if (state.project) words.set("project", state.project);
   const text = words.toString().replaceAll("%3A", ":").replaceAll("%2C", ",");
   const address = `${location.pathname}${text ? `?${text}` : ""}`;
   if (address !== location.pathname + location.search) history.replaceState(null, "", address + location.hash);

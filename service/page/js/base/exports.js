@@ -28,9 +28,10 @@ export async function saveFrom(path, accept, name, options) {
   }
 }
 
-// The drawing with its computed paint as attributes: it looks the same outside the page.
+// The drawing with its computed paint as attributes: it looks the same outside the page. The copy stands in a document
+// of its own, which loads nothing: what the page may load says nothing about a picture inside a file.
 export function standalone(drawing, canvas) {
-  const copy = drawing.cloneNode(true);
+  const copy = document.implementation.createHTMLDocument("").importNode(drawing, true);
   const [from, to] = [drawing.querySelectorAll("*"), copy.querySelectorAll("*")];
   from.forEach((node, i) => {
     const style = getComputedStyle(node);
@@ -48,7 +49,7 @@ export function standalone(drawing, canvas) {
 
 function underlay(copy, canvas) {
   const place = { x: canvas.offsetLeft, y: canvas.offsetTop, width: canvas.offsetWidth, height: canvas.offsetHeight };
-  const image = document.createElementNS("http://www.w3.org/2000/svg", "image");
+  const image = copy.ownerDocument.createElementNS("http://www.w3.org/2000/svg", "image");
   for (const [name, value] of Object.entries(place)) image.setAttribute(name, value);
   image.setAttribute("preserveAspectRatio", "none");
   image.setAttribute("href", canvas.toDataURL("image/png"));

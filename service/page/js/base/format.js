@@ -4,7 +4,9 @@ const LENGTHS = [
   [0.1, "m", 1],
   [1e-4, "mm", 1e3],
   [1e-7, "µm", 1e6],
-  [0, "nm", 1e9],
+  [1e-10, "nm", 1e9],
+  // Below an atom's size only rounding is left: said in metres, with its power of ten.
+  [0, "m", 1],
 ];
 const UNITS = new Map([["frequency", "Hz"], ["amplitude", "N"], ["phase", "rad"]]);
 

@@ -5,47 +5,62 @@ import { csvText, pngBlob, saveBlob, saveText, svgText } from "../base/exports.j
 import { number } from "../base/format.js";
 import { pathOf, plane, shape } from "./plane.js";
 import { extent } from "./scales.js";
+import { dragged, joined, zoomButtons, zoomKey, zoomed } from "./zoom.js";
 
 const MARGIN_LEFT = 62;
 const DASHES = { dashed: "7 4", dotted: "2 4" };
 
 // What a chart shows: {x, y: {name, log, zero, low, high}, series: [{name, x, y, colour, dash, width, shape, bare}],
 // bands: [[low, high]], limits: [{y, name}], marks: [{x, y, text, shape, colour}]}.
-export function chart(host, { label, file, height = 300, onPick, legend = true, pickSeries = 0 }) {
+// Charts of the same `link` share the crosshair and the stretch that is zoomed.
+export function chart(host, { label, file, height = 300, onPick, legend = true, pickSeries = 0, link = "" }) {
   const read = el("p", { class: "chart-read", "aria-live": "polite" });
   const drawing = svg("svg", { class: "chart", role: "group", tabindex: 0, "aria-label": label });
   drawing.setAttribute("aria-roledescription", onPick ? "chart, arrows move along it, Enter picks" : "chart, arrows move along it");
   const tools = el("div", { class: "chart-tools" });
   show(host, drawing, el("div", { class: "chart-foot" }, read, tools));
-  const self = { drawing, shown: null, at: null };
-  tools.append(...saving(self, file, label));
+  const self = { drawing, shown: null, at: null, link, log: null, window: null };
+  tools.append(...zoomButtons(self, label), ...saving(self, file, label));
 
+  self.repaint = () => self.shown && paint(self, host, height, legend, label);
   self.draw = (what) => {
+    const before = self.shown && self.at !== null ? pointOf(self, pickSeries).x : null;
     self.shown = what;
     tools.hidden = false;
-    paint(self, host, height, legend, label);
+    self.repaint();
+    // What the cursor reads is of the curve that is seen, not of the one before.
+    if (before !== null) self.cursor(nearest(self.shown.series[pickSeries], before));
   };
   // Nothing to show: a frame of the same size, so that nothing moves when there is.
   self.clear = (words = "Nothing computed yet.") => {
-    Object.assign(self, { shown: null, at: null });
+    Object.assign(self, { shown: null, at: null, window: null });
     tools.hidden = true;
     read.textContent = "";
     const width = Math.max(host.clientWidth, 240);
+    self.width = host.clientWidth;
     drawingOf(drawing, width, height, empty(width, height, words));
   };
   self.clear();
   self.cursor = (index) => moveCursor(self, index, read, pickSeries);
   drawing.addEventListener("pointermove", (event) => hover(self, event, pickSeries));
-  drawing.addEventListener("pointerleave", () => self.mark?.replaceChildren());
+  drawing.addEventListener("pointerleave", () => {
+    self.mark?.replaceChildren();
+    self.share?.(null);
+  });
+  joined(self);
+  const justDragged = dragged(self);
   drawing.addEventListener("keydown", (event) => keyed(self, event, onPick, pickSeries));
   if (onPick) {
     drawing.addEventListener("click", (event) => {
+      if (justDragged()) return;
       hover(self, event, pickSeries);
       if (self.at !== null) onPick(pointOf(self, pickSeries), self.at);
     });
   }
   new ResizeObserver(() => {
-    if (self.shown && Math.abs(host.clientWidth - self.width) > 1) paint(self, host, height, legend, label);
+    if (Math.abs(host.clientWidth - (self.width ?? 0)) <= 1) return;
+    if (self.shown) self.repaint();
+    else self.clear();
   }).observe(host);
   return self;
 }
@@ -65,8 +80,9 @@ function paint(self, host, height, legend, label) {
   const width = Math.max(host.clientWidth, 240);
   self.width = host.clientWidth;
   const framed = series.filter((line) => !line.bare);
-  const x = ends({ pad: 0, ...self.shown.x }, [...framed.map((line) => line.x), marks.map((m) => m.x)]);
-  const y = ends(self.shown.y, [
+  const whole = ends({ pad: 0, ...self.shown.x }, [...framed.map((line) => line.x), marks.map((m) => m.x)]);
+  const [x, inY] = zoomed(self, whole);
+  const y = ends(inY, self.window ? [...framed.map((line) => inside(line, x))] : [
     ...framed.map((line) => line.y),
     marks.map((m) => m.y),
     limits.map((limit) => limit.y).filter((v) => v !== undefined),
@@ -76,7 +92,7 @@ function paint(self, host, height, legend, label) {
   Object.assign(self, base);
   const clip = `clip-${label.replace(/\W+/g, "-")}`;
   const { box, xs, ys } = base;
-  const inside = svg(
+  const within = svg(
     "g",
     { "clip-path": `url(#${clip})` },
     bands.map(([low, high]) =>
@@ -89,11 +105,23 @@ function paint(self, host, height, legend, label) {
   drawingOf(self.drawing, width, height, [
     svg("defs", {}, svg("clipPath", { id: clip }, svg("rect", { x: box.left, y: box.top - 6, width: box.right - box.left, height: box.bottom - box.top + 12 }))),
     base.frame,
-    inside,
+    within,
     marks.map((mark) => marked(mark, base)),
     key(names),
     self.mark,
   ]);
+}
+
+// The values of a line over a stretch, with its neighbours: what the frame of a zoomed chart holds.
+const inside = (line, { low, high }) =>
+  line.y.filter((_, i) => [i - 1, i, i + 1].some((at) => line.x[at] >= low && line.x[at] <= high));
+
+function nearest(line, x) {
+  let best = 0;
+  line.x.forEach((value, i) => {
+    if (value !== null && line.y[i] !== null && Math.abs(value - x) < Math.abs((line.x[best] ?? Infinity) - x)) best = i;
+  });
+  return best;
 }
 
 function drawingOf(drawing, width, height, nodes) {
@@ -221,12 +249,14 @@ function moveCursor(self, index, read, which) {
     svg("path", { class: "cursor", d: `M${px} ${self.box.top}V${self.box.bottom}M${self.box.left} ${py}H${self.box.right}` }),
     shape("circle", px, py, 4, 7),
   );
+  self.share?.(x);
   read.textContent = self.shown.describe?.(x, y, self.at) ?? `${self.shown.x.name}: ${number(x, 6)} · ${self.shown.y.name}: ${number(y, 5)}`;
 }
 
 function keyed(self, event, onPick, which) {
   const count = self.shown?.series[which]?.x.length ?? 0;
   if (!count) return;
+  if (zoomKey(self, event, () => (self.at === null ? null : pointOf(self, which).x))) return;
   const at = self.at ?? 0;
   const moves = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 };
   if (event.key in moves) self.cursor(at + moves[event.key]);

@@ -31,12 +31,20 @@ export function plane(width, height, x, y, { paper = true, above = 0 } = {}) {
   return { box, xs, ys, frame };
 }
 
+const LETTER = 6.8;
+const APART = 8;
+
 function gridLines(box, xs, ys, lines) {
   const nodes = [];
+  let free = -Infinity;
   for (const { value, text } of xs.ticks((box.right - box.left) / PIXELS_A_TICK.x)) {
     if (xs.whole && !Number.isInteger(value)) continue;
     const at = xs.at(value);
     nodes.push(svg("line", { class: lines ? "grid" : "axis", x1: at, x2: at, y1: lines ? box.top : box.bottom + 4, y2: box.bottom }));
+    // A number that would stand on its neighbour is left out; its line stays.
+    const half = (LETTER * text.length) / 2;
+    if (at - half < free) continue;
+    free = at + half + APART;
     nodes.push(svg("text", { class: "soft", x: at, y: box.bottom + 16, "text-anchor": "middle" }, text));
   }
   for (const { value, text } of ys.ticks((box.bottom - box.top) / PIXELS_A_TICK.y)) {

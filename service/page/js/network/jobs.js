@@ -4,12 +4,17 @@ import { Problem, patiently, post, request } from "./api.js";
 import { state, write } from "../base/address.js";
 import { byId, el, show } from "../base/dom.js";
 import { tell } from "../base/events.js";
-import { percent } from "../base/format.js";
+import { timing } from "../base/timing.js";
 import { watch } from "./stream.js";
 
 const WORDS = { accepted: "waits", running: "runs", successful: "done", failed: "failed", dismissed: "stopped" };
+const ENDED = ["successful", "failed", "dismissed"];
+const TICK_MS = 1000;
 const shown = new Map();
 const watching = new Map();
+
+// What is computed while a project is open belongs to it.
+const inProject = () => (state.project ? { project: state.project } : {});
 
 // A key that no other request has; also where a page that did not come over TLS has no `randomUUID`.
 const freshKey = () =>
@@ -19,17 +24,20 @@ const freshKey = () =>
 export async function run(kind, body, view, priority = 0) {
   forget(kind);
   const mine = begin(kind);
+  tell("job-begun", kind);
   view.waiting?.();
   const key = freshKey();
   try {
     const headers = { "Idempotency-Key": key };
-    const job = await patiently(() => post("/v1/jobs", { kind, priority, ...body }, { headers, signal: mine.signal }));
+    const job = await patiently(() => post("/v1/jobs", { kind, priority, ...body, ...inProject() }, { headers, signal: mine.signal }));
     state.jobs[kind] = job.id;
     write();
     return await follow(kind, job.id, view, mine);
   } catch (error) {
     refused(kind, error, view, mine);
     return false;
+  } finally {
+    if (watching.get(kind) === mine) tell("job-over", kind);
   }
 }
 
@@ -38,6 +46,7 @@ export async function resume(kind, view) {
   const id = state.jobs[kind];
   if (!id) return;
   const mine = begin(kind);
+  tell("job-begun", kind);
   view.waiting?.();
   try {
     await follow(kind, id, view, mine);
@@ -49,6 +58,8 @@ export async function resume(kind, view) {
       list();
       view.gone?.();
     } else refused(kind, error, view, mine);
+  } finally {
+    if (watching.get(kind) === mine) tell("job-over", kind);
   }
 }
 
@@ -74,18 +85,10 @@ function refused(kind, error, view, mine) {
 
 async function follow(kind, id, view, { signal }) {
   const first = await patiently(() => request(`/v1/jobs/${id}`, { signal }));
+  if (typeof first.request.scene === "string" && first.request.scene !== state.scene) return ofAnotherScene(kind, first, view);
   enter(kind, first);
   view.submitted?.(first);
-  const job = ["successful", "failed", "dismissed"].includes(first.status)
-    ? first
-    : await watch(id, {
-        signal,
-        onProgress: (news) => {
-          enter(kind, { ...first, ...news });
-          view.progress?.(news);
-        },
-        onPoints: (news) => view.points?.(news),
-      });
+  const job = ENDED.includes(first.status) ? first : await watched(kind, first, view, signal);
   enter(kind, job);
   if (job.status === "dismissed") {
     view.failed("The job was stopped.", []);
@@ -96,10 +99,44 @@ async function follow(kind, id, view, { signal }) {
     throw error;
   });
   if (signal.aborted) return false;
-  if (results) view.result(results.result, results.sweeps, job);
+  if (results) {
+    view.result(results.result, results.sweeps, job);
+    tell("computed", { kind, request: first.request, result: results.result });
+  }
   if (job.status === "failed") view.failed(job.error?.detail ?? "The job failed.", job.error?.issues ?? []);
   tell("job-ended", job);
   return job.status === "successful";
+}
+
+// Follows a job to its end; the time it takes is told every second, also while nothing else is new.
+async function watched(kind, first, view, signal) {
+  let now = first;
+  const report = () => {
+    enter(kind, now);
+    if (now.status === "running") view.progress?.({ ...now, took: timing(now) });
+  };
+  const clock = setInterval(() => now.status === "running" && report(), TICK_MS);
+  try {
+    return await watch(first.id, {
+      signal,
+      onProgress: (news) => {
+        const started = now.started ?? (news.status === "running" ? new Date().toISOString() : null);
+        now = { ...now, ...news, started };
+        report();
+      },
+      onPoints: (news) => view.points?.(news),
+    });
+  } finally {
+    clearInterval(clock);
+  }
+}
+
+// A job that a link names beside another scene: its values are not for this one.
+function ofAnotherScene(kind, job, view) {
+  delete state.jobs[kind];
+  write();
+  view.failed(`The ${kind} of the link is of the scene ${job.scene}, not of ${state.scene}: it is left out.`, []);
+  return false;
 }
 
 function enter(kind, job) {
@@ -107,24 +144,32 @@ function enter(kind, job) {
   list();
 }
 
+// A row stays the node it is while its job goes on: its button keeps the focus, and a press on it is a click.
+const lines = new Map();
+
 function list() {
+  for (const [kind, { id }] of lines) if (shown.get(kind)?.id !== id) lines.delete(kind);
   const rows = [...shown].map(([kind, job]) => {
-    const active = job.status === "accepted" || job.status === "running";
-    const name = `${kind} of ${job.scene ?? "a scene"}`;
-    const stop = active
-      ? el("button", { type: "button", "aria-label": `Stop ${name}`, onclick: () => dismiss(job.id) }, "Stop")
-      : null;
-    const done = active ? job.progress : 1;
-    return el(
-      "li",
-      { class: "row" },
-      el("span", { class: "job-name" }, name),
-      el("progress", { class: "bar", max: 1, value: done, "aria-label": `Progress of ${name}` }),
-      el("span", {}, `${WORDS[job.status]}${job.status === "running" ? ` ${percent(job.progress)}` : ""}${job.result_of ? ", was stored" : ""}`),
-      stop,
-    );
+    if (!lines.has(kind)) lines.set(kind, line(kind, job));
+    const { node, bar, words, stop } = lines.get(kind);
+    const active = !ENDED.includes(job.status);
+    bar.value = active ? job.progress : 1;
+    words.textContent = `${WORDS[job.status]}${timing(job)}${job.result_of ? ", was stored" : ""}`;
+    stop.hidden = !active;
+    return node;
   });
-  show(byId("jobs-list"), rows.length ? el("ul", { class: "plain" }, rows) : el("p", { class: "note" }, "None yet."));
+  const host = byId("jobs-list");
+  const seen = [...(host.querySelector("ul")?.children ?? [])];
+  if (rows.length && rows.length === seen.length && rows.every((row, i) => row === seen[i])) return;
+  show(host, rows.length ? el("ul", { class: "plain" }, rows) : el("p", { class: "note" }, "None yet."));
+}
+
+function line(kind, job) {
+  const name = `${kind} of ${job.scene ?? "a scene"}`;
+  const bar = el("progress", { class: "bar", max: 1, value: 0, "aria-label": `Progress of ${name}` });
+  const words = el("span", {});
+  const stop = el("button", { type: "button", "aria-label": `Stop ${name}`, onclick: () => dismiss(job.id) }, "Stop");
+  return { id: job.id, bar, words, stop, node: el("li", { class: "row" }, el("span", { class: "job-name" }, name), bar, words, stop) };
 }
 
 async function dismiss(id) {

@@ -7,6 +7,7 @@ import { current } from "./scenes.js";
 import { parameterOf } from "./laws.js";
 
 const escaped = (key) => String(key).replaceAll("~", "~0").replaceAll("/", "~1");
+const MISSING = "";
 let draft = null;
 let rest = [];
 
@@ -50,7 +51,21 @@ function close() {
   byId("edit-scene").focus();
 }
 
+// A value that is missing gets an empty field where it belongs: what is said of it stands there, and it can be filled in.
+function provideMissing(issues) {
+  for (const { pointer } of issues) {
+    const [last, ...above] = pointer.split("/").slice(1).map((part) => part.replaceAll("~1", "/").replaceAll("~0", "~")).reverse();
+    const owner = above.reverse().reduce((item, key) => item?.[key], draft);
+    if (last === undefined || owner === null || typeof owner !== "object" || Array.isArray(owner) || Object.hasOwn(owner, last)) continue;
+    if (owner !== draft || last === "name") owner[last] = MISSING;
+  }
+}
+
+// The scene as it is handed in: fields that are still empty are left out.
+const sent = () => JSON.stringify(draft, (_, value) => (value === MISSING ? undefined : value));
+
 function draw(issues) {
+  provideMissing(issues);
   const panel = byId("editor");
   panel.hidden = false;
   rest = [...issues];
@@ -114,7 +129,7 @@ const UNITS = [
 ];
 
 function unitOf({ pointer, owner, key, value }) {
-  if (typeof value !== "number") return "";
+  if (typeof value !== "number" && value !== MISSING) return "";
   const known = pointer.startsWith("/contacts/") ? parameterOf(owner, key)?.unit : UNITS.find(([end]) => end.test(pointer))?.[1];
   return known ?? "";
 }
@@ -144,9 +159,9 @@ function groupsOf(scene) {
 
 async function store() {
   try {
-    const { issues } = await post("/v1/scenes/read", { text: JSON.stringify(draft), form: "json" });
+    const { issues } = await post("/v1/scenes/read", { text: sent(), form: "json" });
     if (issues.length) return draw(issues);
-    const stored = await post("/v1/scenes", draft);
+    const stored = await post("/v1/scenes", JSON.parse(sent()));
     byId("editor").hidden = true;
     tell("scene-stored", stored.name);
   } catch (error) {

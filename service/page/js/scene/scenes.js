@@ -34,6 +34,13 @@ export const firstForce = () => {
   return Array.isArray(excitation) ? excitation[0] : excitation;
 };
 
+// The value that the scene itself writes down; none where it follows from others.
+export function givenByScene(path) {
+  if (path === "excitation.amplitude") return firstForce().amplitude;
+  const value = contactOf(path)?.[path.split(".")[1]];
+  return typeof value === "number" ? value : undefined;
+}
+
 // The value of a path as the scene has it, before anything is set.
 export function ownValue(path) {
   if (path === "excitation.amplitude") return firstForce().amplitude;

@@ -4,9 +4,10 @@ import { Problem, patiently, post } from "../network/api.js";
 import { state } from "../base/address.js";
 import { byId, el, facts, say, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { length, number, percent, quantity, seconds } from "../base/format.js";
+import { length, number, quantity, seconds } from "../base/format.js";
 import { putAll } from "./live.js";
 import { asked } from "../scene/scenes.js";
+import { basinsOf, conditionsOf, limitsOf, robustOf } from "./held.js";
 
 let token = 0;
 
@@ -21,11 +22,17 @@ export function startDesign() {
 
 export const designView = {
   waiting: () => say("design-status", "The search waits for a worker."),
-  progress: ({ progress }) => say("design-status", `Searching: ${percent(progress)}.`),
-  result(result, _sweeps) {
-    say("design-status", `Found in ${seconds(result.seconds)} with ${result.evaluations} responses. ${result.status}`);
+  progress: ({ took }) => say("design-status", `Searching:${took}.`),
+  result(result, _sweeps, job) {
+    const use = (found) => load(found, job.request);
     const values = Object.entries(result.optimum ?? {});
-    const others = (result.basins ?? []).slice(1).map((b) => Object.entries(b.values).map(([p, v]) => `${quantity(p, v)}: ${length(b.peak)}`).join(", "));
+    const button = values.length ? el("button", { type: "button", onclick: () => use(result.optimum) }, "Load this design") : null;
+    if ("aim" in result) {
+      say("design-status", result.status);
+      show(byId("design-facts"), facts(values.map(([path, v]) => [path, el("strong", {}, quantity(path, v))])), robustOf(result), button);
+      return;
+    }
+    say("design-status", `Found in ${seconds(result.seconds)} with ${result.evaluations} responses. ${result.status}`);
     show(
       byId("design-facts"),
       facts([
@@ -39,9 +46,8 @@ export const designView = {
         ...furtherOf(result).map(({ quantity: name, value, unit, what }) => [name, `${unit === "m" ? length(value) : `${number(value)} ${unit}`}: ${what}`]),
         ["held by", `${(result.active ?? []).join(", ") || "nothing"}${heldIn(result)}`],
         ...(result.looked_at?.length ? [["looked at", `${result.looked_at.length} designs over the whole range`]] : []),
-        ...(others.length ? [["other local optima", others.join("; ")]] : []),
       ]),
-      values.length ? el("button", { type: "button", onclick: () => load(Object.fromEntries(values)) }, "Load this design") : null,
+      button, limitsOf(result), basinsOf(result, use), conditionsOf(result),
     );
     if (values.length) tell("optimum", { values: Object.fromEntries(values), peak: result.peak });
   },
@@ -62,12 +68,18 @@ function furtherOf({ rows }) {
 const heldIn = ({ held_by: held, peaks }) =>
   held && new Set((peaks ?? []).map((peak) => peak.case)).size > 1 ? ` (of ${held.case})` : "";
 
-// Sets the values of a design beside those set before.
-export function load(values) {
-  const set = { ...state.set };
-  for (const path of Object.keys(values)) delete set[path];
-  putAll({ ...set, ...values });
-  byId("live").scrollIntoView({ block: "nearest" });
+// Sets the values of a design with those it was computed with: of no other scene, and beside no other values.
+export function load(values, { scene, set = {} }) {
+  if (scene !== state.scene) return tell("notice", `This design is of the scene ${scene}, and ${state.scene} is shown: choose ${scene} first.`);
+  const own = { ...set };
+  for (const [names, value] of Object.entries(values)) {
+    for (const path of names.split(",").map((name) => name.trim())) {
+      delete own[path];
+      own[path] = value;
+    }
+  }
+  putAll(own);
+  return undefined;
 }
 
 async function plan() {

@@ -4,18 +4,19 @@ import { chart } from "../charts/chart.js";
 import { load } from "./design.js";
 import { byId, el, say, show, table } from "../base/dom.js";
 import { on } from "../base/events.js";
-import { length, lengthUnit, number, percent, quantity, seconds } from "../base/format.js";
+import { length, lengthUnit, number, quantity, seconds } from "../base/format.js";
 
 const FAR_APART = 8;
 let plot = null;
 let points = [];
+let request = null;
 
 export function startFront() {
   plot = chart(byId("front-figure"), {
     label: "Front of peak against band",
     file: "front",
     height: 300,
-    onPick: (_point, at) => points[at] && load(points[at].values),
+    onPick: (_point, at) => points[at] && load(points[at].values, request),
   });
   on("scene", () => {
     points = [];
@@ -27,8 +28,9 @@ export function startFront() {
 
 export const frontView = {
   waiting: () => say("front-status", "The front waits for a worker."),
-  progress: ({ progress }) => say("front-status", `Front: ${percent(progress)}.`),
-  result(result) {
+  progress: ({ took }) => say("front-status", `Front:${took}.`),
+  result(result, _sweeps, job) {
+    ({ request } = job);
     points = [...result.points].sort((a, b) => a.band_hz - b.band_hz);
     if (!points.length) return say("front-status", result.status, true);
     const peaks = points.map((p) => p.peak);
@@ -47,7 +49,7 @@ export const frontView = {
       el("div", { class: "scroll", role: "region", "aria-label": "Designs of the front", tabindex: 0 },
         table(["design", { text: "peak", number: true }, { text: "band", number: true }, ""],
           points.map((p) => [words(p), { text: length(p.peak), number: true }, { text: `${number(p.band_hz)} Hz`, number: true },
-            el("button", { type: "button", "aria-label": `Load the design ${words(p)}`, onclick: () => load(p.values) }, "Load")]),
+            el("button", { type: "button", "aria-label": `Load the design ${words(p)}`, onclick: () => load(p.values, request) }, "Load")]),
           "Designs of the front")),
     );
     return undefined;

@@ -3,6 +3,7 @@
 import { state, write } from "../base/address.js";
 import { request } from "../network/api.js";
 import { chart } from "../charts/chart.js";
+import { throughPeak } from "../charts/curves.js";
 import { load } from "./design.js";
 import { byId, el, say, show, table } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
@@ -32,7 +33,9 @@ export function startLibrary() {
   const inputs = FILTERS.map(([name, words, type]) =>
     el("span", { class: "pair" }, el("label", { for: `filter-${name}` }, words), el("input", { id: `filter-${name}`, name, type, step: "any" })));
   const sort = el("select", { id: "filter-sort", name: "sort" }, SORTS.map(([value, words]) => el("option", { value }, words)));
-  show(form, inputs, el("span", { class: "pair" }, el("label", { for: "filter-sort" }, "Order"), sort), el("button", { type: "submit" }, "Show"));
+  show(form, inputs, el("span", { class: "pair" }, el("label", { for: "filter-sort" }, "Order"), sort), 
+    el("span", { class: "pair" }, el("input", { id: "filter-intermediate", type: "checkbox", name: "all" }), el("label", { for: "filter-intermediate" }, "also those on the way to a design, a map or a front")),
+    el("button", { type: "submit" }, "Show"));
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     list();
@@ -49,12 +52,13 @@ export async function openLibrary() {
 
 function query() {
   const words = new URLSearchParams({ limit: SIZE });
-  for (const [name, value] of new FormData(byId("library-form"))) if (String(value).trim()) words.set(name, String(value).trim());
+  if (!byId("filter-intermediate").checked) words.set("intermediate", "false");
+  for (const [name, value] of new FormData(byId("library-form"))) if (name !== "all" && String(value).trim()) words.set(name, String(value).trim());
   return `/v1/sweeps?${words}`;
 }
 
 const nothing = () =>
-  ([...byId("library-form").querySelectorAll("input")].some(({ value }) => value.trim())
+  ([...byId("library-form").querySelectorAll("input:not([type=checkbox])")].some(({ value }) => value.trim())
     ? "No stored sweep meets this."
     : "No sweep is stored yet: Find the best damper computes the first ones.");
 
@@ -105,11 +109,21 @@ function actions(sweep, name) {
   const file = (words, type, below = "") =>
     button(words, () => saveFrom(`/v1/sweeps/${sweep.id}${below}`, type, `sweep-${sweep.id}.${words.toLowerCase()}`));
   const same = current.body?.name === sweep.scene;
-  const use = same ? el("button", { type: "button", "aria-label": `Load ${name}`, onclick: () => load(valuesOf(sweep)) }, "Load") : null;
+  const take = same ? el("button", { type: "button", "aria-label": `Load ${name}`, onclick: () => use(sweep) }, "Load") : null;
   const forms = [file("CSV", "text/csv"), file("npz", "application/x-npz"), file("Parquet", "application/vnd.apache.parquet"),
     file("SVG", "image/svg+xml", "/plot.svg"), file("PNG", "image/png", "/plot.png"), button("TOML", () => tomlOf(sweep))];
   const more = el("details", {}, el("summary", { "aria-label": `Files of ${name}` }, "Files"), el("span", { class: "row tight" }, forms));
-  return el("span", { class: "row tight" }, use, more);
+  return el("span", { class: "row tight" }, take, more);
+}
+
+// The values of a sweep with all that its job had set.
+async function use(sweep) {
+  try {
+    const { request: asked } = await request(`/v1/jobs/${sweep.job}`);
+    load(Object.fromEntries(Object.entries(valuesOf(sweep)).filter(([path]) => path !== sweep.parameter)), { scene: sweep.scene, set: asked.set });
+  } catch (error) {
+    tell("notice", error.message);
+  }
 }
 
 // The scene of a sweep with its values, and the command that computes the same.
@@ -176,9 +190,10 @@ function drawCompared(found) {
   plot.draw({
     x: { name: withUnit(found[0].parameter) },
     y: { name: `amplitude [${unit.name}]`, zero: !far, log: far },
-    series: found.map((sweep, i) => ({
-      name: titleOf(sweep), x: sweep.arrays.parameter, y: sweep.arrays.amplitude.map((v) => v * unit.perMetre), colour: 1 + (i % 7), dash: DASHES[i % 3],
-    })),
+    series: found.map((sweep, i) => {
+      const { parameter, amplitude } = throughPeak({ ...sweep.arrays, peak: sweep.peak });
+      return { name: titleOf(sweep), x: parameter, y: amplitude.map((v) => v * unit.perMetre), colour: 1 + (i % 7), dash: DASHES[i % 3] };
+    }),
   });
   const row = (name, of) => [name, ...found.map((sweep) => ({ text: of(sweep), number: true }))];
   show(

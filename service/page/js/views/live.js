@@ -4,8 +4,10 @@ import { state, write } from "../base/address.js";
 import { chart } from "../charts/chart.js";
 import { byId, el, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { length, lengthUnit, number, quantity, unitOf } from "../base/format.js";
+import { length, number, quantity, unitOf } from "../base/format.js";
 import { previewer } from "../network/previews.js";
+import { responseOf } from "../charts/curves.js";
+import { ghosts, pinned } from "./pins.js";
 import { asked, current, ownValue, ranges, value, variedContacts } from "../scene/scenes.js";
 
 const STEPS = 400;
@@ -15,6 +17,7 @@ const times = [];
 let plot = null;
 let ask = null;
 let slow = 0;
+let latest = null;
 
 export const rate = () => (times.length > 1 ? (1000 * (times.length - 1)) / (times[times.length - 1] - times[0]) : 0);
 
@@ -23,10 +26,14 @@ export function startLive() {
     label: "Live frequency response",
     file: "live-response",
     height: 260,
+    link: "frequency",
     onPick: ({ x }) => tell("point", x),
   });
   ask = previewer("sweep", drawn, refused);
+  pinned(() => latest);
+  on("pins", redraw);
   on("scene", () => {
+    latest = null;
     buildSliders();
     refresh();
   });
@@ -60,7 +67,8 @@ function refused(error, token) {
 // The response of a job as the live one, where that is not followed.
 export function showResponse(result) {
   clearTimeout(slow);
-  plot.draw(responseOf(result));
+  latest = result;
+  redraw();
   byId("live-status").textContent = `Of a job, with ${asked().harmonics} harmonics: ${words(result)}`;
 }
 
@@ -69,49 +77,23 @@ const words = ({ peak, band_hz: band, status, peak_certificate: certificate }) =
   + (band === null ? "" : `, band ${number(band)} Hz`)
   + (peak && certificate && !certificate.known ? `; ${certificate.reason}` : "");
 
+function redraw() {
+  if (latest) plot.draw(responseOf(latest, ghosts()));
+}
+
 function drawn(answer, { milliseconds, token }) {
   clearTimeout(slow);
   if (token !== state.scene) return;
   const now = performance.now();
   times.push(now);
   if (times.length > RATE_WINDOW) times.shift();
-  const shown = responseOf(answer);
-  plot.draw(shown);
+  latest = answer;
+  redraw();
   tell("states", { states: answer.states, at: answer.peak?.at });
   const fewer = answer.n_harmonics < state.harmonics ? ` · with ${answer.n_harmonics} of ${state.harmonics} harmonics, as the whole disk is solved: the frequency response below keeps all` : "";
   byId("live-status").textContent = `${words(answer)} · ${answer.points} points in ${number(answer.seconds * 1e3, 2)} ms, answered after ${number(milliseconds, 2)} ms${fewer}`;
   performance.mark("live-drawn");
   document.documentElement.dataset.live = String(Number(document.documentElement.dataset.live ?? 0) + 1);
-}
-
-// The amplitudes of the points that are stable, and of those that are not with their neighbours; null elsewhere.
-export function byStability({ amplitude, unstable }) {
-  if (!unstable?.length) return { stable: amplitude, unstable: null };
-  const inside = (i, more) => unstable.some(([first, last]) => i >= first - more && i <= last + more);
-  return {
-    stable: amplitude.map((a, i) => (inside(i, 0) ? null : a)),
-    unstable: amplitude.map((a, i) => (inside(i, 1) ? a : null)),
-  };
-}
-
-// A response as a chart: curve, peak, band. `more` are further curves.
-export function responseOf(answer, more = []) {
-  const scale = lengthUnit(answer.peak?.value ?? 1);
-  const up = (values) => values.map((v) => (v === null ? null : v * scale.perMetre));
-  const parts = byStability(answer);
-  const { dof } = current.body.observe;
-  return {
-    x: { name: "frequency [Hz]" },
-    y: { name: `max |${dof}| [${scale.name}]`, zero: true, low: 0, pad: 0.14 },
-    series: [
-      { name: more.length ? "with friction" : parts.unstable ? "stable" : "", x: answer.parameter, y: up(parts.stable), colour: 1 },
-      ...(parts.unstable ? [{ name: "not stable", x: answer.parameter, y: up(parts.unstable), colour: 1, dash: "dashed" }] : []),
-      ...more.map((line) => ({ ...line, y: up(line.y) })),
-    ],
-    bands: answer.band_intervals_hz ?? [],
-    marks: answer.peak ? [{ x: answer.peak.at, y: answer.peak.value * scale.perMetre, text: `${length(answer.peak.value)} at ${number(answer.peak.at, 5)} Hz` }] : [],
-    describe: (x, y) => `${number(x, 6)} Hz: ${number(y, 5)} ${scale.name}`,
-  };
 }
 
 function allRanges() {

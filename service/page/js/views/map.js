@@ -2,13 +2,14 @@
 
 import { byId, el, facts, say, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { length, number, percent, quantity, seconds, withUnit } from "../base/format.js";
+import { length, number, quantity, seconds, withUnit } from "../base/format.js";
 import { heatmap, shadeStrip } from "../charts/heatmap.js";
 import { load } from "./design.js";
 import { warnings } from "../base/words.js";
 
 let plot = null;
 let last = null;
+let request = null;
 let optimum = null;
 
 export function startMap() {
@@ -17,7 +18,7 @@ export function startMap() {
     file: "map",
     height: 380,
     onPick: ({ x, y }) => {
-      load({ [last.parameter_path]: y });
+      load({ [last.parameter_path]: y }, request);
       tell("point", x);
     },
   });
@@ -35,8 +36,9 @@ export function startMap() {
 
 export const mapView = {
   waiting: () => say("map-status", "The map waits for a worker."),
-  progress: ({ progress, points }) => say("map-status", `Map: ${percent(progress)}, ${points} points.`),
-  result(result) {
+  progress: ({ took, points }) => say("map-status", `Map:${took}; ${points} points.`),
+  result(result, _sweeps, job) {
+    ({ request } = job);
     last = result;
     draw();
     const count = result.parameter.length * result.frequency.length;

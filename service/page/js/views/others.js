@@ -5,7 +5,7 @@ import { state } from "../base/address.js";
 import { byId, el, facts, say, show, table } from "../base/dom.js";
 import { on } from "../base/events.js";
 import { saveText } from "../base/exports.js";
-import { number, percent } from "../base/format.js";
+import { number } from "../base/format.js";
 import { resume, run } from "../network/jobs.js";
 import { asked } from "../scene/scenes.js";
 import { VIEWS } from "../views.js";
@@ -126,7 +126,7 @@ const view = (name) => ({
     say("others-status", `${name} waits for a worker.`);
     show(byId("others-result"));
   },
-  progress: ({ progress }) => say("others-status", `${name}: ${percent(progress)}.`),
+  progress: ({ took }) => say("others-status", `${name}:${took}.`),
   result(result, sweeps) {
     say("others-status", sweeps.length ? `${name} is done; its sweeps are among those stored.` : `${name} is done.`);
     show(byId("others-result"), facts(scalars(result)), columns(result),

@@ -4,8 +4,8 @@ import { chart } from "../charts/chart.js";
 import { byId, el, facts, say, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
 import { saveFrom } from "../base/exports.js";
-import { length, number, percent, seconds } from "../base/format.js";
-import { responseOf } from "./live.js";
+import { length, number, seconds } from "../base/format.js";
+import { responseOf, throughPeak } from "../charts/curves.js";
 import { previewer } from "../network/previews.js";
 import { current } from "../scene/scenes.js";
 import { state } from "../base/address.js";
@@ -24,6 +24,7 @@ export function startResponse() {
     label: "Frequency response",
     file: "response",
     height: 320,
+    link: "frequency",
     onPick: ({ x }) => tell("point", x),
   });
   asking = previewer("limits", (answer, { token }) => {
@@ -47,7 +48,7 @@ export const sweepView = {
     asking({ kind: "limits", scene, set: set ?? {}, harmonics: harmonics ?? 11, contact: state.contact || null }, state.scene);
   },
   waiting: () => say("response-status", "The sweep waits for a worker."),
-  progress: ({ progress, points: count }) => say("response-status", `Sweep: ${percent(progress)}, ${count} points.`),
+  progress: ({ took, points: count }) => say("response-status", `Sweep:${took}; ${count} points.`),
   points({ start, points: more }) {
     points.length = Math.min(points.length, start);
     points.push(...more);
@@ -71,14 +72,20 @@ function partly() {
   plot.draw({ ...responseOf({ parameter: points.map((p) => p[0]), amplitude, peak: { value: highest, at } }), marks: [] });
 }
 
+// A narrow resonance may lie between two points of a linear response: the line goes to its top all the same.
+function lineOf(answer) {
+  const { parameter: x, amplitude: y } = throughPeak(answer);
+  return { x, y };
+}
+
 // The linear limits rise far above: the frame stays with the response with friction.
 function redraw() {
   if (!last || !current.body) return;
   const { result } = last;
   const more = limits
     ? [
-        { name: "removed (linear)", x: limits.free.parameter, y: limits.free.amplitude, colour: 7, dash: "dotted", bare: true },
-        { name: "stuck (linear)", x: limits.stuck.parameter, y: limits.stuck.amplitude, colour: 3, dash: "dashed", bare: true },
+        { name: "removed (linear)", ...lineOf(limits.free), colour: 7, dash: "dotted", bare: true },
+        { name: "stuck (linear)", ...lineOf(limits.stuck), colour: 3, dash: "dashed", bare: true },
       ]
     : [];
   const shown = responseOf(result, more);

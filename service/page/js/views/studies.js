@@ -3,7 +3,7 @@
 import { chart } from "../charts/chart.js";
 import { byId, el, facts, say, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
-import { length, number, percent } from "../base/format.js";
+import { length, number } from "../base/format.js";
 import { current } from "../scene/scenes.js";
 import { warnings } from "../base/words.js";
 
@@ -25,7 +25,7 @@ export function startStudies() {
 
 export const accuracyView = {
   waiting: () => say("accuracy-status", "The study waits for a worker."),
-  progress: ({ progress }) => say("accuracy-status", `Measuring: ${percent(progress)}.`),
+  progress: ({ took }) => say("accuracy-status", `Measuring:${took}.`),
   result(result) {
     const rows = result.rows.filter((row) => row.error !== null && row.milliseconds !== null);
     const share = (row) => Math.max(row.error / result.reference, 1e-12);
@@ -59,7 +59,7 @@ export function campbellBody() {
 
 export const campbellView = {
   waiting: () => say("campbell-status", "The diagram waits for a worker."),
-  progress: ({ progress }) => say("campbell-status", `Orders: ${percent(progress)}.`),
+  progress: ({ took }) => say("campbell-status", `Orders:${took}.`),
   result(result) {
     const [low, high] = [Math.min(...result.speeds_rpm.map((r) => r[0])), Math.max(...result.speeds_rpm.map((r) => r[1]))];
     const top = result.orders.reduce((most, o) => Math.max(most, ...o.peaks.map((p) => p.at)), 0) * 1.35;

@@ -1,0 +1,55 @@
+// A response as a chart: its curve through its polished peak, stable and not, its band.
+
+import { length, lengthUnit, number } from "../base/format.js";
+import { current } from "../scene/scenes.js";
+
+// The amplitudes of the points that are stable, and of those that are not with their neighbours; null elsewhere.
+export function byStability({ amplitude, unstable }) {
+  if (!unstable?.length) return { stable: amplitude, unstable: null };
+  const inside = (i, more) => unstable.some(([first, last]) => i >= first - more && i <= last + more);
+  return {
+    stable: amplitude.map((a, i) => (inside(i, 0) ? null : a)),
+    unstable: amplitude.map((a, i) => (inside(i, 1) ? a : null)),
+  };
+}
+
+// The points of a response with its polished peak among them, which lies between two of them: the curve goes through it.
+export function throughPeak({ parameter, amplitude, peak, unstable }) {
+  const same = { parameter, amplitude, unstable };
+  if (!peak || parameter.includes(peak.at)) return same;
+  let after = -1;
+  for (let i = 1; i < parameter.length; i += 1) {
+    const between = (parameter[i - 1] - peak.at) * (parameter[i] - peak.at) < 0;
+    // Of the branches over a frequency the peak is on the highest.
+    if (between && (after < 0 || Math.max(amplitude[i - 1], amplitude[i]) > Math.max(amplitude[after - 1], amplitude[after]))) after = i;
+  }
+  if (after < 0) return same;
+  const moved = (i) => (i >= after ? i + 1 : i);
+  return {
+    parameter: parameter.toSpliced(after, 0, peak.at),
+    amplitude: amplitude.toSpliced(after, 0, peak.value),
+    unstable: unstable?.map(([first, last]) => [moved(first), moved(last)]),
+  };
+}
+
+// A response as a chart: curve, peak, band. `more` are further curves.
+export function responseOf(answer, more = []) {
+  const scale = lengthUnit(answer.peak?.value ?? 1);
+  const up = (values) => values.map((v) => (v === null ? null : v * scale.perMetre));
+  const points = throughPeak(answer);
+  const parts = byStability(points);
+  const { dof } = current.body.observe;
+  return {
+    x: { name: "frequency [Hz]" },
+    y: { name: `max |${dof}| [${scale.name}]`, zero: true, low: 0, pad: 0.14 },
+    series: [
+      { name: more.length ? "with friction" : parts.unstable ? "stable" : "", x: points.parameter, y: up(parts.stable), colour: 1 },
+      ...(parts.unstable ? [{ name: "not stable", x: points.parameter, y: up(parts.unstable), colour: 1, dash: "dashed" }] : []),
+      ...more.map((line) => ({ ...line, y: up(line.y) })),
+    ],
+    bands: answer.band_intervals_hz ?? [],
+    marks: answer.peak ? [{ x: answer.peak.at, y: answer.peak.value * scale.perMetre, text: `${length(answer.peak.value)} at ${number(answer.peak.at, 5)} Hz` }] : [],
+    describe: (x, y) => `${number(x, 6)} Hz: ${number(y, 5)} ${scale.name}`,
+  };
+}
+

@@ -1,0 +1,75 @@
+// The studies behind the one button, each also alone: their bodies, their order, what became of them.
+
+import { state, write } from "../base/address.js";
+import { byId, say } from "../base/dom.js";
+import { on } from "../base/events.js";
+import { run } from "../network/jobs.js";
+import { asked, current, variable } from "../scene/scenes.js";
+import { readSettings } from "../scene/settings.js";
+import { VIEWS } from "../views.js";
+import { referee } from "./point.js";
+import { computedFor } from "./renewal.js";
+import { campbellBody } from "./studies.js";
+
+// The most wanted first.
+const PRIORITY = { sweep: 6, design: 5, map: 4, accuracy: 3, campbell: 3, pareto: 2 };
+const NOT_ASKED_AGAIN = ["kind", "fresh", "priority", "scene", "set", "harmonics", "project", "name", "notes", "tags"];
+const OF_THE_FORM = ["variables", "parameter", "from", "to", "steps", "frequencies", "ridge", "speeds_rpm", "orders", "band_hz"];
+let studies = 0;
+
+export function startStudy() {
+  byId("study").addEventListener("click", study);
+  on("renew", renew);
+  on("scene-left", () => {
+    studies += 1;
+    say("study-status", "");
+  });
+}
+
+function bodyOf(kind) {
+  const [low, high] = state.range ?? [];
+  const path = variable();
+  const body = asked();
+  const { scene, set } = body;
+  // Peaks are followed where every contact is plain friction; a map without them is for all laws.
+  const tracked = current.body.contacts.every((contact) => (contact.law ?? "coulomb") === "coulomb");
+  const bodies = {
+    sweep: () => body,
+    design: () => ({ ...body, variables: { [path]: [low, high] } }),
+    map: () => ({ ...body, parameter: path, from: low, to: high, steps: 60, frequencies: 400, ridge: tracked }),
+    accuracy: () => ({ scene, set }),
+    campbell: () => ({ ...body, ...campbellBody() }),
+    pareto: () => ({ ...body, variables: { [path]: [low, high] } }),
+  };
+  return bodies[kind]();
+}
+
+const begin = (kind, body = bodyOf(kind)) => run(kind, body, VIEWS[kind], PRIORITY[kind]);
+
+// The one button: every study of the scene.
+function study() {
+  if (!readSettings()) return;
+  state.at = null;
+  write();
+  say("study-status", "The jobs are under way: response, design, map, front, accuracy, Campbell diagram.");
+  const all = [
+    begin("sweep").then(async (done) => done && (await referee(5))),
+    ...["design", "map", "accuracy", "campbell", "pareto"].map((kind) => begin(kind)),
+  ];
+  const mine = (studies += 1);
+  Promise.all(all).then((done) => {
+    const short = done.filter((each) => !each).length;
+    if (mine !== studies) return;
+    if (short) say("study-status", `${short} of ${all.length} studies did not come to their end: each says why.`, true);
+    else say("study-status", "Everything is there.");
+  });
+}
+
+// One study again, with what is set now. A problem that the form can not say, as of several variables or with limits, stays as it was.
+function renew(kind) {
+  if (!readSettings()) return;
+  const before = computedFor(kind);
+  const own = Object.fromEntries(Object.entries(before ?? {}).filter(([key]) => !NOT_ASKED_AGAIN.includes(key)));
+  const further = Object.keys(before?.variables ?? {}).length > 1 || (kind === "design" && Object.keys(own).some((key) => !OF_THE_FORM.includes(key) || key === "speeds_rpm"));
+  begin(kind, further ? { ...asked(), ...own } : bodyOf(kind));
+}

@@ -1,0 +1,94 @@
+// Projects: the one that is open gathers what is computed from now on, and lists what was.
+
+import { request, post } from "../network/api.js";
+import { state, write } from "../base/address.js";
+import { byId, el, say, show } from "../base/dom.js";
+import { on, tell } from "../base/events.js";
+import { undoable } from "./undo.js";
+
+let projects = [];
+let editing = null;
+
+export function startProjects() {
+  byId("project").addEventListener("change", () => choose(byId("project").value));
+  byId("project-new").addEventListener("click", () => form(null));
+  byId("project-edit").addEventListener("click", () => form(opened()));
+  byId("project-delete").addEventListener("click", remove);
+  byId("project-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    save();
+  });
+  byId("project-cancel").addEventListener("click", () => form(undefined));
+  on("projects-changed", listProjects);
+}
+
+export const opened = () => projects.find(({ id }) => id === state.project) ?? null;
+
+export const projectsKnown = () => projects;
+
+// Every project of the owner; one that a link names and that is not there is left.
+export async function listProjects() {
+  const found = [];
+  for (let path = "/v1/projects"; path; ) {
+    const page = await request(path);
+    found.push(...page.items);
+    path = page.next;
+  }
+  projects = found;
+  if (state.project && !opened()) {
+    state.project = "";
+    write();
+  }
+  draw();
+}
+
+function draw() {
+  show(byId("project"), el("option", { value: "" }, "All runs"), projects.map(({ id, name, runs }) => el("option", { value: id }, `${name} (${runs})`)));
+  byId("project").value = state.project;
+  const project = opened();
+  for (const id of ["project-edit", "project-delete"]) byId(id).hidden = project === null;
+  const words = project?.notes || (projects.length ? "" : "No project yet: New makes one, and gathers the runs of a task under its name.");
+  say("project-notes", words);
+}
+
+function choose(id) {
+  state.project = id;
+  write();
+  form(undefined);
+  draw();
+  tell("project", id);
+}
+
+// The form for a new project (null), for one that is there, or closed (undefined).
+function form(project) {
+  editing = project;
+  byId("project-form").hidden = project === undefined;
+  say("project-wrong", "");
+  if (project === undefined) return;
+  byId("project-name").value = project?.name ?? "";
+  byId("project-text").value = project?.notes ?? "";
+  byId("project-name").focus();
+}
+
+async function save() {
+  const body = { name: byId("project-name").value.trim(), notes: byId("project-text").value };
+  try {
+    const saved = editing
+      ? await request(`/v1/projects/${editing.id}`, { method: "PATCH", body, headers: { "If-Match": `"${editing.revision}"` } })
+      : await post("/v1/projects", body);
+    state.project = saved.id;
+    await listProjects();
+    choose(saved.id);
+    byId("project").focus();
+  } catch (error) {
+    say("project-wrong", error.status === 412 ? "Somebody changed this project meanwhile: choose it again to see how." : error.message, true);
+  }
+}
+
+function remove() {
+  const { id, name } = opened();
+  return undoable(`Project “${name}” is in the bin; its runs are where they were.`, `/v1/projects/${id}`, async (gone) => {
+    await listProjects();
+    choose(gone ? "" : id);
+  });
+}

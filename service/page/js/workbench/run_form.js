@@ -1,0 +1,71 @@
+// What is said of a run: name, notes, tags, project; its sweeps; its results as a file; into the bin.
+
+import { request } from "../network/api.js";
+import { el, show } from "../base/dom.js";
+import { tell } from "../base/events.js";
+import { saveFrom } from "../base/exports.js";
+import { length, number, quantity } from "../base/format.js";
+import { projectsKnown } from "./projects.js";
+import { undoable } from "./undo.js";
+
+const UNDER_WAY = ["accepted", "running"];
+
+export function runForm(run, title) {
+  const field = (name, words, input) => [el("label", { for: `run-${name}-${run.id}` }, words), input];
+  const input = (name, value) => el("input", { type: "text", id: `run-${name}-${run.id}`, name, value });
+  const notes = el("textarea", { id: `run-notes-${run.id}`, name: "notes", rows: 3 }, run.notes);
+  const project = el("select", { id: `run-project-${run.id}`, name: "project" },
+    el("option", { value: "" }, "none"), projectsKnown().map(({ id, name }) => el("option", { value: id, selected: id === run.project }, name)));
+  const wrong = el("p", { class: "bad", role: "alert" });
+  const form = el("form", { class: "run-form" },
+    field("name", "Name", input("name", run.name)), field("notes", "Notes", notes),
+    field("tags", "Tags, with commas", input("tags", run.tags.join(", "))), field("project", "Project", project), wrong,
+    el("div", { class: "row tight" }, el("button", { type: "submit" }, "Save"),
+      el("button", { type: "button", "aria-label": `Results of run ${title} as JSON`, onclick: () => saveFrom(`/v1/jobs/${run.id}/results`, "application/json", `${run.kind}-${run.id}.json`) }, "JSON"),
+      UNDER_WAY.includes(run.status) ? null : el("button", { type: "button", "aria-label": `Delete run ${title}`, onclick: () => remove(run, title) }, "Delete")));
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    save(run, form, wrong);
+  });
+  return [form, run.sweeps ? sweeps(run, title) : null];
+}
+
+async function save(run, form, wrong) {
+  const given = new FormData(form);
+  const body = {
+    name: given.get("name").trim(), notes: given.get("notes"), project: given.get("project") || null,
+    tags: given.get("tags").split(",").map((tag) => tag.trim()).filter(Boolean),
+  };
+  try {
+    await request(`/v1/runs/${run.id}`, { method: "PATCH", body, headers: { "If-Match": `"${run.revision}"` } });
+    document.activeElement?.blur();
+    tell("runs-changed");
+    tell("projects-changed");
+  } catch (error) {
+    wrong.textContent = error.status === 412 ? "Somebody changed this run meanwhile: close More and open it again." : error.message;
+  }
+}
+
+const remove = (run, title) =>
+  undoable(`Run “${title}” is in the bin.`, `/v1/runs/${run.id}`, () => tell("runs-changed"));
+
+// The sweeps of a run stand below it, and nowhere else unless they are asked for.
+function sweeps(run, title) {
+  const list = el("div", {}, el("p", { class: "note" }, "…"));
+  const node = el("details", {}, el("summary", { "aria-label": `Sweeps of run ${title}` }, "Its sweeps"), list);
+  node.addEventListener("toggle", async () => {
+    if (!node.open) return;
+    try {
+      const { items, next } = await request(`/v1/sweeps?of=${run.id}&limit=50`);
+      show(list, el("ul", { class: "plain run-sweeps" }, items.map((sweep) => el("li", {}, describe(sweep)))),
+        next ? el("p", { class: "note" }, `The first 50 of ${run.sweeps}.`) : null);
+    } catch (error) {
+      show(list, el("p", { class: "bad" }, error.message));
+    }
+  });
+  return node;
+}
+
+const describe = (sweep) =>
+  [Object.entries(sweep.contacts).map(([name, contact]) => (contact.N0 === null ? "" : `${name} ${number(contact.N0)} N`)).filter(Boolean).join(", "),
+    sweep.peak ? `${length(sweep.peak.value)} at ${quantity(sweep.parameter, sweep.peak.at)}` : "no peak"].filter(Boolean).join(": ");

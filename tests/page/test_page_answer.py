@@ -1,0 +1,144 @@
+"""The answer on the first screen, and what happens to it when something it rests on changes."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import httpx
+import pytest
+from page_site import Site, Watch, opened
+from page_visits import visit
+
+import solver
+
+expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, BrowserContext, Page
+
+Profile = tuple["BrowserContext", Watch]
+LONG_MS = 120_000
+
+
+@pytest.fixture(scope="module")
+def found(browser: Browser, site: Site) -> str:
+    """The address of a page of two-dof with everything on it."""
+    with opened(browser, site) as (context, _):
+        page = visit(context, site, "?scene=two-dof")
+        expect(page.locator("#answer")).to_contain_text("Find the best damper searches damper.N0")
+        page.click("#study")
+        expect(page.locator("#study-status")).to_have_text("Everything is there.", timeout=LONG_MS)
+        return page.url.removeprefix(f"{site.url}/")
+
+
+def set_value(page: Page, path: str, value: str) -> None:
+    box = page.locator(f"#slide-{path} >> xpath=../span/input")
+    box.fill(value)
+    box.press("Tab")
+
+
+def test_the_first_screen_holds_the_answer(profile: Profile, site: Site, found: str) -> None:
+    page = visit(profile[0], site, found)
+    scene = solver.load_scene("two-dof")
+    before = solver.sweep(scene)
+    after = solver.sweep(scene.with_values({"damper.N0": 104.78825627}))
+    assert before.peak is not None
+    assert after.peak is not None
+    assert before.band is not None
+    assert after.band is not None
+    expect(page.locator("#answer-body")).to_contain_text("104.79 N")
+    expect(page.locator("#answer-peak .large")).to_have_text(
+        f"{before.peak.value:.4g} → {after.peak.value:.4g} m"
+    )
+    expect(page.locator("#answer-band .large")).to_have_text(
+        f"{before.band.width:.4g} → {after.band.width:.4g} Hz"
+    )
+    expect(page.locator("#answer-error .small")).to_contain_text("% of the peak")
+    expect(page.locator("#answer-certificate .large")).to_have_text("optimal")
+    for part in ("#answer-certificate", "#use-design", "#save-report"):
+        box = page.locator(part).bounding_box()
+        assert box is not None
+        assert box["y"] + box["height"] <= 900, f"{part} stands below the fold"
+
+
+def test_what_changed_is_said_on_every_card_and_renewed_there(
+    profile: Profile, site: Site, found: str
+) -> None:
+    page = visit(profile[0], site, found)
+    expect(page.locator("#answer-certificate .large")).to_have_text("optimal")
+    expect(page.locator(".stale:visible")).to_have_count(0)
+    set_value(page, "damper-mu", "0.31")
+    for card in ("answer", "response", "design", "map", "front", "accuracy", "campbell"):
+        expect(page.locator(f"#{card}-stale")).to_contain_text("damper.mu 0.3, now 0.31")
+    expect(page.locator("#answer-certificate")).to_contain_text("not for those set now")
+    expect(page.locator("#answer-certificate")).not_to_contain_text("can not be lowered")
+    page.locator("#answer-stale button").click()
+    expect(page.locator("#answer-certificate .large")).to_have_text("optimal", timeout=LONG_MS)
+    expect(page.locator("#answer-body")).not_to_contain_text("104.79 N")
+    expect(page.locator("#design-stale")).to_be_hidden()
+    expect(page.locator("#response-stale")).to_contain_text("damper.mu 0.3, now 0.31")
+    set_value(page, "damper-mu", "0.3")
+    expect(page.locator("#response-stale")).to_be_hidden()
+    expect(page.locator("#design-stale")).to_contain_text("damper.mu 0.31, now 0.3")
+
+
+def test_the_range_and_the_harmonics_make_a_design_stale_too(
+    profile: Profile, site: Site, found: str
+) -> None:
+    page = visit(profile[0], site, found)
+    expect(page.locator("#answer-certificate .large")).to_have_text("optimal")
+    page.fill("#high", "900")
+    page.press("#high", "Tab")
+    expect(page.locator("#answer-stale")).to_contain_text("damper.N0 from 10 to 1500 N, now 10 to 900 N")
+    expect(page.locator("#response-stale")).to_be_hidden()
+    page.fill("#high", "1500")
+    page.fill("#harmonics", "7")
+    page.press("#harmonics", "Tab")
+    expect(page.locator("#answer-stale")).to_contain_text("11 harmonics, now 7")
+    expect(page.locator("#accuracy-stale")).to_be_hidden()
+
+
+def test_a_design_is_used_with_the_values_it_was_computed_for(
+    profile: Profile, site: Site, found: str
+) -> None:
+    page = visit(profile[0], site, found)
+    expect(page.locator("#answer-certificate .large")).to_have_text("optimal")
+    set_value(page, "damper-mu", "0.5")
+    expect(page.locator("#answer-stale")).to_contain_text("now 0.5")
+    page.click("#use-design")
+    expect(page.locator("#answer-stale")).to_be_hidden()
+    expect(page.locator("#use-design")).to_have_text("In use")
+    assert page.input_value("#slide-damper-mu >> xpath=../span/input") == "0.3"
+    assert page.input_value("#slide-damper-N0 >> xpath=../span/input") == "104.788"
+    expect(page.locator("#live-status")).to_contain_text("peak 2.346 m")
+    # What the response was before stays what it was.
+    expect(page.locator("#answer-peak .large")).to_have_text("2.35 → 2.346 m")
+    expect(page.locator("#response-stale")).to_contain_text("damper.N0 100 N, now 104.79 N")
+
+
+def test_a_link_mixes_no_two_scenes(profile: Profile, site: Site, found: str) -> None:
+    page = visit(profile[0], site, found.replace("scene=two-dof", "scene=bladed-disk"))
+    expect(page.locator("#design-status")).to_contain_text("of the scene two-dof, not of bladed-disk")
+    expect(page.locator("#map-status")).to_contain_text("of the scene two-dof, not of bladed-disk")
+    expect(page.locator("#design-facts button")).to_have_count(0)
+    expect(page.locator("#answer-actions")).to_be_hidden()
+    assert "design=" not in page.url
+    job = httpx.get(f"{site.url}/v1/jobs?kind=design&scene=two-dof").json()["items"][0]["id"]
+    assert job not in page.url
+
+
+def test_a_report_is_one_file_that_holds_the_answer(browser: Browser, site: Site, found: str) -> None:
+    with opened(browser, site) as (context, _):
+        page = visit(context, site, found)
+        expect(page.locator("#answer-certificate .large")).to_have_text("optimal")
+        expect(page.locator("#map-facts")).to_contain_text("least peak")
+        with page.expect_download() as taken:
+            page.click("#save-report")
+        text = Path(taken.value.path()).read_text(encoding="utf-8")
+    for words in ("104.79 N", "2.35 → 2.346 m", "stickslip design two-dof.toml", "held by", "in use"):
+        assert words in text
+    assert text.count("<svg") >= 3
+    assert not re.search(r'(?:src|href)="https?://', text)
+    assert "<button" not in text
