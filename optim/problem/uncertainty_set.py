@@ -15,8 +15,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from optim.problem.variables import Real
-from solver.errors import SettingError
-from solver.scene.scene import CyclicStructure, Scene
+from solver.scene.scene import Scene
 
 
 class How(Enum):
@@ -101,12 +100,10 @@ class Disk:
         SettingError, SceneError
             The scene is not cyclic, or the factors do not fit it.
         """
-        if not isinstance(scene.structure, CyclicStructure):
-            raise SettingError("scene", scene.name, "must have a cyclic structure to be mistuned")
-        raw = scene.to_dict()
-        structure = scene.structure.model_dump(mode="json", exclude_none=True)
-        raw["structure"] = {**structure, "mistuning": self.table()}
-        return Scene.from_dict(raw)
+        # Loaded here: it brings the compiled loops along, which reading a problem does not need.
+        from solver.studies.blades import with_mistuning
+
+        return with_mistuning(scene, self.table())
 
     def words(self) -> str:
         """Return it in words."""

@@ -16,7 +16,6 @@ from optim.problem.uncertainty_set import Coordinate, Scenario
 from optim.problem.variables import Real, Variable, parameter_values
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
-from solver.scene.scene import CyclicStructure
 
 ShouldStop = Callable[[], bool] | None
 
@@ -119,7 +118,7 @@ class _Chain:
         scene = case.scene if disk is None else disk.on(case.scene)
         here = replace(case, scene=scene)
         problem = replace(self._problem, variables=_single(values), cases=(here,))
-        if disk is not None and isinstance(scene.structure, CyclicStructure) and "@" not in scene.observe.dof:
+        if disk is not None and scene.structure.has_sectors and "@" not in scene.observe.dof:
             return _of_all_blades(problem, here, values, gradients, should_stop)
         evaluation = evaluate(problem, values, gradients=gradients, should_stop=should_stop)
         return list(evaluation.rows), len(evaluation.responses)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,8 @@ from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.readers.registry import label_suffixes
 from solver.matrices.readers.triplets import Labelled
 
+PART = "parts/"  # begins the key of a part of the structure, such as a blade, beside M, K and C
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatrixSet:
@@ -31,11 +33,14 @@ class MatrixSet:
         Node and component of each row.
     held : int
         Rows left out because a boundary condition holds them.
+    parts : dict
+        Stiffness of parts of the structure, sparse, by their names.
     """
 
     matrices: dict[str, coo_array]
     labels: tuple[Label, ...] | None = None
     held: int = 0
+    parts: dict[str, coo_array] = field(default_factory=dict)
 
     def row(self, label: Label) -> int | None:
         """The row of a label (zero-based); None if there is none."""
@@ -70,7 +75,7 @@ def read_set(paths: Mapping[str, Path], mapping: Path | None = None) -> MatrixSe
 
     Parameters
     ----------
-    paths : file of each of M, K and C.
+    paths : file of each of M, K and C, and of parts (`PART` and a name).
     mapping : a file of labels.
 
     Raises
@@ -96,7 +101,7 @@ def put_together(
     sizes = {key: part.matrix.shape[0] for key, part in parts.items()}
     matrices = {key: part.matrix for key, part in parts.items()}
     if len(set(sizes.values())) > 1:
-        return MatrixSet(matrices=matrices)
+        return _apart(matrices)
     found = mapping or next((name for name in map(labels_beside, paths.values()) if name), None)
     labels = next((part.labels for part in parts.values() if part.labels is not None), None)
     if found is not None:
@@ -109,7 +114,16 @@ def put_together(
                 else ""
             )
             raise MatrixFileError(f"{str(found)!r} names {len(labels)} rows, the matrices have {size}{twice}")
-    return MatrixSet(matrices=matrices, labels=labels)
+    return _apart(matrices, labels)
+
+
+def _apart(
+    matrices: Mapping[str, coo_array], labels: tuple[Label, ...] | None = None, held: int = 0
+) -> MatrixSet:
+    """The set with parts of the structure under their names."""
+    parts = {key.removeprefix(PART): each for key, each in matrices.items() if key.startswith(PART)}
+    whole = {key: each for key, each in matrices.items() if not key.startswith(PART)}
+    return MatrixSet(matrices=whole, labels=labels, held=held, parts=parts)
 
 
 def labels_of(path: Path) -> tuple[Label, ...]:
@@ -144,7 +158,7 @@ def _together(parts: Mapping[str, Labelled]) -> MatrixSet:
         matrices[key] = coo_array(
             (part.matrix.data[kept], (rows[kept], columns[kept])), shape=(len(labels), len(labels))
         )
-    return MatrixSet(matrices=matrices, labels=labels, held=len(held))
+    return _apart(matrices, labels, len(held))
 
 
 def in_si(found: MatrixSet, units: str) -> MatrixSet:
@@ -161,5 +175,8 @@ def in_si(found: MatrixSet, units: str) -> MatrixSet:
     size = next(iter(found.matrices.values())).shape[0]
     turns = np.array([label.rotation for label in found.labels or ()] or [False] * size)
     scale = diags_array(np.sqrt(np.where(turns, about, along)))
-    scaled = {key: coo_array(scale @ csr_array(matrix) @ scale) for key, matrix in found.matrices.items()}
-    return MatrixSet(matrices=scaled, labels=found.labels, held=found.held)
+    scaled, parts = (
+        {key: coo_array(scale @ csr_array(matrix) @ scale) for key, matrix in given.items()}
+        for given in (found.matrices, found.parts)
+    )
+    return MatrixSet(matrices=scaled, labels=found.labels, held=found.held, parts=parts)

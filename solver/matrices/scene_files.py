@@ -13,7 +13,7 @@ from solver.errors import Issue, SceneError
 from solver.matrices.file_units import UNITS
 from solver.matrices.files import MatrixFileError, read_labelled, read_modes
 from solver.matrices.labels import label
-from solver.matrices.load_set import MatrixSet, in_si, put_together
+from solver.matrices.load_set import PART, MatrixSet, in_si, put_together
 from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton
 from solver.matrices.sectors.loading import as_sector
 from solver.matrices.validation import DofTable
@@ -73,6 +73,9 @@ def read_matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:
         A file that cannot be used, or a label that is not there; the pointer is that of the key.
     """
     paths = {key: folder / tables[key] for key in _MATRICES if isinstance(tables.get(key), str)}
+    parts_given = tables.get("parts")
+    if isinstance(parts_given, dict) and tables.get("sectors") is not None and paths:
+        paths |= {PART + key: folder / name for key, name in parts_given.items() if isinstance(name, str)}
     mapping, units = tables.pop(MAPPING, None), tables.pop(IN_UNITS, "SI")
     if mapping is not None and not isinstance(mapping, str):
         raise SceneError([_issue(MAPPING, f"`{MAPPING}` must be the name of a file, got {mapping!r}")])

@@ -8,10 +8,12 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 from solver.contacts.fields import NonNegative, Part, Vector
 from solver.matrices.sectors.diameters import DiameterMatrices
+from solver.matrices.sectors.parts import PartMatrices
 from solver.matrices.sectors.validation import check_sector
 from solver.matrices.validation import DofTable, antisymmetric, check_matrices, symmetric
 from solver.matrices.values import MOST_MODES, Matrix, Modes
 from solver.scene.cyclic.boundary import CyclicBoundary, Sectors
+from solver.scene.cyclic.mistuning import Mistuning
 
 Ratio = Annotated[float, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=False)]
 
@@ -88,6 +90,10 @@ class MatricesStructure(Part):
         How the sectors are joined.
     diameters : DiameterMatrices or None
         In place of M, K and C: a reduced sector, its matrices at each nodal diameter that was built.
+    parts : PartMatrices or None
+        Stiffness [N/m] of parts of the sector, such as its blade, which `mistuning` may name; part of K.
+    mistuning : Mistuning or None
+        Factors that make the sectors differ.
     """
 
     kind: Literal["matrices"]
@@ -107,6 +113,8 @@ class MatricesStructure(Part):
     sectors: Sectors | None = None
     cyclic: CyclicBoundary | None = None
     diameters: DiameterMatrices | None = None
+    parts: PartMatrices | None = None
+    mistuning: Mistuning | None = None
 
     @property
     def n_coordinates(self) -> int:
@@ -147,8 +155,9 @@ class MatricesStructure(Part):
 
     @model_validator(mode="after")
     def _fit(self) -> MatricesStructure:
-        if self.sectors is None and (self.cyclic is not None or self.diameters is not None):
-            key = "cyclic" if self.cyclic is not None else "diameters"
+        of_a_disk = ("cyclic", "diameters", "parts", "mistuning")
+        key = next((key for key in of_a_disk if getattr(self, key) is not None), None)
+        if self.sectors is None and key is not None:
             raise ValueError(
                 f"`sectors` is missing: `{key}` is of one sector of a disk, of which there are so many"
             )

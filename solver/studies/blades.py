@@ -23,9 +23,11 @@ from solver.response.time_history import motion
 from solver.results.base import Drawn
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import annulus, sectors_needed
-from solver.scene.scene import CyclicStructure, Scene
+from solver.scene.parts import LumpedStructure, Mass, MatricesStructure
+from solver.scene.scene import Scene
 from solver.wording import listing, nearest
 
+_ONE_MASS = LumpedStructure(kind="lumped", masses=(Mass(dof="x", m=1.0),))  # stands in for a large structure
 _OF_THE_SWEEP = 0.4  # share of the time; the rest looks for the peaks of the other blades
 
 
@@ -239,13 +241,18 @@ def with_mistuning(scene: Scene, table: Mapping[str, object]) -> Scene:
     SceneError
         A part that does not exist, or values that do not fit.
     """
-    if not isinstance(scene.structure, CyclicStructure):
+    structure = scene.structure
+    if isinstance(structure, LumpedStructure) or not structure.has_sectors:
         raise SettingError("scene", scene.name, "must have a cyclic structure to be mistuned")
-    raw = scene.to_dict()
-    raw["structure"] = {
-        **scene.structure.model_dump(mode="json", exclude_none=True),
-        "mistuning": dict(table),
-    }
+    if isinstance(structure, MatricesStructure):
+        # Its matrices as they are: written out as numbers and read again they would take seconds.
+        given = {key: getattr(structure, key) for key in structure.model_fields_set}
+        plain = {key: value for key, value in given.items() if value is not None}
+        small = scene.model_copy(update={"structure": _ONE_MASS})
+    else:
+        plain, small = structure.model_dump(mode="json", exclude_none=True), scene
+    raw = small.to_dict()
+    raw["structure"] = {**plain, "mistuning": dict(table)}
     return Scene.from_dict(raw)
 
 

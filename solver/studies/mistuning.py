@@ -22,8 +22,8 @@ from solver.results.base import Drawn
 from solver.results.told import Piece
 from solver.results.views import Views
 from solver.results.watch import OnProgress, ShouldStop, part_of
-from solver.scene.parts import Mistuning
-from solver.scene.scene import CyclicStructure, Scene
+from solver.scene.parts import LumpedStructure, Mistuning
+from solver.scene.scene import Scene
 from solver.studies.blades import BladePeaks, blade_peaks, mistuned, with_mistuning
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
@@ -289,8 +289,7 @@ def disk_factors(
         raise SettingError("samples", samples, f"must be a whole number from 1 to {MOST_SAMPLES}")
     if not (math.isfinite(spread) and spread >= 0.0):
         raise SettingError("spread", spread, "must be a number >= 0")
-    structure = scene.structure
-    sectors = structure.sectors if isinstance(structure, CyclicStructure) else 1
+    sectors = scene.structure.sector_count
     drawn = [Mistuning(of=tuple(of), spread=spread, seed=seed + k).factors(sectors) for k in range(samples)]
     for k, row in enumerate(drawn):
         if min(row) <= 0.0:
@@ -302,7 +301,7 @@ def disk_factors(
 def without_mistuning(scene: Scene) -> Scene:
     """Return the scene with sectors that are equal."""
     structure = scene.structure
-    if not isinstance(structure, CyclicStructure):
+    if isinstance(structure, LumpedStructure):
         return scene
     return scene.model_copy(update={"structure": structure.model_copy(update={"mistuning": None})})
 

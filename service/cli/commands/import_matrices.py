@@ -28,6 +28,7 @@ from service.cli.importing.options import (
     Keep,
     Low,
     Mapping,
+    Mistune,
     ModesKept,
     Observed,
     Out,
@@ -93,6 +94,7 @@ def import_scene(
     contacts: Contacts = None,
     forces: Forces = None,
     patches: PatchTexts = None,
+    mistune: Mistune = None,
     _formats: Formats = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -111,7 +113,12 @@ def import_scene(
         raise InputError("`--keep-modes` reduces on every load, --reduce once: keep one of them")
     deck = deck_file(nodes)
     of = disk(sectors, low, high, deck, axis, pair_by, tolerance, engine_order, patches=bool(patches))
-    found = sources(files, mapping, units)
+    if mistune and not (reduce_once and sectors is not None):
+        raise InputError(
+            "`--mistune` goes with --sectors and --reduce; a scene that refers to its files names parts in "
+            "[structure.parts]"
+        )
+    found = sources(files, mapping, units, mistune)
     given = read_sources(found)
     faces = Patches(patches, deck, units, None if of is None else (of.sectors, of.axis), tolerance)
     table = dof_table(dofs, found, given, patches=bool(patches))
@@ -123,7 +130,7 @@ def import_scene(
         if reduce_once:
             path = reduced_file(reduced, target) if of is None else sector_file(reduced, target)
             undo.callback(path.unlink, missing_ok=True)
-            written = _reduced(given, table, modes, up_to, path, of)
+            written = _reduced(given, table, modes, up_to, path, of, tuple(found.parts))
             structure = written.table(target)
             table = dict(written.rows)
         else:
@@ -170,14 +177,14 @@ class _Parts:
 
 def _reduced(
     given: MatrixSet | None, table: dict[str, int | str], modes: int | None, up_to: float | None, path: Path,
-    of: Disk | None,
+    of: Disk | None, mistune: tuple[str, ...] = (),
 ) -> Written | WrittenSector:  # fmt: skip
     if given is None:
         raise InputError("`--reduce` is for matrices; modes are reduced already")
     if of is not None and up_to is not None:
         raise InputError("`--up-to` is not for a sector: give --modes N, as many at each nodal diameter")
     if of is not None:
-        return reduce_disk(given, rows_of(table, given), modes, of, path)
+        return reduce_disk(given, rows_of(table, given), modes, of, path, mistune)
     return reduce(given, rows_of(table, given), modes, up_to, path)
 
 

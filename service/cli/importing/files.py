@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,11 +29,14 @@ class Sources:
         File of the labels of the rows.
     units : str
         Of the files.
+    parts : dict
+        File of each part of the sector that mistuning may scale; None for K and M of the whole.
     """
 
     roles: dict[str, Path]
     mapping: Path | None
     units: str
+    parts: dict[str, Path | None] = field(default_factory=dict)
 
     def table(self, target: Path) -> dict[str, object]:
         """The table [structure] of a scene at `target` that refers to the files."""
@@ -51,7 +54,9 @@ def relative(path: Path, target: Path) -> str:
     return Path(os.path.relpath(path.absolute(), target.absolute().parent)).as_posix()
 
 
-def sources(files: Sequence[str], mapping: str | None, units: str) -> Sources:
+def sources(
+    files: Sequence[str], mapping: str | None, units: str, mistune: Sequence[str] | None = None
+) -> Sources:
     """Sort the files given by what they are."""
     from solver.matrices.file_roles import MAPPING, sorted_files
     from solver.matrices.file_units import UNITS
@@ -71,18 +76,41 @@ def sources(files: Sequence[str], mapping: str | None, units: str) -> Sources:
     except MatrixFileError as error:
         raise InputError(f"`FILES`: {error}") from error
     rows = roles.pop(MAPPING, None)
-    return Sources(roles=roles, mapping=rows, units=units)
+    return Sources(roles=roles, mapping=rows, units=units, parts=_parts(mistune))
+
+
+def _parts(texts: Sequence[str] | None) -> dict[str, Path | None]:
+    """What --mistune names, with the file of each."""
+    from solver.matrices.sectors.parts import WHOLE, check_part_names
+
+    found: dict[str, Path | None] = {}
+    for text in texts or ():
+        name, equals, file = text.partition("=")
+        if (name in WHOLE) == bool(equals) or (equals and not Path(file).is_file()):
+            got = f"there is no file {file!r}" if equals and name not in WHOLE else f"got {text!r}"
+            raise InputError(
+                f"`--mistune` must be K, M, or the name of a part and its file, NAME=FILE: {got}"
+            )
+        if name in found:
+            raise InputError(f"`--mistune` names {name!r} twice; keep one")
+        try:
+            check_part_names([] if name in WHOLE else [name])
+        except ValueError as error:
+            raise InputError(f"`--mistune`: {error}") from error
+        found[name] = Path(file) if equals else None
+    return found
 
 
 def read_sources(found: Sources) -> MatrixSet | None:
     """The matrices in SI units, checked for size; None for modes."""
     from solver.matrices.files import MatrixFileError
-    from solver.matrices.load_set import in_si, read_set
+    from solver.matrices.load_set import PART, in_si, read_set
 
     if "modes" in found.roles:
         return None
+    parts = {PART + name: path for name, path in found.parts.items() if path is not None}
     try:
-        return in_si(read_set(found.roles, found.mapping), found.units)
+        return in_si(read_set(found.roles | parts, found.mapping), found.units)
     except MatrixFileError as error:
         raise InputError(f"`FILES`: {error}") from error
 

@@ -100,6 +100,15 @@ Tolerance = Annotated[
     float | None,
     amount("--tolerance", "D", "Nodes this near are one place, in units of the deck."),
 ]
+Mistune = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--mistune", metavar="NAME[=FILE]",
+        help="With --sectors --reduce: what mistuning may scale: K or M of the whole sector, or the "
+        "stiffness of a part of it (blade=blade-K.mtx), rows as in K; repeatable. Builds every nodal "
+        "diameter.",
+    ),
+]  # fmt: skip
 EngineOrder = Annotated[
     int | None,
     count(

@@ -14,7 +14,7 @@ from service.errors import InputError
 from solver.results.files import whole
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from solver.matrices.load_set import MatrixSet
     from solver.matrices.sectors.reduction import ReducedSector
@@ -181,12 +181,20 @@ class WrittenSector:
 
 
 def reduce_disk(
-    given: MatrixSet, rows: Mapping[str, int], modes: int | None, of: Disk, path: Path
-) -> WrittenSector:
-    """Reduce a sector at every nodal diameter its engine order meets, and write it to `path`."""
+    given: MatrixSet, rows: Mapping[str, int], modes: int | None, of: Disk, path: Path,
+    mistune: Sequence[str] = (),
+) -> WrittenSector:  # fmt: skip
+    """Reduce a sector at every nodal diameter its engine order meets, and write it to `path`.
+
+    Parameters
+    ----------
+    mistune : names of what mistuning may scale; then all nodal diameters are built.
+    """
     from scipy.sparse import csr_array
 
+    from solver.errors import SceneError
     from solver.matrices.diagnostics import refuse
+    from solver.matrices.sectors.loading import check_part_sizes, parts_to_reduce
     from solver.matrices.sectors.reduction import diameters_met, reduce_sector, write_diameters
 
     if modes is None or modes < 0:
@@ -198,8 +206,12 @@ def reduce_disk(
     try:
         refuse(given, reduced=True)
         gone = checked_boundaries(given, of).elimination(matrices["M"].shape[0], of.sectors)
-        met = diameters_met([of.engine_order], of.sectors)
-        reduced = reduce_sector(matrices, gone, rows, modes, met, of.sectors)
+        check_part_sizes(given)
+        parts = parts_to_reduce({"of": mistune}, given)
+        met = range(of.sectors // 2 + 1) if parts else diameters_met([of.engine_order], of.sectors)
+        reduced = reduce_sector(matrices, gone, rows, modes, met, of.sectors, parts)
+    except SceneError as error:
+        raise InputError(f"`--mistune`: {error.issues[0].message}") from error
     except ValueError as error:
         raise InputError(f"`--reduce`: {error}") from error
     with whole(path) as temporary:

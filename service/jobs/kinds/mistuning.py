@@ -23,7 +23,7 @@ from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, SceneError, SettingError, pointer
-from solver.scene.scene import CyclicStructure, Scene
+from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -145,10 +145,10 @@ def resolve(request: MistuningRequest, source: SceneSource) -> Resolved:
 def _issues(request: MistuningRequest, scene: Scene, start: float, stop: float) -> list[Issue]:
     """Everything wrong with the study for the scene."""
     structure = scene.structure
-    if not isinstance(structure, CyclicStructure):
+    if not structure.has_sectors:
         message = f"`scene` {scene.name!r} must have a cyclic structure to be mistuned"
         return [refusal("/scene", message)]
-    sweeps = POINTS_OF_A_SWEEP * request.samples * structure.sectors
+    sweeps = POINTS_OF_A_SWEEP * request.samples * structure.sector_count
     words = "points of all sweeps"
     issues = annulus_issues(scene, request.harmonics)
     issues += size_issues("/samples", words, sweeps, request.harmonics, whole_disk_dofs(scene))
@@ -183,8 +183,7 @@ def _factor_issues(request: MistuningRequest, scene: Scene) -> list[Issue]:
 
 def split(spec: Mapping[str, Any]) -> list[Part]:
     """The tuned disk, and then some of the others at a time."""
-    structure = Scene.from_dict(spec["scene"]).structure
-    sectors = structure.sectors if isinstance(structure, CyclicStructure) else 1
+    sectors = Scene.from_dict(spec["scene"]).structure.sector_count
     a_disk, samples = sectors * max(spec["harmonics"], 1), spec["samples"]
     size = max(math.ceil(_WORK_OF_A_PART / a_disk), math.ceil(samples / _MOST_DIVIDED))
     return [Part(spec={"tuned": True})] + [

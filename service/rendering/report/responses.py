@@ -16,7 +16,8 @@ from service.jobs.linear_limits import linear_limit
 from solver.continuation.branch import Branch
 from solver.continuation.branches.observation import observing
 from solver.results import units
-from solver.scene.scene import CyclicStructure, Scene
+from solver.scene.parts import LumpedStructure
+from solver.scene.scene import Scene
 from solver.views.plots import style
 from solver.views.plots.curves import Response
 
@@ -62,11 +63,11 @@ class Sweeps:
         """As `of`, and of a mistuned disk the response of its worst blade."""
         branch = self.of(scene)
         structure, dof = scene.structure, scene.observe.dof
-        if branch is None or not isinstance(structure, CyclicStructure) or structure.mistuning is None:
+        if branch is None or isinstance(structure, LumpedStructure) or structure.mistuning is None:
             return branch
         if "@" in dof:
             return branch
-        others = [observing(branch, f"{dof}@{j}", limit=self.limit) for j in range(1, structure.sectors)]
+        others = [observing(branch, f"{dof}@{j}", limit=self.limit) for j in range(1, structure.sector_count)]
         return max([branch, *others], key=lambda blade: blade.peak.value if blade.peak else 0.0)
 
     def governing(self, scene: Scene, problem: Mapping[str, Any], values: Mapping[str, float]) -> Governing:

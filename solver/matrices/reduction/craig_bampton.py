@@ -40,12 +40,15 @@ class Reduced:
         Frequency of the highest of them; 0 if there is none.
     quality : Quality
         What the reduction is good for.
+    basis : (rows, n) array or None
+        The motions of the full model that the coordinates stand for, if asked for.
     """
 
     matrices: dict[str, Array]
     modes: int
     highest_hz: float
     quality: Quality
+    basis: Array | None = None
 
 
 def craig_bampton(
@@ -58,6 +61,7 @@ def craig_bampton(
     up_to_hz: float | None = None,
     others: Mapping[str, coo_array] | None = None,
     weigh: bool = True,
+    keep_basis: bool = False,
 ) -> Reduced:
     """Reduce a model onto the DOFs named and `keep_modes` modes of the rest, or all up to `up_to_hz` [Hz].
 
@@ -66,6 +70,7 @@ def craig_bampton(
     M, K, C : sparse (n, n), symmetric or Hermitian.
     others : matrices projected beside them, symmetric or not.
     weigh : whether to find the effective masses too, which takes solutions with M.
+    keep_basis : whether the motions of the coordinates are asked for.
 
     Raises
     ------
@@ -98,6 +103,7 @@ def craig_bampton(
         modes=values.size,
         highest_hz=highest,
         quality=measured(held, values, modes, matrices, weigh=weigh),
+        basis=basis if keep_basis else None,
     )
 
 

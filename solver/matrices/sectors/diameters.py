@@ -12,10 +12,11 @@ from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from solver.errors import SettingError
+from solver.matrices.sectors.parts import PartsAcross
 from solver.matrices.values import MOST_DOFS, Matrix
 
 ComplexArray = NDArray[np.complex128]
-_KEYS = ("diameters", "M", "K", "C")
+_KEYS = ("diameters", "M", "K", "C", "parts")
 _ASYMMETRY = 1e-8  # largest difference from the conjugate transpose, relative to the largest entry
 _MOST = 5001  # nodal diameters of the largest disk
 
@@ -33,6 +34,8 @@ class DiameterMatrices:
     M, K : (nd, n, n) array
         Hermitian; read-only.
     C : (nd, n, n) array or None
+    parts : PartsAcross or None
+        Parts that mistuning may scale, between the nodal diameters.
     digest : str
         Hash of the content.
     """
@@ -41,6 +44,7 @@ class DiameterMatrices:
     M: ComplexArray
     K: ComplexArray
     C: ComplexArray | None = None
+    parts: PartsAcross | None = None
     digest: str = field(init=False)
 
     def __post_init__(self) -> None:
@@ -74,6 +78,9 @@ class DiameterMatrices:
                 np.linalg.cholesky(mass)
             except np.linalg.LinAlgError as error:
                 raise ValueError(f"`M` must be positive definite at nodal diameter {n}") from error
+        if self.parts is not None:
+            self.parts.check(len(self.diameters), self.size)
+            found.update(b"parts" + self.parts.digest.encode())
         object.__setattr__(self, "digest", found.hexdigest())
 
     def __eq__(self, other: object) -> bool:
@@ -114,7 +121,7 @@ class DiameterMatrices:
 
     @classmethod
     def read(cls, data: object) -> DiameterMatrices:
-        """Read a table of `diameters` and lists `M`, `K`, `C` of tables `real` and maybe `imag` of rows."""
+        """Read a table of `diameters`, lists `M`, `K`, `C` of tables `real`, `imag`, and maybe `parts`."""
         if isinstance(data, DiameterMatrices):
             return data
         if isinstance(data, str):
@@ -130,7 +137,8 @@ class DiameterMatrices:
         if not good or any(isinstance(n, bool) or not isinstance(n, int) for n in counts):
             raise ValueError("`diameters` must be a list of whole numbers")
         arrays = {key: _stack(key, data[key], len(counts)) for key in ("M", "K", "C") if data.get(key)}
-        return cls(diameters=tuple(counts), **arrays)
+        parts = None if data.get("parts") is None else PartsAcross.read(data["parts"])
+        return cls(diameters=tuple(counts), parts=parts, **arrays)
 
     def write(self) -> dict[str, object]:
         """The table that `read` reads."""
@@ -139,6 +147,8 @@ class DiameterMatrices:
         for key, value in given.items():
             if value is not None:
                 table[key] = [_written(matrix) for matrix in value]
+        if self.parts is not None:
+            table["parts"] = self.parts.write()
         return table
 
     @classmethod

@@ -16,6 +16,7 @@ from solver.matrices.readers.reader import MatrixFileError
 from solver.matrices.sectors.decks import Deck, read_deck
 from solver.matrices.sectors.elimination import Elimination, Group, elimination
 from solver.matrices.sectors.pairing import PAIR_BY, groups, paired
+from solver.matrices.sectors.parts import WHOLE
 from solver.matrices.sectors.reduction import diameters_met, read_diameters, reduce_sector
 from solver.matrices.values import MOST_DOFS, Matrix
 
@@ -132,6 +133,7 @@ def as_sector(tables: dict[str, Any], found: MatrixSet, folder: Path, orders: li
         return _from_file(tables, folder)
     if not found.matrices:
         return tables
+    check_part_sizes(found)
     kept = {key: value for key, value in joined.items() if key not in FILE_KEYS}
     if "low_rows" in joined or "high_rows" in joined:
         return {**tables, **_dense(found), "cyclic": kept}
@@ -151,12 +153,13 @@ def as_sector(tables: dict[str, Any], found: MatrixSet, folder: Path, orders: li
     matrices = {key: csr_array(matrix) for key, matrix in found.matrices.items()}
     try:
         gone = ends.elimination(matrices["M"].shape[0], sectors)
-        met = diameters_met(orders, sectors)
-        reduced = reduce_sector(matrices, gone, tables["dofs"], keep, met, sectors)
+        parts = parts_to_reduce(tables.get("mistuning"), found)
+        met = tuple(range(sectors // 2 + 1)) if parts else diameters_met(orders, sectors)
+        reduced = reduce_sector(matrices, gone, tables["dofs"], keep, met, sectors, parts)
     except ValueError as error:
         raise SceneError([Issue(pointer="/structure/dofs", message=str(error))]) from error
     return {
-        **{key: value for key, value in tables.items() if key not in matrices},
+        **{key: value for key, value in tables.items() if key not in matrices and key != "parts"},
         "diameters": reduced.matrices,
         "dofs": reduced.rows,
         "cyclic": {**kept, "axis": list(ends.axis)},
@@ -164,6 +167,23 @@ def as_sector(tables: dict[str, Any], found: MatrixSet, folder: Path, orders: li
             "dofs": matrices["M"].shape[0], "modes": reduced.modes, "highest_hz": reduced.highest_hz,
         },
     }  # fmt: skip
+
+
+def parts_to_reduce(mistuning: object, found: MatrixSet) -> dict[str, Any]:
+    """The matrices that mistuning may scale: all parts, and K or M where the table names them."""
+    of = mistuning.get("of") if isinstance(mistuning, Mapping) else None
+    whole = [key for key in WHOLE if isinstance(of, list | tuple) and key in of]
+    matrices = {key: found.matrices[key] for key in whole} | found.parts
+    return {key: csr_array(matrix) for key, matrix in matrices.items()}
+
+
+def check_part_sizes(found: MatrixSet) -> None:
+    """Raise SceneError unless parts have the rows of M and K."""
+    rows = next(iter(found.matrices.values())).shape[0]
+    for name, matrix in found.parts.items():
+        if matrix.shape[0] != rows:
+            message = f"`parts`: {name!r} must have {rows} rows like M and K, got {matrix.shape[0]}"
+            raise SceneError([Issue(pointer=f"/structure/parts/{name}", message=message)])
 
 
 def _refuse_unreduced(tables: Mapping[str, Any], found: MatrixSet) -> None:
@@ -187,7 +207,7 @@ def _from_file(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
     return {**tables, "diameters": matrices, "reduction": was}
 
 
-def _dense(found: MatrixSet) -> dict[str, Matrix]:
+def _dense(found: MatrixSet) -> dict[str, object]:
     for key, matrix in found.matrices.items():
         if matrix.shape[0] > MOST_DOFS:
             message = (
@@ -196,7 +216,10 @@ def _dense(found: MatrixSet) -> dict[str, Matrix]:
                 "[structure.cyclic] does it whenever the scene is loaded"
             )
             raise SceneError([Issue(pointer=f"/structure/{key}", message=message)])
-    return {key: Matrix(matrix.toarray()) for key, matrix in found.matrices.items()}
+    dense: dict[str, object] = {key: Matrix(matrix.toarray()) for key, matrix in found.matrices.items()}
+    if found.parts:
+        dense["parts"] = {name: Matrix(matrix.toarray()) for name, matrix in found.parts.items()}
+    return dense
 
 
 def _refusal(key: str, message: str) -> SceneError:

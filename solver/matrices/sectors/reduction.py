@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from solver.matrices.readers.reader import MatrixFileError
-from solver.matrices.reduction.craig_bampton import craig_bampton
+from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton
 from solver.matrices.reduction.reduction_error import Quality
 from solver.matrices.sectors.diameters import DiameterMatrices
-from solver.matrices.sectors.elimination import Elimination
+from solver.matrices.sectors.elimination import Elimination, phase_factor
+from solver.matrices.sectors.parts import PartsAcross
 from solver.matrices.validation import DofTable
 
 SUFFIX = ".npz"
@@ -69,6 +70,7 @@ def reduce_sector(
     keep_modes: int,
     diameters: Sequence[int],
     sectors: int,
+    parts: Mapping[str, Any] | None = None,
     on_progress: Callable[[int], None] | None = None,
 ) -> ReducedSector:
     """Reduce a sector (Craig, Bampton 1968) at each nodal diameter.
@@ -80,6 +82,7 @@ def reduce_sector(
     dofs : rows of the DOFs in use in the full sector.
     keep_modes : of the rest with these held, at each nodal diameter.
     diameters : ascending.
+    parts : matrices of what mistuning may scale, sparse, of the full sector; then all nodal diameters.
     on_progress : called with each nodal diameter that is done.
 
     Raises
@@ -93,7 +96,9 @@ def reduce_sector(
     for n in diameters:
         begun = time.perf_counter()
         at = {key: circulant.at(n, sectors) for key, circulant in circulants.items()}
-        found.append(craig_bampton(at["M"], at["K"], at.get("C"), own, keep_modes, weigh=False))
+        found.append(
+            craig_bampton(at["M"], at["K"], at.get("C"), own, keep_modes, weigh=False, keep_basis=bool(parts))
+        )
         seconds.append(time.perf_counter() - begun)
         if on_progress is not None:
             on_progress(n)
@@ -104,8 +109,9 @@ def reduce_sector(
             "ask for that many"
         )
     stacks = {key: np.array([each.matrices[key] for each in found]) for key in circulants}
+    across = _across(parts, found, eliminated, diameters, sectors) if parts else None
     return ReducedSector(
-        matrices=DiameterMatrices(diameters=tuple(diameters), **stacks),
+        matrices=DiameterMatrices(diameters=tuple(diameters), parts=across, **stacks),
         rows={name: row for row, name in enumerate(own)},
         full=int(eliminated.here.shape[0]),
         modes=found[0].modes,
@@ -113,6 +119,27 @@ def reduce_sector(
         quality=tuple(each.quality for each in found),
         seconds=tuple(seconds),
     )
+
+
+def _across(
+    parts: Mapping[str, Any], found: Sequence[Reduced], eliminated: Elimination, diameters: Sequence[int],
+    sectors: int,
+) -> PartsAcross:  # fmt: skip
+    """Parts of the sector between the bases of its nodal diameters."""
+    bases = []
+    for n, each in zip(diameters, found, strict=True):
+        if each.basis is not None:
+            turn = phase_factor(n, sectors)
+            bases.append((eliminated.here @ each.basis) + turn * (eliminated.beyond @ each.basis))
+    shape = (len(parts), len(bases), len(bases), bases[0].shape[1], bases[0].shape[1])
+    ahead, back = np.empty(shape, np.complex128), np.empty(shape, np.complex128)
+    for i, P in enumerate(parts.values()):
+        for b, right in enumerate(bases):
+            moved = P @ right
+            for a, left in enumerate(bases):
+                ahead[i, a, b] = left.conj().T @ moved
+                back[i, a, b] = left.conj().T @ moved.conj()
+    return PartsAcross(tuple(parts), ahead, back)
 
 
 def _kept_rows(dofs: Mapping[str, int], eliminated: Elimination) -> DofTable:
@@ -134,6 +161,8 @@ def _kept_rows(dofs: Mapping[str, int], eliminated: Elimination) -> DofTable:
 def write_diameters(path: Path, reduced: ReducedSector) -> None:
     """Write a reduced sector: arrays `diameters`, `M`, `K`, maybe `C`, `names` and `good_to_hz` (.npz).
 
+    With parts `parts` has their names, `parts_ahead` and `parts_back` the matrices (`PartsAcross`).
+
     Raises
     ------
     OSError
@@ -142,6 +171,9 @@ def write_diameters(path: Path, reduced: ReducedSector) -> None:
     found = reduced.matrices
     names = [*reduced.rows, *(f"mode{i}" for i in range(1, reduced.modes + 1))]
     arrays = {"M": found.M, "K": found.K} | ({} if found.C is None else {"C": found.C})
+    if found.parts is not None:
+        arrays |= {"parts_ahead": found.parts.ahead, "parts_back": found.parts.back}
+        arrays["parts"] = np.array(found.parts.names)
     np.savez_compressed(
         path,
         allow_pickle=False,
@@ -170,7 +202,11 @@ def read_diameters(path: Path) -> tuple[DiameterMatrices, dict[str, Any]]:
         held = arrays.get("held_hz", np.zeros((1, 0)))
         kept = {key: arrays[key] for key in ("M", "K", "C") if key in arrays}
         diameters = tuple(int(n) for n in arrays["diameters"])
-        matrices = DiameterMatrices(diameters=diameters, **kept)
+        parts = None
+        if "parts" in arrays:
+            names = tuple(map(str, arrays["parts"]))
+            parts = PartsAcross(names, arrays["parts_ahead"], arrays["parts_back"])
+        matrices = DiameterMatrices(diameters=diameters, parts=parts, **kept)
     except OSError as error:
         raise MatrixFileError(f"{str(path)!r} cannot be read: {error.strerror or error}") from error
     except (KeyError, TypeError, ValueError) as error:

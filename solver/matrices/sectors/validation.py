@@ -9,6 +9,7 @@ import numpy as np
 
 from solver.matrices.sectors.diameters import DiameterMatrices
 from solver.matrices.sectors.elimination import elimination
+from solver.matrices.sectors.parts import PartMatrices
 from solver.matrices.validation import DofTable
 from solver.matrices.values import Matrix, Modes
 
@@ -57,6 +58,10 @@ class Sector(Protocol):
     def dofs(self) -> DofTable:
         """The DOFs in use."""
 
+    @property
+    def parts(self) -> PartMatrices | None:
+        """Stiffness of parts of a full sector [N/m]."""
+
 
 def check_sector(sector: Sector, spinning: Collection[str]) -> None:
     """Raise ValueError unless matrices with boundaries, or those of nodal diameters, are there and fit.
@@ -77,6 +82,7 @@ def check_sector(sector: Sector, spinning: Collection[str]) -> None:
             found = elimination(sector.M.size, low, high, sector.cyclic.axis, count)
             away = np.setdiff1d(np.arange(sector.M.size), found.kept).tolist()
             _check_kept(sector.dofs, set(away))
+            _check_parts(sector.parts, sector.M.size)
         return
     if sector.M is not None or low is not None or high is not None:
         raise ValueError(
@@ -86,6 +92,10 @@ def check_sector(sector: Sector, spinning: Collection[str]) -> None:
         raise ValueError(
             f"`{next(iter(spinning))}` is a matrix of a full sector, not of a reduced one (`diameters`): "
             "give it as [[couplings]] of the DOFs in use, or the sector by M and K"
+        )
+    if sector.parts is not None:
+        raise ValueError(
+            "`parts` are of a full sector: those of a reduced one stand in `diameters` with the rest"
         )
     if not sector.symmetric:
         raise ValueError(
@@ -102,6 +112,12 @@ def _check_kept(dofs: DofTable, away: set[int]) -> None:
                 f"`dofs`: {name!r} is row {row}, on the high boundary: name the DOF of the low boundary that "
                 "it is paired with; in contacts it is NAME@next"
             )
+
+
+def _check_parts(parts: PartMatrices | None, size: int) -> None:
+    for name, matrix in zip(parts or (), () if parts is None else parts.matrices, strict=True):
+        if matrix.size != size:
+            raise ValueError(f"`parts`: {name!r} must have {size} rows like M, got {matrix.size}")
 
 
 def _check_diameters(found: DiameterMatrices, count: int, dofs: DofTable) -> None:

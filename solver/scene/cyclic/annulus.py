@@ -200,7 +200,7 @@ def _standing(scene: Scene) -> bool:
 
 
 def _factors(structure: Structure) -> tuple[float, ...]:
-    mistuning = structure.mistuning if isinstance(structure, CyclicStructure) else None
+    mistuning = None if isinstance(structure, LumpedStructure) else structure.mistuning
     n = structure.sector_count
     return (1.0,) * n if mistuning is None else mistuning.factors(n)
 

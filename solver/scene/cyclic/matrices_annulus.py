@@ -6,6 +6,7 @@ from functools import lru_cache
 
 from solver.errors import SettingError
 from solver.matrices.sectors.blocks import annulus_matrices, annulus_of, full_elimination
+from solver.matrices.sectors.mistuned import added_by_mistuning
 from solver.matrices.validation import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix
 from solver.scene.matrices_structure import MatricesStructure
@@ -18,7 +19,8 @@ def matrices_annulus(sector: MatricesStructure) -> MatricesStructure:
     Raises
     ------
     SettingError
-        It would be too large, a nodal diameter is not known, or modes have damping ratios of their own.
+        It would be too large, a nodal diameter is not known, modes have damping ratios of their own, or there
+        is no such part to be mistuned.
     """
     count, n = sector.sector_count, sector.n_coordinates
     if count * n > MOST_DOFS:
@@ -35,6 +37,9 @@ def matrices_annulus(sector: MatricesStructure) -> MatricesStructure:
             "must be one number where all sectors are solved: modes are counted at each nodal diameter",
         )
     K, C, M = annulus_matrices(sector)
+    if sector.mistuning is not None:
+        more_K, more_M = added_by_mistuning(sector, sector.mistuning.of, sector.mistuning.factors(count))
+        K, M = K + more_K, M + more_M
     own = sector.dofs.rows
     if sector.diameters is None:
         eliminated = full_elimination(sector)

@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from solver.errors import Issue
+from solver.matrices.sectors.parts import WHOLE, PartsAcross
 from solver.scene.cyclic.boundary import is_cyclic
 from solver.scene.parts import Mistuning
 from solver.wording import listing, nearest, quoted
@@ -21,7 +22,7 @@ def cyclic_issues(raw: dict[str, Any]) -> list[Issue]:
     found = [*_pattern_issues(raw.get("excitation"), structure)]
     found += _group_issues(structure)
     mistuning = structure.get("mistuning")
-    if structure.get("kind") == "cyclic" and isinstance(mistuning, dict):
+    if is_cyclic(structure) and isinstance(mistuning, dict):
         found += [*_name_issues(structure, mistuning), *_factor_issues(mistuning, structure.get("sectors"))]
     return found
 
@@ -82,8 +83,13 @@ def _group_issues(structure: dict[str, Any]) -> Iterator[Issue]:
 
 def _name_issues(structure: dict[str, Any], mistuning: dict[str, Any]) -> Iterator[Issue]:
     """Names in `of` that are neither a DOF nor the name of a spring, dashpot or mass, or stand twice."""
-    masses = structure.get("masses")
-    known = [*_names(structure), *map(str, masses if isinstance(masses, dict) else ())]
+    if structure.get("kind") == "matrices":
+        known, what = _matrix_parts(structure), "part of the matrices"
+        hint = "" if known else ": reduce the sector with --mistune"
+    else:
+        masses = structure.get("masses")
+        known = [*_names(structure), *map(str, masses if isinstance(masses, dict) else ())]
+        what, hint = "spring, damper, mass or DOF", " (parts need a `name`)"
     of = mistuning.get("of")
     named = of if isinstance(of, list) else []
     for i, name in enumerate(named):
@@ -92,12 +98,22 @@ def _name_issues(structure: dict[str, Any], mistuning: dict[str, Any]) -> Iterat
         pointer = f"/structure/mistuning/of/{i}"
         if name not in known:
             message = (
-                f"`of`: there is no spring, damper, mass or DOF {quoted(name)} (parts need a `name`); "
-                f"known: {listing(known)}{nearest(name, known)}"
+                f"`of`: there is no {what} {quoted(name)}{hint}; "
+                f"known: {listing(known) or 'none'}{nearest(name, known)}"
             )
             yield Issue(pointer=pointer, message=message)
         elif name in named[:i]:
             yield Issue(pointer=pointer, message=f"`of` has {name!r} twice: its factor would count twice")
+
+
+def _matrix_parts(structure: dict[str, Any]) -> list[str]:
+    """What may be mistuned of a sector given by matrices: K, M and its parts, if reduced those kept."""
+    reduced, parts = structure.get("diameters"), structure.get("parts")
+    if reduced is None:
+        return [*WHOLE, *map(str, parts if isinstance(parts, dict | list | tuple) else ())]
+    kept = reduced.get("parts") if isinstance(reduced, dict) else reduced.parts
+    names = kept.names if isinstance(kept, PartsAcross) else kept
+    return list(map(str, names or ()))
 
 
 def _factor_issues(mistuning: dict[str, Any], sectors: object) -> Iterator[Issue]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.linalg import eigh, eigvalsh
-from sector_cases import as_matrices
+from sector_cases import ROWS, as_matrices
 
 import solver
 from solver import Scene, SceneError, SettingError, load_scene
@@ -48,6 +49,70 @@ def test_every_sector_of_it_is_the_annulus_of_the_lumped_one() -> None:
              for scene in (LUMPED, given)]  # fmt: skip
     assert found[1].max_abs == pytest.approx(found[0].max_abs, rel=1e-9)
     assert found[1].max_abs == pytest.approx(solved(given, 690.0, 5).max_abs, rel=1e-8)
+
+
+FACTORS = [1.02, 0.97, 1.0, 1.01, 0.99, 1.03, 0.98, 1.005]
+
+
+def blade_spring(name: str) -> np.ndarray:
+    """Stiffness of a spring of the blade over the rows of the sector."""
+    (spring,) = (one for one in LUMPED.structure.springs if one.name == name)
+    i, j = (ROWS[str(end.dof)] for end in spring.ends)
+    part = np.zeros((5, 5))
+    part[[i, j], [i, j]], part[[i, j], [j, i]] = spring.k, -spring.k
+    return part
+
+
+@pytest.mark.parametrize("name", ["tip_middle", "root_disk"])
+def test_a_mistuned_part_of_the_matrices_is_the_mistuned_spring(name: str) -> None:
+    mistuning = {"of": [name], "values": FACTORS}
+    raw = LUMPED.to_dict()
+    raw["structure"] = {**raw["structure"], "mistuning": mistuning}
+    table = as_matrices(LUMPED, parts={name: blade_spring(name).tolist()}, mistuning=mistuning)
+    given = Scene.from_dict(table)
+    assert Scene.from_dict(given.to_dict()) == given
+    for hz in (690.0, 705.0):
+        one, other = (solved(scene, hz, 5) for scene in (Scene.from_dict(raw), given))
+        np.testing.assert_allclose(
+            solver.blade_amplitudes(other).max_abs, solver.blade_amplitudes(one).max_abs, rtol=1e-9
+        )
+    tuned = Scene.from_dict(as_matrices(LUMPED, parts={name: blade_spring(name).tolist()}))
+    others = [
+        solver.mistuning_study(scene, of=name, spread=0.03, samples=2, seed=4, harmonics=1)
+        for scene in (LUMPED, tuned)
+    ]
+    assert others[1].completed
+    np.testing.assert_allclose(others[1].magnifications, others[0].magnifications, rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("of", "values", "wanted"),
+    [
+        (["blade"], FACTORS, "there is no part of the matrices 'blade'; known: K, M, tip_middle"),
+        (["tip_middle"], FACTORS[:3], "one factor for each of the 8 sectors, got 3"),
+        (["K", "K"], FACTORS, "'K' twice"),
+    ],
+)
+def test_mistuning_that_does_not_fit_is_told(of: list[str], values: list[float], wanted: str) -> None:
+    parts = {"tip_middle": blade_spring("tip_middle").tolist()}
+    with pytest.raises(SceneError, match=re.escape(wanted)):
+        Scene.from_dict(as_matrices(LUMPED, parts=parts, mistuning={"of": of, "values": values}))
+
+
+@pytest.mark.parametrize(
+    ("parts", "wanted"),
+    [
+        ({"K": np.eye(5).tolist()}, "stands for that of the whole sector"),
+        ({"a b": np.eye(5).tolist()}, "only letters, digits"),
+        ({"blade": np.eye(4).tolist()}, "must have 5 rows like M, got 4"),
+        ({"blade": np.triu(np.ones((5, 5))).tolist()}, "must be symmetric"),
+        ({"blade": "blade.mtx"}, "must be given inline"),
+        ({}, "must be a table of names and matrices"),
+    ],
+)
+def test_parts_that_are_none_are_told(parts: dict[str, Any], wanted: str) -> None:
+    with pytest.raises(SceneError, match=re.escape(wanted)):
+        Scene.from_dict(as_matrices(LUMPED, parts=parts))
 
 
 def test_a_standing_wave_and_the_march_write_it_out() -> None:

@@ -20,6 +20,7 @@ from scipy.sparse.linalg import eigsh
 import solver
 from service.cli import main
 from solver import Scene
+from solver.linear.assembly import linear_model
 from solver.matrices.load_set import MatrixSet, read_set
 from solver.matrices.readers.label import Label
 from solver.matrices.readers.numbers_in_text import FormatError
@@ -170,6 +171,45 @@ def test_a_response_with_friction_is_that_of_the_annulus_and_of_the_reduced_sect
         assert reduced.max_abs == pytest.approx(one.max_abs, rel=1e-3)
 
 
+def test_a_mistuned_reduced_disk_is_the_annulus_of_full_sectors() -> None:
+    """With all modes kept exactly; with some to the error of the reduction; by the file too."""
+    deck, found, low, high = a_sector()
+    ours, theirs = groups(paired(deck, low, high, AXIS, SECTORS), found)
+    rows = rows_in_use(found, deck)
+    matrices = {key: csr_array(matrix) for key, matrix in found.matrices.items()}
+    outside = np.zeros(matrices["K"].shape[0])
+    outside[
+        [i for i, one in enumerate(found.labels or ()) if math.hypot(*deck.nodes[one.node][:2]) > 0.16]
+    ] = 1.0
+    blade = csr_array(outside[:, None] * matrices["K"].toarray() * outside[None, :])
+    values = [1.06, 0.95, 1.0, 1.03, 0.98, 1.02]
+    mistuning = {"of": ["blade", "M"], "values": values}
+    boundary = {"low_rows": list(map(list, ours)), "high_rows": list(map(list, theirs)), "axis": list(AXIS)}
+    whole = {key: matrix.toarray().tolist() for key, matrix in matrices.items()}
+    whole |= {"parts": {"blade": blade.toarray().tolist()}, "mistuning": mistuning}
+    whole |= {"cyclic": boundary, "dofs": rows}
+    scene = scene_of(whole, 2)
+    one = solver.solve(scene, frequency_hz=3200.0, harmonics=2)
+    assert one.converged
+    assert {contact.state.value for contact in one.contacts} != {"stuck"}
+    alone = solver.solve(scene_of({**whole, "mistuning": None}, 2), frequency_hz=3200.0, harmonics=2)
+    blades = solver.blade_amplitudes(one).max_abs
+    assert np.ptp(blades) > 0.05 * alone.max_abs  # the factors matter
+
+    _, gone = joined()
+    free = gone.kept.size - len(rows)
+    parts = {"blade": blade, "M": matrices["M"]}
+    for modes, tolerance in ((free, 1e-8), (16, 3e-3)):
+        kept = reduce_sector(matrices, gone, rows, modes, range(SECTORS // 2 + 1), SECTORS, parts)
+        small = {"diameters": kept.matrices, "dofs": kept.rows, "cyclic": {"axis": [0.0, 0.0, 1.0]}}
+        given = scene_of(small | {"mistuning": mistuning}, 2)
+        other = solver.solve(given, frequency_hz=3200.0, harmonics=2)
+        np.testing.assert_allclose(solver.blade_amplitudes(other).max_abs, blades, rtol=tolerance)
+    assert Scene.from_dict(given.to_dict()) == given
+    with pytest.raises(solver.SceneError, match="there is no part of the matrices 'K'; known: blade, M"):
+        scene_of(small | {"mistuning": {**mistuning, "of": ["K"]}}, 2)
+
+
 def test_the_reduction_reports_its_error(monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where nested dissection and block Lanczos take the place of what serves small models."""
     deck, found, _, _ = a_sector()
@@ -309,6 +349,35 @@ def test_the_command_makes_the_scene_of_a_disk(capsys: pytest.CaptureFixture[str
         "there is no set 'SIDE' of nodes in the deck; known: ALL, FOOT, HIGH, LOW" in capsys.readouterr().err
     )
     assert not Path("none.toml").exists()
+
+
+@pytest.mark.usefixtures("beside_docs")
+def test_the_command_keeps_what_is_to_be_mistuned(capsys: pytest.CaptureFixture[str]) -> None:
+    files = ["import", "matrices.sti", "matrices.mas", "--sectors", "24", "--dof", "tip=383.UY"]
+    files += ["--nodes", "sector.inp", "--low", "LOW", "--high", "HIGH", "--engine-order", "8"]
+    reduced = [*files, "--reduce", "--modes", "4"]
+    assert main([*reduced, "--out", "disk.toml", "--mistune", "K"]) == 0
+    scene = solver.load_scene("disk.toml")
+    assert scene.structure.diameters.diameters == tuple(range(13))
+    # With one factor on all of them the disk is tuned, and its stiffness that many times as large.
+    tuned = solver.mistuned(scene, of="K", values=[1.21] * 24)
+    frequencies = [
+        np.sqrt(eigh(model.K0, model.M, eigvals_only=True)[:6])
+        for model in map(linear_model, (tuned, solver.annulus(scene)))
+    ]
+    np.testing.assert_allclose(frequencies[0], 1.1 * frequencies[1], rtol=1e-9)
+    capsys.readouterr()
+    for wrong, wanted in (
+        (["--mistune", "blade"], "`--mistune` must be K, M, or the name of a part and its file"),
+        (["--mistune", "blade=none.mtx"], "there is no file 'none.mtx'"),
+        (["--mistune", "K", "--mistune", "K"], "twice"),
+    ):
+        assert main([*reduced, "--out", "none.toml", "--reduced", "none.npz", *wrong]) != 0
+        assert wanted in capsys.readouterr().err
+    assert main([*files, "--out", "none.toml", "--mistune", "K"]) != 0
+    assert "goes with --sectors and --reduce" in capsys.readouterr().err
+    assert not Path("none.toml").exists()
+    assert not Path("none.npz").exists()
 
 
 def test_the_shipped_disk() -> None:

@@ -1,0 +1,53 @@
+"""The table [structure.mistuning]: sectors of a disk that are not quite equal."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from solver.contacts.fields import MemberName, NonNegative, Part, Positive
+
+Seed = Annotated[int, Field(strict=True, ge=0, le=2**63 - 1)]
+
+
+class Mistuning(Part):
+    """Blades that are not quite equal: one factor for each sector, on the parts `of` names.
+
+    Attributes
+    ----------
+    of : tuple of str
+        Names of springs (the factor multiplies k), dashpots (c) and masses, or DOFs (their mass). Of a sector
+        given by matrices: K, M, or names of its `parts`.
+    spread : float or None
+        Standard deviation of the factors: 1 + spread * z, z independent and normal.
+    seed : int or None
+        Of the random numbers z: numpy's Generator with PCG64; 1 if left out.
+    values : tuple of float or None
+        The factors themselves, one for each sector, instead of `spread` and `seed`.
+    """
+
+    of: Annotated[tuple[MemberName, ...], Field(min_length=1)]
+    spread: NonNegative | None = None
+    seed: Seed | None = None
+    values: tuple[Positive, ...] | None = None
+
+    @model_validator(mode="after")
+    def _drawn_or_given(self) -> Mistuning:
+        if self.values is None and self.spread is None:
+            raise ValueError("`mistuning` needs `spread` (with an optional `seed`) or `values`, got neither")
+        if self.values is not None and (self.spread is not None or self.seed is not None):
+            other = "spread" if self.spread is not None else "seed"
+            raise ValueError(
+                f"`values` and `{other}` of `mistuning` exclude each other: give one, "
+                f"got {other} = {getattr(self, other)!r} beside {len(self.values)} values"
+            )
+        return self
+
+    def factors(self, sectors: int) -> tuple[float, ...]:
+        """The factor of each sector; those drawn may be 0 or less if the spread is large."""
+        if self.values is not None:
+            return self.values
+        draw = np.random.Generator(np.random.PCG64(1 if self.seed is None else self.seed))
+        return tuple((1.0 + (self.spread or 0.0) * draw.standard_normal(sectors)).tolist())
