@@ -12,10 +12,12 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from matrix_cases import beam, hb_text
 from scipy import sparse
 from scipy.io import mmwrite
+from sector_cases import as_matrices, sector_matrices
 
 import optim
 import solver
@@ -87,7 +89,15 @@ def test_json_and_toml_are_read() -> None:
     assert all(json.loads(text) for text in blocks("json"))
     assert all(tomllib.loads(text) for text in blocks("toml"))
     starts = {next(line for line in text.splitlines() if not line.startswith("#")) for text in blocks("toml")}
-    known = ("name = ", "scene = ", "[structure]", "[structure.mistuning]", "[[contacts]]", "[[dampers]]")
+    known = (
+        "name = ",
+        "scene = ",
+        "[structure]",
+        "[structure.mistuning]",
+        "[structure.parts]",
+        "[[contacts]]",
+    )
+    known += ("[[dampers]]",)
     assert [start for start in starts if not start.startswith(known)] == []
 
 
@@ -216,6 +226,31 @@ def test_the_page_knows_every_key_and_option_of_a_problem() -> None:
     keys = set(DesignRequest.model_fields) - {"fresh", "priority", "max_seconds", *ABOUT_THE_RUN}
     assert [key for key in keys if f"`{key}`" not in table] == []
     assert [option for option in OPTIONS.values() if f"`{option}" not in table] == []
+
+
+def test_the_mistuned_sector_of_the_page_on_disks_is_read(tmp_path: Path) -> None:
+    """The factors of its blade are those of the disk made of lumped parts, from files too."""
+    (given,) = [tomllib.loads(text) for text in blocks("toml") if text.startswith("[structure.parts]")]
+    lumped = solver.load_scene("bladed-disk")
+    blade = np.zeros((5, 5))
+    spring = next(one for one in lumped.structure.springs if one.name == "tip_middle")
+    blade[:2, :2] = spring.k * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    mmwrite(tmp_path / "blade-K.mtx", sparse.coo_array(blade), symmetry="symmetric")
+    M, K = sector_matrices()
+    for name, matrix in (("M", M), ("K", K)):
+        mmwrite(tmp_path / f"{name}.mtx", sparse.coo_array(matrix), symmetry="symmetric")
+    files = {"M": "M.mtx", "K": "K.mtx", **given["structure"]}
+    (tmp_path / "disk.json").write_text(json.dumps(as_matrices(lumped, **files)))
+    disk = solver.load_scene(tmp_path / "disk.json")
+    one = solver.solve(disk, frequency_hz=690.0, harmonics=1)
+    factors = given["structure"]["mistuning"]
+    other = solver.mistuned(lumped, of="tip_middle", spread=factors["spread"])
+    assert one.max_abs == pytest.approx(
+        solver.solve(other, frequency_hz=690.0, harmonics=1).max_abs, rel=1e-9
+    )
+    (tmp_path / "blade-K.mtx").unlink()
+    with pytest.raises(solver.SceneError, match=r"blade-K\.mtx"):
+        solver.load_scene(tmp_path / "disk.json")
 
 
 def test_parts_of_scenes_are_read() -> None:

@@ -52,6 +52,11 @@ BODIES: dict[str, dict[str, Any]] = {
         "scene": DISK, "of": ["tip_middle", "tip"], "spread": 0.03, "samples": 6, "seed": 5, "from": 700,
         "to": 850, "harmonics": 1,
     },
+    "modes": {"scene": "two-dof", "from": 0.01, "to": 10.0, "harmonics": 3},
+    "identify": {
+        "scene": "two-dof", "unknowns": {"damper.N0": [20, 500]}, "harmonics": 3, "starts": 1,
+        "data": [{"frequency": [0.9, 1.0, 1.1], "amplitude": [1.5, 2.0, 1.8]}],
+    },
 }  # fmt: skip
 OF_TIME = ("seconds", "milliseconds", "pareto")  # the last: whether no other row is faster and as exact
 

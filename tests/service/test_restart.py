@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import socket
@@ -234,9 +235,11 @@ def test_what_the_end_of_a_service_interrupts_is_answered_503_and_can_be_repeate
 
     def submit() -> None:
         body = {"kind": "iteration", "seconds": 0.0, "seed": 1}
-        found.append(
-            httpx.post(f"http://127.0.0.1:{port}/v1/jobs", json=body, headers=headers, timeout=PATIENCE)
-        )
+        # Nothing is promised to who comes when the service takes no connections any more.
+        with contextlib.suppress(httpx.ConnectError):
+            found.append(
+                httpx.post(f"http://127.0.0.1:{port}/v1/jobs", json=body, headers=headers, timeout=PATIENCE)
+            )
 
     process = start(port)
     until(lambda: answers(port))
@@ -246,12 +249,12 @@ def test_what_the_end_of_a_service_interrupts_is_answered_503_and_can_be_repeate
     process.terminate()
     thread.join()
     assert process.wait(PATIENCE) == 0
-    if found[0].status_code != 202:  # 202 if it was written in time
+    if found and found[0].status_code != 202:  # 202 if it was written in time
         assert is_problem(found[0], 503)["type"].endswith("stopping")
         assert int(found[0].headers["retry-after"]) >= 1
     start(port)
     until(lambda: answers(port))
     submit()
-    assert found[1].status_code == 202
-    client.wait(found[1].json()["id"])
+    assert found[-1].status_code == 202
+    client.wait(found[-1].json()["id"])
     assert len(list(client.jobs())) == 1
