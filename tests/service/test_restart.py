@@ -249,12 +249,13 @@ def test_what_the_end_of_a_service_interrupts_is_answered_503_and_can_be_repeate
     process.terminate()
     thread.join()
     assert process.wait(PATIENCE) == 0
-    if found and found[0].status_code != 202:  # 202 if it was written in time
+    written = [answer for answer in found if answer.status_code == 202]  # in time
+    if found and not written:
         assert is_problem(found[0], 503)["type"].endswith("stopping")
         assert int(found[0].headers["retry-after"]) >= 1
     start(port)
     until(lambda: answers(port))
     submit()
-    assert found[-1].status_code == 202
+    assert found[-1].status_code == (200 if written else 202)
     client.wait(found[-1].json()["id"])
     assert len(list(client.jobs())) == 1
