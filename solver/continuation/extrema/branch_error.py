@@ -44,6 +44,7 @@ _FEEDBACK = 8.0
 _RIVAL, _RIVALS = 0.7, 3  # share of the highest peak, and how many of those above it are judged
 _FOLLOWED = 3  # resonances that are followed, at most
 _MEET = 4  # rounds in which a resonance and the forces at its place are made to agree
+_LEAST = 0.1  # of its frequency, from which a resonance is followed at least
 _REACH = 0.02  # least share of a frequency that is followed on either side of a resonance
 _WIDTHS = 20.0  # half widths of it that are
 _ABOVE = 1.4  # harmonics with which harmonic k is followed, in units of k
@@ -258,7 +259,8 @@ class _Look:
         wide = more_harmonics(self._kept, top)
         reach = max(_REACH * one.at, _WIDTHS * one.half_width)
         guess = pad(one.guess, self._larger.balance, wide)
-        peak = follow(wide, one.at - reach, one.at + reach, guess)
+        # A resonance with much damping is wider than its frequency is high.
+        peak = follow(wide, max(one.at - reach, _LEAST * one.at), one.at + reach, guess)
         if peak is None:
             return one.height
         error = ErrorEstimator(Workspace.of(wide)).at(

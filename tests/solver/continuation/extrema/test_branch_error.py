@@ -82,3 +82,16 @@ def test_estimates_cover_the_errors_of_many_random_branches(harmonics: int):
 def test_a_linear_branch_has_no_error_but_rounding():
     branch = sweep(oscillator(k=2.0, c=0.1), "frequency", 0.1, 0.4)
     assert branch.error_estimate <= 1e-14 * branch.amplitude.max()
+
+
+def test_a_resonance_wider_than_its_frequency_is_high_is_followed_from_above_zero():
+    """The third engine order meets, with its seventh harmonic, a mode damped by shrouds under 500 N."""
+    raw = solver.load_scene("bladed-disk").to_dict()
+    raw["excitation"]["engine_order"] = 3
+    scene = solver.Scene.from_dict(raw).with_values({"shroud.N0": 500.0, "shroud.kt": 4e6})
+    branch = solver.sweep(scene, harmonics=3)
+    assert branch.completed
+    assert branch.peak is not None
+    true = solver.sweep(scene, harmonics=41)
+    assert true.peak is not None
+    assert abs(true.peak.value - branch.peak.value) <= branch.error_estimate
