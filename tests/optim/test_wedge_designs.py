@@ -71,6 +71,7 @@ def _is_least(
             assert beside >= here * (1.0 - 1e-6), (path, step)
 
 
+@pytest.mark.long
 def test_a_stiffer_face_is_better_up_to_its_bound() -> None:
     scene = solver.load_scene("platform-wedge").with_values({"wedge.mass": 0.0042})
     bounds = {"wedge.kt": (5e6, 8e7)}

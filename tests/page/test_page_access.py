@@ -61,7 +61,7 @@ def unfold(page: Page) -> None:
     expect(page.locator("#runs-list .run-form").first).to_be_visible()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.long)])
 def test_axe_finds_nothing_serious(browser: Browser, site: Site, studied: str, scheme: str) -> None:
     with opened(browser, site, color_scheme=scheme) as (context, _):
         page = visit(context, site, studied)

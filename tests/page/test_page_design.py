@@ -81,6 +81,7 @@ def test_two_variables_two_cases_and_a_limit(profile: Profile, site: Site) -> No
     expect(page.locator("[role=group][aria-label='case 2'] [name=level]")).to_have_value("1.5")
 
 
+@pytest.mark.long
 def test_a_robust_design_is_shown_beside_the_nominal_one(profile: Profile, site: Site) -> None:
     page = visit(profile[0], site, "?scene=two-dof&tab=design&harmonics=3")
     fill(page, "variable 1", path="damper.N0", low="20", high="500")

@@ -80,6 +80,7 @@ def test_coulomb_friction_has_the_sliders_it_had(page_of: Any) -> None:
     assert page.input_value("#slide-damper-N1 >> xpath=../span/input") == "60"
 
 
+@pytest.mark.long
 def test_a_law_from_outside_has_sliders_and_is_designed(page_of: Any) -> None:
     page = page_of("joined")
     assert sliders(page) == ["k of joint", "limit of joint", "f0, the force"]

@@ -110,7 +110,8 @@ def test_one_service_on_sqlite(tmp_path: Path, number: int) -> None:
     undergo(site, COMMON, number, seed=number)
 
 
-@pytest.mark.parametrize("number", [2, pytest.param(30, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("number", [2, 30])
 def test_a_disk_that_is_full_for_a_while(tmp_path: Path, small_disk: Path, number: int) -> None:
     site = Site(f"sqlite:///{small_disk}/jobs.db", tmp_path, [free_port()])
     undergo(site, {"disk full": disk_full(small_disk)}, number, seed=number)

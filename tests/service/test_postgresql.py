@@ -229,6 +229,7 @@ def answers(client: Client) -> bool:
     return True
 
 
+@pytest.mark.long
 def test_the_jobs_of_a_killed_service_are_done_by_another(tmp_path: Path, start: Start) -> None:
     file = tmp_path / "pids"
     running = [start() for _ in range(2)]

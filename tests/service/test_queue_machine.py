@@ -302,6 +302,7 @@ def unguarded() -> Iterator[None]:
     importlib.reload(job_statements)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("unguarded")
 def test_a_queue_that_forgets_the_guard_is_caught(tmp_path: Path) -> None:
     """The test can fail: a queue that lets a lost attempt write is found out."""

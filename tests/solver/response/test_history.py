@@ -116,6 +116,7 @@ def test_a_stuck_contact_that_slipped_on_its_way() -> None:
     assert solution.mean_range[0] < rest.mean < solution.mean_range[1]
 
 
+@pytest.mark.long
 def test_a_circular_limit_that_is_only_grazed() -> None:
     """In the end it sticks, along a circle that touches the limit: what is kept depends on the history."""
     scene = load_scene(DATA / "mean_of_history_circle.toml")
