@@ -2,7 +2,8 @@
 
 The equations are those of the extended periodic motion (`solver.modes.equations`) with the excitation f in
 place of the artificial damping, Z_1 x_1 + Lᴴ F_1 = p f, at a given modal amplitude a: what a test with a
-controlled phase and amplitude measures (S. Peter, R. I. Leine, Mech. Syst. Signal Process. 96 (2017) 139).
+controlled phase and amplitude measures (S. Peter, R. I. Leine, Mech. Syst. Signal Process. 96 (2017) 139,
+doi:10.1016/j.ymssp.2017.04.011).
 The force is written as p = z c a with c = 2ω₀²/|φᴴ f| of the linear mode φ, so that the last unknown z is the
 damping ratio that one mode alone would have.
 """

@@ -95,7 +95,8 @@ class PartsAcross:
 
     A mistuned disk is no wave: its nodal diameters move together. Of a part with the factor 1 + δ_j in sector
     j they get the matrices T(n)ᴴ P T(m) 1/N Σ_j δ_j e^{i(m−n)jα}, with T(−n) the complex conjugate of T(n)
-    (component mode mistuning: S.-H. Lim, R. Bladh, M. P. Castanier, C. Pierre, AIAA J. 45 (2007) 2285).
+    (component modes of mistuned disks: R. Bladh, M. P. Castanier, C. Pierre, J. Eng. Gas Turbines Power 123
+    (2001) 100, doi:10.1115/1.1338948).
 
     Attributes
     ----------
