@@ -30,6 +30,7 @@ from solver.scene.scene import Scene
 
 _BOUND = 1e-6  # scaled distance from a bound within which an estimate lies on it
 _IMPLAUSIBLE = 200.0  # ratio of measured to computed amplitudes, over a whole run, that is a wrong unit
+_MOST_SCATTER = 0.25  # relative noise; responses of rigs repeat to a few per cent
 _MISFIT = 2.0  # reduced χ² of given noise above which the model does not describe the data
 
 
@@ -156,7 +157,7 @@ def _described(
     by_path = unknowns.by_path(z)
     here = runs.scene.with_values(by_path)
     intervals = clipped(unknowns, np.array([one.interval for one in estimates]))
-    bad = level_known and info.reduced_chi2 > _MISFIT
+    misfit = _misfit(info.reduced_chi2) if level_known else _scatter(best.level)
     others = [
         {**dict(zip(unknowns.names, unknowns.values(z_other).tolist(), strict=True)), "misfit": ratio}
         for z_other, ratio in found.others
@@ -165,7 +166,7 @@ def _described(
         scene=runs.scene.name, status=status, estimates=estimates, covariance=in_units,
         correlation=covariance / np.outer(spread, spread),
         noise=(math.nan if noise is None else noise) if level_known else best.level,
-        reduced_chi2=info.reduced_chi2, misfit=_MISFIT_WORDS if bad else "", untold=missing,
+        reduced_chi2=info.reduced_chi2, misfit=misfit, untold=missing,
         correlated=strong_correlations(unknowns, info), candidates=(),
         runs=_curves(runs, best, covariance), not_reached=left_out,
         uncertain=uncertain_table(here, unknowns, values, in_units, intervals, told=not missing),
@@ -174,11 +175,26 @@ def _described(
     )  # fmt: skip
 
 
-_MISFIT_WORDS = (
-    "The residuals are larger than the noise given: the model does not describe the data, or the noise is "
-    "larger. "
-    "Intervals are too narrow then. Look at the fit; leave `noise` out to judge by what is left over."
-)
+def _misfit(reduced_chi2: float) -> str:
+    """Return what residuals far above the noise given say."""
+    if reduced_chi2 <= _MISFIT:
+        return ""
+    return (
+        "The residuals are larger than the noise given: the model does not describe the data, or the noise "
+        "is larger. Intervals are too narrow then. Look at the fit; leave `noise` out to judge by what is "
+        "left over."
+    )
+
+
+def _scatter(level: float) -> str:
+    """Return what a level of the noise says that was found in the residuals."""
+    if not level > _MOST_SCATTER:
+        return ""
+    return (
+        f"The fit leaves {100.0 * level:.3g} % of the responses, far more than measurements scatter: the "
+        "model does not describe the data, and the intervals say nothing. Look at the fit; another parameter "
+        "may have to be looked for, other bounds, or the data are of another structure."
+    )
 
 
 def _estimates(

@@ -97,7 +97,8 @@ class Identification(Drawn):
         Mean square of the residuals over the noise; about 1 where the model describes the data and the noise
         was given, 1 by construction where it was not.
     misfit : str
-        What a large `reduced_chi2` of given noise says; else empty.
+        What a large `reduced_chi2` of given noise says, or a `noise` found that is larger than measurements
+        have; else empty.
     untold : tuple of Untold
     correlated : tuple of (name, name, correlation)
     candidates : tuple of Candidate

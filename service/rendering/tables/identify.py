@@ -9,6 +9,7 @@ from service.rendering.tables.text import print_pairs, print_table
 from solver.results import units
 
 _CANDIDATES = 5  # shown, the most telling
+_TELLING = 0.99  # of an error, above which a measurement lowers none
 
 
 def report(found: Mapping[str, Any]) -> None:
@@ -20,7 +21,8 @@ def report(found: Mapping[str, Any]) -> None:
     if found["noise"] is not None:
         pairs.append(("noise", f"{100.0 * found['noise']:.3g} %"))
     if found["misfit"]:
-        pairs.append(("warning", f"{found['misfit']} (reduced chi² {found['reduced_chi2']:.3g})"))
+        chi2 = f" (reduced chi² {found['reduced_chi2']:.3g})" if found["reduced_chi2"] > 1.0 else ""
+        pairs.append(("warning", found["misfit"] + chi2))
     pairs += [("not told", one["words"]) for one in found["untold"]]
     for one in found["correlated"]:
         names = " and ".join(one["names"])
@@ -29,9 +31,13 @@ def report(found: Mapping[str, Any]) -> None:
     for one in found["other_optima"]:
         values = ", ".join(f"{name} = {value:.5g}" for name, value in one.items() if name != "misfit")
         pairs.append(("another optimum", f"{values}; misfit {one['misfit']:.3g} times as large"))
-    for place, one in enumerate(found["candidates"][:_CANDIDATES]):
-        if one["gain"] is not None:
-            pairs.append(("measure next" if place == 0 else "  or", _candidate(one)))
+    known = [one for one in found["candidates"] if one["gain"] is not None]
+    telling = [one for one in known if one["factor"] < _TELLING]
+    for place, one in enumerate(telling[:_CANDIDATES]):
+        pairs.append(("measure next" if place == 0 else "  or", _candidate(one)))
+    if known and not telling:
+        tried = f"none of the {len(known)} conditions tried lowers an error by 1 %"
+        pairs.append(("measure next", f"{tried}: try others (--candidate), or another DOF"))
     pairs.append(("starts", f"{found['starts']}, of the best {found['agreeing']} ended at the same place"))
     pairs.append(("time", units.duration(found["seconds"])))
     print_pairs("", pairs)

@@ -15,6 +15,7 @@ from optim.identification.fit.evaluation import Runs
 from optim.identification.reading import read_data
 from optim.identification.unknowns import read_unknowns
 from optim.problem.uncertainty_input import read_uncertain
+from service.rendering.tables.identify import report
 
 SCENE = solver.load_scene("two-dof")
 BOUNDS = {"damper.kt": (15.0, 80.0), "damper.mu": (0.1, 0.6)}
@@ -129,6 +130,25 @@ def test_noise_that_is_given_too_small_is_said() -> None:
     found = identified(two_dof_runs(np.random.default_rng(3), 0.04), BOUNDS, noise=0.005)
     assert found.reduced_chi2 > 10.0
     assert "larger than the noise given" in found.misfit
+
+
+def test_data_of_another_structure_are_said_not_to_fit() -> None:
+    """No load within the bounds has this response; noise of 10 % alone says nothing of the kind."""
+    hertz = np.linspace(0.85, 1.6, 16)
+    strange = {"frequency": hertz.tolist(), "amplitude": (1.0 + 0.9 * np.sin(25.0 * hertz)).tolist()}
+    found = optim.identify(SCENE, [strange], BOUNDS, harmonics=3, starts=2)
+    assert found.noise > 0.25
+    assert "the model does not describe the data" in found.misfit
+    noisy = identified(two_dof_runs(np.random.default_rng(3), 0.1), BOUNDS)
+    assert noisy.misfit == ""
+
+
+def test_conditions_that_tell_nothing_are_not_proposed(capsys: pytest.CaptureFixture[str]) -> None:
+    found = identified(two_dof_runs(np.random.default_rng(3), 0.02), BOUNDS).to_json()
+    useless = {"conditions": {"damper.N0": 1.0}, "like": "", "gain": 1e-8, "tells": "damper.kt"}
+    for factor, wanted in ((1.0, "none of the 1 conditions tried"), (0.5, "error of damper.kt times 0.5")):
+        report({**found, "candidates": [{**useless, "factor": factor}]})
+        assert wanted in " ".join(capsys.readouterr().out.split())
 
 
 def test_it_can_be_stopped() -> None:
