@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -207,11 +208,17 @@ def read_diameters(path: Path) -> tuple[DiameterMatrices, dict[str, Any]]:
             names = tuple(map(str, arrays["parts"]))
             parts = PartsAcross(names, arrays["parts_ahead"], arrays["parts_back"])
         matrices = DiameterMatrices(diameters=diameters, parts=parts, **kept)
+        highest = float(held[:, -1].min()) if held.size else 0.0
+        if not 0.0 <= highest < math.inf:
+            raise ValueError(f"`held_hz` must hold finite frequencies >= 0, got {highest}")
+        full = int(arrays.get("full", matrices.size))
+        return matrices, {"dofs": full, "modes": int(held.shape[1]), "highest_hz": highest}
     except OSError as error:
         raise MatrixFileError(f"{str(path)!r} cannot be read: {error.strerror or error}") from error
-    except (KeyError, TypeError, ValueError) as error:
+    except MemoryError as error:
+        raise MatrixFileError(f"{str(path)!r} holds more than fits into memory") from error
+    except Exception as error:  # a damaged archive raises many kinds
         reason = f"has no array {error}" if isinstance(error, KeyError) else f"is no reduced sector: {error}"
-        raise MatrixFileError(f"{str(path)!r} {reason}") from error
-    highest = float(held[:, -1].min()) if held.size else 0.0
-    full = int(arrays.get("full", matrices.size))
-    return matrices, {"dofs": full, "modes": int(held.shape[1]), "highest_hz": highest}
+        raise MatrixFileError(
+            f"{str(path)!r} {reason}; `stickslip import --sectors … --reduce` writes one"
+        ) from error
