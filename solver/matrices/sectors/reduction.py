@@ -198,10 +198,13 @@ def read_diameters(path: Path) -> tuple[DiameterMatrices, dict[str, Any]]:
     if path.suffix.lower() != SUFFIX:
         raise MatrixFileError(f"{str(path)!r} must end in {SUFFIX}: a sector that `stickslip import` reduced")
     try:
-        with np.load(path, allow_pickle=False) as found:
+        # Opened here: NumPy leaves a damaged archive open.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             arrays = {key: found[key] for key in found.files}
         held = arrays.get("held_hz", np.zeros((1, 0)))
         kept = {key: arrays[key] for key in ("M", "K", "C") if key in arrays}
+        if arrays["diameters"].dtype.kind not in "iu":
+            raise ValueError(f"`diameters` must be whole numbers, got {arrays['diameters'].dtype}")
         diameters = tuple(int(n) for n in arrays["diameters"])
         parts = None
         if "parts" in arrays:
