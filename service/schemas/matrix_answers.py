@@ -15,7 +15,7 @@ class FormatAnswer(Answer):
     name: str
     suffixes: list[str] = Field(description="What the names of its files end in.")
     word: str = Field(description="Of `?format=`.")
-    gives: list[str] = Field(description="Any of matrix, matrices (one or several), modes, labels.")
+    gives: list[str] = Field(description="Any of matrix, matrices (one or several), modes, labels, nodes.")
     help: str = Field(description="What the files hold and which program writes them.")
 
 

@@ -28,7 +28,7 @@ _DESCRIBE, _RESOLVE, _LOOK = "describe", "resolve", "look"
 
 
 def contents(file: Path, seconds: float) -> list[dict[str, Any]]:
-    """The matrices or modes in a file: name, rows, columns and entries of each.
+    """The matrices, modes or nodes in a file: name, rows, columns and entries of each.
 
     Raises
     ------
@@ -42,9 +42,13 @@ def contents(file: Path, seconds: float) -> list[dict[str, Any]]:
 
 
 def resolved_structure(
-    structure: Mapping[str, Any], folder: Path, seconds: float, most_bytes: int
+    structure: Mapping[str, Any], orders: list[int], folder: Path, seconds: float, most_bytes: int
 ) -> dict[str, Any]:
     """The tables of a structure with the files it names, in `folder`, replaced by what they hold.
+
+    Parameters
+    ----------
+    orders : engine orders of the excitation, for which a sector is reduced.
 
     Raises
     ------
@@ -53,7 +57,8 @@ def resolved_structure(
     UnreadableUploadError
         If reading takes too much.
     """
-    found: dict[str, Any] = _ask(_RESOLVE, folder, dict(structure), seconds, most_bytes)
+    scene = {"structure": dict(structure), "excitation": [{"engine_order": order} for order in orders]}
+    found: dict[str, Any] = _ask(_RESOLVE, folder, scene, seconds, most_bytes)
     return found
 
 
@@ -165,11 +170,18 @@ def _describe(name: str) -> list[dict[str, Any]]:
     from solver.matrices.files import array_names, read_matrix, read_modes
     from solver.matrices.load_set import labels_of
     from solver.matrices.readers import registry
+    from solver.matrices.sectors.reduction import read_diameters
 
     file = Path(name)
     if file.suffix.lower() in registry.label_suffixes():
         return [{"name": "mapping", "rows": len(labels_of(file)), "columns": 1, "entries": None}]
+    if file.suffix.lower() in registry.nodes_suffixes():
+        return [{"name": "nodes", "rows": _nodes_of(file), "columns": 3, "entries": None}]
     names = array_names(file)
+    if "diameters" in names:
+        reduced, _ = read_diameters(file)
+        count = len(reduced.diameters)
+        return [{"name": "diameters", "rows": reduced.size, "columns": count, "entries": None}]
     if "modes" in names:
         modes = read_modes(file)
         return [{"name": "modes", "rows": modes.size, "columns": int(modes.omega2.size), "entries": None}]
@@ -182,11 +194,34 @@ def _describe(name: str) -> list[dict[str, Any]]:
     return found
 
 
-def _resolve(structure: dict[str, Any]) -> dict[str, Any]:
+def _nodes_of(file: Path) -> int:
+    """How many nodes a deck has."""
+    from solver.matrices.readers.numbers_in_text import FormatError
+    from solver.matrices.readers.reader import MatrixFileError
+    from solver.matrices.sectors.decks import check_alone, read_deck
+
+    try:
+        check_alone(file)
+        return len(read_deck(file).nodes)
+    except FormatError as error:
+        raise MatrixFileError(f"{file.name!r}: {error}") from error
+
+
+def _resolve(scene: dict[str, Any]) -> dict[str, Any]:
+    from solver.errors import SceneError
+    from solver.matrices.readers.numbers_in_text import FormatError
     from solver.matrices.scene_files import with_files
+    from solver.matrices.sectors.decks import check_alone
     from solver.matrices.values import as_json
 
-    tables = with_files({"structure": structure}, Path())["structure"]
+    cyclic = scene["structure"].get("cyclic")
+    if isinstance(cyclic, dict) and isinstance(cyclic.get("nodes"), str):
+        try:
+            check_alone(Path(cyclic["nodes"]))
+        except FormatError as error:
+            message = f"`nodes`: {cyclic['nodes']!r}: {error}"
+            raise SceneError([Issue(pointer="/structure/cyclic/nodes", message=message)]) from error
+    tables = with_files(scene, Path())["structure"]
     if not isinstance(tables, dict):
         raise TypeError(f"the structure is {type(tables).__name__}")
     return as_json(tables)

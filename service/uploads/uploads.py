@@ -15,15 +15,18 @@ from service.auth.callers import KEYLESS, Caller, visible
 from service.auth.storage import Storage
 from service.db.repositories.uploads import UploadRepository, UploadRow
 from service.errors import InvalidRequestError, NotFoundError, UnreadableUploadError
-from service.jobs.common.scenes import UPLOAD
+from service.jobs.common.scenes import UPLOAD, Place, named_files, with_named
 from service.jobs.strict_json import digest
 from service.settings.settings import Settings
 from service.uploads.inspection import contents, look_at, resolved_structure
 from solver.errors import Issue, pointer
 
-_KEYS = ("M", "K", "C", "modes", "mapping")
 _KEPT = 4
 _LARGEST_STRUCTURE = 16 * 1024 * 1024
+_REDUCE = (
+    ": keep fewer modes in `cyclic.keep_modes`, or reduce the sector with `stickslip import --sectors … "
+    "--reduce` and upload its file as `diameters`"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,9 +121,10 @@ class Uploads:
         structure = body.get("structure")
         if not isinstance(structure, Mapping) or structure.get("kind") != "matrices":
             return body
-        if not any(_is_reference(structure.get(key)) for key in _KEYS):
+        if not any(map(_is_reference, named_files(structure).values())):
             return body
-        return {**body, "structure": self._with(structure, self._rows(structure, caller))}
+        rows = self._rows(structure, caller)
+        return {**body, "structure": self._with(structure, rows, _engine_orders(body))}
 
     def looked_at(self, asked: Mapping[str, Any], caller: Caller = KEYLESS) -> dict[str, Any]:
         """What uploaded matrices hold, and the scene that is asked for, as
@@ -135,12 +139,15 @@ class Uploads:
         """
         structure = asked["structure"]
         if structure is None:
-            rows = {f"{at}": self._row("uploads", at, id, caller) for at, id in enumerate(asked["uploads"])}
+            rows: dict[Place, UploadRow] = {
+                (f"{at}",): self._row("uploads", at, id, caller) for at, id in enumerate(asked["uploads"])
+            }
         else:
+            _refuse_sector(structure)
             rows = self._rows(structure, caller)
         names = file_names(rows)
-        uploaded = {names[key]: f"{UPLOAD}{row.id}" for key, row in rows.items()}
-        placed = None if structure is None else {**structure, **names}
+        uploaded = {names[place]: f"{UPLOAD}{row.id}" for place, row in rows.items()}
+        placed = None if structure is None else with_named(structure, names)
         with self._placed(rows, names) as folder:
             try:
                 files = list(names.values())
@@ -152,13 +159,12 @@ class Uploads:
                 raise InvalidRequestError([Issue(pointer=where, message=error.detail)]) from error
         resolved = found.pop("resolved", None)
         if resolved is not None:
-            self._remember(_digest(structure, rows), resolved)
+            self._remember(_digest(structure, rows, []), resolved)
         for tables in (found, found.get("scene") or {}):
             if "structure" in tables:
-                tables["structure"] = {
-                    key: uploaded.get(item, item) if key in _KEYS else item
-                    for key, item in tables["structure"].items()
-                }
+                named = named_files(tables["structure"])
+                ids = {place: uploaded.get(name, name) for place, name in named.items()}
+                tables["structure"] = with_named(tables["structure"], ids)
         return found
 
     def _row(self, key: str, at: int, upload_id: str, caller: Caller) -> UploadRow:
@@ -167,8 +173,8 @@ class Uploads:
         except NotFoundError as error:
             raise InvalidRequestError([Issue(pointer=pointer(key, at), message=error.detail)]) from error
 
-    def _rows(self, structure: Mapping[str, Any], caller: Caller) -> dict[str, UploadRow]:
-        """The uploads a structure names, by its keys.
+    def _rows(self, structure: Mapping[str, Any], caller: Caller) -> dict[Place, UploadRow]:
+        """The uploads a structure names, by their places.
 
         Raises
         ------
@@ -176,24 +182,24 @@ class Uploads:
             One that is not there; a file that is named in another way.
         """
         rows, issues = {}, []
-        for key in _KEYS:
-            given = structure.get(key)
-            if not isinstance(given, str):
-                continue
+        for place, given in named_files(structure).items():
+            key = place[-1]
             if not _is_reference(given):
                 message = f"`{key}` must be inline or an upload, `{UPLOAD}ID`: files are not read here"
-                issues.append(_issue(key, message))
+                issues.append(_issue(place, message))
                 continue
             try:
-                rows[key] = self.get(given.removeprefix(UPLOAD), caller)
+                rows[place] = self.get(given.removeprefix(UPLOAD), caller)
             except NotFoundError as error:
-                issues.append(_issue(key, f"`{key}`: {error.detail}"))
+                issues.append(_issue(place, f"`{key}`: {error.detail}"))
         if issues:
             raise InvalidRequestError(issues)
         return rows
 
-    def _with(self, structure: Mapping[str, Any], rows: Mapping[str, UploadRow]) -> dict[str, Any]:
-        known = _digest(structure, rows)
+    def _with(
+        self, structure: Mapping[str, Any], rows: Mapping[Place, UploadRow], orders: list[int]
+    ) -> dict[str, Any]:
+        known = _digest(structure, rows, orders)
         with self._lock:
             if known in self._resolved:
                 self._resolved.move_to_end(known)
@@ -201,18 +207,20 @@ class Uploads:
         names = file_names(rows)
         with self._placed(rows, names) as folder:
             try:
-                found = resolved_structure({**structure, **names}, folder, self._seconds, _LARGEST_STRUCTURE)
+                placed = with_named(structure, names)
+                found = resolved_structure(placed, orders, folder, self._seconds, _LARGEST_STRUCTURE)
             except UnreadableUploadError as error:
-                raise InvalidRequestError([_issue(next(iter(rows)), error.detail)]) from error
+                message = error.detail + (_REDUCE if structure.get("sectors") is not None else "")
+                raise InvalidRequestError([_issue(next(iter(rows)), message)]) from error
         self._remember(known, found)
         return found
 
     @contextmanager
-    def _placed(self, rows: Mapping[str, UploadRow], names: Mapping[str, str]) -> Iterator[Path]:
+    def _placed(self, rows: Mapping[Place, UploadRow], names: Mapping[Place, str]) -> Iterator[Path]:
         """A folder that holds the files of uploads under their names."""
         with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
-            for key, row in rows.items():
-                (Path(folder) / names[key]).write_bytes(self.repository.data(row.id))
+            for place, row in rows.items():
+                (Path(folder) / names[place]).write_bytes(self.repository.data(row.id))
             yield Path(folder)
 
     def _remember(self, known: str, found: dict[str, Any]) -> None:
@@ -222,15 +230,16 @@ class Uploads:
                 self._resolved.popitem(last=False)
 
 
-def file_names(rows: Mapping[str, UploadRow]) -> dict[str, str]:
-    """Names of files for uploads by their keys: those they came with, each upload its own."""
+def file_names(rows: Mapping[Place, UploadRow]) -> dict[Place, str]:
+    """Names of files for uploads by their places: those they came with, each upload its own."""
     owners: dict[str, str] = {}
     names = {}
-    for key, row in rows.items():
+    for at, (place, row) in enumerate(rows.items(), start=1):
         name = file_name(row.name, row.format)
-        if owners.setdefault(name, row.id) != row.id:
-            name = f"{key}-{name}"
-        names[key] = name
+        # Never with the place in it: the name of a part is the client's, and might lead out of the folder.
+        while owners.setdefault(name, row.id) != row.id:
+            name = f"{at}-{name}"
+        names[place] = name
     return names
 
 
@@ -241,15 +250,39 @@ def file_name(name: str, form: str) -> str:
     return name if registry.word_of(name, "") == form else f"{name}.{form}"
 
 
-def _digest(structure: Mapping[str, Any], rows: Mapping[str, UploadRow]) -> str:
-    """What a structure resolves to depends on: its tables, and what the files hold under which names."""
+def _digest(structure: Mapping[str, Any], rows: Mapping[Place, UploadRow], orders: list[int]) -> str:
+    """What a structure resolves to depends on: its tables, what the files hold under which names, and the
+    engine orders, which say at which nodal diameters a sector is reduced.
+    """
     names = file_names(rows)
-    return digest({**structure, **{key: [row.sha256, names[key]] for key, row in rows.items()}})
+    held = [[*place, row.sha256, names[place]] for place, row in rows.items()]
+    return digest({"structure": with_named(structure, names), "files": held, "orders": orders})
+
+
+def _engine_orders(body: Mapping[str, object]) -> list[int]:
+    """Engine orders of the excitation of a scene that has sectors."""
+    structure, given = body.get("structure"), body.get("excitation")
+    if not isinstance(structure, Mapping) or structure.get("sectors") is None:
+        return []
+    rows = given if isinstance(given, list) else [given]
+    found = {row.get("engine_order", 0) for row in rows if isinstance(row, Mapping)}
+    return sorted(order for order in found if type(order) is int)
+
+
+def _refuse_sector(structure: Mapping[str, Any]) -> None:
+    """Refuse to begin a scene of a sector: of it, matrices alone are looked at."""
+    if structure.get("sectors") is None or not (structure.get("dofs") or "diameters" in structure):
+        return
+    message = (
+        "`sectors`: a scene of a sector is not begun here: hand in the scene itself, with `cyclic` and "
+        "uploads; leave out `dofs` and `diameters` to look at the matrices"
+    )
+    raise InvalidRequestError([_issue(("sectors",), message)])
 
 
 def _is_reference(value: object) -> bool:
     return isinstance(value, str) and value.startswith(UPLOAD)
 
 
-def _issue(key: str, message: str) -> Issue:
-    return Issue(pointer=pointer("structure", key), message=message)
+def _issue(place: Place, message: str) -> Issue:
+    return Issue(pointer=pointer("structure", *place), message=message)

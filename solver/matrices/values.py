@@ -234,8 +234,15 @@ class Modes:
 
 
 def as_json(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables of a structure with its matrices and modes as lists of numbers."""
-    return {key: item.write() if isinstance(item, Matrix | Modes) else item for key, item in tables.items()}
+    """Tables of a structure with its matrices, modes and nodal diameters as lists of numbers."""
+    return {key: _plain(item) for key, item in tables.items()}
+
+
+def _plain(item: Any) -> Any:
+    """A value of the scene as it writes itself, in tables too; numbers and words as they are."""
+    if isinstance(item, dict):
+        return as_json(item)
+    return item.write() if hasattr(item, "write") else item
 
 
 def _numbers(data: object, what: str) -> FloatArray:

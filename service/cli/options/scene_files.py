@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from service.errors import InputError
-from service.jobs.common.scenes import UPLOAD
+from service.jobs.common.scenes import UPLOAD, Place, named_files, with_named
 
 if TYPE_CHECKING:
     from service.client.client import Client
 
-_KEYS = ("M", "K", "C", "modes", "mapping")
+_DECK = "inp"  # word of the format of a deck, which may have any ending
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ def scene_to_submit(path: str) -> dict[str, Any] | SceneWithFiles:
     named = (
         isinstance(structure, Mapping)
         and structure.get("kind") == "matrices"
-        and any(isinstance(structure.get(key), str) for key in _KEYS)
+        and bool(named_files(structure))
     )
     return SceneWithFiles(raw, Path(path).parent) if named else solver.load_scene(path).to_dict()
 
@@ -57,16 +57,17 @@ def uploaded(client: Client, body: Mapping[str, Any]) -> dict[str, Any]:
     if not isinstance(scene, SceneWithFiles):
         return dict(body)
     structure = dict(scene.tables["structure"])
-    known: dict[str, str] = {}
+    known: dict[tuple[str, bool], str] = {}
     labels = _labels_beside(structure, scene.folder)
     if labels is not None:
         structure["mapping"] = str(labels)
-    for key in _KEYS:
-        name = structure.get(key)
-        if isinstance(name, str) and not name.startswith(UPLOAD):
-            known[name] = known.get(name) or _sent(client, scene.folder / name, key)
-            structure[key] = known[name]
-    return {**body, "scene": {**scene.tables, "structure": structure}}
+    sent = {}
+    for place, name in named_files(structure).items():
+        if not name.startswith(UPLOAD):
+            once = name, place[-1] == "nodes"
+            known[once] = known.get(once) or _sent(client, scene.folder / name, place)
+            sent[place] = known[once]
+    return {**body, "scene": {**scene.tables, "structure": with_named(structure, sent)}}
 
 
 def _labels_beside(structure: Mapping[str, Any], folder: Path) -> Path | None:
@@ -75,6 +76,8 @@ def _labels_beside(structure: Mapping[str, Any], folder: Path) -> Path | None:
 
     dofs = structure.get("dofs")
     by_node = isinstance(dofs, Mapping) and any(isinstance(row, str) for row in dofs.values())
+    cyclic = structure.get("cyclic")
+    by_node = by_node or (isinstance(cyclic, Mapping) and not {"low", "high", "nodes"}.isdisjoint(cyclic))
     if not by_node or "mapping" in structure:
         return None
     files = [folder / structure[key] for key in ("M", "K", "C") if isinstance(structure.get(key), str)]
@@ -82,10 +85,12 @@ def _labels_beside(structure: Mapping[str, Any], folder: Path) -> Path | None:
     return None if found is None else found.absolute()
 
 
-def _sent(client: Client, file: Path, key: str) -> str:
+def _sent(client: Client, file: Path, place: Place) -> str:
+    key = place[-1]
     try:
         data = file.read_bytes()
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"`{key}` of the scene: {str(file)!r} cannot be read: {reason}") from error
-    return UPLOAD + client.upload(data, f"{key}{file.suffix}").id
+    form = _DECK if place == ("cyclic", "nodes") else None
+    return UPLOAD + client.upload(data, f"{place[0]}{file.suffix}", form).id

@@ -26,6 +26,11 @@ from solver.scene.scene import Scene, load_scene, shipped_scenes
 MOST_SET = 1000
 UPLOAD = "upload:"
 """What stands before the id of an upload where a scene file names a file."""
+FILE_KEYS = ("M", "K", "C", "G", "K_omega2", "modes", "mapping", "diameters")
+"""Of a structure of kind `matrices`; files also stand in its tables `cyclic` and `parts`."""
+
+Place = tuple[str, ...]
+"""Keys that lead to a value in a structure."""
 
 _SCENE_NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 
@@ -126,8 +131,31 @@ def refers_to_uploads(body: Mapping[str, object]) -> bool:
     """Whether the structure of a scene names uploads."""
     structure = body.get("structure")
     return isinstance(structure, Mapping) and any(
-        isinstance(item, str) and item.startswith(UPLOAD) for item in structure.values()
+        name.startswith(UPLOAD) for name in named_files(structure).values()
     )
+
+
+def named_files(structure: Mapping[str, Any]) -> dict[Place, str]:
+    """What stands in a structure where a file may be named, in place of numbers: text by its place."""
+    places: list[Place] = [(key,) for key in FILE_KEYS]
+    places += [("cyclic", "nodes")]
+    parts = structure.get("parts")
+    places += [("parts", name) for name in parts] if isinstance(parts, Mapping) else []
+    found = {}
+    for place in places:
+        table = structure if len(place) == 1 else structure.get(place[0])
+        given = table.get(place[-1]) if isinstance(table, Mapping) else None
+        if isinstance(given, str):
+            found[place] = given
+    return found
+
+
+def with_named(structure: Mapping[str, Any], names: Mapping[Place, str]) -> dict[str, Any]:
+    """A structure with other names of files at these places."""
+    changed = dict(structure)
+    for place, name in names.items():
+        changed[place[0]] = name if len(place) == 1 else {**changed[place[0]], place[1]: name}
+    return changed
 
 
 def _below_scene(issues: Iterable[Issue]) -> InvalidRequestError:

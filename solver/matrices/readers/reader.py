@@ -22,7 +22,7 @@ class MatrixFileError(ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reader:
-    """A format of files that hold matrices, modes, or the labels of rows.
+    """A format of files that hold matrices, modes, the labels of rows, or nodes.
 
     Commands, uploads, the page, error messages and the table in docs/matrices.md follow from it.
 
@@ -51,6 +51,8 @@ class Reader:
         Reads the arrays ``modes``, ``omega2`` or ``frequencies_hz``, and maybe ``damping_ratio``.
     labels : callable or None
         Reads the labels of all rows, in order.
+    nodes : callable or None
+        Reads positions and sets of nodes, a `solver.matrices.sectors.decks.Deck`.
     roles : mapping
         Ending to ``M``, ``K`` or ``C``, where the ending tells which matrix a file holds.
 
@@ -70,6 +72,7 @@ class Reader:
     names: Callable[[Path], list[str]] | None = None
     modes: Callable[[Path], dict[str, Any]] | None = None
     labels: Callable[[Path], tuple[Label, ...]] | None = None
+    nodes: Callable[[Path], Any] | None = None
     roles: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -81,16 +84,17 @@ class Reader:
         odd = [role for role in self.roles.values() if role not in ROLES]
         if odd or not set(self.roles) <= set(self.suffixes):
             raise ValueError(f"`roles` of {self.name} must be its endings with {', '.join(ROLES)}")
-        if self.matrix is None and self.labels is None:
-            raise ValueError(f"the reader of {self.name} must have `matrix` or `labels`")
+        if self.matrix is None and self.labels is None and self.nodes is None:
+            raise ValueError(f"the reader of {self.name} must have `matrix`, `labels` or `nodes`")
 
     @property
     def gives(self) -> tuple[str, ...]:
-        """What its files may hold: ``matrix``, ``matrices``, ``modes``, ``labels``."""
+        """What its files may hold: ``matrix``, ``matrices``, ``modes``, ``labels``, ``nodes``."""
         kinds = {
             "matrix": self.matrix is not None and self.names is None,
             "matrices": self.names is not None,
             "modes": self.modes is not None,
             "labels": self.labels is not None,
+            "nodes": self.nodes is not None,
         }
         return tuple(kind for kind, there in kinds.items() if there)

@@ -24,6 +24,7 @@ SHIPPED = (
     "solver.matrices.readers.calculix",
     "solver.matrices.readers.nastran.output4",
     "solver.matrices.readers.nastran.dmig",
+    "solver.matrices.sectors.decks",
 )
 _START = 200
 _added: list[Reader] = []
@@ -67,6 +68,11 @@ def matrix_suffixes() -> tuple[str, ...]:
 def label_suffixes() -> tuple[str, ...]:
     """Endings of files that name the rows."""
     return _suffixes(lambda reader: reader.labels is not None)
+
+
+def nodes_suffixes() -> tuple[str, ...]:
+    """Endings of decks, which have positions and sets of nodes."""
+    return _suffixes(lambda reader: reader.nodes is not None)
 
 
 def modes_suffixes() -> tuple[str, ...]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from solver.matrices.readers.registry import readers
 
 _GIVES = {
-    "matrix": "one matrix", "matrices": "one matrix or several", "modes": "modes", "labels": "names of rows"
+    "matrix": "one matrix", "matrices": "one matrix or several", "modes": "modes", "labels": "names of rows",
+    "nodes": "nodes",
 }  # fmt: skip
 
 

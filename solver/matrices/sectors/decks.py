@@ -7,6 +7,7 @@ coordinate system, which has no sets.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from solver.matrices.readers.numbers_in_text import FormatError
+from solver.matrices.readers.reader import Reader
 
 _MOST_NODES = 10_000_000
 _DEEPEST = 10  # files that include each other
@@ -48,6 +50,41 @@ def read_deck(path: Path) -> Deck:
         It cannot be read.
     """
     deck = Deck()
+    try:
+        _fill(deck, path)
+    except FormatError:
+        raise
+    except (IndexError, ValueError, OverflowError) as error:
+        raise FormatError(f"{path.name!r} is damaged or no deck: {error}") from error
+    if not deck.nodes:
+        raise FormatError(
+            f"{path.name!r} has no nodes: *NODE (CalculiX, Abaqus), NBLOCK (Ansys) or GRID (Nastran)"
+        )
+    bad = next((node for node, place in deck.nodes.items() if not all(map(math.isfinite, place))), None)
+    if bad is not None:
+        raise FormatError(f"node {bad} must be at a finite place, got {deck.nodes[bad]}")
+    return deck
+
+
+def check_alone(path: Path) -> None:
+    """Raise FormatError if a deck includes other files, which a stranger's may not.
+
+    Raises
+    ------
+    FormatError
+        With the line.
+    OSError
+        It cannot be read.
+    """
+    for number, line in enumerate(_lines(path), start=1):
+        if line.strip().upper().startswith("*INCLUDE"):
+            raise FormatError(
+                f"line {number} includes another file, which is not read here: put the nodes and sets into "
+                "one deck"
+            )
+
+
+def _fill(deck: Deck, path: Path) -> None:
     lines = _lines(path)
     if any(line.upper().startswith("NBLOCK") for line in lines):
         _ansys(lines, deck)
@@ -55,11 +92,6 @@ def read_deck(path: Path) -> Deck:
         _nastran(lines, deck)
     else:
         _abaqus(path, lines, deck, 0)
-    if not deck.nodes:
-        raise FormatError(
-            f"{path.name!r} has no nodes: *NODE (CalculiX, Abaqus), NBLOCK (Ansys) or GRID (Nastran)"
-        )
-    return deck
 
 
 def _lines(path: Path) -> list[str]:
@@ -119,11 +151,15 @@ def _members(deck: Deck, text: str, number: int, *, generate: bool) -> list[int]
     try:
         if generate:
             first, last, *step = map(int, parts)
+            if last - first > _MOST_NODES:
+                raise FormatError(f"line {number} generates more than {_MOST_NODES} nodes")
             return list(range(first, last + 1, step[0] if step else 1))
         found: list[int] = []
         for part in parts:
             found += deck.sets[part.upper()] if part.upper() in deck.sets else [int(part)]
         return found
+    except FormatError:
+        raise
     except ValueError as error:
         raise FormatError(f"line {number} must hold nodes or names of sets, got {text[:80]!r}") from error
 
@@ -216,3 +252,15 @@ def positions(deck: Deck, nodes: list[int]) -> np.ndarray:
     if missing:
         raise ValueError(f"node {missing[0]} is not in the deck, which has {len(deck.nodes)} nodes")
     return np.array([deck.nodes[node] for node in nodes]).reshape(-1, 3)
+
+
+READERS = (
+    Reader(
+        name="a deck",
+        suffixes=(".inp", ".cdb"),
+        word="inp",
+        help="CalculiX, Abaqus (`*NODE`, `*NSET`), Ansys (`NBLOCK`, `CMBLOCK`): positions and sets of nodes, "
+        "for the boundaries of a sector of a disk; Nastran (`GRID`) too, uploaded with `?format=inp`.",
+        nodes=read_deck,
+    ),
+)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,9 +19,11 @@ from solver.matrices.sectors.elimination import Elimination, Group, elimination
 from solver.matrices.sectors.pairing import PAIR_BY, groups, paired
 from solver.matrices.sectors.parts import WHOLE
 from solver.matrices.sectors.reduction import diameters_met, read_diameters, reduce_sector
+from solver.matrices.validation import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix
 
 FILE_KEYS = ("low", "high", "nodes", "pair_by", "tolerance", "keep_modes")
+MOST_SECTORS = 10_000
 DEFAULT_AXIS = (0.0, 0.0, 1.0)
 
 
@@ -61,7 +64,7 @@ def boundaries(given: Mapping[str, Any], found: MatrixSet, sectors: int, folder:
         Sets or nodes that are not there, or do not match.
     """
     axis = given.get("axis", DEFAULT_AXIS)
-    if not (isinstance(axis, list | tuple) and len(axis) == 3 and any(axis)):
+    if not (isinstance(axis, list | tuple) and len(axis) == 3 and _is_direction(axis)):
         raise _refusal("axis", f"`axis` must be a direction [x, y, z], got {axis!r}")
     pair_by, tolerance = given.get("pair_by", "position"), given.get("tolerance")
     if pair_by not in PAIR_BY:
@@ -76,6 +79,11 @@ def boundaries(given: Mapping[str, Any], found: MatrixSet, sectors: int, folder:
     except ValueError as error:
         raise _refusal("low", str(error)) from error
     return Boundaries(low=ours, high=theirs, axis=(float(axis[0]), float(axis[1]), float(axis[2])))
+
+
+def _is_direction(given: Sequence[object]) -> bool:
+    numbers = [float(part) for part in given if isinstance(part, int | float) and not isinstance(part, bool)]
+    return len(numbers) == len(given) and 0.0 < math.hypot(*numbers) < math.inf
 
 
 def _deck(name: object, folder: Path) -> Deck | None:
@@ -125,14 +133,18 @@ def as_sector(tables: dict[str, Any], found: MatrixSet, folder: Path, orders: li
     if (
         isinstance(sectors, bool)
         or not isinstance(sectors, int)
-        or sectors < 1
+        or not 1 <= sectors <= MOST_SECTORS
         or not isinstance(joined, dict)
     ):
         return tables  # what is wrong is said with the rest of the scene
     if isinstance(tables.get("diameters"), str):
+        if found.matrices:
+            message = f"`diameters` stands in place of {', '.join(found.matrices)}: remove one or the other"
+            raise SceneError([Issue(pointer="/structure/diameters", message=message)])
         return _from_file(tables, folder)
     if not found.matrices:
         return tables
+    _check_sizes(found)
     check_part_sizes(found)
     kept = {key: value for key, value in joined.items() if key not in FILE_KEYS}
     if "low_rows" in joined or "high_rows" in joined:
@@ -146,16 +158,13 @@ def as_sector(tables: dict[str, Any], found: MatrixSet, folder: Path, orders: li
             "keep_modes", f"`keep_modes` must be a whole number from 0 to {MOST_DOFS}, got {keep!r}"
         )
     _refuse_unreduced(tables, found)
-    if not isinstance(tables.get("dofs"), dict):
-        raise SceneError(
-            [Issue(pointer="/structure/dofs", message="`dofs` must be a table of names and rows")]
-        )
     matrices = {key: csr_array(matrix) for key, matrix in found.matrices.items()}
     try:
+        dofs = DofTable.read(tables.get("dofs")).write()
         gone = ends.elimination(matrices["M"].shape[0], sectors)
         parts = parts_to_reduce(tables.get("mistuning"), found)
         met = tuple(range(sectors // 2 + 1)) if parts else diameters_met(orders, sectors)
-        reduced = reduce_sector(matrices, gone, tables["dofs"], keep, met, sectors, parts)
+        reduced = reduce_sector(matrices, gone, dofs, keep, met, sectors, parts)
     except ValueError as error:
         raise SceneError([Issue(pointer="/structure/dofs", message=str(error))]) from error
     return {
@@ -177,6 +186,17 @@ def parts_to_reduce(mistuning: object, found: MatrixSet) -> dict[str, Any]:
     return {key: csr_array(matrix) for key, matrix in matrices.items()}
 
 
+def _check_sizes(found: MatrixSet) -> None:
+    """Raise SceneError unless all matrices have as many rows."""
+    sizes = {key: int(matrix.shape[0]) for key, matrix in found.matrices.items()}
+    first = next(iter(sizes))
+    odd = next((key for key in sizes if sizes[key] != sizes[first]), None)
+    if odd is not None:
+        rows = f"`{odd}` has {sizes[odd]} rows, {first} has {sizes[first]}"
+        message = f"{rows}: export all matrices from one analysis"
+        raise SceneError([Issue(pointer=f"/structure/{odd}", message=message)])
+
+
 def check_part_sizes(found: MatrixSet) -> None:
     """Raise SceneError unless parts have the rows of M and K."""
     rows = next(iter(found.matrices.values())).shape[0]
@@ -187,7 +207,11 @@ def check_part_sizes(found: MatrixSet) -> None:
 
 
 def _refuse_unreduced(tables: Mapping[str, Any], found: MatrixSet) -> None:
-    """Refuse what a reduction of a sector does not carry along."""
+    """Refuse what a reduction of a sector does not carry along, and matrices without M or K."""
+    missing = next((key for key in "MK" if key not in found.matrices), None)
+    if missing is not None:
+        message = f"`{missing}` must come from a file too: `keep_modes` of a sector reduces M and K together"
+        raise SceneError([Issue(pointer=f"/structure/{missing}", message=message)])
     keys: list[str] = [key for key in ("G", "K_omega2") if key in found.matrices]
     keys += ["symmetric"] if tables.get("symmetric") is False else []
     for key in keys[:1]:

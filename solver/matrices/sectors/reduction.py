@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -197,21 +198,30 @@ def read_diameters(path: Path) -> tuple[DiameterMatrices, dict[str, Any]]:
     if path.suffix.lower() != SUFFIX:
         raise MatrixFileError(f"{str(path)!r} must end in {SUFFIX}: a sector that `stickslip import` reduced")
     try:
-        with np.load(path, allow_pickle=False) as found:
+        # Opened here: NumPy leaves a damaged archive open.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             arrays = {key: found[key] for key in found.files}
         held = arrays.get("held_hz", np.zeros((1, 0)))
         kept = {key: arrays[key] for key in ("M", "K", "C") if key in arrays}
+        if arrays["diameters"].dtype.kind not in "iu":
+            raise ValueError(f"`diameters` must be whole numbers, got {arrays['diameters'].dtype}")
         diameters = tuple(int(n) for n in arrays["diameters"])
         parts = None
         if "parts" in arrays:
             names = tuple(map(str, arrays["parts"]))
             parts = PartsAcross(names, arrays["parts_ahead"], arrays["parts_back"])
         matrices = DiameterMatrices(diameters=diameters, parts=parts, **kept)
+        highest = float(held[:, -1].min()) if held.size else 0.0
+        if not 0.0 <= highest < math.inf:
+            raise ValueError(f"`held_hz` must hold finite frequencies >= 0, got {highest}")
+        full = int(arrays.get("full", matrices.size))
+        return matrices, {"dofs": full, "modes": int(held.shape[1]), "highest_hz": highest}
     except OSError as error:
         raise MatrixFileError(f"{str(path)!r} cannot be read: {error.strerror or error}") from error
-    except (KeyError, TypeError, ValueError) as error:
+    except MemoryError as error:
+        raise MatrixFileError(f"{str(path)!r} holds more than fits into memory") from error
+    except Exception as error:  # a damaged archive raises many kinds
         reason = f"has no array {error}" if isinstance(error, KeyError) else f"is no reduced sector: {error}"
-        raise MatrixFileError(f"{str(path)!r} {reason}") from error
-    highest = float(held[:, -1].min()) if held.size else 0.0
-    full = int(arrays.get("full", matrices.size))
-    return matrices, {"dofs": full, "modes": int(held.shape[1]), "highest_hz": highest}
+        raise MatrixFileError(
+            f"{str(path)!r} {reason}; `stickslip import --sectors … --reduce` writes one"
+        ) from error
