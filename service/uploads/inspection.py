@@ -12,7 +12,7 @@ import multiprocessing as mp
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -42,7 +42,7 @@ def contents(file: Path, seconds: float) -> list[dict[str, Any]]:
 
 
 def resolved_structure(
-    structure: Mapping[str, Any], orders: list[int], folder: Path, seconds: float, most_bytes: int
+    structure: Mapping[str, Any], folder: Path, seconds: float, most_bytes: int, orders: Sequence[int] = ()
 ) -> dict[str, Any]:
     """The tables of a structure with the files it names, in `folder`, replaced by what they hold.
 

@@ -208,7 +208,7 @@ class Uploads:
         with self._placed(rows, names) as folder:
             try:
                 placed = with_named(structure, names)
-                found = resolved_structure(placed, orders, folder, self._seconds, _LARGEST_STRUCTURE)
+                found = resolved_structure(placed, folder, self._seconds, _LARGEST_STRUCTURE, orders)
             except UnreadableUploadError as error:
                 message = error.detail + (_REDUCE if structure.get("sectors") is not None else "")
                 raise InvalidRequestError([_issue(next(iter(rows)), message)]) from error

@@ -173,7 +173,8 @@ def test_what_does_not_fit_names_field_and_remedy(shipped: ServedClient, ids: di
     missing["dofs"] = {"rim": 17, "hub": 9}
     assert "`mapping`" in refused(shipped, missing)["/cyclic/low"]
     small = sent(shipped, "C.npz", npz(C=np.eye(5)))
-    assert "export all matrices from one analysis" in refused(shipped, {**uploaded(ids), "C": small})["/C"]
+    unlike = {**uploaded(ids), "dofs": missing["dofs"], "C": small}
+    assert "export all matrices from one analysis" in refused(shipped, unlike)["/C"]
     other = sent(shipped, "M.npz", npz(M=np.eye(5)))
     for diameters, remedy in ((other, "has no array 'diameters'"), (ids["ring.sti"], "must end in .npz")):
         issue = refused(shipped, {"diameters": diameters, "dofs": {"rim": 0, "hub": 1}})["/diameters"]
