@@ -29,7 +29,7 @@ class SubmitGroup(TyperGroup):
         if name is None:
             return name, None, rest
         # Loaded here: `stickslip --help` needs no kinds.
-        from service.cli.commands.submit import command_of
+        from service.cli.commands.client.submit import command_of
 
         return name, command_of(registry()[name]), rest
 

@@ -24,9 +24,9 @@ COMMANDS = (
     Entry("demo", "commands.service.demo", "Run the main job end to end, with pictures."),
     Entry("serve", "commands.service.serve", "Serve the REST API and work off its queue."),
     Entry("worker", "commands.service.worker", "Work off a queue without HTTP."),
-    Entry("watch", "commands.jobs.watch", "Follow a job until it has ended.", keyed=True),
+    Entry("watch", "commands.client.jobs.watch", "Follow a job until it has ended.", keyed=True),
     Entry(
-        "results", "commands.jobs.results", "Print what a job computed, or list the stored designs.",
+        "results", "commands.client.jobs.results", "Print what a job computed, or list the stored designs.",
         keyed=True,
     ),
     Entry("peaks", "commands.track.peaks", "Track the highest peak over a parameter."),
@@ -75,20 +75,24 @@ KEYS = (
 )  # fmt: skip
 
 RUNS = (
-    Entry("list", "commands.runs.show", "List the runs, newest first.", keyed=True),
-    Entry("change", "commands.runs.change", "Change project, name, notes or tags of a run.", keyed=True),
-    Entry("delete", "commands.runs.delete", "Put a run in the bin.", keyed=True),
-    Entry("restore", "commands.runs.restore", "Take a run out of the bin.", keyed=True),
-    Entry("compare", "commands.runs.compare", "Say what differs between two runs.", keyed=True),
-    Entry("share", "commands.runs.share", "Make a link to a run that needs no key.", keyed=True),
+    Entry("list", "commands.client.runs.show", "List the runs, newest first.", keyed=True),
+    Entry(
+        "change", "commands.client.runs.change", "Change project, name, notes or tags of a run.", keyed=True
+    ),
+    Entry("delete", "commands.client.runs.delete", "Put a run in the bin.", keyed=True),
+    Entry("restore", "commands.client.runs.restore", "Take a run out of the bin.", keyed=True),
+    Entry("compare", "commands.client.runs.compare", "Say what differs between two runs.", keyed=True),
+    Entry("share", "commands.client.runs.share", "Make a link to a run that needs no key.", keyed=True),
 )
 
 PROJECTS = (
-    Entry("list", "commands.projects.show", "List the projects, newest first.", keyed=True),
-    Entry("create", "commands.projects.create", "Make a project and print its id.", keyed=True),
-    Entry("change", "commands.projects.change", "Change name or notes of a project.", keyed=True),
-    Entry("delete", "commands.projects.delete", "Put a project in the bin; its runs stay.", keyed=True),
-    Entry("restore", "commands.projects.restore", "Take a project out of the bin.", keyed=True),
+    Entry("list", "commands.client.projects.show", "List the projects, newest first.", keyed=True),
+    Entry("create", "commands.client.projects.create", "Make a project and print its id.", keyed=True),
+    Entry("change", "commands.client.projects.change", "Change name or notes of a project.", keyed=True),
+    Entry(
+        "delete", "commands.client.projects.delete", "Put a project in the bin; its runs stay.", keyed=True
+    ),
+    Entry("restore", "commands.client.projects.restore", "Take a project out of the bin.", keyed=True),
 )
 
 GROUPS = (

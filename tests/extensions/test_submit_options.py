@@ -9,7 +9,7 @@ import pytest
 from pydantic import Field
 
 from optim.problem.keys import of_front
-from service.cli.commands import submit
+from service.cli.commands.client import submit
 from service.errors import InputError
 from service.jobs.common.problem import Pair, ProblemRequest, Ranges
 from service.jobs.common.scenes import Number, SceneRequest

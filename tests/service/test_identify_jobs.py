@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import solver
-from service.cli.commands import submit
+from service.cli.commands.client import submit
 from service.cli.options.inputs import join_words
 from service.errors import InvalidRequestError
 from service.jobs.kinds.identify import IDENTIFY, IdentifyRequest

@@ -31,7 +31,7 @@ def report(
     A page that needs nothing else; a PDF where Chromium or Chrome is there.
     """
     import solver
-    from service.cli.commands.jobs import client_of
+    from service.cli.commands.client.jobs import client_of
     from service.jobs.registry import ABOUT_THE_RUN
     from service.rendering.report.sections import Designed
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.commands import stored_designs
+from service.cli.commands.client import stored_designs
 from service.cli.failures import BAD_INPUT, FELL_SHORT
 from service.cli.options import inputs, problem_inputs
 from service.cli.options import shared as options

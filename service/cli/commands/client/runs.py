@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.commands.jobs import client_of
+from service.cli.commands.client.jobs import client_of
 from service.cli.options import shared as options
 from service.cli.options.numeric import amount, count
 from service.errors import InputError

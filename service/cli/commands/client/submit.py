@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from optim.problem.keys import options as key_options_of
-from service.cli.commands.jobs import hand_in, scene_of
+from service.cli.commands.client.jobs import hand_in, scene_of
 from service.cli.options import problem_inputs
 from service.cli.options import shared as options
 from service.cli.options.key_options import (

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.commands.jobs import client_of
-from service.cli.commands.runs import Binned, Count, Name, Notes, Text, given_of, most_of
+from service.cli.commands.client.jobs import client_of
+from service.cli.commands.client.runs import Binned, Count, Name, Notes, Text, given_of, most_of
 from service.cli.options import shared as options
 from service.rendering.tables.text import print_json, print_table, say
 
