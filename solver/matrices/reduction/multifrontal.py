@@ -4,7 +4,7 @@ Rows are eliminated in the blocks of a nested dissection. A block and the later 
 dense matrix, its front: the entries of the matrix and what earlier blocks left for those rows are added up
 in it, LAPACK factorises the block, and what is left for the later rows is passed on. Duff and Reid, ACM
 Trans. Math. Softw. 9 (1983) 302, doi:10.1145/356044.356047; J. W. H. Liu, SIAM Review 34 (1992) 82,
-doi:10.1137/1034004. SuperLU, which knows no symmetry, keeps twice the entries and takes several times as long.
+doi:10.1137/1034004. SuperLU knows no symmetry: twice the entries, several times the time.
 """
 
 from __future__ import annotations

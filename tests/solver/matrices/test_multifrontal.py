@@ -36,8 +36,8 @@ def chain(n: int) -> csc_array:
 def test_solves_as_the_dense_matrix(monkeypatch: pytest.MonkeyPatch, leaf: int, complex_: bool) -> None:
     """Sparse and nearly full, one row, loose parts, chains."""
     monkeypatch.setattr(ordering, "LEAF", leaf)
-    cases: list[Any] = [positive_definite(n, density, n, complex_=complex_)
-                        for n, density in ((1, 1.0), (2, 0.5), (40, 0.02), (90, 0.03), (60, 0.5))]  # fmt: skip
+    sizes = ((1, 1.0), (2, 0.5), (40, 0.02), (90, 0.03), (60, 0.5))
+    cases: list[Any] = [positive_definite(n, density, n, complex_=complex_) for n, density in sizes]
     cases += [chain(200), csc_array(np.diag(np.arange(1.0, 50.0))), csc_array(block_diag(cases))]
     for matrix in cases:
         n = matrix.shape[0]
