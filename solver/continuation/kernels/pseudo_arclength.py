@@ -18,7 +18,7 @@ from solver.balance.kernels.jacobian import factorise, step_back
 from solver.balance.kernels.newton import ACCEPTED, arc_newton, newton
 from solver.balance.kernels.output import RESIDUAL, measure, piece
 from solver.balance.kernels.residual import evaluate
-from solver.contacts.kernels.system import AT_BRANCH_POINT, SIZE, Evaluation, Receptance, System
+from solver.contacts.kernels.system import AT_BRANCH_POINT, Evaluation, Receptance, System
 from solver.continuation.kernels.predictor import predict
 from solver.continuation.kernels.state import (
     CUBIC,
@@ -56,7 +56,7 @@ from solver.linear.kernels.receptance import receptance
 _TINY = 64.0  # smallest steps: a step as short as this may turn as it likes
 STRAIGHT_ON = 0.98  # cosine of the turn at a branch point; more than that is a step across a sharp peak
 CLEARLY = 0.1  # share of the accepted residual below which a point is more than nearly a solution
-FROZEN_FROM = 64  # rows of the factors from which old factors beat new ones (measured)
+FROZEN_FROM = 64  # unknowns from which old factors beat new ones (measured)
 
 
 @apart
@@ -125,14 +125,12 @@ def _correct(
     """
     copy_to(trial, guess)
     p = p_guess
-    if point.counts[SIZE] >= FROZEN_FROM and point.counts[AT_BRANCH_POINT] == 1:
+    if trial.size >= FROZEN_FROM and point.counts[AT_BRANCH_POINT] == 1:
         good, solves, p, norm = frozen_arc(
             system, linear, trial, p_guess, walk.tangent, weight_u, weight_p, point
         )
         walk.numbers[FROZEN] += solves
         if good:
-            if system.alone.sum() > 0:
-                norm = evaluate(system, linear, trial, p, 0.0, point)
             return True, (solves + 1) // 2, p, norm
         # What is a solution but for a stall is where Newton's method goes on.
         if not norm <= ACCEPTED:
