@@ -11,7 +11,7 @@ import numpy as np
 from solver.balance.balance import build
 from solver.balance.kernels.observers import measure_through_modes, modal_motion
 from solver.balance.kernels.output import measure
-from solver.balance.kernels.residual import evaluate
+from solver.balance.kernels.residual import evaluate, evaluate_forces, prepare_forces
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.contacts.kernels.system import DENSE
@@ -119,15 +119,20 @@ def _measure_all(
     first = workspaces[0]
     u, p = np.ascontiguousarray(solution[:-1]), float(solution[-1])
     du, dp = np.ascontiguousarray(tangent[:-1]), float(tangent[-1])
-    receptance(first.system, p, first.linear)
-    evaluate(first.system, first.linear, u, p, 0.0, first.point)
-    if first.balance.system.form == DENSE:
+    system = first.balance.system
+    if system.alone.any() or system.hold == 1:
+        receptance(first.system, p, first.linear)
+        evaluate(first.system, first.linear, u, p, 0.0, first.point)
+    else:
+        prepare_forces(first.system, first.linear, p)
+        evaluate_forces(first.system, first.linear, u, p, first.point)
+    if system.form == DENSE:
         for j, each in enumerate(workspaces):
             if j > 0:
                 observer_receptance(each.system, p, each.linear)
             measure(each.system, each.linear, u, first.point, du, dp, rows[j], out[j])
         return
-    amplitudes = np.empty((2, *first.balance.system.modal_forces.shape), np.complex128)
+    amplitudes = np.empty((2, *system.modal_forces.shape), np.complex128)
     modal_motion(first.system, u, p, first.point, du, dp, amplitudes)
     for j, each in enumerate(workspaces):
         measure_through_modes(each.system, first.point, amplitudes, rows[j], out[j])
