@@ -23,6 +23,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         disk,
         identify,
         large,
+        mistuned,
         modes,
         page,
         reduction,
@@ -74,6 +75,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "scale": service_scale.scale,
         "page": page.page,
         "cluster": cluster.mistuning_study,
+        "mistuned": mistuned.mistuned_disks,
     }
 
 

@@ -14,8 +14,10 @@ structure is the same change of its modal matrix.)
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import blake2b
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
 MOST_MODES = 160
 _FEW_MODES = 2  # whose eigenvalues cost no more than to tell where there are none
 _MOST_ENTRIES = 2_000_000  # of the matrices that are looked at together
+_Spring = tuple[int, float, bytes]  # structure, kω, and the stiffness of its contacts
 _FASTEST = 1e150  # rad/s; what is faster does not resonate
 
 
@@ -67,6 +70,8 @@ class ClosedLoop:
         self._balance = balance
         same = like is not None and like.system.eigenvalues is self.system.eigenvalues
         self._like = like if same and self.system.form != DENSE else None
+        self._poles: dict[_Spring, tuple[Real, Real]] = {}
+        self._nearness: dict[_Spring, float] = {}
 
     @staticmethod
     def serves(balance: Balance) -> bool:
@@ -139,9 +144,14 @@ class ClosedLoop:
         -------
         (P, nm) poles.
         """
-        k = self.system.ks[numbers].astype(np.float64)
-        found = self._of(stiffness, self.system.which[numbers], k * omega)
-        return Poles(at=found.at / k[:, None], half_width=found.half_width / k[:, None])
+        k, which = self.system.ks[numbers].astype(np.float64), self.system.which[numbers]
+        keys = _springs(stiffness, which, k * omega)
+        new = _first_of_new(keys, self._poles)
+        if new:
+            found = self._of(stiffness[new], which[new], k[new] * omega[new])
+            self._poles |= {keys[row]: (found.at[j], found.half_width[j]) for j, row in enumerate(new)}
+        at, half_width = (np.array([self._poles[key][side] for key in keys]) for side in (0, 1))
+        return Poles(at=at / k[:, None], half_width=half_width / k[:, None])
 
     def _of(self, stiffness: Complex, structures: Integer, speeds: Real | None) -> Poles:
         """Return the resonances of structures (P,) in units of kω.
@@ -202,24 +212,36 @@ class ClosedLoop:
         system, k, may = self.system, self.system.ks[numbers], np.ones(len(omega), bool)
         if system.form == DENSE or system.eigenvalues.shape[1] <= _FEW_MODES:
             return may
-        structures, moved = system.which[numbers], stiffness - np.diag(system.shift)
+        structures, speeds = system.which[numbers], k * omega
+        keys = _springs(stiffness, structures, speeds)
+        new = _first_of_new(keys, self._nearness)
+        if new:
+            sizes = self._inverse_sizes(stiffness[new], structures[new], speeds[new])
+            self._nearness |= {keys[row]: float(size) for row, size in zip(new, sizes, strict=True)}
+        near = math.hypot(1.0, 0.5) * k * reach
+        if system.form != POLES:
+            near = near * (2.0 * speeds + near)
+        may &= ~(near * np.array([self._nearness[key] for key in keys]) < 1.0)
+        return may
+
+    def _inverse_sizes(self, stiffness: Complex, structures: Integer, speeds: Real) -> Real:
+        """Return ‖(z − H)⁻¹‖ of structures (P,) at kω (P,), z = ikω, or (kω)² of ω²; infinite at a pole."""
+        system, moved = self.system, stiffness - np.diag(self.system.shift)
+        sizes = np.full(len(speeds), np.inf)
         for some in self._together(structures):
             values, dampings, X, Y, springs = self._kept(structures[some], moved[some])
-            speeds, near = k[some] * omega[some], math.hypot(1.0, 0.5) * k[some] * reach[some]
             if system.form == POLES:
-                left, place = coupled(values, None, X, -Y, springs), 1j * speeds
+                left, place = coupled(values, None, X, -Y, springs), 1j * speeds[some]
             else:
-                turning = np.asarray(1j * speeds[:, None] * dampings, np.complex128)
-                left = coupled(values, turning, X, Y, springs)
-                place, near = speeds**2 + 0j, near * (2.0 * speeds + near)
+                turning = np.asarray(1j * speeds[some, None] * dampings, np.complex128)
+                left, place = coupled(values, turning, X, Y, springs), speeds[some] ** 2 + 0j
             diagonal = np.arange(values.shape[-1])
             left[:, diagonal, diagonal] -= place[:, None]
             try:
-                size = np.linalg.norm(np.linalg.inv(left), axis=(1, 2))
+                sizes[some] = np.linalg.norm(np.linalg.inv(left), axis=(1, 2))
             except np.linalg.LinAlgError:
                 continue  # exactly at a resonance
-            may[some] = ~(near * size < 1.0)
-        return may
+        return sizes
 
     def _kept(self, structures: Integer, moved: Complex) -> tuple[Complex, Real, Complex, Complex, Complex]:
         """Return eigenvalues, dampings, contact modes and duals of the modes kept, and their stiffness.
@@ -261,6 +283,24 @@ class ClosedLoop:
             at.append(np.where(values.imag > 0.0, values.imag, _FASTEST))
             half_width.append(np.abs(values.real))
         return Poles(at=np.array(at), half_width=np.array(half_width))
+
+
+def _springs(stiffness: Complex, structures: Integer, speeds: Real) -> list[_Spring]:
+    """Return what names each of several contact stiffnesses of a structure at its kω: equal is the same."""
+    rows = np.ascontiguousarray(stiffness)
+    return [
+        (int(s), float(speed), blake2b(row.data, digest_size=16).digest())
+        for s, speed, row in zip(structures, speeds, rows, strict=True)
+    ]
+
+
+def _first_of_new(keys: list[_Spring], known: Mapping[_Spring, object]) -> list[int]:
+    """Return the rows of the keys that are not known, each once."""
+    new: dict[_Spring, int] = {}
+    for row, key in enumerate(keys):
+        if key not in known:
+            new.setdefault(key, row)
+    return list(new.values())
 
 
 def rates(K: Complex, C: Complex, M: Complex) -> Complex:

@@ -124,10 +124,22 @@ class Workspace:
     loop: ClosedLoop
 
     @classmethod
-    def of(cls, balance: Balance, like: Workspace | None = None) -> Workspace:
-        """Return a fresh workspace for a balance; `like`: of the same scene with other harmonics."""
+    def of(
+        cls, balance: Balance, like: Workspace | None = None, observing_another: Workspace | None = None
+    ) -> Workspace:
+        """Return a fresh workspace for a balance.
+
+        Parameters
+        ----------
+        like : of the same scene with other harmonics.
+        observing_another : of the same scene and harmonics with another DOF observed: its resonances are
+            shared.
+        """
         system = by_reference(balance.system)
-        loop = ClosedLoop(balance, None if like is None else like.loop)
+        if observing_another is None:
+            loop = ClosedLoop(balance, None if like is None else like.loop)
+        else:
+            loop = observing_another.loop
         return cls(balance, system, new_receptance(system), new_evaluation(system), loop)
 
     def solve(self, p: float, guess: Real | None = None) -> PointSolution:

@@ -13,13 +13,12 @@ import numpy as np
 
 from solver.balance.kernels.jacobian import step_back
 from solver.balance.kernels.newton import ACCEPTED, TARGET
-from solver.balance.kernels.residual import evaluate_forces
+from solver.balance.kernels.residual import complete, evaluate_forces, prepare_forces
 from solver.contacts.kernels.system import Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Real
 from solver.jit.lapack import set_to
 from solver.jit.separate import apart
-from solver.linear.kernels.receptance import receptance
 
 _MOST_SOLVES = 14
 _SLOWEST = 0.5  # the residual has to fall by this factor a step from the third step on
@@ -37,7 +36,7 @@ def frozen_arc(
 
     Returns
     -------
-    (converged, solves, p, relative residual); derivatives of the forces are not in place.
+    (converged, solves, p, relative residual); where it converged derivatives are in place.
     """
     n = u.size
     steps, sizes = np.empty((_MOST_SOLVES + 1, n + 1)), np.empty(_MOST_SOLVES + 1)
@@ -46,12 +45,13 @@ def frozen_arc(
     for i in range(n):
         across += weight_u * tangent[i] * tangent[i]
     for iteration in range(_MOST_SOLVES + 1):
-        receptance(system, p, linear)
+        prepare_forces(system, linear, p)
         norm = evaluate_forces(system, linear, u, p, point)
         if not math.isfinite(norm):
             return False, iteration, p, norm
         if norm <= TARGET:
-            return True, iteration, p, norm
+            norm = complete(system, linear, u, p, norm, point)
+            return norm <= ACCEPTED, iteration, p, norm
         if norm <= ACCEPTED and norm > 0.5 * before:
             return (
                 False,

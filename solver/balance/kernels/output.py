@@ -122,14 +122,20 @@ def _along(system: System, x: Real, tau: float) -> float:
 def measure(
     system: System, linear: Receptance, u: Real, point: Evaluation, du: Real, dp: float, x: Real, out: Real
 ) -> None:
-    """Fill `x` with the observed coefficients and `out` with the measures and their slopes along (du, dλ).
+    """Fill `x` with the observed coefficients and `out` with the measures and their slopes along (du, dλ)."""
+    observed_motion(system, linear, u, point, x)
+    dx = np.empty(x.size)
+    observed_slope(system, linear, u, point, du, dp, dx)
+    measure_motion(system, point, x, dx, out)
+
+
+@apart
+def measure_motion(system: System, point: Evaluation, x: Real, dx: Real, out: Real) -> None:
+    """Fill `out` with the measures of the observed coefficients `x` and their slopes where x changes by dx.
 
     The place of an extremum is stationary, so a slope is the change of the motion at that place.
     """
-    observed_motion(system, linear, u, point, x)
     high, at_high, low, at_low = extremes(system, x)
-    dx = np.empty(x.size)
-    observed_slope(system, linear, u, point, du, dp, dx)
     rise, sink = _along(system, dx, at_high), _along(system, dx, at_low)
     out[HALF_RANGE], out[RANGE_SLOPE] = 0.5 * (high - low), 0.5 * (rise - sink)
     out[HIGH], out[LOW], out[HIGH_SLOPE], out[LOW_SLOPE] = high, -low, rise, -sink

@@ -17,8 +17,10 @@ from solver.contacts.kernels.stick_slip_events import BEGAN, FAILED, SEPARATED, 
 from solver.contacts.kernels.system import FREQUENCY, LEVEL, LOAD_COEFFICIENTS, Evaluation, Receptance, System
 from solver.jit.decorators import compiled
 from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position
-from solver.jit.lapack import copy_block
+from solver.jit.lapack import copy_block, fill
 from solver.jit.separate import apart
+from solver.linear.kernels.modal_responses import driven_motions, goes_through_modes, modal_responses
+from solver.linear.kernels.receptance import receptance
 
 _CANCELLED, _LOST = 1e-3, 1e-5  # shares of |A| |F| and |A| |dF/dU| |u| a residual is relative to at least
 
@@ -66,11 +68,33 @@ def evaluate(system: System, linear: Receptance, u: Real, p: float, added: float
 
 @compiled
 def evaluate_forces(system: System, linear: Receptance, u: Real, p: float, out: Evaluation) -> float:
-    """Evaluate the residual alone where kernels do that for less: derivatives are not in place then.
+    """Evaluate the residual alone where that costs less: derivatives are not in place then.
 
-    Where a constant force holds what no contact does the residual itself depends on derivatives.
+    What is driven is that of λ = p (`prepare_forces`); A may be that of another λ, whose size alone is looked
+    at where forces go through the modes. Where a constant force holds what no contact does the residual
+    itself depends on derivatives.
     """
     return _evaluate(system, linear, u, p, 0.0, system.hold == 0, out)
+
+
+@compiled
+def prepare_forces(system: System, linear: Receptance, p: float) -> None:
+    """Fill in what `evaluate_forces` needs of the receptance at λ = p."""
+    if system.hold == 0 and goes_through_modes(system):
+        driven_motions(system, p, linear)
+    else:
+        receptance(system, p, linear)
+
+
+@compiled
+def complete(system: System, linear: Receptance, u: Real, p: float, norm: float, out: Evaluation) -> float:
+    """Put in place what `evaluate_forces` left out where it found the residual `norm`; return it anew."""
+    through_modes = system.hold == 0 and goes_through_modes(system)
+    if through_modes:
+        receptance(system, p, linear)
+    if system.hold == 0 and system.alone.sum() > 0:
+        return evaluate(system, linear, u, p, 0.0, out)
+    return _residual(system, linear, u, p, least_size(system, p), False, out) if through_modes else norm
 
 
 @apart
@@ -86,7 +110,7 @@ def _evaluate(
         good = _element(system, e, u, table[e], load[e], slope[e], dload[e], alone, out)
         if not good:
             return np.nan
-    return _residual(system, linear, u, least_size(system, p), alone, out)
+    return _residual(system, linear, u, p, least_size(system, p), alone, out)
 
 
 @compiled
@@ -193,8 +217,28 @@ def _led_responses(
 
 
 @apart
+def _responses_through_modes(
+    system: System, linear: Receptance, u: Real, p: float, i: int, out: Evaluation, responses: Complex,
+    reaches: Real,
+) -> None:  # fmt: skip
+    """Fill the same without the slopes by λ: (nc,) of `responses` from the modes at λ = p."""
+    nc, here, has_sine = system.owner.size, cosine_position(system.ks, i), system.ks[i] > 0
+    n, forces = coefficient_count(system.ks), responses[1]
+    for d in range(nc):
+        at, stiffness = d * n + here, system.shift[d]
+        fc = out.F[d, here] - stiffness * u[at]
+        forces[d] = complex(fc, stiffness * u[at + 1] - out.F[d, here + 1] if has_sine else 0.0)
+        reaches[d] = 0.0
+        for e in range(nc):
+            a = linear.A[0, i, d, e]
+            reaches[d] = max(reaches[d], abs(a.real) + abs(a.imag))
+    modal_responses(system, p, i, forces, responses[0])
+    fill(forces, 0.0)
+
+
+@apart
 def _residual(
-    system: System, linear: Receptance, u: Real, least: float, alone: bool, out: Evaluation
+    system: System, linear: Receptance, u: Real, p: float, least: float, alone: bool, out: Evaluation
 ) -> float:
     """Put r and dr/dλ together from the contact forces and the receptance.
 
@@ -209,7 +253,8 @@ def _residual(
         find_gauge(system, out)
     worst, check = 0.0, 0.0
     led = is_reduced(system, linear)
-    some = nc if led else 0
+    through_modes = alone and goes_through_modes(system)
+    some = nc if led or through_modes else 0
     responses, reaches = np.empty((2, some), np.complex128), np.empty(some)
     for i in range(system.ks.size):
         here = cosine_position(system.ks, i)
@@ -217,9 +262,11 @@ def _residual(
         scale, residual = max(least, motion), 0.0
         if led:
             _led_responses(system, linear, u, i, out, responses, reaches)
+        elif through_modes:
+            _responses_through_modes(system, linear, u, p, i, out, responses, reaches)
         for c in range(nc):
             row = c * n + here
-            if led:
+            if led or through_modes:
                 response, dresponse, reach = responses[0, c], responses[1, c], reaches[c]
             else:
                 response, dresponse, reach = _response(system, linear, u, i, c, out)

@@ -9,10 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from solver.balance.balance import build
+from solver.balance.kernels.observers import measure_through_modes, modal_motion
 from solver.balance.kernels.output import measure
-from solver.balance.kernels.residual import evaluate
+from solver.balance.kernels.residual import evaluate, evaluate_forces, prepare_forces
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
+from solver.contacts.kernels.system import DENSE
 from solver.continuation.branch import Branch, Peak
 from solver.continuation.branches.sweep import highest_between
 from solver.continuation.extrema.branch_error import branch_error
@@ -91,24 +93,15 @@ def highest_peaks(branch: Branch, dofs: Sequence[str]) -> list[Peak]:
         No such DOF.
     """
     scene, count = branch.balance.scene, len(branch.values)
-    workspaces = []
+    workspaces: list[Workspace] = []
     for dof in dofs:
         other = scene.model_copy(update={"observe": scene.observe.model_copy(update={"dof": dof})})
-        workspaces.append(Workspace.of(build(other, "frequency", harmonics=branch.balance.n_harmonics)))
+        balance = build(other, "frequency", harmonics=branch.balance.n_harmonics)
+        workspaces.append(Workspace.of(balance, observing_another=workspaces[0] if workspaces else None))
     rows = np.zeros((len(dofs), count, branch.balance.n_coefficients))
     measures = np.repeat(branch.measures[None], len(dofs), axis=0)
     for i, (solution, tangent) in enumerate(zip(branch.solutions, branch.tangents, strict=True)):
-        u, p = np.ascontiguousarray(solution[:-1]), float(solution[-1])
-        du, dp = np.ascontiguousarray(tangent[:-1]), float(tangent[-1])
-        point = workspaces[0].point
-        for j, workspace in enumerate(workspaces):
-            system, linear = workspace.system, workspace.linear
-            if j == 0:
-                receptance(system, p, linear)
-                evaluate(system, linear, u, p, 0.0, point)
-            else:
-                observer_receptance(system, p, linear)
-            measure(system, linear, u, point, du, dp, rows[j, i], measures[j, i])
+        _measure_all(workspaces, solution, tangent, rows[:, i], measures[:, i])
     found, lost = [], set[Place]()
     for j, workspace in enumerate(workspaces):
         points = Points(
@@ -117,6 +110,32 @@ def highest_peaks(branch: Branch, dofs: Sequence[str]) -> list[Peak]:
         )  # fmt: skip
         found.append(Survey(workspace, points, worth=COMPETES_FOR_HIGHEST, lost=lost).peaks[0])
     return found
+
+
+def _measure_all(
+    workspaces: Sequence[Workspace], solution: Real, tangent: Real, rows: Real, out: Real
+) -> None:
+    """Fill a row for each of several DOFs of one motion; `out` keeps its residual."""
+    first = workspaces[0]
+    u, p = np.ascontiguousarray(solution[:-1]), float(solution[-1])
+    du, dp = np.ascontiguousarray(tangent[:-1]), float(tangent[-1])
+    system = first.balance.system
+    if system.alone.any() or system.hold == 1:
+        receptance(first.system, p, first.linear)
+        evaluate(first.system, first.linear, u, p, 0.0, first.point)
+    else:
+        prepare_forces(first.system, first.linear, p)
+        evaluate_forces(first.system, first.linear, u, p, first.point)
+    if system.form == DENSE:
+        for j, each in enumerate(workspaces):
+            if j > 0:
+                observer_receptance(each.system, p, each.linear)
+            measure(each.system, each.linear, u, first.point, du, dp, rows[j], out[j])
+        return
+    amplitudes = np.empty((2, *system.modal_forces.shape), np.complex128)
+    modal_motion(first.system, u, p, first.point, du, dp, amplitudes)
+    for j, each in enumerate(workspaces):
+        measure_through_modes(each.system, first.point, amplitudes, rows[j], out[j])
 
 
 def _measure(workspace: Workspace, solution: Real, tangent: Real, row: Real, out: Real) -> None:

@@ -131,8 +131,6 @@ def _correct(
         )
         walk.numbers[FROZEN] += solves
         if good:
-            if system.alone.sum() > 0:
-                norm = evaluate(system, linear, trial, p, 0.0, point)
             return True, (solves + 1) // 2, p, norm
         # What is a solution but for a stall is where Newton's method goes on.
         if not norm <= ACCEPTED:

@@ -53,7 +53,7 @@ def receptance(system: System, p: float, out: Receptance) -> None:
         _dense_receptance(system, p, out)
     else:
         _modal_receptance(system, p, system.leading.size, out)
-    _scale(system, p, out)
+    scale_driven(system, p, out)
 
 
 @apart
@@ -66,11 +66,11 @@ def observer_receptance(system: System, p: float, out: Receptance) -> None:
         _dense_receptance(system, p, out)
     else:
         _modal_receptance(system, p, 0, out)
-    _scale(system, p, out)
+    scale_driven(system, p, out)
 
 
 @compiled
-def _scale(system: System, p: float, out: Receptance) -> None:
+def scale_driven(system: System, p: float, out: Receptance) -> None:
     """Multiply the motions under the unit excitation by its level and phase."""
     for k in range(system.ks.size):
         f, df = excitation(system, p, system.ks[k])
@@ -121,10 +121,10 @@ def _modal_receptance(system: System, p: float, r: int, out: Receptance) -> None
             turns = _fill_weights(system, s, r, first, size, weights)
             for i in range(system.ks.size):
                 if system.which[i] == s:
-                    _fill_terms(system, s, first, size, float(system.ks[i]), omega, by_omega, terms)
+                    fill_terms(system, s, first, size, float(system.ks[i]), omega, by_omega, terms)
                     _add_pairs(system, r, size, i, turns, weights, terms, out)
-                    if _fill_driven(system, s, first, size, i, driven):
-                        _add_driven(size, i, driven, terms, out)
+                    if fill_driven(system, s, first, size, i, driven):
+                        add_driven_modes(size, i, driven, terms, out)
 
 
 @compiled
@@ -164,7 +164,7 @@ def _products(left: Complex, right: Complex, first: int, size: int, real: Real, 
 
 
 @compiled
-def _fill_driven(system: System, s: int, first: int, size: int, i: int, driven: Real) -> bool:
+def fill_driven(system: System, s: int, first: int, size: int, i: int, driven: Real) -> bool:
     """Fill in real and imaginary rows of x_m y_mᴴ f̂_k at contacts and observer; False without a force."""
     nc, modes, seen = system.contact_modes.shape[1], system.contact_modes[s], system.observe_modes[s]
     forces = system.modal_forces[i]
@@ -180,7 +180,7 @@ def _fill_driven(system: System, s: int, first: int, size: int, i: int, driven: 
 
 
 @compiled
-def _fill_terms(
+def fill_terms(
     system: System, s: int, first: int, size: int, k: float, omega: float, by_omega: float, terms: Real
 ) -> None:
     """Fill in 1/d_m and its derivative by λ: real, imaginary, real, imaginary; NaN where d_m is zero."""
@@ -252,7 +252,7 @@ def _add_pairs(
 
 
 @compiled
-def _add_driven(size: int, i: int, driven: Real, terms: Real, out: Receptance) -> None:
+def add_driven_modes(size: int, i: int, driven: Real, terms: Real, out: Receptance) -> None:
     """Add a block of modes to ū and x̄ of harmonic number i."""
     nc = out.B.shape[2]
     for c in range(nc + 1):

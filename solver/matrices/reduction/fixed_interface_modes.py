@@ -14,6 +14,7 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
 from solver.matrices.reduction.block_lanczos import lowest_modes
+from solver.matrices.reduction.multifrontal import Cholesky
 from solver.matrices.reduction.ordering import nested_dissection
 from solver.matrices.values import MOST_MODES
 
@@ -105,15 +106,25 @@ def _factorised(K: Any, M: Any, couplings: dict[str, Array], shift: float) -> In
 
 
 def factor(matrix: Any) -> Callable[[Array], Array]:
-    """The inverse of a symmetric or Hermitian matrix: pivots from the diagonal, ordered for little fill."""
+    """The inverse of a symmetric or Hermitian matrix: pivots from the diagonal, ordered for little fill.
+
+    Raises
+    ------
+    RuntimeError
+        The matrix is singular.
+    """
     symmetric = {"diag_pivot_thresh": 1e-3, "options": {"SymmetricMode": True}}
     if matrix.shape[0] < LARGE:
         direct: Callable[[Array], Array] = splu(matrix, permc_spec="MMD_AT_PLUS_A", **symmetric).solve
         return direct
-    order = nested_dissection(matrix)
+    blocks = nested_dissection(matrix)
+    try:
+        return Cholesky(matrix, blocks).solve
+    except np.linalg.LinAlgError:  # a shift among the eigenvalues, or a matrix that is singular
+        order = np.concatenate(blocks)
     back = np.argsort(order)
-    factor = splu(csc_array(matrix[order][:, order]), permc_spec="NATURAL", **symmetric)
-    return lambda forces: factor.solve(forces[order])[back]
+    general = splu(csc_array(matrix[order][:, order]), permc_spec="NATURAL", **symmetric)
+    return lambda forces: general.solve(forces[order])[back]
 
 
 def _lowest_estimate(rest: Interior) -> float:

@@ -20,8 +20,12 @@ LEAF = 180  # rows that are cut no further
 _MIDDLE = (0.35, 0.65)  # where a cut may be, as shares of the rows
 
 
-def nested_dissection(matrix: Any) -> Rows:
-    """Return the order of the rows of a sparse matrix of symmetric pattern, (n,)."""
+def nested_dissection(matrix: Any) -> list[Rows]:
+    """Return the rows of a sparse matrix of symmetric pattern in blocks, in the order of their elimination.
+
+    A block is a cut or a part that was cut no further; what a cut separates stands in front of it, the parts
+    of each half side by side.
+    """
     graph = csr_array(matrix)
     graph = csr_array((np.ones(graph.nnz, np.int8), graph.indices, graph.indptr), shape=graph.shape)
     done: list[Rows] = []
@@ -29,17 +33,10 @@ def nested_dissection(matrix: Any) -> Rows:
     waiting = [np.arange(graph.shape[0])]
     while waiting:
         rows = waiting.pop()
-        if rows.size <= LEAF:
-            done.append(rows)
-            continue
-        parts = _cut(graph, rows)
-        if len(parts) == 1:
-            done.append(rows)
-            continue
-        separator, *halves = parts
-        done.append(separator)
-        waiting += halves
-    return np.concatenate(done[::-1]) if done else np.zeros(0, np.int64)
+        parts = _cut(graph, rows) if rows.size > LEAF else [rows]
+        done.append(parts[0])
+        waiting += parts[1:]
+    return [rows for rows in done[::-1] if rows.size]
 
 
 def _cut(graph: csr_array, rows: Rows) -> list[Rows]:
@@ -47,7 +44,8 @@ def _cut(graph: csr_array, rows: Rows) -> list[Rows]:
     own = graph[rows][:, rows]
     start = 0
     for _ in range(2):  # from the far end of the far end: the levels are small and many
-        reached, before = breadth_first_order(own, start, directed=False)
+        # The pattern is symmetric: "directed" spares a transpose.
+        reached, before = breadth_first_order(own, start, directed=True)
         if reached.size < rows.size:
             rest = np.setdiff1d(np.arange(rows.size), reached)
             return [np.zeros(0, np.int64), rows[rest], rows[reached]]

@@ -1,0 +1,66 @@
+"""Many observed DOFs at one solution: the modes move once, and each DOF is a sum over them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.balance.kernels.output import force_slope, measure_motion
+from solver.contacts.kernels.system import FREQUENCY, Evaluation, System
+from solver.jit.fourier import Complex, Real, coefficient_count, cosine_position
+from solver.jit.separate import apart
+from solver.linear.kernels.receptance import excitation, fill_terms
+
+
+@apart
+def modal_motion(
+    system: System, u: Real, p: float, point: Evaluation, du: Real, dp: float, amplitudes: Complex
+) -> None:
+    """Fill in the modal coordinates q̂ = (f̂ − Yᴴ (F̂ − shift û)) / d and their change for (du, dλ).
+
+    Parameters
+    ----------
+    point : the balance evaluated at (u, λ = p), with derivatives.
+    amplitudes : (2, nk, nm) value and change.
+    """
+    omega = p if system.kind == FREQUENCY else system.omega
+    by_omega = 1.0 if system.kind == FREQUENCY else 0.0
+    nc, n, nm = system.owner.size, coefficient_count(system.ks), system.eigenvalues.shape[1]
+    dF, terms, force = np.empty((nc, n)), np.empty((4, nm)), np.empty((2, nm), np.complex128)
+    force_slope(system, point, du, dp, dF)
+    for i in range(system.ks.size):
+        s, here, has_sine = system.which[i], cosine_position(system.ks, i), system.ks[i] > 0
+        fill_terms(system, s, 0, nm, float(system.ks[i]), omega, by_omega, terms)
+        f, df = excitation(system, p, system.ks[i])
+        for m in range(nm):
+            force[0, m], force[1, m] = f * system.modal_forces[i, m], dp * df * system.modal_forces[i, m]
+        for c in range(nc):
+            at = c * n + here
+            fc, dfc = point.F[c, here] - system.shift[c] * u[at], dF[c, here]
+            fs, dfs = 0.0, 0.0
+            if has_sine:
+                fs, dfs = point.F[c, here + 1] - system.shift[c] * u[at + 1], dF[c, here + 1]
+            here_force, change = complex(fc, -fs), complex(dfc, -dfs)
+            row = system.contact_duals[s, c]
+            for m in range(nm):
+                force[0, m] -= row[m] * here_force
+                force[1, m] -= row[m] * change
+        for m in range(nm):
+            term, slope = complex(terms[0, m], terms[1, m]), complex(terms[2, m], terms[3, m])
+            amplitudes[0, i, m] = term * force[0, m]
+            amplitudes[1, i, m] = term * force[1, m] + dp * slope * force[0, m]
+
+
+@apart
+def measure_through_modes(system: System, point: Evaluation, amplitudes: Complex, x: Real, out: Real) -> None:
+    """Fill `x` and `out` as `solver.balance.kernels.output.measure` does, from the modal coordinates."""
+    dx = np.empty(x.size)
+    for i in range(system.ks.size):
+        here, seen = cosine_position(system.ks, i), system.observe_modes[system.which[i]]
+        value, change = complex(0.0), complex(0.0)
+        for m in range(seen.size):
+            value += seen[m] * amplitudes[0, i, m]
+            change += seen[m] * amplitudes[1, i, m]
+        x[here], dx[here] = value.real, change.real
+        if system.ks[i] > 0:
+            x[here + 1], dx[here + 1] = -value.imag, -change.imag
+    measure_motion(system, point, x, dx, out)
