@@ -53,7 +53,7 @@ def observing(
     workspace = Workspace.of(balance)
     rows, measures = np.zeros((len(branch.values), balance.n_coefficients)), branch.measures.copy()
     for i, (solution, tangent) in enumerate(zip(branch.solutions, branch.tangents, strict=True)):
-        _measure(workspace, solution, tangent, rows[i], measures[i])
+        _measure_all([workspace], solution, tangent, rows[i : i + 1], measures[i : i + 1])
     survey = Survey(
         workspace,
         Points(
@@ -136,12 +136,3 @@ def _measure_all(
     modal_motion(first.system, u, p, first.point, du, dp, amplitudes)
     for j, each in enumerate(workspaces):
         measure_through_modes(each.system, first.point, amplitudes, rows[j], out[j])
-
-
-def _measure(workspace: Workspace, solution: Real, tangent: Real, row: Real, out: Real) -> None:
-    """Fill a row with what is observed at a point; `out` keeps its residual."""
-    system, linear, point = workspace.system, workspace.linear, workspace.point
-    u, p = np.ascontiguousarray(solution[:-1]), float(solution[-1])
-    receptance(system, p, linear)
-    evaluate(system, linear, u, p, 0.0, point)
-    measure(system, linear, u, point, np.ascontiguousarray(tangent[:-1]), float(tangent[-1]), row, out)

@@ -165,7 +165,7 @@ def error_of(law: Law, at: Point, w: np.ndarray, way: Point) -> float:
     return best
 
 
-@pytest.mark.parametrize("count", [15, pytest.param(40, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [10, pytest.param(40, marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", LAWS)
 def test_second_derivatives_equal_differences_of_the_gradient(name: str, count: int) -> None:
     """To 1e-5 in every state, along the motions, the numbers and the load at once."""
