@@ -28,6 +28,7 @@ from optim.results.json import (
 )
 from solver.continuation.branch import Branch
 from solver.results.base import Drawn
+from solver.results.told import Piece
 from solver.results.views import Views
 
 SAME_HEIGHT = 1e-5  # relative distance within which rows count as equally high
@@ -71,9 +72,11 @@ class DesignStatus(Enum):
     STOPPED = "The search was stopped by the caller."
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DesignPeak:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class DesignPeak(Piece):
     """A peak of the response of a design: max|x| of the observed DOF [m] and its frequency [Hz]."""
+
+    UNITS: ClassVar[Mapping[str, str]] = {"value": "m", "at": "Hz"}
 
     value: float
     at: float
@@ -221,13 +224,18 @@ class DesignResult(Drawn):
         """What holds the optimum in place, in words: equally high peaks, bounds, limits."""
         if self.evaluation is None or not self.evaluation.rows:
             return ()
-        held = [row.what for row in self.evaluation.highest(SAME_HEIGHT)]
+        held = [self._words(row.what, row) for row in self.evaluation.highest(SAME_HEIGHT)]
         for variable in self.problem.variables:
             value = self.evaluation.values[variable.name]
             for bound, name in ((variable.low, "lower"), (variable.high, "upper")):
                 if abs(value - bound) <= 1e-9 * max(abs(bound), 1e-300):
                     held.append(f"{name} bound of {variable.name}")
-        return (*held, *(limit_words(row) for row in self.evaluation.rows if at_limit(row)))
+        at_limits = [self._words(limit_words(row), row) for row in self.evaluation.rows if at_limit(row)]
+        return (*held, *at_limits)
+
+    def _words(self, what: str, row: Row) -> str:
+        """Return what a row says, with the name of its case where there are several."""
+        return f"{what} of {row.case}" if len(self.problem.cases) > 1 and row.case else what
 
     @property
     def broken(self) -> tuple[Row, ...]:

@@ -13,6 +13,7 @@ from solver.views.parameter_units import parameter_unit
 from solver.views.to_dataset import attributes, column
 
 if TYPE_CHECKING:
+    from optim.criteria.rows import Evaluation
     from optim.identification.result import Identification
     from optim.problem.variables import Variable as DesignVariable
     from optim.results.design import DesignResult
@@ -38,6 +39,8 @@ def design_dataset(result: DesignResult) -> Dataset:
         "objective": column("design", np.array([one.objective for one in tried]), "", "what is minimised"),
         "optimum": column("design", np.array([one is result.evaluation for one in tried], dtype=bool)),
     }
+    if len(result.problem.cases) > 1:
+        variables |= _peaks_of_cases([case.name for case in result.problem.cases], tried)
     for row in result.further:
         values = [next((found.value for found in one.of(row.quantity)), math.nan) for one in tried]
         name, unit = row.quantity.name, row.quantity.unit
@@ -47,6 +50,18 @@ def design_dataset(result: DesignResult) -> Dataset:
         active="; ".join(result.active), limit=result.limit,
     )  # fmt: skip
     return Dataset(kind="design", rows=("design",), variables=variables, attributes=notes)
+
+
+def _peaks_of_cases(names: Sequence[str], tried: Sequence[Evaluation]) -> dict[str, Variable]:
+    """The highest peak of every load case, NaN where none of it competes."""
+    found: dict[str, Variable] = {}
+    for name in names:
+        highest = [next((peak for peak in one.peaks if peak.case == name), None) for one in tried]
+        heights = np.array([math.nan if peak is None else peak.value for peak in highest])
+        places = np.array([math.nan if peak is None else peak.at_hz for peak in highest])
+        found[f"peak_of_{name}"] = column("design", heights, "m", f"highest peak of {name}")
+        found[f"peak_frequency_of_{name}"] = column("design", places, "Hz", "where it is")
+    return found
 
 
 def _values(

@@ -44,6 +44,15 @@ def test_several_bands_levels_and_orders_are_judged_together() -> None:
         there = evaluate(result.problem, {"shroud.N0": N0 * factor})
         assert there.objective > expected
     assert {row.case for row in result.evaluation.rows} == {"order 1", "order 2", "stronger"}  # type: ignore[union-attr]
+    held = result.held_by
+    assert held is not None
+    assert f"{held.what} of {held.case}" in result.active
+    assert str(result.peak).endswith("Hz>")
+    assert f"value {result.peak.value:.6g} m" in str(result.peak)  # type: ignore[union-attr]
+    frame = result.to_pandas()
+    at = frame[frame["optimum"]].iloc[0]
+    assert at["peak_of_order 2"] == pytest.approx(second, rel=1e-9)
+    assert at["peak_of_stronger"] == pytest.approx(third, rel=1e-9)
 
 
 def test_several_observed_dofs_are_cases_of_their_own() -> None:
