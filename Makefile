@@ -23,7 +23,7 @@ help:
 	@echo "make test-long  run the long studies"
 	@echo "make lint       check the code: ruff, mypy, import-linter"
 	@echo "make bench      measure the solver and print tables; some of them: make bench BENCH='case-a chains'"
-	@echo "make docs       build the reference from the docstrings; it goes to site/"
+	@echo "make docs       build the documentation site, reference and gallery too; it goes to site/"
 	@echo "make serve      start the service on http://127.0.0.1:8000"
 	@echo "make clean      remove .venv, caches and demo-output/"
 
@@ -69,7 +69,7 @@ bench: dev
 	$(BIN)/python -m benchmarks $(BENCH)
 
 docs: dev
-	$(BIN)/python docs/reference.py site
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
 serve: setup
 	$(BIN)/stickslip serve

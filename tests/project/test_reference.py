@@ -1,10 +1,11 @@
-"""The reference: it builds without a warning, and every public name has a docstring."""
+"""The documentation site builds without a warning, and every public name has a docstring."""
 
 from __future__ import annotations
 
 import inspect
+import os
 import re
-import runpy
+import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -12,7 +13,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-SCRIPT = ROOT / "docs" / "reference.py"
 MODULES = ("solver", "optim", "service.client", "service.schemas.answers")
 
 
@@ -57,24 +57,49 @@ def own_docstring(found: object) -> str:
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What `make docs` writes; pytest makes warnings errors."""
+    """What `make docs` writes; links that lead nowhere and pages without a place are errors."""
+    pytest.importorskip("material", reason="mkdocs-material is not installed")
     pytest.importorskip("pdoc", reason="pdoc is not installed")
     folder = tmp_path_factory.mktemp("site")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", [str(SCRIPT), str(folder)])
-        runpy.run_path(str(SCRIPT), run_name="__main__")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)]
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, check=False,
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr + done.stdout
     return folder
 
 
-def test_the_reference_builds_without_a_warning(site: Path) -> None:
+def test_the_site_builds_without_a_warning_and_has_every_public_name(site: Path) -> None:
     for module, name in NAMES:
-        page = (site / f"{module.replace('.', '/')}.html").read_text(encoding="utf-8")
-        assert f'id="{name}"' in page, f"{module}.{name} is not in the reference"
+        page = (site / f"reference-{module.replace('.', '-')}.html").read_text(encoding="utf-8")
+        assert re.search(rf'<h2 id="[\w-]+">{name}<', page), f"{module}.{name} is not in the reference"
+
+
+def test_the_site_has_every_page_and_picture_and_can_be_searched(site: Path) -> None:
+    pages = {path.stem for path in (ROOT / "docs").glob("*.md")} - {"index"}
+    assert pages <= {path.stem for path in site.glob("*.html")}
+    gallery = (site / "gallery.html").read_text(encoding="utf-8")
+    for path in (ROOT / "docs").glob("*.md"):
+        for picture in re.findall(r"!\[[^]]*\]\((img/[^)]+)\)", path.read_text(encoding="utf-8")):
+            assert (site / picture).is_file()
+            assert f'src="{picture}"' in gallery
+    index = (site / "search" / "search_index.json").read_text(encoding="utf-8")
+    for words in ("limit cycles", "underplatform", "nonlinear_mode"):
+        assert words in index
+
+
+def test_the_site_needs_nothing_from_elsewhere(site: Path) -> None:
+    """No fonts, styles or scripts of another server."""
+    page = (site / "readme.html").read_text(encoding="utf-8")
+    loaded = re.findall(r'<(?:script|link|img)[^>]*(?:src|href)="([^"]+)"', page)
+    assert loaded
+    assert [path for path in loaded if "://" in path] == []
 
 
 def test_parameters_read_as_they_are_written(site: Path) -> None:
     """With a type and without, and where a description goes on in the next line."""
-    page = (site / "solver.html").read_text(encoding="utf-8")
+    page = (site / "reference-solver.html").read_text(encoding="utf-8")
     text = " ".join(re.sub("<[^>]+>", "", page).split())
     for part in (
         "scene: what vibrates, with the values that stay fixed. ",
@@ -85,7 +110,7 @@ def test_parameters_read_as_they_are_written(site: Path) -> None:
 
 
 def test_make_builds_it() -> None:
-    assert "$(BIN)/python docs/reference.py site" in (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert "$(BIN)/python -m mkdocs build --strict" in (ROOT / "Makefile").read_text(encoding="utf-8")
 
 
 def test_what_names_refer_to_exists_in_docstrings() -> None:
