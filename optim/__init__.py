@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from optim.errors import DataError, DesignError
     from optim.identification.identify import identify
     from optim.identification.result import Identification, IdentifyStatus
+    from optim.problem.typed import Case, Limit
     from optim.results.design import DesignResult, DesignStatus
     from optim.robust.result import RobustResult, RobustStatus
     from optim.robust.robust import robust_design
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 _HOME = {
     "DataError": "errors", "identify": "identification.identify", "Identification": "identification.result",
     "IdentifyStatus": "identification.result",
+    "Case": "problem.typed", "Limit": "problem.typed",
     "design": "search", "DesignResult": "results.design", "DesignStatus": "results.design",
     "DesignError": "errors", "CampbellDiagram": "studies.crossings", "CampbellStatus": "studies.crossings",
     "campbell_diagram": "studies.campbell", "forbidden_hz": "studies.campbell",
@@ -34,12 +36,14 @@ _HOME = {
 __all__ = [
     "CampbellDiagram",
     "CampbellStatus",
+    "Case",
     "DataError",
     "DesignError",
     "DesignResult",
     "DesignStatus",
     "Identification",
     "IdentifyStatus",
+    "Limit",
     "ParetoResult",
     "ParetoStatus",
     "RobustResult",

@@ -19,6 +19,7 @@ from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
 from optim.problem.keys import ROBUST, DesignKeys
 from optim.problem.keywords import keywords
 from optim.problem.problem import Method, Problem, pose
+from optim.problem.typed import Limit, with_limits
 from optim.results.basins import SAME_PLACE, Basin
 from optim.results.design import DesignResult, DesignStatus
 from solver.results.watch import OnProgress, ShouldStop
@@ -35,6 +36,7 @@ SAME_HEIGHT = 1e-9  # relative, of two levels that are one
 def design(
     scene: Scene,
     *,
+    limits: Sequence[Limit] = (),
     on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
     **problem: Unpack[DesignKeywords],
@@ -44,6 +46,7 @@ def design(
     Parameters
     ----------
     scene : the scene; `observe` says which DOF and which band.
+    limits : bounds with types, in place of the keys `max_peak` and its like.
     on_progress : called with (share done, evaluations so far).
     should_stop : asked between responses and within them.
     **problem : the keys of a problem.
@@ -59,7 +62,9 @@ def design(
     TypeError
         An argument that is no key.
     """
-    return solve_problem(pose(scene, **problem), on_progress=on_progress, should_stop=should_stop)
+    return solve_problem(
+        pose(scene, **with_limits(problem, limits)), on_progress=on_progress, should_stop=should_stop
+    )
 
 
 def solve_problem(

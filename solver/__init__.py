@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from solver.results.base import Shown, progress_bar
     from solver.results.dataset import Dataset, Variable
     from solver.results.told import Summary
+    from solver.scene.builder import SceneBuilder
     from solver.scene.cyclic.annulus import Extent, annulus, sectors_needed
     from solver.scene.scene import Scene, load_scene, shipped_scenes
     from solver.sensitivity.gradient import Gradient, Sensitivities
@@ -71,6 +72,7 @@ _HOME = {
     "save": "views.io", "MissingExtraError": "errors", "ResultFileError": "errors", "Issue": "errors",
     "SceneError": "errors", "SettingError": "errors", "SolverError": "errors",
     "Effects": "balance.simplifications", "Plan": "studies.plan", "plan": "studies.plan",
+    "SceneBuilder": "scene.builder",
     "Scene": "scene.scene", "load_scene": "scene.scene", "shipped_scenes": "scene.scene",
     "Solution": "response.solution", "SolutionStatus": "response.solution", "solve": "response.solve",
     "Growth": "response.stability.floquet", "Stability": "response.stability.floquet",
@@ -169,6 +171,7 @@ __all__ = [
     "ResponseMap",
     "ResultFileError",
     "Scene",
+    "SceneBuilder",
     "SceneError",
     "Sensitivities",
     "SettingError",

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Unpack
 
@@ -25,6 +25,7 @@ from optim.problem.keys import FEWEST_SAMPLES, QUANTILE, SEED, DesignKeys
 from optim.problem.keywords import keywords
 from optim.problem.numbers import is_number, whole
 from optim.problem.problem import pose
+from optim.problem.typed import Limit, with_limits
 from optim.problem.uncertainty_input import check_settings, read_uncertain
 from optim.problem.uncertainty_set import Scenario
 from optim.problem.words import Aim
@@ -53,6 +54,7 @@ def robust_design(
     quantile: float = QUANTILE,
     samples: int | None = None,
     seed: int = SEED,
+    limits: Sequence[Limit] = (),
     on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
     **problem: Unpack[DesignKeywords],
@@ -69,6 +71,7 @@ def robust_design(
     samples : how many scenarios are drawn: for the mean and quantiles shown, and minimised with these aims;
         64, of a worst case 32 if left out.
     seed : of the random numbers.
+    limits : bounds with types, in place of the keys `max_peak` and its like.
     on_progress : called with (share done, responses so far).
     should_stop : asked between responses and within them.
     **problem : the keys of a problem.
@@ -87,7 +90,7 @@ def robust_design(
         An argument that is no key.
     """
     begun = time.perf_counter()
-    posed = pose(scene, **problem)
+    posed = pose(scene, **with_limits(problem, limits))
     over = read_uncertain(scene, posed.variables, uncertain)
     search = RobustSearch(posed, over, _aim(aim), _quantile(quantile), on_progress, should_stop)
     wanted = SAMPLES[search.aim] if samples is None else whole("samples", samples, least=FEWEST_SAMPLES)

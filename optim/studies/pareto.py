@@ -28,6 +28,7 @@ from optim.methods.kkt import Local
 from optim.problem.keys import FEWEST_POINTS, POINTS, FrontKeys
 from optim.problem.keywords import keywords
 from optim.problem.problem import Method, Problem, pose
+from optim.problem.typed import Limit, with_limits
 from optim.problem.variables import Variable, scaled, unscaled
 from optim.results.design import DesignResult, DesignStatus
 from optim.search import judge, local_search_of, solve_problem
@@ -51,6 +52,7 @@ def pareto_front(
     scene: Scene,
     *,
     points: int = POINTS,
+    limits: Sequence[Limit] = (),
     on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
     **problem: Unpack[FrontKeywords],
@@ -63,6 +65,7 @@ def pareto_front(
     ----------
     scene : the scene; `observe` says which DOF and which band.
     points : how many, both ends included.
+    limits : bounds with types, in place of the keys `max_peak` and its like.
     on_progress : called with (share done, designs evaluated so far).
     should_stop : asked between responses and within them.
     **problem : the keys of a problem.
@@ -79,7 +82,7 @@ def pareto_front(
         An argument that is no key.
     """
     begun = time.perf_counter()
-    posed = pose(scene, **problem)
+    posed = pose(scene, **with_limits(problem, limits))
     if isinstance(points, bool) or not isinstance(points, int) or points < FEWEST_POINTS:
         raise DesignError("points", points, f"must be a whole number >= {FEWEST_POINTS}")
     front = _Front(posed, points, on_progress, should_stop)

@@ -53,6 +53,8 @@ assert_type(robust.gain, float)
 front = optim.pareto_front(scene, variables={"shroud.N0": (20.0, 3000.0)}, limit=1e-4)
 assert_type([point.peak for point in front.points], list[float])
 assert_type(optim.sensitivities(scene).plot(), Figure)
+typed = optim.design(scene, cases=[optim.Case(name="a", engine_order=2)], limits=[optim.Limit("peak", 1e-4)])
+assert_type(typed, optim.DesignResult)
 assert_type(optim.campbell_diagram(scene, speeds_rpm=(1e3, 2e3)).status, optim.CampbellStatus)
 
 assert_type(solver.response_map(scene, "shroud.N0", 20, 300, on_progress=report).status, solver.MapStatus)
