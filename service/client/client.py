@@ -149,6 +149,7 @@ class Client(Workbench):
         on_progress: Callable[[float, int], None] | None = None,
         timeout: float | None = None,
         on_points: Callable[[JobPoints], None] | None = None,
+        on_best: Callable[[dict[str, Any]], None] | None = None,
     ) -> JobAnswer:
         """Follow a job until it has ended; with `timeout` [s] it may be unfinished still.
 
@@ -160,6 +161,8 @@ class Client(Workbench):
             Longest time to wait [s].
         on_points : callable, optional
             Called with the new points of a sweep.
+        on_best : callable, optional
+            Called with the best design so far of a design job, before the progress it came with.
         """
         end = None if timeout is None else time.monotonic() + timeout
         silence = _SILENCE_SECONDS if timeout is None else min(max(timeout, 0.001), _SILENCE_SECONDS)
@@ -167,6 +170,8 @@ class Client(Workbench):
             for event in self.events(job_id, silence) if timeout is None or timeout > 0.0 else ():
                 if isinstance(event, JobAnswer):
                     return event
+                if isinstance(event, JobProgress) and on_best is not None and event.best is not None:
+                    on_best(event.best)
                 if isinstance(event, JobProgress) and on_progress is not None:
                     on_progress(event.progress, event.points)
                 if isinstance(event, JobPoints) and on_points is not None:

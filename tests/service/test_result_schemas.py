@@ -82,6 +82,8 @@ class Silent:
 
     def found(self, points: Sequence[Point]) -> None: ...
 
+    def best(self, found: object) -> None: ...
+
 
 @pytest.mark.parametrize("case", BODIES)
 def test_a_result_is_what_its_schema_says(case: str) -> None:

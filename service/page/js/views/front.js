@@ -28,7 +28,7 @@ export function startFront() {
 
 export const frontView = {
   waiting: () => say("front-status", "The front waits for a worker."),
-  progress: ({ took }) => say("front-status", `Front:${took}.`),
+  progress: ({ took, points: count }) => say("front-status", `Front:${took}, ${count} evaluations.`),
   result(result, _sweeps, job) {
     ({ request } = job);
     points = [...result.points].sort((a, b) => a.band_hz - b.band_hz);
