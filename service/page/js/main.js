@@ -12,6 +12,7 @@ import { loadLaws } from "./scene/laws.js";
 import { forget, resume, run, startJobs } from "./network/jobs.js";
 import { openLibrary, startLibrary } from "./views/library.js";
 import { showResponse, startLive } from "./views/live.js";
+import { startModes } from "./views/modes/view.js";
 import { startMap } from "./views/map.js";
 import { openMatrices } from "./scene/matrices.js";
 import { SCENES } from "./scene/matrix_files.js";
@@ -219,6 +220,7 @@ function start() {
   startPoint();
   startFront();
   startStudies();
+  startModes();
   startOthers();
   startLibrary();
   startSettings();

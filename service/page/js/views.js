@@ -4,6 +4,7 @@
 import { designView } from "./views/design.js";
 import { frontView } from "./views/front.js";
 import { mapView } from "./views/map.js";
+import { modesView } from "./views/modes/view.js";
 import { sweepView } from "./views/response.js";
 import { accuracyView, campbellView } from "./views/studies.js";
 
@@ -14,5 +15,6 @@ export const VIEWS = {
   pareto: frontView,
   accuracy: accuracyView,
   campbell: campbellView,
+  modes: modesView,
   march: null, // Follows the point that is looked at, which begins it.
 };
