@@ -256,6 +256,11 @@ class Client(Workbench):
         answer: dict[str, Any] = self._transport.json("POST", "/v1/scenes/read", json=body)
         return answer
 
+    def read_measurements(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Measured data in CSV as tables of a job: the body of ``POST /v1/measurements/read``."""
+        answer: dict[str, Any] = self._transport.json("POST", "/v1/measurements/read", json=dict(body))
+        return answer
+
     def scene_text(self, body: Mapping[str, Any]) -> str:
         """A scene with its values set, as TOML: the body of ``POST /v1/scenes/text``."""
         return self._transport.send("POST", "/v1/scenes/text", json=dict(body)).text

@@ -29,6 +29,7 @@ from service.http.routes import (
     kinds,
     laws,
     matrices,
+    measurements,
     metrics,
     page,
     plan,
@@ -102,8 +103,8 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     events.install(app)
     app.include_router(jobs.submissions(service.registry))
     for module in (
-        jobs, kinds, laws, events, designs, sweeps, scene_text, scenes, uploads, matrices, plan, previews,
-        projects, runs, shares, health, metrics, reference, page,
+        jobs, kinds, laws, events, designs, sweeps, scene_text, scenes, uploads, matrices, measurements, plan,
+        previews, projects, runs, shares, health, metrics, reference, page,
     ):  # fmt: skip
         app.include_router(module.router)
     openapi.install(app, service.registry)

@@ -12,6 +12,7 @@ import { loadLaws } from "./scene/laws.js";
 import { forget, resume, run, startJobs } from "./network/jobs.js";
 import { openLibrary, startLibrary } from "./views/library.js";
 import { showResponse, startLive } from "./views/live.js";
+import { startIdentify } from "./views/identify/view.js";
 import { startModes } from "./views/modes/view.js";
 import { startMap } from "./views/map.js";
 import { openMatrices } from "./scene/matrices.js";
@@ -221,6 +222,7 @@ function start() {
   startFront();
   startStudies();
   startModes();
+  startIdentify();
   startOthers();
   startLibrary();
   startSettings();

@@ -3,6 +3,7 @@
 
 import { designView } from "./views/design.js";
 import { frontView } from "./views/front.js";
+import { identifyView } from "./views/identify/view.js";
 import { mapView } from "./views/map.js";
 import { modesView } from "./views/modes/view.js";
 import { sweepView } from "./views/response.js";
@@ -16,5 +17,6 @@ export const VIEWS = {
   accuracy: accuracyView,
   campbell: campbellView,
   modes: modesView,
+  identify: identifyView,
   march: null, // Follows the point that is looked at, which begins it.
 };
