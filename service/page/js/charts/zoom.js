@@ -21,7 +21,7 @@ export function zoomed(self, x) {
   return [{ ...x, low, high }, free ? { ...y, log, low: log ? undefined : y.low, high: undefined, zero: !log && y.zero } : { ...y, log }];
 }
 
-function look(self, window) {
+export function look(self, window) {
   const wanted = window && self.whole && (window[0] > self.whole[0] || window[1] < self.whole[1])
     ? [Math.max(window[0], self.whole[0]), Math.min(window[1], self.whole[1])] : null;
   if (wanted && !(wanted[1] > wanted[0])) return;

@@ -21,6 +21,7 @@ let studies = 0;
 export function startStudy() {
   byId("study").addEventListener("click", study);
   on("renew", renew);
+  on("front-wanted", front);
   on("scene-left", () => {
     studies += 1;
     say("study-status", "");
@@ -66,6 +67,16 @@ function study() {
   });
 }
 
+// The front again, with the amplitude at which the band is measured and as many designs as are asked for.
+function front({ limit, points }) {
+  if (!readSettings()) return;
+  const before = computedFor("pareto");
+  const several = Object.keys(before?.variables ?? {}).length > 1 ? { variables: before.variables } : {};
+  begin("pareto", { ...bodyOf("pareto"), ...several, ...ofTheFront({ limit, points }) });
+}
+
+const ofTheFront = ({ limit, points }) => Object.fromEntries(Object.entries({ limit, points }).filter(([, value]) => value !== undefined && value !== null));
+
 // One study again, with what is set now. A problem that the form can not say, as of several variables or with limits, stays as it was.
 function renew(kind) {
   // Kinds with a form of their own are asked again as it stands.
@@ -74,6 +85,6 @@ function renew(kind) {
   const before = computedFor(kind);
   const own = Object.fromEntries(Object.entries(before ?? {}).filter(([key]) => !NOT_ASKED_AGAIN.includes(key)));
   const further = Object.keys(before?.variables ?? {}).length > 1 || (kind === "design" && Object.keys(own).some((key) => !OF_THE_FORM.includes(key) || key === "speeds_rpm"));
-  begin(kind, further ? { ...asked(), ...own } : bodyOf(kind));
+  begin(kind, further ? { ...asked(), ...own } : { ...bodyOf(kind), ...(kind === "pareto" ? ofTheFront(own) : {}) });
   return undefined;
 }

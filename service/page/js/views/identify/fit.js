@@ -78,7 +78,7 @@ const wordsOf = (conditions) => Object.entries(conditions).map(([path, v]) => `$
 
 export function candidatesTable({ candidates }) {
   if (!candidates.length) return null;
-  return scrolled("Measurements to make next", table(["measure next", numeric("tells more"), "narrows most"],
+  return scrolled("Measurements to make next", table(["measure next", numeric("tells more"), "narrows the error of"],
     candidates.slice(0, 6).map((one, i) => [i ? wordsOf(one.conditions) : el("strong", {}, wordsOf(one.conditions)), numeric(number(one.gain, 3)),
-      one.tells ? `${one.tells}, its standard error × ${number(one.factor, 2)}` : "–"]), "Measurements to make next"));
+      one.tells ? `${one.tells} × ${number(one.factor, 2)}` : "–"]), "Measurements to make next"));
 }
