@@ -187,6 +187,11 @@ class Client(Workbench):
         """What a job computed."""
         return self._get(ResultsAnswer, f"/v1/jobs/{segment(job_id)}/results")
 
+    def job_report(self, job_id: str, form: Literal["html", "pdf"] = "pdf") -> bytes:
+        """The design report of a job, made by the service: a page or a PDF."""
+        path = f"/v1/jobs/{segment(job_id)}/report"
+        return self._transport.send("GET", path, params={"format": form}).content
+
     def job_scene(self, job_id: str) -> dict[str, Any]:
         """The scene of a job as it is computed, with its values set and what its uploads held."""
         return self._get(JobScene, f"/v1/jobs/{segment(job_id)}/scene").scene

@@ -35,6 +35,7 @@ from service.http.routes import (
     plan,
     previews,
     reference,
+    reports,
     scene_text,
     scenes,
     sweeps,
@@ -104,7 +105,7 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     app.include_router(jobs.submissions(service.registry))
     for module in (
         jobs, kinds, laws, events, designs, sweeps, scene_text, scenes, uploads, matrices, measurements, plan,
-        previews, projects, runs, shares, health, metrics, reference, page,
+        previews, projects, reports, runs, shares, health, metrics, reference, page,
     ):  # fmt: skip
         app.include_router(module.router)
     openapi.install(app, service.registry)

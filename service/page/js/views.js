@@ -3,9 +3,9 @@
 
 import { designView } from "./views/design.js";
 import { frontView } from "./views/front.js";
-import { identifyView } from "./views/identify/view.js";
+import { identifyView } from "./identify/view.js";
 import { mapView } from "./views/map.js";
-import { modesView } from "./views/modes/view.js";
+import { modesView } from "./modes/view.js";
 import { sweepView } from "./views/response.js";
 import { accuracyView, campbellView } from "./views/studies.js";
 

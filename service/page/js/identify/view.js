@@ -1,15 +1,15 @@
 // Identification: measured responses and loops, the parameters looked for, the fit, how sure it is, what comes next.
 
-import { state } from "../../base/address.js";
-import { byId, el, facts, say, show } from "../../base/dom.js";
-import { on, tell } from "../../base/events.js";
-import { csvText, saveText } from "../../base/exports.js";
-import { number, percent, quantity, seconds } from "../../base/format.js";
-import { chart } from "../../charts/chart.js";
-import { rowsOf } from "../../design/rows.js";
-import { run } from "../../network/jobs.js";
-import { asked, ranges, value, variables, variedContacts } from "../../scene/scenes.js";
-import { putAll } from "../live.js";
+import { state } from "../base/address.js";
+import { byId, el, facts, say, show } from "../base/dom.js";
+import { on, tell } from "../base/events.js";
+import { csvText, saveText } from "../base/exports.js";
+import { number, percent, quantity, seconds } from "../base/format.js";
+import { chart } from "../charts/chart.js";
+import { rowsOf } from "../design/rows.js";
+import { run } from "../network/jobs.js";
+import { asked, ranges, value, variables, variedContacts } from "../scene/scenes.js";
+import { putAll } from "../views/live.js";
 import { clearData, fillData, list, runsRead, sourceNames, startData, tables } from "./data.js";
 import { candidatesTable, correlationTable, estimatesTable, loopsChart, phasesChart, responsesChart } from "./fit.js";
 

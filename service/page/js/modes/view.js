@@ -1,14 +1,14 @@
 // Nonlinear modes: frequency and damping of a free motion over its amplitude, and what follows from them.
 
-import { state } from "../../base/address.js";
-import { byId, el, facts, say, show } from "../../base/dom.js";
-import { on } from "../../base/events.js";
-import { csvText, saveText } from "../../base/exports.js";
-import { length, number, seconds } from "../../base/format.js";
-import { chart } from "../../charts/chart.js";
-import { run } from "../../network/jobs.js";
-import { asked, current, value } from "../../scene/scenes.js";
-import { putAll } from "../live.js";
+import { state } from "../base/address.js";
+import { byId, el, facts, say, show } from "../base/dom.js";
+import { on } from "../base/events.js";
+import { csvText, saveText } from "../base/exports.js";
+import { length, number, seconds } from "../base/format.js";
+import { chart } from "../charts/chart.js";
+import { run } from "../network/jobs.js";
+import { asked, current, value } from "../scene/scenes.js";
+import { putAll } from "../views/live.js";
 import { amplitudeOf, columnsOf, dampingChart, frequencyChart, loopChart, nearestMotion, performanceChart, shapeChart, statesAt } from "./charts.js";
 import { buildForm, complain, fillForm, readForm } from "./form.js";
 

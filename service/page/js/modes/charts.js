@@ -1,6 +1,6 @@
 // A nonlinear mode as charts: frequency and damping over the amplitude, peaks, loops, shape.
 
-import { largest, length, lengthUnit, number } from "../../base/format.js";
+import { largest, length, lengthUnit, number } from "../base/format.js";
 
 const LINEAR = ["stuck", "separated", "closed"];
 const GHOSTS = [7, 5, 4, 3];

@@ -1,9 +1,9 @@
 // Measured data of the page: files that were chosen, dropped or pasted, read by the service against the scene.
 
-import { Problem, patiently, post } from "../../network/api.js";
-import { byId, el, show } from "../../base/dom.js";
-import { number, quantity } from "../../base/format.js";
-import { asked } from "../../scene/scenes.js";
+import { Problem, patiently, post } from "../network/api.js";
+import { byId, el, show } from "../base/dom.js";
+import { number, quantity } from "../base/format.js";
+import { asked } from "../scene/scenes.js";
 
 const PASTED = "pasted";
 let files = [];

@@ -1,7 +1,7 @@
 // The fit over the data, and the tables that say how sure it is.
 
-import { el, table } from "../../base/dom.js";
-import { largest, lengthUnit, number, quantity } from "../../base/format.js";
+import { el, table } from "../base/dom.js";
+import { largest, lengthUnit, number, quantity } from "../base/format.js";
 
 const COLOURS = 6;
 const SHAPES = ["circle", "square", "triangle", "diamond"];

@@ -1,7 +1,7 @@
 // What a nonlinear mode is asked with: which one, over which amplitudes, and what goes along.
 
-import { byId, el, show } from "../../base/dom.js";
-import { current, value } from "../../scene/scenes.js";
+import { byId, el, show } from "../base/dom.js";
+import { current, value } from "../scene/scenes.js";
 
 const FALLBACK = [1e-7, 0.1];
 const AROUND = [0.05, 300];
