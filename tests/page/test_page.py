@@ -35,6 +35,27 @@ def has_paths(page: Page, figure: str, count: int) -> None:
     expect(page.locator(f"#{figure} svg.chart g[clip-path] > path.series")).to_have_count(count)
 
 
+def the_map_zooms(page: Page) -> None:
+    """Linked with the responses, drawn in a tenth of a second or less, and back."""
+    page.click("#tab-all")
+    assert float(page.get_attribute("#map-figure", "data-milliseconds") or "nan") <= 100.0
+    ticks = "svg.chart text.soft[text-anchor=middle]"
+    whole = page.locator(f"#map-figure {ticks}").all_text_contents()
+    page.locator("#map-figure svg.chart").focus()
+    page.keyboard.press("+")
+    near = page.locator(f"#map-figure {ticks}").all_text_contents()
+    assert near != whole
+    assert page.locator(f"#response-figure {ticks}").all_text_contents() == near
+    page.keyboard.press("0")
+    assert page.locator(f"#map-figure {ticks}").all_text_contents() == whole
+    button = page.get_by_role("button", name="Map of amplitude over frequency and load: logarithmic y")
+    expect(button).to_have_attribute("aria-pressed", "true")
+    button.click()
+    expect(button).to_have_attribute("aria-pressed", "false")
+    button.click()
+    page.click("#tab-response")
+
+
 def test_a_newcomer_presses_one_button_and_takes_results_away(profile: Profile, site: Site) -> None:
     assert httpx.get(f"{site.url}/v1/jobs").json()["items"] == []
     context, _ = profile
@@ -55,6 +76,7 @@ def test_a_newcomer_presses_one_button_and_takes_results_away(profile: Profile, 
     expect(page.locator("#map-facts")).to_contain_text("least peak2.346 m at 104.79 N")
     has_paths(page, "response-figure", 3)
     has_paths(page, "front-figure", 1)
+    the_map_zooms(page)
     for motion in ("path.stick", "path.slip", "circle.f7"):
         assert page.locator(f"#loops-figure g[clip-path] > {motion}").count() >= 1
     assert page.locator("#campbell-figure path.f7").count() >= 2
