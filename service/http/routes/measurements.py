@@ -75,7 +75,7 @@ ReadBody = Annotated[MeasurementsRequest, Body(openapi_examples={"read": {"value
 
 
 @router.post("/read", response_model=MeasurementsRead)
-async def read(body: ReadBody, service: ServiceDependency, caller: CallerDependency) -> Response:
+async def read_measurements(body: ReadBody, service: ServiceDependency, caller: CallerDependency) -> Response:
     """Read measured data in CSV against a scene; nothing is stored.
 
     The first thing that is wrong with each file is told with its line and column.
