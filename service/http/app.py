@@ -29,19 +29,17 @@ from service.http.routes import (
     kinds,
     laws,
     matrices,
-    measurements,
     metrics,
     page,
     plan,
     previews,
     reference,
-    reports,
-    scene_text,
     scenes,
     sweeps,
     uploads,
 )
-from service.http.workbench import projects, runs, shares
+from service.http.routes.texts import measurements, scene_text
+from service.http.workbench import projects, reports, runs, shares
 from service.jobs.registry import Registry
 from service.queue.core import SOLVER_VERSION, Service
 from service.queue.health import Probe
