@@ -16,11 +16,13 @@ from optim.methods.eased import Eased
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.global_look import WholeRange
 from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
+from optim.methods.tally import Tally
 from optim.problem.keys import ROBUST, DesignKeys
 from optim.problem.keywords import keywords
 from optim.problem.problem import Method, Problem, pose
 from optim.problem.typed import Limit, with_limits
 from optim.results.basins import SAME_PLACE, Basin
+from optim.results.best_so_far import OnBest
 from optim.results.design import DesignResult, DesignStatus
 from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene
@@ -39,6 +41,7 @@ def design(
     limits: Sequence[Limit] = (),
     on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
+    on_best: OnBest = None,
     **problem: Unpack[DesignKeywords],
 ) -> DesignResult:
     """Choose parameters within bounds so that the highest peak over the scene's band is least.
@@ -49,6 +52,7 @@ def design(
     limits : bounds with types, in place of the keys `max_peak` and its like.
     on_progress : called with (share done, evaluations so far).
     should_stop : asked between responses and within them.
+    on_best : called with every design that is better than those before, while the search goes on.
     **problem : the keys of a problem.
 
     Returns
@@ -62,30 +66,38 @@ def design(
     TypeError
         An argument that is no key.
     """
-    return solve_problem(
-        pose(scene, **with_limits(problem, limits)), on_progress=on_progress, should_stop=should_stop
-    )
+    posed = pose(scene, **with_limits(problem, limits))
+    return solve_problem(posed, on_progress=on_progress, should_stop=should_stop, on_best=on_best)
 
 
 def solve_problem(
-    problem: Problem, *, on_progress: OnProgress = None, should_stop: ShouldStop = None
+    problem: Problem,
+    *,
+    on_progress: OnProgress = None,
+    should_stop: ShouldStop = None,
+    on_best: OnBest = None,
 ) -> DesignResult:
     """Search the best design of a problem; see `design`."""
-    found = _solved(problem, on_progress, should_stop)
-    return looked_after(found, should_stop)
+    tally = Tally(on_progress)
+    found = looked_after(_solved(problem, tally.searching, should_stop, on_best), should_stop, tally.further)
+    if found.evaluation is not None:
+        tally.tell(1.0)
+    return found
 
 
-def _solved(problem: Problem, on_progress: OnProgress, should_stop: ShouldStop) -> DesignResult:
+def _solved(
+    problem: Problem, on_progress: OnProgress, should_stop: ShouldStop, on_best: OnBest
+) -> DesignResult:
     """Search the best design of a problem by its method."""
     begun = time.perf_counter()
     trackable = problem.method in (Method.AUTO, Method.TRACKED) and problem.why_not_tracked is None
     if trackable:
         from optim.methods.peak_tracking import tracked_optimum
 
-        tracked = tracked_optimum(problem, on_progress=on_progress, should_stop=should_stop)
+        tracked = tracked_optimum(problem, on_progress=on_progress, should_stop=should_stop, on_best=on_best)
         if problem.method is Method.TRACKED or tracked.status is not DesignStatus.NOT_TRACKED:
             return _of_tracked(problem, tracked, time.perf_counter() - begun)
-    search = Search(problem, on_progress, should_stop)
+    search = Search(problem, on_progress, should_stop, on_best=on_best)
     eased = Eased.of(search)
     if eased.proven is not None:
         return _of_tracked(problem, eased.proven, time.perf_counter() - begun)
@@ -97,8 +109,6 @@ def _solved(problem: Problem, on_progress: OnProgress, should_stop: ShouldStop) 
         status = stop.status
         if status is DesignStatus.TOO_MANY and found:
             status = DesignStatus.LOCAL
-    if on_progress is not None and found:
-        on_progress(1.0, search.count)
     return _result(search, whole, status, begun)
 
 

@@ -15,6 +15,7 @@ from optim.identification.data.measured import DataKind, Measured
 from optim.identification.data.registry import data_kinds
 from optim.identification.data.table import Table, check_numbers, runs_of
 from optim.identification.readers.columns import Head, read_head, table_of
+from optim.identification.readers.csv_text import FromText
 from optim.identification.readers.registry import read_file
 from solver.errors import SettingError
 from solver.scene.scene import Scene
@@ -24,7 +25,7 @@ MOST_POINTS = 100_000
 _CONDITIONS, _UNITS = "conditions", "units"
 _WITH_HEAD = re.compile(r"^(?P<file>.+?):(?P<pairs>[A-Za-z_][\w.@-]*=[^=,]+(?:,[A-Za-z_][\w.@-]*=[^=,]+)*)$")
 
-Given = str | Path | Mapping[str, Any]
+Given = str | Path | Mapping[str, Any] | FromText
 
 
 def read_data(scene: Scene, data: Sequence[Given], unknown: Sequence[str] = ()) -> tuple[Measured, ...]:
@@ -58,6 +59,8 @@ def read_data(scene: Scene, data: Sequence[Given], unknown: Sequence[str] = ()) 
 
 def _tables(given: Given, index: int, paths: frozenset[str]) -> list[Table]:
     place = ("data", index)
+    if isinstance(given, FromText):
+        return [replace(given.table, place=place)]
     if isinstance(given, Mapping):
         return [_table_of(given, index, paths)]
     if not isinstance(given, (str, Path)):

@@ -11,7 +11,7 @@ from optim.criteria.linearised import Conditions, conditions, model_of
 from optim.criteria.rows import Evaluation
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.kkt import KEPT, KKT_TOLERANCE
-from optim.methods.plateau import Plateau, plateau_of
+from optim.methods.plateau import Plateau, Tick, nothing, plateau_of
 from optim.results.basins import Basin, Checked
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import DOUBTFUL, open_peaks
@@ -30,14 +30,21 @@ def settled_status(found: Conditions) -> DesignStatus:
     return DesignStatus.AT_BOUND if held else DesignStatus.OPTIMAL
 
 
-def looked_after(result: DesignResult, should_stop: ShouldStop) -> DesignResult:
-    """Return a result with its plateau and its check by more harmonics; as far as the caller lets it."""
+def looked_after(result: DesignResult, should_stop: ShouldStop, tick: Tick = nothing) -> DesignResult:
+    """Return a result with its plateau and its check by more harmonics; as far as the caller lets it.
+
+    Parameters
+    ----------
+    result : of a search.
+    should_stop : asked between responses.
+    tick : called after every design looked at.
+    """
     begun = time.perf_counter()
     found = result
     stopped = result.status in (DesignStatus.STOPPED, DesignStatus.NO_RESPONSE)
     if result.evaluation is not None and result.evaluation.good and not stopped:
         try:
-            found = _checked(_level(found, should_stop), should_stop)
+            found = _checked(_level(found, should_stop, tick), should_stop, tick)
         except StoppedError:
             found = replace(found, status=DesignStatus.STOPPED)
     return replace(_proven(found), seconds=result.seconds + time.perf_counter() - begun)
@@ -51,18 +58,20 @@ def _proven(result: DesignResult) -> DesignResult:
     return result
 
 
-def _level(result: DesignResult, should_stop: ShouldStop, again: int = MOST_AGAIN) -> DesignResult:
+def _level(
+    result: DesignResult, should_stop: ShouldStop, tick: Tick, again: int = MOST_AGAIN
+) -> DesignResult:
     """Return a result with the plateau its optimum lies on, at the design chosen of it."""
     if result.evaluation is None:
         return result
     if result.status is DesignStatus.FLAT:
         return replace(result, plateau={v.name: (v.low, v.high) for v in result.problem.variables})
-    plateau = plateau_of(result.problem, result.evaluation, should_stop)
+    plateau = plateau_of(result.problem, result.evaluation, should_stop, tick)
     if plateau is None:
         return result
     if plateau.better is not None:
-        improved = _improved(result, plateau.better, should_stop)
-        return _level(improved, should_stop, again - 1) if again > 0 else improved
+        improved = _improved(result, plateau.better, should_stop, tick)
+        return _level(improved, should_stop, tick, again - 1) if again > 0 else improved
     evaluation = plateau.evaluation
     status: DesignStatus = result.status
     model = model_of(
@@ -82,11 +91,11 @@ def _level(result: DesignResult, should_stop: ShouldStop, again: int = MOST_AGAI
     )  # fmt: skip
 
 
-def _improved(result: DesignResult, begin: Evaluation, should_stop: ShouldStop) -> DesignResult:
+def _improved(result: DesignResult, begin: Evaluation, should_stop: ShouldStop, tick: Tick) -> DesignResult:
     """Return a result after a local search from a better design that was met beside a plateau."""
     from optim.methods.minimax import thorough_search
 
-    search = Search(result.problem, None, should_stop)
+    search = Search(result.problem, lambda _share, _count: tick(), should_stop)
     search.keep(begin)
     local = thorough_search(search, search.variables, begin, search.model)
     basin = Basin(
@@ -128,7 +137,7 @@ def _on(plateau: Plateau, basin: Basin, chosen: Evaluation) -> bool:
     return True
 
 
-def _checked(result: DesignResult, should_stop: ShouldStop) -> DesignResult:
+def _checked(result: DesignResult, should_stop: ShouldStop, tick: Tick) -> DesignResult:
     """Return a result with its local optima computed again where the harmonics may be too few."""
     few = result.problem.harmonics
     if result.evaluation is None or 2 * few > MOST_HARMONICS or result.status is DesignStatus.FLAT:
@@ -143,6 +152,7 @@ def _checked(result: DesignResult, should_stop: ShouldStop) -> DesignResult:
             raise StoppedError(DesignStatus.STOPPED)
         found = evaluate(problem, values, gradients=False, should_stop=should_stop)
         responses += len(found.responses)
+        tick()
         good = found.good and bool(found.peaks)
         checked.append(
             Checked(

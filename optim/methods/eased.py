@@ -46,8 +46,8 @@ class Eased:
         from optim.methods.peak_tracking import tracked_optimum
 
         for eased in _cases(problem):
-            tracked = tracked_optimum(eased, should_stop=search.should_stop)
-            search.scouted += tracked.sweeps
+            tracked = tracked_optimum(eased, on_progress=search.easing, should_stop=search.should_stop)
+            search.eased(tracked.sweeps)
             starts += [dict(basin.values) for basin in tracked.basins]
             if len(problem.cases) == 1 and tracked.status is DesignStatus.OPTIMAL and starts:
                 proven = _kept(search, tracked)

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import Model, model_of
 from optim.criteria.rows import Evaluation
+from optim.methods.kkt import KEPT
+from optim.methods.tally import share_of
 from optim.problem.problem import Problem
 from optim.problem.variables import Variable
+from optim.results.best_so_far import FEWER_HARMONICS, PEAKS_OPEN, VERIFIED, BestSoFar, OnBest
 from optim.results.design import DesignStatus
+from optim.results.doubts import open_peaks
 from solver.results.watch import OnProgress, ShouldStop
 
 MOST_EVALUATIONS = 800
@@ -29,17 +34,20 @@ class Search:
 
     def __init__(
         self, problem: Problem, on_progress: OnProgress = None, should_stop: ShouldStop = None,
-        most: int = MOST_EVALUATIONS,
+        most: int = MOST_EVALUATIONS, *, on_best: OnBest = None, above: Search | None = None,
     ) -> None:  # fmt: skip
         self.problem = problem
         self.history: list[Evaluation] = []
         self.scales = natural_scales(problem)
         self.should_stop = should_stop
-        self.on_progress = on_progress
+        self.on_progress, self.on_best = on_progress, on_best
         self.scouted = 0  # responses of a coarse stage with fewer harmonics
         self._before = 0
         self._most = most
         self._scale: float | None = None
+        self._above = above  # the search with all harmonics, for which this one only ranks designs
+        self._scout: Search | None = None
+        self._least = (math.inf, math.inf)
 
     def __call__(self, values: Mapping[str, float]) -> Evaluation:
         """Evaluate one design with gradients.
@@ -59,16 +67,29 @@ class Search:
     @property
     def count(self) -> int:
         """Designs looked at so far."""
-        return self._before + len(self.history)
+        scout = 0 if self._scout is None else len(self._scout.history)
+        return self._before + len(self.history) + scout
 
     def scout(self, harmonics: int) -> Search:
         """Return a search of the same problem with fewer harmonics, to be handed to `scouting_done`."""
-        return Search(replace(self.problem, harmonics=harmonics), self.on_progress, self.should_stop)
+        fewer = replace(self.problem, harmonics=harmonics)
+        self._scout = Search(fewer, self.on_progress, self.should_stop, on_best=self.on_best, above=self)
+        return self._scout
 
     def scouting_done(self, scout: Search) -> None:
         """Count what a scout looked at; its numbers are not exact enough to be kept."""
-        self._before += len(scout.history)
+        self._before, self._scout = self._before + len(scout.history), None
         self.scouted += sum(len(evaluation.responses) for evaluation in scout.history)
+
+    def easing(self, _share: float, sweeps: int) -> None:
+        """Hear of responses to a problem without its limits."""
+        if self.on_progress is not None:
+            self.on_progress(share_of(self.count + sweeps), self.count + sweeps)
+
+    def eased(self, sweeps: int) -> None:
+        """Count those responses."""
+        self._before += sweeps
+        self.scouted += sweeps
 
     def check(self) -> None:
         """Raise StoppedError if the caller asked to stop."""
@@ -80,10 +101,31 @@ class Search:
         self.history.append(evaluation)
         if self._scale is None and evaluation.good:
             self._scale = evaluation.objective or 1.0
+        if self.on_best is not None and evaluation.good:
+            self._compare(evaluation, self.on_best)
         if self.on_progress is not None:
-            # The number of evaluations is not known beforehand: the share approaches 1 from below.
-            done = self.count
-            self.on_progress(done / (done + 12.0), done)
+            count = (self._above or self).count
+            self.on_progress(share_of(count), count)
+
+    def _compare(self, evaluation: Evaluation, on_best: Callable[[BestSoFar], None]) -> None:
+        """Tell of a design that is better than all before."""
+        violation = max(evaluation.violation(self.scales), 0.0)
+        standing = (0.0 if violation <= KEPT else violation, evaluation.objective)
+        ranked = self._above is not None
+        # Once a design was computed with all harmonics, those that are only ranked are not told any more.
+        if standing >= self._least or (self._above is not None and self._above.history):
+            return
+        self._least = standing
+        known = VERIFIED if not open_peaks(evaluation) else PEAKS_OPEN
+        on_best(
+            BestSoFar(
+                values=dict(evaluation.values),
+                peak=evaluation.peaks[0].value if evaluation.peaks else math.nan,
+                objective=evaluation.objective, feasible=violation <= KEPT,
+                verified=known is VERIFIED and not ranked, words=FEWER_HARMONICS if ranked else known,
+                evaluations=(self._above or self).count,
+            )
+        )  # fmt: skip
 
     @property
     def variables(self) -> tuple[Variable, ...]:

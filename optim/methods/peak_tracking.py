@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from optim.criteria.evaluation import Judge, effects_of, evaluate, ranges_of
@@ -9,7 +11,9 @@ from optim.criteria.peak import PEAK
 from optim.criteria.rows import Evaluation, Response
 from optim.problem.problem import Problem
 from optim.results.basins import Basin
+from optim.results.best_so_far import PEAKS_OPEN, VERIFIED, BestSoFar, OnBest
 from optim.results.design import DesignStatus
+from solver.continuation.branch import Branch
 from solver.results.watch import OnProgress, ShouldStop
 from solver.studies.peaks.minimise_peak import least_peak
 from solver.studies.peaks.results import LeastPeak, TrackStatus
@@ -54,7 +58,11 @@ class Tracked:
 
 
 def tracked_optimum(
-    problem: Problem, *, on_progress: OnProgress = None, should_stop: ShouldStop = None
+    problem: Problem,
+    *,
+    on_progress: OnProgress = None,
+    should_stop: ShouldStop = None,
+    on_best: OnBest = None,
 ) -> Tracked:
     """Find the least highest peak by following the peaks over the variable; see `solver.least_peak`.
 
@@ -63,6 +71,7 @@ def tracked_optimum(
     problem : one whose `why_not_tracked` is None.
     on_progress : called with (share done, frequency responses so far).
     should_stop : asked between sweeps.
+    on_best : told of every response that is the lowest so far.
     """
     case, variable = problem.cases[0], problem.variables[0]
     first = None if problem.start is None else problem.start[variable.name]
@@ -70,6 +79,7 @@ def tracked_optimum(
     found = least_peak(
         case.scene, variable.paths[0], variable.low, variable.high, harmonics=problem.harmonics, first=first,
         basins=problem.basins, effects=effects, on_progress=on_progress, should_stop=should_stop,
+        on_look=None if on_best is None else _Lowest(problem, on_best),
     )  # fmt: skip
     basins = tuple(
         Basin(
@@ -89,6 +99,29 @@ def tracked_optimum(
         sweeps=found.sweeps + int(extra),
         work=found.work + extra,
     )
+
+
+class _Lowest:
+    """Tells of the lowest of the responses that a tracked peak looks at."""
+
+    def __init__(self, problem: Problem, on_best: Callable[[BestSoFar], None]) -> None:
+        self._problem, self._on_best = problem, on_best
+        self._least, self._looks = math.inf, 0
+
+    def __call__(self, value: float, branch: Branch) -> None:
+        """Hear of a response."""
+        self._looks += 1
+        if branch.peak is None or branch.peak.value >= self._least:
+            return
+        peak = self._least = branch.peak.value
+        known = branch.peak_certificate.known
+        self._on_best(
+            BestSoFar(
+                values={self._problem.variables[0].name: value}, peak=peak,
+                objective=peak * self._problem.weights[PEAK] * self._problem.cases[0].weight, feasible=True,
+                verified=known, words=VERIFIED if known else PEAKS_OPEN, evaluations=self._looks,
+            )
+        )  # fmt: skip
 
 
 def _evaluation(problem: Problem, found: LeastPeak) -> Evaluation | None:

@@ -33,6 +33,11 @@ BROAD = 1e-5  # scaled width from which the next criterion is level too
 
 Along = Callable[[float], Evaluation]
 TieBreak = Callable[[Evaluation], float | None]
+Tick = Callable[[], None]
+
+
+def nothing() -> None:
+    """Do nothing: for a caller that does not count."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,15 +65,17 @@ class Plateau:
     responses: int
 
 
-def plateau_of(problem: Problem, best: Evaluation, should_stop: ShouldStop) -> Plateau | None:
-    """Return the plateau an optimum lies on; None if it is sharp in every variable.
+def plateau_of(
+    problem: Problem, best: Evaluation, should_stop: ShouldStop, tick: Tick = nothing
+) -> Plateau | None:
+    """Return the plateau an optimum lies on; None if it is sharp in every variable. Every design ticks.
 
     Raises
     ------
     StoppedError
         The caller asked to stop.
     """
-    level = _Level(problem, best, should_stop)
+    level = _Level(problem, best, should_stop, tick)
     here, chosen_by = best, ""
     for variable in problem.variables:
         if level.may_be_level(here, variable):
@@ -93,8 +100,8 @@ def plateau_of(problem: Problem, best: Evaluation, should_stop: ShouldStop) -> P
 class _Level:
     """Designs as good as an optimum."""
 
-    def __init__(self, problem: Problem, best: Evaluation, should_stop: ShouldStop) -> None:
-        self._problem, self._should_stop = problem, should_stop
+    def __init__(self, problem: Problem, best: Evaluation, should_stop: ShouldStop, tick: Tick) -> None:
+        self._problem, self._should_stop, self._tick = problem, should_stop, tick
         self._scales = natural_scales(problem)
         self._enough = best.objective * (1.0 + LEVEL)
         self._allowed = max(best.violation(self._scales), KEPT)
@@ -112,6 +119,7 @@ class _Level:
             raise StoppedError(DesignStatus.STOPPED)
         found = evaluate(self._problem, values, gradients=gradients, should_stop=self._should_stop)
         self.responses += len(found.responses)
+        self._tick()
         if found.good and found.objective < self._lower and self._good(found):
             self.better, self._lower = found, found.objective
         return found

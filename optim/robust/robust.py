@@ -29,6 +29,7 @@ from optim.problem.typed import Limit, with_limits
 from optim.problem.uncertainty_input import check_settings, read_uncertain
 from optim.problem.uncertainty_set import Scenario
 from optim.problem.words import Aim
+from optim.results.best_so_far import OnBest
 from optim.results.design import DesignResult, DesignStatus
 from optim.robust.assessment import side_of
 from optim.robust.cutting_sets import CLOSED, Progress, cutting_sets, sampled
@@ -57,6 +58,7 @@ def robust_design(
     limits: Sequence[Limit] = (),
     on_progress: OnProgress = None,
     should_stop: ShouldStop = None,
+    on_best: OnBest = None,
     **problem: Unpack[DesignKeywords],
 ) -> RobustResult:
     """Choose parameters so that the peak is least over an uncertainty, and compare with the nominal optimum.
@@ -74,6 +76,7 @@ def robust_design(
     limits : bounds with types, in place of the keys `max_peak` and its like.
     on_progress : called with (share done, responses so far).
     should_stop : asked between responses and within them.
+    on_best : called with the best design so far whenever it is another, while the search goes on.
     **problem : the keys of a problem.
 
     `method` is that of the search without uncertainty: the robust one is always the cone programme.
@@ -92,7 +95,7 @@ def robust_design(
     begun = time.perf_counter()
     posed = pose(scene, **with_limits(problem, limits))
     over = read_uncertain(scene, posed.variables, uncertain)
-    search = RobustSearch(posed, over, _aim(aim), _quantile(quantile), on_progress, should_stop)
+    search = RobustSearch(posed, over, _aim(aim), _quantile(quantile), on_progress, should_stop, on_best)
     wanted = SAMPLES[search.aim] if samples is None else whole("samples", samples, least=FEWEST_SAMPLES)
     drawn = over.draw(wanted, whole("seed", seed, least=0))
     for scenario in drawn:
@@ -137,7 +140,11 @@ def _run(
     def count(_share: float, evaluations: int) -> None:
         search.count(before + evaluations - search.responses)
 
-    state = _State(nominal=solve_problem(search.problem, on_progress=count, should_stop=should_stop))
+    state = _State(
+        nominal=solve_problem(
+            search.problem, on_progress=count, should_stop=should_stop, on_best=search.nominal
+        )
+    )
     try:
         status = _search(search, drawn, state)
     except StoppedError as stop:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from optim.criteria.evaluation import natural_scales
 from optim.criteria.linearised import Model
@@ -14,6 +16,7 @@ from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Scenario, UncertainSet
 from optim.problem.variables import Variable
 from optim.problem.words import Aim
+from optim.results.best_so_far import NOMINAL, BestSoFar, OnBest
 from optim.results.design import DesignStatus
 from optim.robust.risk_measure import aim_model
 from optim.robust.scenarios import Outcome, outcome, together
@@ -23,6 +26,11 @@ from optim.robust.worst_case import Aspect
 MOST_RESPONSES = 20_000
 USUAL = 200.0  # responses of a usual search; what is left is not known beforehand
 EUCLIDEAN = 2.0
+OVER = {
+    Aim.WORST_CASE: "Its peak is the highest of the {count} scenarios so far; others may be worse.",
+    Aim.MEAN: "Best by the mean of {count} samples; its peak is the highest of them.",
+    Aim.QUANTILE: "Best by the quantile of {count} samples; its peak is the highest of them.",
+}
 
 Key = tuple[tuple[float, ...], Scenario, bool]
 
@@ -33,13 +41,15 @@ class RobustSearch:
     def __init__(
         self, problem: Problem, uncertain: UncertainSet, aim: Aim, quantile: float,
         on_progress: Callable[[float, int], None] | None = None,
-        should_stop: Callable[[], bool] | None = None,
+        should_stop: Callable[[], bool] | None = None, on_best: OnBest = None,
     ) -> None:  # fmt: skip
         self.problem, self.uncertain, self.aim, self.quantile = problem, uncertain, aim, quantile
         self.scales = natural_scales(problem)
         self.responses = 0
         self._on_progress, self._should_stop = on_progress, should_stop
         self._outcomes: dict[Key, Outcome] = {}
+        self._on_best = on_best
+        self._known: tuple[int, tuple[float, float]] | None = None  # scenarios and standing of the best
         self._scale: float | None = None
 
     @property
@@ -113,7 +123,29 @@ class RobustSearch:
         if not found.settled and self.aim is not Aim.QUANTILE:
             again = self._searched(found.evaluation, scenarios, REMEMBERED)
             found = min(found, again, key=lambda local: (local.standing, not local.settled))
+        self._tell(found, len(scenarios))
         return found
+
+    def nominal(self, best: BestSoFar) -> None:
+        """Hear of the search without the uncertainty."""
+        if self._on_best is not None:
+            self._on_best(replace(best, verified=False, words=NOMINAL))
+
+    def _tell(self, local: Local, scenarios: int) -> None:
+        """Tell of a design that is better over the same scenarios, or is the first over more of them."""
+        if self._on_best is None or not local.evaluation.good:
+            return
+        if self._known is not None and self._known[0] == scenarios and self._known[1] <= local.standing:
+            return
+        self._known = scenarios, local.standing
+        peaks = local.evaluation.peaks
+        self._on_best(
+            BestSoFar(
+                values=dict(local.evaluation.values), peak=peaks[0].value if peaks else math.nan,
+                objective=self.objective(local, scenarios), feasible=local.feasible, verified=False,
+                words=OVER[self.aim].format(count=scenarios), evaluations=self.designs,
+            )
+        )  # fmt: skip
 
     def _searched(self, begin: Evaluation, scenarios: Sequence[Scenario], remembered: int) -> Local:
         """Return the end of the minimax search over scenarios that keeps so many designs' rows as cuts."""

@@ -143,11 +143,12 @@ class _Front:
         search.keep(evaluation)
         return -steepest(search.model(evaluation), self.problem.variables) * least.peak / least.band_hz
 
-    def _report(self, _share: float, _count: int) -> None:
+    def _report(self, share: float, count: int) -> None:
         if self._on_progress is not None:
-            done = len(self.ends) + max(len(self.found) - 2, 0) + len(self.missed)
+            # Each point is as far as its search; how many evaluations that takes is not known beforehand.
+            done = len(self.ends) + max(len(self.found) - 2, 0) + len(self.missed) + min(share, 0.99)
             # A tracked end reports its responses, of which one is a design: the count must not fall back.
-            self.reported = max(self.reported, self.evaluations + _count)
+            self.reported = max(self.reported, self.evaluations + count)
             self._on_progress(min(done / self.points, 0.99), self.reported)
 
     def _keep(self, history: Sequence[Evaluation]) -> None:

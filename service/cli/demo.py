@@ -14,7 +14,7 @@ import numpy as np
 
 import solver
 from service.cli.failures import ShortfallError
-from service.cli.progress import OnProgress, bars, patience
+from service.cli.progress import Reporter, bars, patience
 from service.client.embedded import EmbeddedService
 from service.db.models import JobState
 from service.errors import InputError
@@ -137,7 +137,7 @@ def _sweeps(service: EmbeddedService, cases: Sequence[Case]) -> list[list[JobAns
 
 
 def _follow(
-    service: EmbeddedService, groups: Sequence[Sequence[str]], reporters: Sequence[OnProgress | None]
+    service: EmbeddedService, groups: Sequence[Sequence[str]], reporters: Sequence[Reporter | None]
 ) -> list[list[JobAnswer]]:
     """Wait for groups of jobs, each with its progress bar; ShortfallError if one was not successful.
 

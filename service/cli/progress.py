@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
-
-OnProgress = Callable[[float, int], None]
 
 _PATIENCE_SECONDS = 4.0
 _FIRST_RUN = "still at it: a first run after an installation compiles its kernels, which takes about a minute"
@@ -23,8 +20,35 @@ def on_terminal() -> bool:
     return sys.stderr.isatty()
 
 
+class Reporter:
+    """One bar: how far it is, and the best design so far."""
+
+    def __init__(self, progress: Progress, task: TaskID, counted: str) -> None:
+        self._progress, self._task, self._counted = progress, task, counted
+
+    def __call__(self, fraction: float, count: int) -> None:
+        """Move the bar."""
+        self._progress.update(self._task, completed=fraction, counted=f"{count} {self._counted}")
+
+    def best(self, found: Mapping[str, Any]) -> None:
+        """Say the best design so far, which is given as JSON."""
+        self._progress.update(self._task, best=told_best(found))
+
+
+def told_best(found: Mapping[str, Any]) -> str:
+    """The best design so far in a few words."""
+    from solver.results import units
+    from solver.views.parameter_units import parameter
+
+    values = [parameter(name.split(",")[0].strip(), value) for name, value in found["values"].items()]
+    peak = "" if found["peak"] is None else f": {units.length(found['peak'])}"
+    doubt = "" if found["verified"] else ", to be verified"
+    broken = "" if found["feasible"] else ", breaks a limit"
+    return f"best {', '.join(values)}{peak}{doubt}{broken}"
+
+
 @contextmanager
-def bar(label: str, counted: str = "points") -> Iterator[OnProgress | None]:
+def bar(label: str, counted: str = "points") -> Iterator[Reporter | None]:
     """A progress bar on standard error for the length of a block; None where nobody watches.
 
     Parameters
@@ -37,7 +61,7 @@ def bar(label: str, counted: str = "points") -> Iterator[OnProgress | None]:
 
 
 @contextmanager
-def bars(labels: Sequence[str], counted: str) -> Iterator[Sequence[OnProgress | None]]:
+def bars(labels: Sequence[str], counted: str) -> Iterator[Sequence[Reporter | None]]:
     """A progress bar for each label, as `bar`."""
     if not on_terminal():
         yield [None] * len(labels)
@@ -47,11 +71,11 @@ def bars(labels: Sequence[str], counted: str) -> Iterator[Sequence[OnProgress | 
 
     columns = (
         TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(),
-        TextColumn("{task.fields[counted]}"),
+        TextColumn("{task.fields[counted]}"), TextColumn("{task.fields[best]}"),
     )  # fmt: skip
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        tasks = [progress.add_task(label, total=1.0, counted="") for label in labels]
-        yield [partial(_advance, progress, task, counted) for task in tasks]
+        tasks = [progress.add_task(label, total=1.0, counted="", best="") for label in labels]
+        yield [Reporter(progress, task, counted) for task in tasks]
 
 
 @contextmanager
@@ -67,7 +91,3 @@ def patience() -> Iterator[None]:
         yield
     finally:
         timer.cancel()
-
-
-def _advance(progress: Progress, task: TaskID, counted: str, fraction: float, count: int) -> None:
-    progress.update(task, completed=fraction, counted=f"{count} {counted}")

@@ -149,6 +149,7 @@ class Client(Workbench):
         on_progress: Callable[[float, int], None] | None = None,
         timeout: float | None = None,
         on_points: Callable[[JobPoints], None] | None = None,
+        on_best: Callable[[dict[str, Any]], None] | None = None,
     ) -> JobAnswer:
         """Follow a job until it has ended; with `timeout` [s] it may be unfinished still.
 
@@ -160,6 +161,8 @@ class Client(Workbench):
             Longest time to wait [s].
         on_points : callable, optional
             Called with the new points of a sweep.
+        on_best : callable, optional
+            Called with the best design so far of a design job, before the progress it came with.
         """
         end = None if timeout is None else time.monotonic() + timeout
         silence = _SILENCE_SECONDS if timeout is None else min(max(timeout, 0.001), _SILENCE_SECONDS)
@@ -167,6 +170,8 @@ class Client(Workbench):
             for event in self.events(job_id, silence) if timeout is None or timeout > 0.0 else ():
                 if isinstance(event, JobAnswer):
                     return event
+                if isinstance(event, JobProgress) and on_best is not None and event.best is not None:
+                    on_best(event.best)
                 if isinstance(event, JobProgress) and on_progress is not None:
                     on_progress(event.progress, event.points)
                 if isinstance(event, JobPoints) and on_points is not None:
@@ -181,6 +186,11 @@ class Client(Workbench):
     def results(self, job_id: str) -> ResultsAnswer:
         """What a job computed."""
         return self._get(ResultsAnswer, f"/v1/jobs/{segment(job_id)}/results")
+
+    def job_report(self, job_id: str, form: Literal["html", "pdf"] = "pdf") -> bytes:
+        """The design report of a job, made by the service: a page or a PDF."""
+        path = f"/v1/jobs/{segment(job_id)}/report"
+        return self._transport.send("GET", path, params={"format": form}).content
 
     def job_scene(self, job_id: str) -> dict[str, Any]:
         """The scene of a job as it is computed, with its values set and what its uploads held."""
@@ -249,6 +259,11 @@ class Client(Workbench):
         """The tables in the text of a scene file (`scene`), and everything wrong with them (`issues`)."""
         body = {"text": text, "form": form}
         answer: dict[str, Any] = self._transport.json("POST", "/v1/scenes/read", json=body)
+        return answer
+
+    def read_measurements(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Measured data in CSV as tables of a job: the body of ``POST /v1/measurements/read``."""
+        answer: dict[str, Any] = self._transport.json("POST", "/v1/measurements/read", json=dict(body))
         return answer
 
     def scene_text(self, body: Mapping[str, Any]) -> str:

@@ -122,6 +122,7 @@ class Job(Base):
     cancel_requested: Mapped[bool] = mapped_column(default=False)
     progress: Mapped[float] = mapped_column(default=0.0)
     points: Mapped[int] = mapped_column(default=0)
+    best: Mapped[dict[str, Any] | None]
     created: Mapped[datetime]
     started: Mapped[datetime | None]
     finished: Mapped[datetime | None]

@@ -17,7 +17,7 @@ from service.auth.callers import Caller, visible
 from service.db.models import NOBODY, JobState
 from service.db.repositories import JobRow
 from service.queue.core import Service
-from service.queue.queue import Live
+from service.queue.running import Live
 from service.queue.subscriptions import Event
 from service.schemas.answers import JobAnswer
 from service.schemas.event_answers import END, PARTIAL, PROGRESS, JobPoints, JobProgress
@@ -47,10 +47,13 @@ class _Story:
         if live is not None:
             yield from self._points(live)
             now = JobProgress(
-                status=JobState.RUNNING, attempt=live.attempt, progress=live.fraction, points=live.points
-            )
+                status=JobState.RUNNING, attempt=live.attempt, progress=live.fraction, points=live.points,
+                best=None if live.best is None else dict(live.best),
+            )  # fmt: skip
         else:
-            now = JobProgress(status=row.state, attempt=row.attempt, progress=row.progress, points=row.points)
+            now = JobProgress(
+                status=row.state, attempt=row.attempt, progress=row.progress, points=row.points, best=row.best
+            )
         if now != self._said and not now.status.finished:
             self._said = now
             yield ServerSentEvent(event=PROGRESS, data=now, id=self._mark())

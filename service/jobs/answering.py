@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError
+from service.jobs.common.measurements import read_measurements
 from service.jobs.common.scene_text import issues_of_scene, read_text
 from service.jobs.common.scenes import (
     HarmonicRequest,
@@ -29,6 +30,7 @@ from service.jobs.validation import validated
 from solver.errors import Issue
 
 PLAN, READ, TEXT, STORE, RESOLVE, PREVIEW = "plan", "read", "text", "store", "resolve", "preview"
+MEASURED = "measured"
 
 Words = Mapping[str, Any]
 Answer = Callable[[Words, SceneSource], Any]
@@ -167,6 +169,11 @@ def _text(words: Words, source: SceneSource) -> str:
     return toml_text(scene.to_dict(), tuple(words["comments"]))
 
 
+def _measured(words: Words, source: SceneSource) -> JsonText:
+    scene = resolve_scene(SceneRequest.model_validate(words["scene"]), source)
+    return encoded(read_measurements(scene, words["files"]))
+
+
 def _store(words: Words, source: SceneSource) -> dict[str, Any]:
     scene = read_scene(source.with_uploads(words))
     tables = scene.to_dict()
@@ -203,7 +210,8 @@ class Answering:
 def runs(jobs: Registry, previews: Registry) -> dict[str, RunOn]:
     """The functions of the processes, by the names of the tasks."""
     tasks: dict[str, Answer] = {
-        PLAN: _plan, READ: _read, TEXT: _text, STORE: _store, RESOLVE: _Resolving.of(jobs),
+        PLAN: _plan, READ: _read, TEXT: _text, STORE: _store, MEASURED: _measured,
+        RESOLVE: _Resolving.of(jobs),
         PREVIEW: _Resolving.of(previews),
     }  # fmt: skip
     return {name: Answering(task) for name, task in tasks.items()}

@@ -5,25 +5,38 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 from service.jobs.strict_json import JsonText
 from solver.errors import Issue
 
+Best = Mapping[str, Any]
+"""The best design so far, as JSON (`optim.results.best_so_far`)."""
 Point = tuple[float, float]
 """Value of what is swept and amplitude [m]."""
 OnProgress = Callable[[float, int], None]
 ShouldStop = Callable[[], bool]
 
 
+class Told(NamedTuple):
+    """How far an attempt is: share of its path, points computed, the best design so far."""
+
+    fraction: float
+    points: int
+    best: Best | None = None
+
+
 class Progress(Protocol):
-    """What a run says on its way; both methods cost next to nothing and may be called at any rate."""
+    """What a run says on its way; its methods cost next to nothing and may be called at any rate."""
 
     def __call__(self, fraction: float, points: int) -> None:
         """So far it got: share of its path, points computed."""
 
     def found(self, points: Sequence[Point]) -> None:
         """The next points of the branch it follows; they go with the next report."""
+
+    def best(self, found: Best) -> None:
+        """The best design so far; it goes with the next report."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

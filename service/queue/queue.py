@@ -6,7 +6,6 @@ truth: every write of a running job is guarded by its attempt, so that whoever l
 
 from __future__ import annotations
 
-import enum
 import logging
 import math
 import os
@@ -16,11 +15,11 @@ import threading
 import time
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 from service.db.repositories import Attempt, JobRepository
-from service.jobs.outputs import FailureKind, JobFailure, JobOutput, Piece, Point
+from service.jobs.outputs import Best, FailureKind, JobFailure, JobOutput, Piece, Point, Told
+from service.queue.running import Live, Running, StopReason
 from service.queue.subscriptions import Waiters
 from service.settings import logs
 from service.settings.settings import Settings
@@ -33,52 +32,6 @@ _TROUBLE_SECONDS = 1.0
 # a second of each job, and ten times a second of all that run here.
 _WRITE_SECONDS, _WRITES_A_SECOND = 1.0, 10.0
 _MOST_POINTS = 50_000
-
-
-class _StopReason(enum.Enum):
-    """Why an attempt was told to stop."""
-
-    CANCEL = "its cancel was asked for"
-    TIME = "it ran too long"
-    LEASE = "the job is not ours any more"
-    SHUTDOWN = "the service stops"
-
-
-@dataclass(slots=True)
-class _Running:
-    """An attempt that an executor has."""
-
-    attempt: Attempt
-    started: float
-    written: float
-    fraction: float = 0.0
-    points: int = 0
-    stop: _StopReason | None = None
-    tag: str = field(default_factory=lambda: secrets.token_hex(4))
-    found: list[Point] = field(default_factory=list)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Live:
-    """How far an attempt is that runs here, newer than its row.
-
-    Attributes
-    ----------
-    tag : str
-        Of this run alone; another one has found other points.
-    attempt : int
-        Which attempt at the job it is.
-    fraction, points : float, int
-        Share of its path, points computed.
-    found : list of (value, amplitude)
-        The points of its branch so far, if its kind tells them; grows while it runs.
-    """
-
-    tag: str
-    attempt: int
-    fraction: float
-    points: int
-    found: Sequence[Point]
 
 
 def _about(attempt: Attempt, seconds: float | None = None) -> AbstractContextManager[None]:
@@ -113,7 +66,7 @@ class JobQueue:
         self._executor = executor
         self._settings = settings
         self._waiters = waiters
-        self._running: dict[str, _Running] = {}
+        self._running: dict[str, Running] = {}
         self._lock = threading.Lock()
         self._claiming = threading.Lock()
         self._wake = threading.Event()
@@ -144,7 +97,7 @@ class JobQueue:
         with self._lock:
             running = list(self._running.values())
         for entry in running:
-            self._ask_to_stop(entry, _StopReason.SHUTDOWN)
+            self._ask_to_stop(entry, StopReason.SHUTDOWN)
         self._executor.close()
 
     def wake(self) -> None:
@@ -156,13 +109,13 @@ class JobQueue:
         with self._claiming, self._lock:
             entry = self._running.get(job_id)
         if entry is not None:
-            self._ask_to_stop(entry, _StopReason.CANCEL)
+            self._ask_to_stop(entry, StopReason.CANCEL)
 
-    def live_progress(self, job_id: str) -> tuple[float, int] | None:
-        """Fraction and points of a job that runs here, newer than its row."""
+    def live_progress(self, job_id: str) -> Told | None:
+        """What a job that runs here has told, newer than its row."""
         with self._lock:
             entry = self._running.get(job_id)
-        return None if entry is None else (entry.fraction, entry.points)
+        return None if entry is None else Told(entry.fraction, entry.points, entry.best)
 
     def live(self, job_id: str) -> Live | None:
         """How far a job is that runs here."""
@@ -172,7 +125,7 @@ class JobQueue:
             return None
         return Live(
             tag=entry.tag, attempt=entry.attempt.attempt, fraction=entry.fraction, points=entry.points,
-            found=entry.found,
+            best=entry.best, found=entry.found,
         )  # fmt: skip
 
     def status(self) -> ExecutorStatus:
@@ -197,20 +150,27 @@ class JobQueue:
             return
         entry.written = now
         try:
-            owned = self._jobs.report(attempt, fraction, points, self._lease_until())
+            owned = self._jobs.report(attempt, fraction, points, self._lease_until(), entry.best)
+            entry.unwritten = False
         except Exception:
             log.exception("job %s: its progress could not be written", attempt.job_id)
             return
         if owned:
             self._waiters.progress(attempt.job_id, fraction, points)
         else:
-            self._ask_to_stop(entry, _StopReason.LEASE)
+            self._ask_to_stop(entry, StopReason.LEASE)
 
     def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
         """From the executor: keep the points of a branch for those who follow it."""
         entry = self._entry(attempt)
         if entry is not None:
             entry.found.extend(points[: _MOST_POINTS - len(entry.found)])
+
+    def best(self, attempt: Attempt, found: Best) -> None:
+        """From the executor: keep the best design so far; it is written with the next progress."""
+        entry = self._entry(attempt)
+        if entry is not None:
+            entry.best, entry.unwritten = found, True
 
     def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:
         """From the executor: store pieces for a later attempt, also while the service stops."""
@@ -226,7 +186,7 @@ class JobQueue:
         # The report that counts what is kept comes next, and is written as well.
         entry.written = -math.inf
         if not owned:
-            self._ask_to_stop(entry, _StopReason.LEASE)
+            self._ask_to_stop(entry, StopReason.LEASE)
 
     def ended(self, attempt: Attempt, outcome: Outcome) -> None:
         """From the executor: write what became of an attempt.
@@ -238,6 +198,9 @@ class JobQueue:
         seconds = None if entry is None else round(time.monotonic() - entry.started, 3)
         try:
             with _about(attempt, seconds):
+                if entry is not None and entry.unwritten and not isinstance(outcome, Finished):
+                    # Of a design that was stopped it is all there is.
+                    self._jobs.report(attempt, entry.fraction, entry.points, self._lease_until(), entry.best)
                 self._conclude(attempt, outcome, None if entry is None else entry.stop)
         except Exception:
             log.exception("job %s: its outcome could not be written, it will be tried again", attempt.job_id)
@@ -253,7 +216,7 @@ class JobQueue:
         """From the executor: an attempt may be taken."""
         self._wake.set()
 
-    def _entry(self, attempt: Attempt) -> _Running | None:
+    def _entry(self, attempt: Attempt) -> Running | None:
         with self._lock:
             entry = self._running.get(attempt.job_id)
         return entry if entry is not None and entry.attempt == attempt else None
@@ -261,18 +224,18 @@ class JobQueue:
     def _lease_until(self) -> datetime:
         return self._jobs.now() + timedelta(seconds=self._settings.lease_seconds)
 
-    def _ask_to_stop(self, entry: _Running, reason: _StopReason) -> None:
+    def _ask_to_stop(self, entry: Running, reason: StopReason) -> None:
         entry.stop = entry.stop or reason
         with _about(entry.attempt):
             log.info("job %s is told to stop: %s", entry.attempt.job_id, entry.stop.value)
         self._executor.stop_attempt(entry.attempt)
 
-    def _conclude(self, attempt: Attempt, outcome: Outcome, stop: _StopReason | None) -> None:
+    def _conclude(self, attempt: Attempt, outcome: Outcome, stop: StopReason | None) -> None:
         """Write an outcome, seen in the light of why the attempt was told to stop, if it was."""
         match outcome:
-            case Finished(output) if stop is not _StopReason.CANCEL:
+            case Finished(output) if stop is not StopReason.CANCEL:
                 self._conclude_finished(attempt, output)
-            case Failed(failure) if stop is not _StopReason.CANCEL:
+            case Failed(failure) if stop is not StopReason.CANCEL:
                 self._note(attempt, "failed", written=self._jobs.fail(attempt, failure))
             case Stopped() | Lost() | Finished() | Failed() if stop is not None:
                 self._conclude_stopped(attempt, stop)
@@ -291,20 +254,20 @@ class JobQueue:
         else:
             self._note(attempt, "dismissed", written=self._jobs.dismiss(attempt))
 
-    def _conclude_stopped(self, attempt: Attempt, stop: _StopReason) -> None:
+    def _conclude_stopped(self, attempt: Attempt, stop: StopReason) -> None:
         match stop:
-            case _StopReason.CANCEL:
+            case StopReason.CANCEL:
                 self._note(attempt, "dismissed", written=self._jobs.dismiss(attempt))
-            case _StopReason.SHUTDOWN:
+            case StopReason.SHUTDOWN:
                 self._note(attempt, "given back", written=self._jobs.release(attempt))
-            case _StopReason.TIME:
+            case StopReason.TIME:
                 limit = self._seconds_of(attempt)
                 failure = JobFailure(
                     kind=FailureKind.TIME_LIMIT,
                     detail=f"the computation took longer than the {limit:g} s one attempt may take",
                 )
                 self._note(attempt, "took too long", written=self._jobs.fail(attempt, failure))
-            case _StopReason.LEASE:
+            case StopReason.LEASE:
                 self._note(attempt, "stopped", written=False)
 
     @staticmethod
@@ -338,7 +301,7 @@ class JobQueue:
             attempts = self._jobs.claim_several(self.owner, self._lease_until(), free)
             now = time.monotonic()
             entries = [
-                _Running(attempt=one, started=now, written=now, fraction=one.progress, points=one.points)
+                Running(attempt=one, started=now, written=now, fraction=one.progress, points=one.points)
                 for one in attempts
             ]
             with self._lock:
@@ -347,7 +310,7 @@ class JobQueue:
             self._submit(entry)
         return len(attempts) == free
 
-    def _submit(self, entry: _Running) -> None:
+    def _submit(self, entry: Running) -> None:
         attempt = entry.attempt
         with _about(attempt):
             words = "job %s (%s), attempt %d of %d"
@@ -377,18 +340,18 @@ class JobQueue:
             running = list(self._running.values())
         for entry in running:
             if entry.stop is None and now - entry.started > self._seconds_of(entry.attempt):
-                self._ask_to_stop(entry, _StopReason.TIME)
+                self._ask_to_stop(entry, StopReason.TIME)
         if now < self._next_upkeep:
             return
         self._next_upkeep = now + min(self._settings.lease_seconds / 3.0, self._settings.poll_seconds)
         self._jobs.keep_time()
         by_attempt = {id(entry.attempt): entry for entry in running}
         for lost in self._jobs.renew([entry.attempt for entry in running], self._lease_until()):
-            self._ask_to_stop(by_attempt[id(lost)], _StopReason.LEASE)
+            self._ask_to_stop(by_attempt[id(lost)], StopReason.LEASE)
         cancelled = self._jobs.cancelled(self.owner) if running else ()
         for entry in running:
             if entry.stop is None and entry.attempt.job_id in cancelled:
-                self._ask_to_stop(entry, _StopReason.CANCEL)
+                self._ask_to_stop(entry, StopReason.CANCEL)
         if self._jobs.recover_expired([entry.attempt.job_id for entry in running]).total:
             log.warning("jobs whose lease ran out were taken back")
             self._wake.set()

@@ -24,7 +24,7 @@ BY_FORMAT = {"json": JSON, "csv": CSV, "npz": NPZ, "parquet": PARQUET}
 SUFFIXES = {CSV: "csv", NPZ: "npz", ZIP: "npz", PARQUET: "parquet"}
 
 _NO_PARQUET = "Parquet needs pyarrow where the service runs: pip install 'stickslip[parquet]'"
-_NOT_OF_LISTS = ("links", "request", "error")
+_NOT_OF_LISTS = ("links", "request", "error", "best")
 _drawing = threading.Lock()
 
 

@@ -16,7 +16,7 @@ from service.db.models import Design, JobState, Sweep
 from service.db.repositories import JobRow, SweepRepository
 from service.db.repositories.stored import StoredRepository
 from service.jobs.arrays import decode
-from service.jobs.outputs import ContactValues, VariableValues
+from service.jobs.outputs import ContactValues, Told, VariableValues
 from service.queue.scene_store import KnownScene, WholeScene
 
 if TYPE_CHECKING:
@@ -27,6 +27,12 @@ if TYPE_CHECKING:
 _COLUMNS: dict[type[Any], frozenset[str]] = {
     table: frozenset(table.__mapper__.columns.keys()) - {"peak"} for table in (Sweep, Design)
 }
+
+
+BEST = (
+    "The best design that a search knew last, of a `design`: values, peak, objective, feasible, verified, "
+    "words, evaluations."
+)
 
 
 class Answer(BaseModel):
@@ -44,6 +50,7 @@ class JobAnswer(Answer):
     status: JobState
     progress: float = Field(description="Fraction of the path, 0 to 1.")
     points: int = Field(description="Points computed so far.")
+    best: dict[str, Any] | None = Field(default=None, description=BEST)
     scene: str | None
     priority: int
     attempt: int
@@ -58,9 +65,9 @@ class JobAnswer(Answer):
     links: dict[str, str]
 
     @classmethod
-    def of(cls, row: JobRow, live: tuple[float, int] | None = None) -> Self:
+    def of(cls, row: JobRow, live: Told | None = None) -> Self:
         """The answer for a row, with progress that is newer than the row if there is any."""
-        progress, points = (row.progress, row.points) if live is None else live
+        progress, points, best = live or (row.progress, row.points, row.best)
         source = row.result_of or row.id
         links = {
             "self": f"/v1/jobs/{row.id}",
@@ -77,6 +84,7 @@ class JobAnswer(Answer):
             status=row.state,
             progress=progress,
             points=points,
+            best=None if best is None else dict(best),
             scene=row.scene_name,
             priority=row.priority,
             attempt=row.attempt,

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import Field
 
 from service.db.models import JobState
-from service.schemas.answers import Answer, JobAnswer
+from service.schemas.answers import BEST, Answer, JobAnswer
 
 END, PARTIAL, PROGRESS = "end", "partial", "progress"
 
@@ -22,6 +22,7 @@ class JobProgress(Answer):
     attempt: int
     progress: float = Field(description="Fraction of the path, 0 to 1.")
     points: int = Field(description="Points computed so far.")
+    best: dict[str, Any] | None = Field(default=None, description=BEST)
 
 
 class JobPoints(Answer):

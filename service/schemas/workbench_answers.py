@@ -8,6 +8,7 @@ from typing import Any, Self
 from pydantic import Field
 
 from service.db.repositories.workbench.rows import ProjectRow, RunRow, ShareRow
+from service.jobs.outputs import Told
 from service.schemas.answers import Answer, JobAnswer
 
 _REVISION = "Counts the changes; the `ETag`, for `If-Match` of a change."
@@ -27,7 +28,7 @@ class RunAnswer(JobAnswer):
     deleted: datetime | None = Field(description=_DELETED)
 
     @classmethod
-    def of_run(cls, row: RunRow, live: tuple[float, int] | None = None) -> Self:
+    def of_run(cls, row: RunRow, live: Told | None = None) -> Self:
         """The answer for a row, with progress that is newer than the row if there is any."""
         job = JobAnswer.of(row.job, live)
         about = f"/v1/runs/{row.job.id}"

@@ -283,6 +283,9 @@ class Settings(Limits):
     inspection_seconds: float = Field(
         default=30.0, ge=1.0, le=3600.0, description="Time reading an uploaded file may take [s]."
     )
+    report_seconds: float = Field(
+        default=60.0, ge=1.0, le=3600.0, description="Time making a report of a design may take [s]."
+    )
     max_wait_seconds: float = Field(
         default=60.0, ge=0.0, le=3600.0, description="Longest `Prefer: wait=N` honoured [s]."
     )

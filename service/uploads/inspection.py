@@ -128,18 +128,19 @@ def _turn() -> Iterator[None]:
 
 def _main(connection: Connection, task: str, folder: str, argument: Any, seconds: float) -> None:
     """The life of the process."""
-    _limit(seconds)
+    limit_process(seconds, MEMORY_BYTES)
     os.chdir(folder)
     # The other end may have lost its patience.
     with contextlib.suppress(BrokenPipeError):
         connection.send_bytes(json.dumps(_answer(task, argument), allow_nan=False).encode())
 
 
-def _limit(seconds: float) -> None:
+def limit_process(seconds: float, memory: int) -> None:
+    """Limit the time [s] and the memory [bytes] of this process; it writes no files."""
     import resource
 
     for what, value in (
-        (resource.RLIMIT_AS, MEMORY_BYTES),
+        (resource.RLIMIT_AS, memory),
         (resource.RLIMIT_CPU, round(seconds) + 1),
         (resource.RLIMIT_CORE, 0),
         (resource.RLIMIT_FSIZE, 0),

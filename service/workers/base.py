@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from service.db.repositories import Attempt
-from service.jobs.outputs import JobFailure, JobOutput, Piece, Point
+from service.jobs.outputs import Best, JobFailure, JobOutput, Piece, Point
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +49,9 @@ class Sink(Protocol):
     def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
         """The next points of the attempt's branch; said before the progress that counts them."""
 
+    def best(self, attempt: Attempt, found: Best) -> None:
+        """The attempt's best design so far; said before the progress that goes with it."""
+
     def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:
         """The attempt keeps pieces of its work for a later one; `anew` if they replace all before them."""
 
@@ -66,6 +69,9 @@ class Unwatched:
         """Nobody watches."""
 
     def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
+        """Nobody watches."""
+
+    def best(self, attempt: Attempt, found: Best) -> None:
         """Nobody watches."""
 
     def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:

@@ -302,6 +302,8 @@ class DaskExecutor:
         elif "share" in note:
             if found:
                 self._sink.found(flight.work.attempt, found)
+            if "best" in note:
+                self._sink.best(flight.work.attempt, note["best"])
             flight.work.progress(flight.index, float(note["share"]), int(note["points"]))
 
     def _begun_again(self, flight: Flight) -> None:

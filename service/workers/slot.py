@@ -291,6 +291,8 @@ class Slot(threading.Thread):
         else:
             if about.found:
                 self._executor.sink.found(current.attempt, about.found)
+            if about.best is not None:
+                self._executor.sink.best(current.attempt, about.best)
             self._executor.sink.progress(current.attempt, about.fraction, about.points)
 
     def _conclude(self, child: Child, token: int, done: Done) -> None:

@@ -153,7 +153,8 @@ def _answer(order: Order) -> Answer:
         nonlocal known
         found = [list(point) for point in report.found[known:]]
         known = max(known - len(report.found), 0)
-        say(share=report.fraction, points=report.points, found=found)
+        best = {} if report.best is None else {"best": dict(report.best)}
+        say(share=report.fraction, points=report.points, found=found, **best)
 
     # The time tells a second start of an order from the first one, even in the same process.
     say(begun=time.time_ns(), threads=worker.state.nthreads)

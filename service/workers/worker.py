@@ -26,7 +26,7 @@ from optim.errors import DesignError
 from service.errors import UnknownKindError
 from service.jobs import strict_json
 from service.jobs.checkpoints import Checkpoints, Kept
-from service.jobs.outputs import FailureKind, JobFailure, JobOutput, Pace, Piece, Point
+from service.jobs.outputs import Best, FailureKind, JobFailure, JobOutput, Pace, Piece, Point
 from service.jobs.registry import RunOn, WarmUp
 from service.settings import logs
 from service.workers.process_limits import ProcessLimits
@@ -69,11 +69,12 @@ class Ready:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """From a worker: how far it got, with the points found since the last report."""
+    """From a worker: how far it got, with what was found since the last report."""
 
     fraction: float
     points: int
     found: tuple[Point, ...] = ()
+    best: Best | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,18 +146,25 @@ class Throttle:
         self._interval = interval
         self._next = time.monotonic() + interval
         self._found: list[Point] = []
+        self._best: Best | None = None
 
     def __call__(self, fraction: float, points: int) -> None:
         """Send it if the last report is long enough ago."""
         now = time.monotonic()
         if now >= self._next:
             self._next = now + self._interval
-            self._send(Report(min(max(float(fraction), 0.0), 1.0), int(points), tuple(self._found)))
+            share = min(max(float(fraction), 0.0), 1.0)
+            self._send(Report(share, int(points), tuple(self._found), self._best))
             self._found.clear()
+            self._best = None
 
     def found(self, points: Sequence[Point]) -> None:
         """Keep points for the next report."""
         self._found.extend(points)
+
+    def best(self, found: Best) -> None:
+        """Keep a design for the next report."""
+        self._best = found
 
 
 def main(

@@ -18,7 +18,7 @@ from optim.problem.problem import pose
 from optim.problem.words import Aim, AimWord, Method, MethodWord, Scaling, ScalingWord
 
 TWO = solver.load_scene("two-dof")
-OF_NO_PROBLEM = {"scene", "on_progress", "should_stop"}
+OF_NO_PROBLEM = {"scene", "on_progress", "should_stop", "on_best"}
 
 
 @pytest.mark.parametrize(

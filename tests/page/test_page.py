@@ -35,6 +35,26 @@ def has_paths(page: Page, figure: str, count: int) -> None:
     expect(page.locator(f"#{figure} svg.chart g[clip-path] > path.series")).to_have_count(count)
 
 
+def the_map_zooms(page: Page) -> None:
+    """Linked with the responses, and back; both axes of the map change."""
+
+    def drawn(figure: str) -> str:
+        return page.locator(f"#{figure}-figure g[clip-path] path.series").first.get_attribute("d") or ""
+
+    whole = drawn("map"), drawn("response")
+    page.locator("#map-figure svg.chart").focus()
+    page.keyboard.press("+")
+    assert drawn("map") != whole[0]
+    assert drawn("response") != whole[1]
+    page.keyboard.press("0")
+    assert (drawn("map"), drawn("response")) == whole
+    button = page.get_by_role("button", name="Map of amplitude over frequency and load: logarithmic y")
+    expect(button).to_have_attribute("aria-pressed", "true")
+    button.click()
+    expect(button).to_have_attribute("aria-pressed", "false")
+    button.click()
+
+
 def test_a_newcomer_presses_one_button_and_takes_results_away(profile: Profile, site: Site) -> None:
     assert httpx.get(f"{site.url}/v1/jobs").json()["items"] == []
     context, _ = profile
@@ -55,6 +75,7 @@ def test_a_newcomer_presses_one_button_and_takes_results_away(profile: Profile, 
     expect(page.locator("#map-facts")).to_contain_text("least peak2.346 m at 104.79 N")
     has_paths(page, "response-figure", 3)
     has_paths(page, "front-figure", 1)
+    the_map_zooms(page)
     for motion in ("path.stick", "path.slip", "circle.f7"):
         assert page.locator(f"#loops-figure g[clip-path] > {motion}").count() >= 1
     assert page.locator("#campbell-figure path.f7").count() >= 2

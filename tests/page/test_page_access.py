@@ -34,6 +34,12 @@ FOCUSABLE = (
 )
 
 
+ROWS = "\n".join([
+    "frequency,amplitude,phase", "1.0,1.93,-20", "1.1,2.12,-95", "1.2,1.77,-120", "1.3,1.48,-135",
+    "1.4,1.25,-143",
+])  # fmt: skip
+
+
 def visit(context: BrowserContext, site: Site, words: str = "?scene=two-dof") -> Page:
     page = context.new_page()
     page.goto(f"{site.url}/{with_all(words)}")
@@ -61,11 +67,23 @@ def unfold(page: Page) -> None:
     expect(page.locator("#runs-list .run-form").first).to_be_visible()
 
 
+def compute_further(page: Page) -> None:
+    """A mode, and parameters from data, whose views are empty else."""
+    page.click("#modes-submit")
+    page.locator("#identify-paste").evaluate("(node, text) => { node.value = text; }", ROWS)
+    page.evaluate("document.getElementById('identify-paste-take').click()")
+    expect(page.locator("#identify-files")).to_contain_text("1 run")
+    page.click("#identify-submit")
+    expect(page.locator("#identify-result")).to_be_visible()
+    expect(page.locator("#modes-facts")).to_contain_text("most damping")
+
+
 @pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.long)])
 def test_axe_finds_nothing_serious(browser: Browser, site: Site, studied: str, scheme: str) -> None:
     with opened(browser, site, color_scheme=scheme) as (context, _):
         page = visit(context, site, studied)
         expect(page.locator("#front-facts tbody tr").first).to_be_visible()
+        compute_further(page)
         page.click("#edit-scene")
         expect(page.locator("#editor form")).to_be_visible()
         unfold(page)

@@ -62,6 +62,7 @@ def power_iteration(spec: Mapping[str, Any], progress: Progress, should_stop: Sh
         vector = image / np.linalg.norm(image)
         steps += 1
         if spec["tells"]:
+            progress.best({"values": {"step": float(steps)}, "peak": value})
             progress.found([(float(steps), value)])
             time.sleep(0.002)
         elif steps > _STEPS:

@@ -75,6 +75,9 @@ class _Silent:
     def found(self, _points: Any) -> None:
         pass
 
+    def best(self, _found: object) -> None:
+        pass
+
 
 def timeless(value: Any) -> Any:
     """Without the time things took."""

@@ -68,6 +68,9 @@ class Silent:
     def found(self, _points: object) -> None:
         pass
 
+    def best(self, _found: object) -> None:
+        pass
+
 
 def settings_on(folder: Path, cluster: DaskCluster, **values: object) -> Settings:
     defaults: dict[str, object] = {"grace_seconds": 0.3, "poll_seconds": 1.0, "max_attempts": 3}

@@ -58,6 +58,9 @@ def test_a_job_is_followed_to_its_end(http: httpx.Client) -> None:
     assert 3 <= len(running) <= 10 * elapsed + 2, "ten a second at most"
     assert [told["progress"] for told in running] == sorted(told["progress"] for told in running)
     assert running[-1]["attempt"] == 1
+    best = [told["best"]["values"]["step"] for told in running if told["best"] is not None]
+    assert len(best) >= 2
+    assert best == sorted(best), "the best so far goes with the progress"
     partial = [event["data"] for event in named if event["event"] == "partial"]
     points = [point for told in partial for point in told["points"]]
     assert [told["start"] for told in partial] == [
@@ -84,7 +87,9 @@ def test_a_broken_connection_goes_on_where_it_ended(http: httpx.Client) -> None:
     assert http.delete(f"/v1/jobs/{job}").json()["status"] == "dismissed"
     again = http.get(f"/v1/jobs/{job}/events", headers={"Last-Event-ID": "end"})
     assert (again.status_code, again.content) == (204, b"")
-    assert follow(http, job)[-1]["data"]["status"] == "dismissed"
+    ended = follow(http, job)[-1]["data"]
+    assert ended["status"] == "dismissed"
+    assert ended["best"]["values"]["step"] > 0.0, "of a search that was stopped the best is kept"
 
 
 def test_refusals(http: httpx.Client) -> None:

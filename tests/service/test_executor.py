@@ -38,6 +38,9 @@ class Heard:
     def found(self, attempt: Attempt, points: Sequence[Point]) -> None:
         """Nothing is kept."""
 
+    def best(self, attempt: Attempt, found: object) -> None:
+        """Nothing is kept."""
+
     def kept(self, attempt: Attempt, pieces: Sequence[Piece], *, anew: bool) -> None:
         """Nothing is kept."""
 

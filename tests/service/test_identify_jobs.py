@@ -37,6 +37,8 @@ class Silent:
 
     def found(self, points: list[Point]) -> None: ...
 
+    def best(self, found: object) -> None: ...
+
 
 def test_it_finds_what_the_data_say() -> None:
     spec = IDENTIFY.resolve(validated(IdentifyRequest, dict(BODY)), Shipped()).spec

@@ -30,6 +30,7 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
         {"scene": "bladed-disk", "of": "tip", "samples": 2, "harmonics": 1, "from": 740, "to": 780},
     ),
     "modes": ("modes", {**TWO, "from": 0.1, "to": 3.0}),
+    "modes with motions": ("modes", {**TWO, "from": 0.1, "to": 3.0, "motions": True}),
     "design": ("design", TWO),
     "a design that misses its goal": ("design", {**TWO, "limit": 1.0, "max_band_hz": 1e-6}),
     "robust design": ("design", {**TWO, "uncertain": {"damper.mu": [0.28, 0.32]}, "samples": 3}),
@@ -64,6 +65,7 @@ SOMETIMES = {
     "branches",
     "performance",
     "limit_cycles",
+    "motions",
 }
 
 
@@ -81,6 +83,8 @@ class Silent:
     def __call__(self, fraction: float, points: int) -> None: ...
 
     def found(self, points: Sequence[Point]) -> None: ...
+
+    def best(self, found: object) -> None: ...
 
 
 @pytest.mark.parametrize("case", BODIES)

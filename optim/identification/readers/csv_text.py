@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from optim.errors import DataError
+from optim.identification.data.measured_units import split_head
 from optim.identification.data.table import Table
-from optim.identification.readers.columns import read_head, table_of
+from optim.identification.readers.columns import Head, read_head, table_of
 from optim.identification.readers.registry import DataFormat
+from solver.jit.fourier import Real
 
 _SEPARATORS = (";", "\t", ",")
 
@@ -26,22 +30,70 @@ def read_csv(path: Path, paths: frozenset[str]) -> list[Table]:
         text = path.read_text("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise DataError(str(path), str(error), "must be a text file in UTF-8") from error
+    return [read_text(text, path.name, paths).table]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FromText:
+    """What a text of CSV says: its table in SI units, and the same in the words of a description."""
+
+    table: Table
+    job_table: dict[str, Any]
+
+
+def described(text: str, name: str, paths: frozenset[str]) -> FromText:
+    """Read a text that came under a name.
+
+    Raises
+    ------
+    DataError
+        What is wrong, with its line.
+    """
+    return read_text(text.removeprefix("\ufeff"), name, paths)
+
+
+def read_text(text: str, name: str, paths: frozenset[str]) -> FromText:
+    """Read a text.
+
+    Parameters
+    ----------
+    text : of a file.
+    name : of the file, for messages.
+    paths : parameter paths of the scene.
+
+    Raises
+    ------
+    DataError
+        What is wrong, with its line.
+    """
     lines = {number: line.strip() for number, line in enumerate(text.splitlines(), start=1) if line.strip()}
     remarks = {number: line for number, line in lines.items() if line.startswith("#")}
     rows = {number: line for number, line in lines.items() if not line.startswith("#")}
-    head = read_head(path.name, remarks, paths)
+    head = read_head(name, remarks, paths)
     if len(rows) < 2:
         raise DataError(
-            path.name, f"{len(rows)} lines", "must have a line of column heads and rows of numbers",
+            name, f"{len(rows)} lines", "must have a line of column heads and rows of numbers",
             line=next(iter(rows), 1),
         )  # fmt: skip
     head_line = next(iter(rows))
     separator = next((one for one in _SEPARATORS if one in rows[head_line]), ",")
     heads = [text.strip().strip('"') for text in rows.pop(head_line).split(separator)]
-    _check_heads(path.name, head_line, heads)
-    numbers = np.array([_row(path.name, line, text, separator, heads) for line, text in rows.items()])
+    _check_heads(name, head_line, heads)
+    numbers = np.array([_row(name, line, text, separator, heads) for line, text in rows.items()])
     at = np.array(list(rows), np.int64)
-    return [table_of(path.name, heads, list(numbers.T), head, paths, lines=at, head_line=head_line)]
+    table = table_of(name, heads, list(numbers.T), head, paths, lines=at, head_line=head_line)
+    return FromText(table=table, job_table=_job_table(heads, numbers, head))
+
+
+def _job_table(heads: list[str], numbers: Real, head: Head) -> dict[str, Any]:
+    """Return the columns as lists with their units, conditions and words beside them."""
+    split = [split_head(text) for text in heads]
+    return {
+        **head.words,
+        **{name: column.tolist() for (name, _), column in zip(split, numbers.T, strict=True)},
+        "units": {name: unit for name, unit in split if unit is not None},
+        "conditions": dict(head.conditions),
+    }
 
 
 def _check_heads(source: str, line: int, heads: list[str]) -> None:

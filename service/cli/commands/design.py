@@ -18,12 +18,13 @@ from service.cli.options import shared as options
 from service.cli.options.problem import ProblemFlags, takes_problem
 from service.cli.options.problem_inputs import Description, IssuesOf
 from service.cli.output_files import Outputs
-from service.cli.progress import bar
+from service.cli.progress import Reporter, bar
 from service.rendering.tables import design as design_reports
 from service.rendering.tables import robust as robust_reports
 from service.rendering.tables.text import show
 
 if TYPE_CHECKING:
+    from optim.results.best_so_far import OnBest
     from optim.results.design import DesignResult
     from optim.robust.result import RobustResult
     from optim.studies.pareto_result import ParetoResult
@@ -93,14 +94,23 @@ def design(
         with bar("robust design", "responses") as on_progress:
             import optim
 
-            robust = optim.robust_design(asked.scene, **asked.given, on_progress=on_progress)
+            robust = optim.robust_design(
+                asked.scene, **asked.given, on_progress=on_progress, on_best=_telling(on_progress)
+            )
         asked.end(robust, robust_reports.robust, drawn=robust.nominal is not None)
         return
     with bar("design", "designs") as on_progress:
         import optim
 
-        found = optim.design(asked.scene, **asked.given, on_progress=on_progress)
+        found = optim.design(
+            asked.scene, **asked.given, on_progress=on_progress, on_best=_telling(on_progress)
+        )
     asked.end(found, design_reports.design, drawn=bool(found.sweeps))
+
+
+def _telling(reporter: Reporter | None) -> OnBest:
+    """What says the best design so far beside a bar."""
+    return None if reporter is None else lambda found: reporter.best(found.to_json())
 
 
 @takes_problem(key_options(FrontKeys))

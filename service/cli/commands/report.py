@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from service.rendering.report.sections import Designed
 
 SUFFIXES = (".html", ".pdf")
-_KINDS = ("design", "pareto")
 
 
 def report(
@@ -28,31 +27,26 @@ def report(
 ) -> None:
     """Write the report of a design that the service computed.
 
-    A page that needs nothing else; a PDF where Chromium or Chrome is there.
+    A page that needs nothing else, or a PDF of a few sheets (with the extra `pdf`).
     """
     import solver
     from service.cli.commands.client.jobs import client_of
-    from service.jobs.registry import ABOUT_THE_RUN
-    from service.rendering.report.sections import Designed
+    from service.rendering.report.sections import KINDS, Designed, problem_of_request
 
     target = inputs.output_path("--out", out, SUFFIXES)
     with client_of(url) as client:
         asked = client.job(job)
-        if asked.kind not in _KINDS:
+        if asked.kind not in KINDS:
             raise InputError(
                 f"`JOB` must be a design or a pareto job, {job!r} is of the kind {asked.kind!r} and has no "
                 f"optimum to report: `stickslip results {job} --plot F` draws it, without --plot prints it"
             )
         answer = client.results(job)
         scene = solver.Scene.from_dict(client.job_scene(job))
-    apart = (*_NOT_OF_A_PROBLEM, *ABOUT_THE_RUN)
-    problem = {k: v for k, v in (asked.request or {}).items() if k not in apart}
+    problem = problem_of_request(asked.request or {})
     if target is not None:
         write(Designed(scene=scene, problem=problem, result=answer.result), target)
         say(f"{target} is written")
-
-
-_NOT_OF_A_PROBLEM = ("kind", "scene", "set", "fresh", "priority", "max_seconds")
 
 
 def write(given: Designed, target: Path) -> None:
@@ -61,19 +55,11 @@ def write(given: Designed, target: Path) -> None:
     Raises
     ------
     InputError
-        No browser for a PDF.
+        A PDF, where what writes it is not installed.
     """
-    from service.rendering.report.design import design_report
-    from service.rendering.report.robust import robust_report
+    from service.rendering.report.making import report_of
     from solver.results.files import whole
 
-    made = robust_report if "nominal" in given.result else design_report
-    if target.suffix.lower() == ".pdf":
-        from service.rendering.report.pdf import browser, write_pdf
-
-        program = browser()
-        write_pdf(made(given), target, program)
-        return
-    page = made(given)
+    made = report_of(given, target.suffix.lower().removeprefix("."))
     with whole(target) as temporary:
-        temporary.write_text(page, "utf-8")
+        temporary.write_bytes(made)

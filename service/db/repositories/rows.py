@@ -31,6 +31,7 @@ class JobRow:
     cancel_requested: bool
     progress: float
     points: int
+    best: dict[str, Any] | None
     created: datetime
     started: datetime | None
     finished: datetime | None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ConfigDict, RootModel
@@ -24,6 +24,7 @@ from solver.scene.scene import Scene
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from optim.results.best_so_far import BestSoFar
     from solver import Branch
 
 UNCERTAIN = "uncertain"
@@ -159,7 +160,9 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
     scene, given = Scene.from_dict(spec["scene"]), problem_of(spec)
     if UNCERTAIN in given:
         return _run_robust(scene, given, progress, should_stop)
-    found = optim.design(scene, **given, on_progress=progress, should_stop=should_stop)
+    found = optim.design(
+        scene, **given, on_progress=progress, should_stop=should_stop, on_best=_telling(progress)
+    )
     return JobOutput.of(
         found,
         reached=found.reached,
@@ -172,13 +175,20 @@ def _run_robust(
     scene: Scene, given: Mapping[str, Any], progress: Progress, should_stop: ShouldStop
 ) -> JobOutput:
     """Search over the uncertainty; the stored sweeps are those of the search without it."""
-    found = optim.robust_design(scene, **given, on_progress=progress, should_stop=should_stop)
+    found = optim.robust_design(
+        scene, **given, on_progress=progress, should_stop=should_stop, on_best=_telling(progress)
+    )
     return JobOutput.of(
         found,
         reached=found.reached,
         sweeps=_on_the_way(found.design.sweeps),
         design=robust_record(found),
     )
+
+
+def _telling(progress: Progress) -> Callable[[BestSoFar], None]:
+    """What tells of the best design so far."""
+    return lambda found: progress.best(found.to_json())
 
 
 def _on_the_way(branches: Iterable[Branch]) -> tuple[SweepRecord, ...]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 import solver
+from service.jobs.common.modes import MOST_PEAKS, MOST_POINTS, exact_peaks, excitations, motions_of
 from service.jobs.common.scenes import (
     HarmonicRequest,
     Number,
@@ -17,12 +18,13 @@ from service.jobs.common.scenes import (
     resolve_scene,
     resolved,
 )
-from service.jobs.common.sizes import balance_issues
+from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
 from service.jobs.kinds.registry.results import Curve, EndedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, SettingError, pointer
+from solver.results.watch import part_of
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
 _EXAMPLE: dict[str, Any] = {"scene": "two-dof", "mode": 1, "from": 0.01, "to": 100}
 _POINTS = 200  # a curve seldom has more
 _MOST_MODES = 100_000
+_OF_THE_CURVE = 0.3  # share of the progress, where exact peaks follow
 
 
 class ModesRequest(HarmonicRequest):
@@ -48,6 +51,10 @@ class ModesRequest(HarmonicRequest):
         Peaks over excitation and load too.
     aero_damping : float or None
         Damping ratio of the gas, for the limit cycles.
+    motions : bool
+        Loops and shapes too.
+    exact_peaks : int
+        How many excitations the performance curve is compared at.
     """
 
     model_config = ConfigDict(validate_by_alias=True, json_schema_extra={"examples": [_EXAMPLE]})
@@ -65,6 +72,12 @@ class ModesRequest(HarmonicRequest):
     )
     aero_damping: Annotated[Number, Field(ge=-10.0, le=10.0)] | None = Field(
         default=None, description="Aerodynamic damping ratio, below 0 if it feeds: the limit cycles too."
+    )
+    motions: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description=f"Loops and shapes of up to {MOST_POINTS} points too."
+    )
+    exact_peaks: Annotated[int, Field(strict=True, ge=0, le=MOST_PEAKS)] = Field(
+        default=0, description="With `performance`: of so many excitations the whole response as well."
     )
 
 
@@ -89,12 +102,14 @@ class ModesResult(EndedResult):
     seconds: float
     performance: Table | None = None
     limit_cycles: Table | None = None
+    motions: Table | None = None
 
 
 def resolve(request: ModesRequest, source: SceneSource) -> Resolved:
     """Look up the scene; check amplitudes, mode, nodal diameter and the size."""
     scene = resolve_scene(request, source)
-    require(_issues(request, scene) or balance_issues("/harmonics", scene, request.harmonics, _POINTS))
+    points = _POINTS + POINTS_OF_A_SWEEP * request.exact_peaks
+    require(_issues(request, scene) or balance_issues("/harmonics", scene, request.harmonics, points))
     return resolved(
         scene,
         mode=request.mode,
@@ -104,6 +119,8 @@ def resolve(request: ModesRequest, source: SceneSource) -> Resolved:
         harmonics=request.harmonics,
         performance=request.performance,
         aero_damping=request.aero_damping,
+        motions=request.motions,
+        exact_peaks=request.exact_peaks,
     )
 
 
@@ -113,6 +130,9 @@ def _issues(request: ModesRequest, scene: Scene) -> list[Issue]:
     from solver.modes.nonlinear_mode import at_nodal_diameter, check_mode
 
     issues: list[Issue] = []
+    if request.exact_peaks and not request.performance:
+        words = f"`exact_peaks` needs `performance`, which is false here, got {request.exact_peaks!r}"
+        issues.append(refusal("/exact_peaks", words))
     if request.from_ >= request.to:
         words = f"`to` must be above `from` = {request.from_!r} √kg m, got {request.to!r}"
         issues.append(refusal("/to", words))
@@ -127,20 +147,30 @@ def _issues(request: ModesRequest, scene: Scene) -> list[Issue]:
 
 def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
     """Follow the mode."""
+    scene = Scene.from_dict(spec["scene"])
+    checked = spec["exact_peaks"]
     found = solver.nonlinear_mode(
-        Scene.from_dict(spec["scene"]),
+        scene,
         spec["mode"],
         amplitudes=(spec["start"], spec["stop"]),
         nodal_diameter=spec["nodal_diameter"],
         harmonics=spec["harmonics"],
-        on_progress=progress,
+        on_progress=part_of(progress, 0.0, _OF_THE_CURVE if checked else 1.0),
         should_stop=should_stop,
     )
     answer = found.to_json()
     if spec["performance"]:
-        answer["performance"] = solver.performance_curve(found).to_json()
+        curve = solver.performance_curve(found)
+        answer["performance"] = curve.to_json()
+        if checked:
+            factors = excitations(curve, scene.observe.band, checked)
+            rest = part_of(progress, _OF_THE_CURVE, 1.0, len(found.amplitude))
+            exact = exact_peaks(found.scene, factors, spec["harmonics"], rest, should_stop)
+            answer["performance"]["exact"] = exact
     if spec["aero_damping"] is not None:
         answer["limit_cycles"] = solver.limit_cycles(found, spec["aero_damping"]).to_json()
+    if spec["motions"]:
+        answer["motions"] = motions_of(found)
     return JobOutput(result=answer, shortfall=None if found.completed else found.status.value)
 
 

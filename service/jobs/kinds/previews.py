@@ -28,7 +28,7 @@ from service.jobs.common.sizes import (
     dofs_solved,
 )
 from service.jobs.linear_limits import linear_limit
-from service.jobs.outputs import JobOutput, Point, Progress, ShouldStop
+from service.jobs.outputs import Best, JobOutput, Point, Progress, ShouldStop
 from service.jobs.registry import JobKind, Registry, Resolved, SceneSource
 from solver.errors import Issue
 from solver.scene.examples import DAMPER_LOAD
@@ -206,6 +206,9 @@ class _Silent:
         """Say nothing."""
 
     def found(self, points: Sequence[Point]) -> None:
+        """Say nothing."""
+
+    def best(self, found: Best) -> None:
         """Say nothing."""
 
 

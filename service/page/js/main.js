@@ -12,6 +12,8 @@ import { loadLaws } from "./scene/laws.js";
 import { forget, resume, run, startJobs } from "./network/jobs.js";
 import { openLibrary, startLibrary } from "./views/library.js";
 import { showResponse, startLive } from "./views/live.js";
+import { startIdentify } from "./identify/view.js";
+import { startModes } from "./modes/view.js";
 import { startMap } from "./views/map.js";
 import { openMatrices } from "./scene/matrices.js";
 import { SCENES } from "./scene/matrix_files.js";
@@ -219,6 +221,8 @@ function start() {
   startPoint();
   startFront();
   startStudies();
+  startModes();
+  startIdentify();
   startOthers();
   startLibrary();
   startSettings();

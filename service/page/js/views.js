@@ -3,7 +3,9 @@
 
 import { designView } from "./views/design.js";
 import { frontView } from "./views/front.js";
+import { identifyView } from "./identify/view.js";
 import { mapView } from "./views/map.js";
+import { modesView } from "./modes/view.js";
 import { sweepView } from "./views/response.js";
 import { accuracyView, campbellView } from "./views/studies.js";
 
@@ -14,5 +16,7 @@ export const VIEWS = {
   pareto: frontView,
   accuracy: accuracyView,
   campbell: campbellView,
+  modes: modesView,
+  identify: identifyView,
   march: null, // Follows the point that is looked at, which begins it.
 };

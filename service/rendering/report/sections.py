@@ -10,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import solver
+from service.jobs.registry import ABOUT_THE_RUN
 from service.rendering.report.responses import Line, comparison_figure
 from solver.continuation.branch import Branch
 from solver.results import units
@@ -45,6 +46,16 @@ class Designed:
     def harmonics(self) -> int:
         """Highest harmonic kept."""
         return int(self.problem.get("harmonics", 11))
+
+
+KINDS = ("design", "pareto")
+"""Kinds of job with an optimum to report."""
+_NOT_OF_A_PROBLEM = ("kind", "scene", "set", "fresh", "priority", "max_seconds", *ABOUT_THE_RUN)
+
+
+def problem_of_request(request: Json) -> dict[str, Any]:
+    """What a job asked of the design layer, without what is said of the job itself."""
+    return {key: value for key, value in request.items() if key not in _NOT_OF_A_PROBLEM}
 
 
 def by_path(values: Mapping[str, float]) -> dict[str, float]:

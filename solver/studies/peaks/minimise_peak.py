@@ -23,6 +23,7 @@ from solver.studies.peaks.proof import judge, result_of, seen
 from solver.studies.peaks.refine_tracks import tighten
 from solver.studies.peaks.results import ChosenBy, LeastPeak, TrackStatus
 from solver.studies.peaks.secondary_minima import NEAR, with_further
+from solver.studies.peaks.survey import OnLook
 from solver.studies.peaks.track import Pace
 from solver.studies.peaks.tracker import Tracker
 from solver.studies.peaks.work_limit import RESPONSES, Allowance, HaltedError
@@ -57,6 +58,7 @@ def least_peak(
     effects: Effects | None = None,
     on_progress: Callable[[float, int], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    on_look: OnLook = None,
 ) -> LeastPeak:
     """Find the value of one parameter at which the highest peak over the scene's band is least.
 
@@ -77,6 +79,7 @@ def least_peak(
     effects : what is paid for though the scene does not call for it.
     on_progress : called after every sweep with (share done, as far as that is known; sweeps so far).
     should_stop : asked several times a second; once the optimum is proven it only ends the coarse stage.
+    on_look : called with the value of the parameter and the branch of every response over the whole band.
 
     Raises
     ------
@@ -89,6 +92,7 @@ def least_peak(
     pace = replace(_PACE, above=WIDE) if thorough and basins > 1 else _PACE
     allowance = Allowance(should_stop, RESPONSES * (THOROUGHLY if thorough else 1.0))
     tracker = Tracker(scene, parameter, low, high, harmonics, effects, pace, allowance)
+    tracker.on_look = on_look
     scale = tracker.scale
     places = [scale.low + share * scale.span for share in _STARTS]
     if first is not None:

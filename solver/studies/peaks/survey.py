@@ -25,6 +25,7 @@ SAME = (
 )
 FEWEST = 3  # harmonics of a glance
 Counting = Callable[[Branch], tuple[Peak, ...]]
+OnLook = Callable[[float, Branch], None] | None
 
 
 def all_peaks(branch: Branch) -> tuple[Peak, ...]:
@@ -48,6 +49,7 @@ class Looking(ABC):
         self.looks: list[Look] = []
         self.glances: list[Glance] = []
         self.allowance = allowance or Allowance(None)
+        self.on_look: OnLook = None
         self._effects, self._pace = effects, pace
         self._scene, self._harmonics = self.balance.scene, harmonics
         self._counting: Counting = all_peaks
@@ -122,6 +124,8 @@ class Looking(ABC):
         higher = bool(self.lines) and top > float(self.envelope(np.array([z]))[0]) * (1.0 + SAME)
         look = Look(z=z, branch=branch, surprising=higher, peaks=peaks)
         self.looks.append(look)
+        if self.on_look is not None and look.seen:
+            self.on_look(self.scale.outside(z), branch)
         self.allowance.measure([one.branch.newton_iterations for one in self.looks])
         return look
 

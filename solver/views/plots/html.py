@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import base64
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from html import escape
 from typing import Any
 
@@ -35,6 +38,20 @@ pre { background: #f5f5f5; padding: .8rem; overflow-x: auto; font-size: .8rem; w
 """
 
 
+_FORM: ContextVar[str] = ContextVar("form", default="svg")
+_MEDIA = {"svg": "svg+xml", "png": "png"}
+
+
+@contextmanager
+def pictures_as_png() -> Iterator[None]:
+    """Have pictures of pages made inside the block be PNG, for what reads no SVG."""
+    token = _FORM.set("png")
+    try:
+        yield
+    finally:
+        _FORM.reset(token)
+
+
 def page(title: str, body: str) -> str:
     """A whole page; `body` is HTML, the title is not."""
     return (
@@ -46,9 +63,12 @@ def page(title: str, body: str) -> str:
 
 def image(figure: Figure, words: str, caption: str = "") -> str:
     """A picture inside the page; `words` are read to those who do not see it."""
-    data = base64.b64encode(style.written(figure, "svg")).decode()
+    form = _FORM.get()
+    data = base64.b64encode(style.written(figure, form)).decode()
     below = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
-    return f'<figure><img src="data:image/svg+xml;base64,{data}" alt="{escape(words)}">{below}</figure>'
+    return (
+        f'<figure><img src="data:image/{_MEDIA[form]};base64,{data}" alt="{escape(words)}">{below}</figure>'
+    )
 
 
 def table(heads: list[str], rows: list[list[Any]]) -> str:

@@ -27,6 +27,9 @@ class _Silent:
     def found(self, points):
         """Nobody watches."""
 
+    def best(self, found):
+        """Nobody watches."""
+
 
 def limits(scene, contact=None):
     spec = {"scene": scene.to_dict(), "contact": contact}

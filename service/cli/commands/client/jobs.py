@@ -126,8 +126,8 @@ def client_of(url: str) -> Client:
 
 
 def _follow(client: Client, job: str) -> JobAnswer:
-    with bar(job) as on_progress:
-        return client.wait(job, on_progress)
+    with bar(job) as reporter:
+        return client.wait(job, reporter, on_best=None if reporter is None else reporter.best)
 
 
 def _show(job: JobAnswer, answer: ResultsAnswer, *, as_json: bool) -> None:

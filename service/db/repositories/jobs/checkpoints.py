@@ -64,4 +64,5 @@ def as_far_as_kept() -> dict[str, Any]:
     return {
         "progress": case((kept, Job.progress), else_=0.0),
         "points": case((kept, Job.points), else_=0),
+        "best": None,
     }

@@ -32,7 +32,7 @@ from service.db.repositories.sweeps import insert_sweeps
 from service.db.repositories.workbench.words import in_the_bin, insert_words, require_project
 from service.errors import IdempotencyError
 from service.jobs.ids import new_id
-from service.jobs.outputs import JobFailure, JobOutput, Piece
+from service.jobs.outputs import Best, JobFailure, JobOutput, Piece
 from service.jobs.strict_json import JsonText, encoded
 
 __all__ = ["Attempt", "JobRepository", "JobRow", "NewJob", "Recovered"]
@@ -206,13 +206,15 @@ class JobRepository:
         connection.execute(statements.TAKE, changes)
         return [_attempt(row, owner) for row in found]
 
-    def report(self, attempt: Attempt, fraction: float, points: int, lease_until: datetime) -> bool:
+    def report(
+        self, attempt: Attempt, fraction: float, points: int, lease_until: datetime, best: Best | None = None
+    ) -> bool:
         """Write progress and renew the lease; False if the attempt owns the job no more.
 
         In a transaction of its own: of two that each told of one job and concluded the other's, PostgreSQL
         would have to end one.
         """
-        values = {"fraction": fraction, "counted": points, "until": lease_until}
+        values = {"fraction": fraction, "counted": points, "until": lease_until, "told": best}
         with self._db.writing() as connection:
             return _guarded(connection, statements.REPORT, attempt, values)
 
@@ -230,7 +232,7 @@ class JobRepository:
 
         A waiting job with points is one with a checkpoint: there is at least one point then.
         """
-        values = {"fraction": fraction, "counted": max(points, 1), "until": lease_until}
+        values = {"fraction": fraction, "counted": max(points, 1), "until": lease_until, "told": None}
         with self._db.writing() as connection:
             owned = _guarded(connection, statements.REPORT, attempt, values)
             if owned:

@@ -21,6 +21,7 @@ ROW = [item.name for item in fields(JobRow)]
 NEW_COLUMNS = [item.name for item in fields(NewJob) if item.name not in ("fresh", "words")]
 INITIAL: dict[str, Any] = {
     "state": JobState.ACCEPTED, "attempt": 0, "cancel_requested": False, "progress": 0.0, "points": 0,
+    "best": None,
     "started": None, "finished": None, "result_of": None, "error": None,
 }  # fmt: skip
 """What a job begins with."""
@@ -67,7 +68,10 @@ def _guarded(*conditions: ColumnElement[bool]) -> Update:
 
 
 REPORT = _guarded().values(
-    progress=bindparam("fraction"), points=bindparam("counted"), lease_until=bindparam("until")
+    progress=bindparam("fraction"),
+    points=bindparam("counted"),
+    best=bindparam("told", type_=_C.best.type),
+    lease_until=bindparam("until"),
 )
 SUCCEED = _guarded(_C.cancel_requested.is_(False)).values(
     state=JobState.SUCCESSFUL,

@@ -5,31 +5,39 @@ import { chartTools } from "./heatmap_tools.js";
 import { SHADES } from "../base/colours.js";
 import { el, show, svg } from "../base/dom.js";
 import { lengthUnit, number } from "../base/format.js";
+import { mapButtons, mapDragged, mapKey } from "./map_zoom.js";
 import { pathOf, plane, shape } from "./plane.js";
+import { joined } from "./zoom.js";
 
 const LEGEND = 14;
 
 // Draws {x, y: {name, values, log}, rows: [[metre]], lines: [{name, x, y, colour, dash}], marks: [{x, y, text}]}.
-export function heatmap(host, { label, file, height = 340, onPick }) {
+export function heatmap(host, { label, file, height = 340, onPick, link = "" }) {
   const read = el("p", { class: "chart-read", "aria-live": "polite" });
   const canvas = el("canvas", { "aria-hidden": "true" });
   const drawing = svg("svg", { class: "chart", role: "group", tabindex: 0, "aria-label": label });
-  drawing.setAttribute("aria-roledescription", "map, arrows move in it, Enter picks");
+  drawing.setAttribute("aria-roledescription", "map, arrows move in it, with Shift they move the map, Enter picks");
   const stage = el("div", { class: "canvas-host" }, canvas, drawing);
-  const self = { drawing, canvas, shown: null, row: 0, column: 0 };
-  const tools = chartTools(self, file, label);
+  const self = { drawing, canvas, shown: null, row: null, column: null, link, window: null, windowY: null, log: {} };
+  const at = () => (self.column === null ? null : pointOf(self));
+  const tools = chartTools(self, file, label, mapButtons(self, label, at));
   show(host, stage, el("div", { class: "chart-foot" }, read, tools));
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-  self.draw = (what) => {
+  self.repaint = () => {
+    if (!self.shown) return;
     const begun = performance.now();
-    self.shown = what;
-    tools.hidden = false;
     paint(self, host, height);
     self.milliseconds = performance.now() - begun;
   };
+  self.draw = (what) => {
+    self.shown = what;
+    self.range = rangeOf(what.rows);
+    tools.hidden = false;
+    self.repaint();
+  };
   // Nothing to show: a frame of the same size, so that nothing moves when there is.
   self.clear = () => {
-    self.shown = null;
+    Object.assign(self, { shown: null, row: null, column: null, window: null, windowY: null, log: {} });
     tools.hidden = true;
     canvas.width = 0;
     read.textContent = "";
@@ -38,7 +46,7 @@ export function heatmap(host, { label, file, height = 340, onPick }) {
     show(drawing, empty(width, height, "Nothing computed yet."));
   };
   self.clear();
-  self.redraw = () => self.shown && paint(self, host, height);
+  joined(self);
   const place = (event) => {
     if (!self.shown) return false;
     const frame = drawing.getBoundingClientRect();
@@ -48,12 +56,16 @@ export function heatmap(host, { label, file, height = 340, onPick }) {
     cursor(self, nearest(self.shown.x.values, x), nearest(self.shown.y.values, y), read);
     return true;
   };
-  drawing.addEventListener("pointermove", place);
-  drawing.addEventListener("pointerleave", () => self.mark?.replaceChildren());
-  drawing.addEventListener("click", (event) => place(event) && onPick(pointOf(self)));
-  drawing.addEventListener("keydown", (event) => keyed(self, event, read, onPick));
+  drawing.addEventListener("pointermove", (event) => event.buttons || place(event));
+  drawing.addEventListener("pointerleave", () => {
+    self.mark?.replaceChildren();
+    self.share?.(null);
+  });
+  const justDragged = mapDragged(self);
+  drawing.addEventListener("click", (event) => !justDragged() && place(event) && onPick(pointOf(self)));
+  drawing.addEventListener("keydown", (event) => self.shown && (mapKey(self, event, at) || keyed(self, event, read, onPick)));
   new ResizeObserver(() => {
-    if (self.shown && Math.abs(host.clientWidth - self.width) > 1) paint(self, host, height);
+    if (self.shown && Math.abs(host.clientWidth - self.width) > 1) self.repaint();
   }).observe(host);
   return self;
 }
@@ -64,12 +76,16 @@ const pointOf = ({ shown, row, column }) => ({
   value: shown.rows[row][column],
 });
 
+// Values rise or fall: the two around the wanted one are found by halving.
 function nearest(values, wanted) {
-  let best = 0;
-  values.forEach((value, i) => {
-    if (Math.abs(value - wanted) < Math.abs(values[best] - wanted)) best = i;
-  });
-  return best;
+  const up = values[values.length - 1] >= values[0];
+  let [low, high] = [0, values.length - 1];
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (values[middle] <= wanted === up) low = middle;
+    else high = middle;
+  }
+  return Math.abs(values[high] - wanted) < Math.abs(values[low] - wanted) ? high : low;
 }
 
 function sized(drawing, width, height) {
@@ -78,26 +94,36 @@ function sized(drawing, width, height) {
   drawing.setAttribute("height", height);
 }
 
-const axisOf = ({ name, values, log }) => ({ name, log, low: Math.min(...values), high: Math.max(...values) });
+// An axis as it is looked at: its whole, the stretch that is zoomed, logarithmic where it is asked for and may be.
+function axisOf({ name, values, log }, window, wanted) {
+  const whole = [Math.min(...values), Math.max(...values)];
+  const may = whole[0] > 0;
+  const [low, high] = window ?? whole;
+  return { name, log: may && (wanted ?? log ?? false), may, whole, low, high };
+}
 
 function paint(self, host, height) {
   const { x, y, lines = [], marks = [] } = self.shown;
   const width = Math.max(host.clientWidth, 240);
   self.width = host.clientWidth;
-  const base = plane(width, height, axisOf(x), axisOf(y), { paper: false });
+  const [ofX, ofY] = [axisOf(x, self.window, self.log.x), axisOf(y, self.windowY, self.log.y)];
+  Object.assign(self, { whole: ofX.whole, wholeY: ofY.whole });
+  self.sayLog(ofX.log, ofY.log, ofX.may, ofY.may);
+  const base = plane(width, height, ofX, ofY, { paper: false });
   Object.assign(self, base);
   const { box, xs, ys } = base;
-  const range = shades(self, box);
+  shades(self, box);
   self.mark = svg("g", {});
   sized(self.drawing, width, height);
   const inside = (m) => m.x >= xs.low && m.x <= xs.high && m.y >= ys.low && m.y <= ys.high;
   show(
     self.drawing,
+    svg("defs", {}, svg("clipPath", { id: "clip-of-the-map" }, svg("rect", { x: box.left, y: box.top, width: box.right - box.left, height: box.bottom - box.top }))),
     base.frame,
-    lines.map((line) => [
+    svg("g", { "clip-path": "url(#clip-of-the-map)" }, lines.map((line) => [
       svg("path", { class: "series map-under", d: pathOf(xs, ys, line.x, line.y), "stroke-width": 4.5 }),
       svg("path", { class: "series map-line", d: pathOf(xs, ys, line.x, line.y), "stroke-dasharray": line.dash ? "6 4" : undefined }),
-    ]),
+    ])),
     marks.filter(inside).map((m) => {
       const right = xs.at(m.x) > (box.left + box.right) / 2;
       return [
@@ -107,14 +133,21 @@ function paint(self, host, height) {
     }),
     self.mark,
   );
-  self.range = range;
 }
 
-// Colours of every cell, logarithmic in the amplitude, drawn cell by cell at the canvas's own pixels.
-function shades(self, box) {
-  const { rows, x, y } = self.shown;
+// The least and the largest amplitude of all cells: colours mean the same however the map is zoomed.
+function rangeOf(rows) {
   let [low, high] = [Infinity, 0];
   for (const row of rows) for (const v of row) if (v !== null && v > 0) [low, high] = [Math.min(low, v), Math.max(high, v)];
+  return [low, high];
+}
+
+const PAINT = new Uint32Array(SHADES.buffer);
+
+// Colours of every cell, logarithmic in the amplitude, at the canvas's own pixels: a row of cells is painted once.
+function shades(self, box) {
+  const { rows, x, y } = self.shown;
+  const [low, high] = self.range;
   const [first, span] = [Math.log(low), Math.log(high) - Math.log(low) || 1];
   const [wide, tall] = [Math.round(box.right - box.left), Math.round(box.bottom - box.top)];
   const { canvas } = self;
@@ -123,18 +156,18 @@ function shades(self, box) {
   Object.assign(canvas.style, { left: `${box.left}px`, top: `${box.top}px`, width: `${wide}px`, height: `${tall}px` });
   const brush = canvas.getContext("2d");
   const image = brush.createImageData(wide, tall);
+  const pixels = new Uint32Array(image.data.buffer);
   const columns = Array.from({ length: wide }, (_, i) => nearest(x.values, self.xs.back(box.left + i + 0.5)));
+  const painted = new Map();
   for (let j = 0; j < tall; j += 1) {
-    const row = rows[nearest(y.values, self.ys.back(box.top + j + 0.5))];
-    for (let i = 0; i < wide; i += 1) {
-      const value = row[columns[i]];
-      if (value === null) continue;
-      const shade = 4 * Math.round((255 * (Math.log(Math.max(value, low)) - first)) / span);
-      image.data.set(SHADES.subarray(shade, shade + 4), 4 * (j * wide + i));
+    const at = nearest(y.values, self.ys.back(box.top + j + 0.5));
+    if (!painted.has(at)) {
+      const colours = rows[at].map((v) => (v === null ? 0 : PAINT[Math.round((255 * (Math.log(Math.max(v, low)) - first)) / span)]));
+      painted.set(at, Uint32Array.from(columns, (column) => colours[column]));
     }
+    pixels.set(painted.get(at), j * wide);
   }
   brush.putImageData(image, 0, 0);
-  return [low, high];
 }
 
 function cursor(self, column, row, read) {
@@ -146,15 +179,15 @@ function cursor(self, column, row, read) {
   show(self.mark, svg("path", { class: "map-cursor", d: `M${px} ${box.top}V${box.bottom}M${box.left} ${py}H${box.right}` }));
   const unit = lengthUnit(point.value ?? 0);
   const height = point.value === null ? "no solution" : `${number(point.value * unit.perMetre)} ${unit.name}`;
+  self.share?.(point.x);
   read.textContent = `${shown.x.name} ${number(point.x, 6)} · ${shown.y.name} ${number(point.y, 5)} · ${height}`;
 }
 
 function keyed(self, event, read, onPick) {
-  if (!self.shown) return;
   const moves = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1], PageUp: [20, 0], PageDown: [-20, 0] };
   const step = moves[event.key];
-  if (step) cursor(self, self.column + step[0], self.row + step[1], read);
-  else if (event.key === "Enter" || event.key === " ") onPick(pointOf(self));
+  if (step) cursor(self, (self.column ?? 0) + step[0], (self.row ?? 0) + step[1], read);
+  else if ((event.key === "Enter" || event.key === " ") && self.column !== null) onPick(pointOf(self));
   else return;
   event.preventDefault();
 }

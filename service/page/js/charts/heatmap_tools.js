@@ -15,7 +15,7 @@ function columns({ x, y, rows }) {
   return [[x.name, xs], [y.name, ys], ["amplitude [m]", values]];
 }
 
-export function chartTools(self, file, label) {
+export function chartTools(self, file, label, more) {
   self.columns = () => columns(self.shown);
-  return el("div", { class: "chart-tools" }, saving(self, file, label, () => self.canvas));
+  return el("div", { class: "chart-tools" }, more, saving(self, file, label, () => self.canvas));
 }

@@ -13,7 +13,7 @@ export function plane(width, height, x, y, { paper = true, above = 0 } = {}) {
     top: MARGIN.top + above,
     bottom: height - MARGIN.bottom,
   };
-  const xs = { ...scale(x.log, x.low, x.high, box.left, box.right), whole: x.whole };
+  const xs = { ...scale(x.log, x.low, x.high, box.left, box.right), whole: x.whole, names: x.names };
   const ys = scale(y.log, y.low, y.high, box.bottom, box.top);
   const frame = svg(
     "g",
@@ -37,8 +37,9 @@ const APART = 8;
 function gridLines(box, xs, ys, lines) {
   const nodes = [];
   let free = -Infinity;
-  for (const { value, text } of xs.ticks((box.right - box.left) / PIXELS_A_TICK.x)) {
+  for (const { value, text: plain } of xs.ticks((box.right - box.left) / PIXELS_A_TICK.x)) {
     if (xs.whole && !Number.isInteger(value)) continue;
+    const text = xs.names ? (xs.names[value] ?? "") : plain;
     const at = xs.at(value);
     nodes.push(svg("line", { class: lines ? "grid" : "axis", x1: at, x2: at, y1: lines ? box.top : box.bottom + 4, y2: box.bottom }));
     // A number that would stand on its neighbour is left out; its line stays.

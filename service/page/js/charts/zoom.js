@@ -21,7 +21,7 @@ export function zoomed(self, x) {
   return [{ ...x, low, high }, free ? { ...y, log, low: log ? undefined : y.low, high: undefined, zero: !log && y.zero } : { ...y, log }];
 }
 
-function look(self, window) {
+export function look(self, window) {
   const wanted = window && self.whole && (window[0] > self.whole[0] || window[1] < self.whole[1])
     ? [Math.max(window[0], self.whole[0]), Math.min(window[1], self.whole[1])] : null;
   if (wanted && !(wanted[1] > wanted[0])) return;
@@ -36,8 +36,11 @@ const linked = (self) => [...charts].filter((each) => each === self || (self.lin
 function around(self, factor, at) {
   if (!self.whole) return;
   const [low, high] = self.window ?? self.whole;
-  const centre = at !== null && at >= low && at <= high ? at : (low + high) / 2;
-  look(self, [centre - (centre - low) * factor, centre + (high - centre) * factor]);
+  // Of a logarithmic abscissa stretches are shares of decades.
+  const [to, back] = self.shown.x.log ? [Math.log, Math.exp] : [(v) => v, (v) => v];
+  const [first, last] = [to(low), to(high)];
+  const centre = at !== null && at >= low && at <= high ? to(at) : (first + last) / 2;
+  look(self, [centre - (centre - first) * factor, centre + (last - centre) * factor].map(back));
 }
 
 export function zoomButtons(self, label) {

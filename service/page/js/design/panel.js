@@ -20,6 +20,8 @@ const FIELDS = [
 const CHOICES = { method: ["", "auto", "tracked", "minimax", "ipopt"], aim: ["", "worst-case", "mean", "quantile"] };
 const WEIGHTS = [["peak", "Weight of the peak [1/m]"], ["band", "Weight of the band [1/Hz]"]];
 let lists = null;
+// What is not known, in a form that the rows have no fields for: an ellipsoid, or samples.
+let given = null;
 
 export function startPanel() {
   const paths = () => [...variables(), ...variedContacts().flatMap(({ name }) => ranges(name).map(({ path }) => path))].filter((path, i, all) => all.indexOf(path) === i);
@@ -44,6 +46,11 @@ export function startPanel() {
     submit();
   });
   on("scene", () => fill({}));
+  on("uncertain-given", (found) => {
+    lists.uncertain.fill([]);
+    hold(found);
+    byId("problem-uncertainty-fold").open = true;
+  });
   on("scene-contact", () => lists.variables.count() <= 1 && fillVariables({}));
   // What is being typed is not taken away by a search that ends meanwhile.
   on("computed", ({ kind, request }) => kind === "design" && !byId("problem-form").contains(document.activeElement) && fill(request));
@@ -62,17 +69,24 @@ function fillVariables(request) {
   lists.variables.fill(given.length ? given : own ? [{ path: own, low: (state.range ?? defaultRange())[0], high: (state.range ?? defaultRange())[1], how: "auto" }] : []);
 }
 
+function hold(found) {
+  given = found;
+  show(byId("problem-given"), given ? el("p", { class: "row" }, el("span", { class: "chip good" }, given.words), el("span", { class: "note" }, "in place of intervals"),
+    el("button", { type: "button", onclick: () => { hold(null); byId("problem-uncertain-add").focus(); } }, "Take it out")) : null);
+}
+
 function fill(request) {
   const { cases, uncertain, fields, contacts, weights } = fieldsOf(request);
   fillVariables(request);
   lists.cases.fill(cases);
   lists.uncertain.fill(uncertain);
+  hold(request.uncertain && !uncertain.length ? { uncertain: request.uncertain, words: Array.isArray(request.uncertain) ? `${request.uncertain.length} samples` : `an ellipsoid of ${Object.keys(request.uncertain.centre ?? request.uncertain.half_axes ?? {}).join(", ") || "deviations"}` } : null);
   for (const [key, text] of Object.entries(fields)) byId(`problem-${key}`).value = String(text);
   for (const [key] of WEIGHTS) byId(`problem-weight-${key}`).value = String(weights[key] ?? "");
   show(byId("problem-contacts"), (current.body?.contacts ?? []).map(({ name }) =>
     el("label", { class: "pair" }, el("input", { type: "checkbox", name, checked: contacts.includes(name) }), `${name} must not open`)));
   byId("problem-submit").disabled = !variable();
-  for (const [id, used] of [["limits", contacts.length || ["max_peak", "max_band_hz", "limit", "forbidden_hz", "speeds_rpm", "max_friction_work"].some((key) => fields[key])], ["cases", cases.length], ["uncertainty", uncertain.length], ["method", fields.method || fields.basins || Object.keys(weights).length]]) {
+  for (const [id, used] of [["limits", contacts.length || ["max_peak", "max_band_hz", "limit", "forbidden_hz", "speeds_rpm", "max_friction_work"].some((key) => fields[key])], ["cases", cases.length], ["uncertainty", uncertain.length || given], ["method", fields.method || fields.basins || Object.keys(weights).length]]) {
     if (used) byId(`problem-${id}-fold`).open = true;
   }
   complain([]);
@@ -92,6 +106,11 @@ async function submit() {
   let body;
   try {
     body = bodyOf(asFields());
+    if (given) {
+      if (body.uncertain) throw new Unreadable("/uncertain", "Intervals and what was identified do not go together: take one of them out.");
+      body.uncertain = given.uncertain;
+      if (text("aim")) body.aim = text("aim");
+    }
   } catch (error) {
     if (!(error instanceof Unreadable)) throw error;
     return complain(error.errors);

@@ -91,7 +91,7 @@ async function follow(kind, id, view, { signal }) {
   const job = ENDED.includes(first.status) ? first : await watched(kind, first, view, signal);
   enter(kind, job);
   if (job.status === "dismissed") {
-    view.failed("The job was stopped.", []);
+    view.failed("The job was stopped.", [], job);
     return false;
   }
   const results = await patiently(() => request(`/v1/jobs/${id}/results`, { signal })).catch((error) => {
@@ -103,7 +103,7 @@ async function follow(kind, id, view, { signal }) {
     view.result(results.result, results.sweeps, job);
     tell("computed", { kind, request: first.request, result: results.result });
   }
-  if (job.status === "failed") view.failed(job.error?.detail ?? "The job failed.", job.error?.issues ?? []);
+  if (job.status === "failed") view.failed(job.error?.detail ?? "The job failed.", job.error?.issues ?? [], results ? null : job);
   tell("job-ended", job);
   return job.status === "successful";
 }

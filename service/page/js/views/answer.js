@@ -3,6 +3,7 @@
 import { state } from "../base/address.js";
 import { byId, el, show } from "../base/dom.js";
 import { on } from "../base/events.js";
+import { saveFrom } from "../base/exports.js";
 import { length, lengthUnit, number, quantity } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 import { inUse, sameValues } from "../scene/inputs.js";
@@ -74,6 +75,18 @@ function actions() {
   use.disabled = used || Object.keys(result.optimum).length === 0;
   use.onclick = () => load(result.optimum, request);
   byId("save-report").onclick = () => saveReport(designed, figures(), changed);
+  byId("save-pdf").onclick = savePdf;
+}
+
+// The service makes it, from the job of the design.
+async function savePdf() {
+  const button = byId("save-pdf");
+  button.disabled = true;
+  button.textContent = "Being made …";
+  await saveFrom(`/v1/jobs/${state.jobs.design}/report?format=pdf`, "application/pdf", `report-${state.scene}.pdf`);
+  button.disabled = false;
+  button.textContent = "Report as PDF";
+  button.focus();
 }
 
 const arrow = (was, is) => (was === null ? is : `${was} → ${is}`);

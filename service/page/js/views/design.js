@@ -22,7 +22,10 @@ export function startDesign() {
 
 export const designView = {
   waiting: () => say("design-status", "The search waits for a worker."),
-  progress: ({ took }) => say("design-status", `Searching:${took}.`),
+  progress({ took, points, best }) {
+    say("design-status", `Searching:${took}${points ? `, ${points} evaluations` : ""}.`);
+    if (best) showBest(best);
+  },
   result(result, _sweeps, job) {
     const use = (found) => load(found, job.request);
     const values = Object.entries(result.optimum ?? {});
@@ -51,8 +54,27 @@ export const designView = {
     );
     if (values.length) tell("optimum", { values: Object.fromEntries(values), peak: result.peak });
   },
-  failed: (text) => say("design-status", text, true),
+  // Of a search that was stopped the best so far is all there is: it stays, and may be loaded.
+  failed(text, _issues, job) {
+    say("design-status", text, true);
+    if (!job?.best) return;
+    showBest(job.best);
+    byId("design-best")?.append(el("button", { type: "button", onclick: () => load(job.best.values, job.request) }, "Load the best so far"));
+  },
 };
+
+// The best design so far, while the search goes on: what it is, how well it is known, and that it may be another in the end.
+let seen = null;
+function showBest(best) {
+  const key = JSON.stringify(best);
+  if (key === seen && byId("design-best")) return;
+  seen = key;
+  const values = Object.entries(best.values).map(([path, v]) => `${path} ${quantity(path, v)}`).join(", ");
+  show(byId("design-facts"), el("div", { id: "design-best", class: "best-so-far", role: "status" },
+    el("p", {}, el("strong", {}, "Best so far"), ` ${values}`, best.peak === null ? "" : `: peak ${length(best.peak)}`, `, after ${best.evaluations} evaluation${best.evaluations === 1 ? "" : "s"}`),
+    el("p", { class: "note" }, el("span", { class: best.verified ? "chip good" : "chip" }, best.verified ? "verified" : "to be verified"),
+      best.feasible ? null : el("span", { class: "chip bad" }, "breaks a limit"), ` ${best.words}`)));
+}
 
 // The largest row of each criterion that is minimised besides peak and band.
 function furtherOf({ rows }) {

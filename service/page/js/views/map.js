@@ -16,7 +16,8 @@ export function startMap() {
   plot = heatmap(byId("map-figure"), {
     label: "Map of amplitude over frequency and load",
     file: "map",
-    height: 380,
+    height: 420,
+    link: "frequency",
     onPick: ({ x, y }) => {
       load({ [last.parameter_path]: y }, request);
       tell("point", x);
@@ -73,7 +74,7 @@ function draw() {
   if (ridge?.optimum?.plateau) rows.push(["as good", ridge.optimum.plateau.map((v) => quantity(path, v)).join(" to ")], ["chosen by", ridge.optimum.chosen_by]);
   rows.push(...warnings((ridge?.peaks_open ?? []).map((reason) => ({ known: false, reason }))));
   show(byId("map-facts"), shadeStrip(plot.range), facts(rows),
-    el("p", { class: "note" }, "A click loads the load there and shows its loops at that frequency."));
+    el("p", { class: "note" }, "A click loads the load there and shows its loops at that frequency. A rectangle drawn with the mouse is zoomed, Shift and a drag move the map."));
 }
 
 // The ridge with gaps where another peak becomes the highest.

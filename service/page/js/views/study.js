@@ -2,7 +2,7 @@
 
 import { state, write } from "../base/address.js";
 import { byId, say } from "../base/dom.js";
-import { on } from "../base/events.js";
+import { on, tell } from "../base/events.js";
 import { run } from "../network/jobs.js";
 import { asked, current, variable } from "../scene/scenes.js";
 import { readSettings } from "../scene/settings.js";
@@ -15,11 +15,13 @@ import { campbellBody } from "./studies.js";
 const PRIORITY = { sweep: 6, design: 5, map: 4, accuracy: 3, campbell: 3, pareto: 2 };
 const NOT_ASKED_AGAIN = ["kind", "fresh", "priority", "scene", "set", "harmonics", "project", "name", "notes", "tags"];
 const OF_THE_FORM = ["variables", "parameter", "from", "to", "steps", "frequencies", "ridge", "speeds_rpm", "orders", "band_hz"];
+const OWN_FORM = ["modes", "identify"];
 let studies = 0;
 
 export function startStudy() {
   byId("study").addEventListener("click", study);
   on("renew", renew);
+  on("front-wanted", front);
   on("scene-left", () => {
     studies += 1;
     say("study-status", "");
@@ -65,11 +67,24 @@ function study() {
   });
 }
 
+// The front again, with the amplitude at which the band is measured and as many designs as are asked for.
+function front({ limit, points }) {
+  if (!readSettings()) return;
+  const before = computedFor("pareto");
+  const several = Object.keys(before?.variables ?? {}).length > 1 ? { variables: before.variables } : {};
+  begin("pareto", { ...bodyOf("pareto"), ...several, ...ofTheFront({ limit, points }) });
+}
+
+const ofTheFront = ({ limit, points }) => Object.fromEntries(Object.entries({ limit, points }).filter(([, value]) => value !== undefined && value !== null));
+
 // One study again, with what is set now. A problem that the form can not say, as of several variables or with limits, stays as it was.
 function renew(kind) {
-  if (!readSettings()) return;
+  // Kinds with a form of their own are asked again as it stands.
+  if (OWN_FORM.includes(kind)) return tell("resubmit", kind);
+  if (!readSettings()) return undefined;
   const before = computedFor(kind);
   const own = Object.fromEntries(Object.entries(before ?? {}).filter(([key]) => !NOT_ASKED_AGAIN.includes(key)));
   const further = Object.keys(before?.variables ?? {}).length > 1 || (kind === "design" && Object.keys(own).some((key) => !OF_THE_FORM.includes(key) || key === "speeds_rpm"));
-  begin(kind, further ? { ...asked(), ...own } : bodyOf(kind));
+  begin(kind, further ? { ...asked(), ...own } : { ...bodyOf(kind), ...(kind === "pareto" ? ofTheFront(own) : {}) });
+  return undefined;
 }

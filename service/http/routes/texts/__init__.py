@@ -1,0 +1,1 @@
+"""Routes that read the texts of files: scenes, measured data."""

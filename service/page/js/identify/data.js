@@ -1,0 +1,111 @@
+// Measured data of the page: files that were chosen, dropped or pasted, read by the service against the scene.
+
+import { Problem, patiently, post } from "../network/api.js";
+import { byId, el, show } from "../base/dom.js";
+import { number, quantity } from "../base/format.js";
+import { asked } from "../scene/scenes.js";
+
+const PASTED = "pasted";
+let files = [];
+let changed = () => undefined;
+
+export function startData(onChange) {
+  changed = onChange;
+  const input = byId("identify-file");
+  byId("identify-open").addEventListener("click", () => input.click());
+  input.addEventListener("change", async () => {
+    await takeFiles([...input.files]);
+    input.value = "";
+  });
+  byId("identify-paste-take").addEventListener("click", () => {
+    const text = byId("identify-paste").value;
+    if (text.trim()) take([{ name: fresh(PASTED), text }]).then((good) => { if (good) byId("identify-paste").value = ""; });
+  });
+  const card = byId("identify-data");
+  const over = (event, on) => {
+    if (!event.dataTransfer?.types.includes("Files")) return;
+    event.preventDefault();
+    card.classList.toggle("dropping", on);
+  };
+  card.addEventListener("dragover", (event) => over(event, true));
+  card.addEventListener("dragleave", (event) => over(event, false));
+  card.addEventListener("drop", (event) => {
+    over(event, false);
+    takeFiles([...event.dataTransfer.files]);
+  });
+}
+
+// A name that no other file has.
+function fresh(name) {
+  for (let i = 1; ; i += 1) {
+    const wanted = i === 1 ? name : `${name} ${i}`;
+    if (!files.some((file) => file.name === wanted)) return wanted;
+  }
+}
+
+const takeFiles = async (list) => take(await Promise.all(list.map(async (file) => ({ name: file.name, text: await file.text() }))));
+
+// Reads texts against the scene; what is wrong is said with file, line and column. Whether nothing is.
+async function take(texts) {
+  if (!texts.length) return true;
+  const { scene, set } = asked();
+  let answer;
+  try {
+    answer = await patiently(() => post("/v1/measurements/read", { scene, set, files: texts }));
+  } catch (error) {
+    if (!(error instanceof Problem)) throw error;
+    issues((error.errors?.length ? error.errors : [error]).map((each) => ({ file: texts.map(({ name }) => name).join(", "), line: null, column: null, detail: each.detail ?? each.message })));
+    return false;
+  }
+  for (const one of answer.files) {
+    const text = texts.find(({ name }) => name === one.name)?.text;
+    files = [...files.filter(({ name }) => name !== one.name), { ...one, text }];
+  }
+  issues(answer.issues);
+  changed();
+  return answer.issues.length === 0;
+}
+
+// Without the place, which has columns of its own.
+const short = ({ file, line, column, detail }) => {
+  const where = `${file}${line === null ? "" : `, line ${line}`}${column === null ? "" : `, \`${column}\``}: `;
+  return detail.startsWith(where) ? detail.slice(where.length) : detail;
+};
+
+function issues(list) {
+  show(byId("identify-data-wrong"), list.length ? el("table", {},
+    el("caption", { class: "unseen" }, "What is wrong with the data"),
+    el("thead", {}, el("tr", {}, ["file", "line", "column", "what is wrong"].map((head) => el("th", { scope: "col" }, head)))),
+    el("tbody", {}, list.map((issue) => el("tr", {}, [issue.file, issue.line ?? "–", issue.column ?? "–", short(issue)].map((cell) => el("td", { class: "bad" }, String(cell))))))) : []);
+}
+
+export function clearData() {
+  files = [];
+  issues([]);
+  list();
+}
+
+export const tables = () => files.map(({ table }) => table);
+
+export const sourceNames = () => files.map(({ name }) => name);
+
+export const runsRead = () => files.flatMap(({ runs }) => runs);
+
+// The data of a job that was asked before, as tables without their text.
+export function fillData(data) {
+  if (JSON.stringify(data) === JSON.stringify(tables())) return;
+  files = data.map((table, i) => ({ name: `data ${i + 1}`, table, runs: [] }));
+  list();
+}
+
+const conditionsOf = (runs) => [...new Set(runs.map(({ conditions }) => Object.entries(conditions).map(([path, v]) => `${path} ${quantity(path, v)}`).join(", ")))];
+
+export function list() {
+  show(byId("identify-files"), files.length ? el("ul", { class: "plain" }, files.map((file) => el("li", { class: "measured" },
+    el("strong", {}, file.name),
+    el("span", { class: "note" }, file.runs.length ? ` ${file.runs.length} run${file.runs.length > 1 ? "s" : ""}, ${number(file.runs.reduce((sum, run) => sum + run.points, 0))} points: ${conditionsOf(file.runs).join(" · ") || "as the scene has it"}` : " of the run that is shown"),
+    el("button", { type: "button", "aria-label": `Remove ${file.name}`, onclick: () => {
+      files = files.filter((each) => each !== file);
+      changed();
+    } }, "×")))) : el("p", { class: "note" }, "No data yet."));
+}

@@ -1,0 +1,140 @@
+"""The views of nonlinear modes and of identification, and the front against an amplitude of one's own."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import httpx
+import numpy as np
+import pytest
+from page_site import Site, Watch
+from page_visits import visit
+
+import solver
+
+expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
+
+if TYPE_CHECKING:
+    from playwright.sync_api import BrowserContext, Page
+
+Profile = tuple["BrowserContext", Watch]
+
+
+def request_of(site: Site, page: Page, kind: str) -> dict:
+    job = re.search(rf"[?&]{kind}=([0-9a-f-]{{36}})", page.url)
+    assert job is not None
+    return httpx.get(f"{site.url}/v1/jobs/{job[1]}").json()["request"]
+
+
+def abscissa(page: Page, figure: str) -> list[str]:
+    return page.locator(f"#{figure} svg.chart text.soft[text-anchor=middle]").all_text_contents()
+
+
+def test_a_mode_is_followed_and_its_points_are_looked_at(profile: Profile, site: Site) -> None:
+    context, watch = profile
+    page = visit(context, site, "?scene=two-dof&tab=modes&harmonics=3")
+    expect(page.locator("#modes-frequency")).to_contain_text("press “Follow the mode”")
+    page.fill("#modes-from", "400")
+    page.fill("#modes-to", "300")
+    watch.allowed += ("422",)
+    page.click("#modes-submit")
+    expect(page.locator("#modes-to-wrong")).to_contain_text("must be above")
+    page.fill("#modes-from", "0.1")
+    page.fill("#modes-exact_peaks", "3")
+    page.click("#modes-submit")
+    mode = solver.nonlinear_mode(solver.load_scene("two-dof"), 1, amplitudes=(0.1, 300.0), harmonics=3)
+    expect(page.locator("#modes-status")).to_contain_text(f"{mode.amplitude.size} points in")
+    expect(page.locator("#modes-facts")).to_contain_text(f"{mode.frequency_hz[0]:.6g} Hz")
+    expect(page.locator("#modes-facts")).to_contain_text(f"ζ {100 * mode.damping_ratio.max():.4g} %")
+    expect(page.locator("#modes-performance path.f2")).to_have_count(4)  # three responses, and their name
+    best = page.locator("#modes-loop path.series").get_attribute("d")
+    page.locator("#modes-frequency svg.chart").focus()
+    page.keyboard.press("Home")
+    page.keyboard.press("Enter")
+    expect(page.locator("#modes-loop-more")).to_contain_text("At a = 0.1 √kg m")
+    assert page.locator("#modes-loop path.series").get_attribute("d") != best
+    whole = abscissa(page, "modes-damping")
+    page.keyboard.press("+")
+    assert abscissa(page, "modes-damping") == abscissa(page, "modes-frequency") != whole
+    page.keyboard.press("0")
+    page.locator("#modes-tools").get_by_role("button", name="Pin this curve").click()
+    expect(page.locator("#modes-frequency path[stroke-dasharray='2 4']")).to_have_count(2)  # curve and name
+    with page.expect_download() as saved:
+        page.locator("#modes-tools").get_by_role("button", name="Curve as CSV").click()
+    rows = saved.value.path().read_text().splitlines()
+    assert len(rows) == mode.amplitude.size + 1
+    assert float(rows[-1].split(",")[2]) == pytest.approx(mode.frequency_hz[-1], rel=1e-9)
+    page.reload()
+    expect(page.locator("#modes-status")).to_contain_text("points in")
+    expect(page.locator("#modes-to")).to_have_value("300")
+
+
+def test_parameters_are_identified_from_what_is_pasted(profile: Profile, site: Site) -> None:
+    truth = solver.load_scene("two-dof").with_values({"damper.mu": 0.27})
+    lines = ["damper.N0,frequency [Hz],amplitude [mm]"]
+    for load in (100, 50):
+        for hertz in np.linspace(0.9, 1.4, 9):
+            found = solver.solve(truth.with_values({"damper.N0": load}), frequency_hz=hertz, harmonics=3)
+            size = 1e3 * abs(complex(found.observed[1], -found.observed[2]))
+            lines.append(f"{load},{hertz:.4f},{size:.9g}")
+    page = visit(profile[0], site, "?scene=two-dof&tab=identify&harmonics=3")
+    page.locator("#identify summary", has_text="Paste a table").click()
+    page.fill("#identify-paste", "\n".join([*lines[:4], lines[4].replace("100,", "100,x"), *lines[5:]]))
+    page.click("#identify-paste-take")
+    wrong = page.locator("#identify-data-wrong tbody td")
+    expect(wrong).to_have_count(4)
+    assert wrong.all_text_contents()[:3] == ["pasted", "5", "frequency [Hz]"]
+    page.fill("#identify-paste", "\n".join(lines))
+    page.click("#identify-paste-take")
+    expect(page.locator("#identify-files")).to_contain_text("2 runs, 18 points")
+    page.get_by_role("button", name="Remove parameter 1").click()
+    expect(page.locator("#identify-unknowns [name=path]")).to_have_value("damper.mu")
+    page.click("#identify-submit")
+    expect(page.locator("#identify-status")).to_contain_text("The data tell every unknown.")
+    row = page.get_by_role("region", name="Estimates").locator("tbody tr").first
+    assert float(row.locator("td").nth(1).text_content() or "nan") == pytest.approx(0.27, rel=1e-3)
+    expect(page.locator("#identify-response path.series")).to_have_count(2)
+    page.click("#identify-robust-design")
+    expect(page.locator("#tab-design")).to_have_attribute("aria-selected", "true")
+    expect(page.locator("#problem-given")).to_contain_text("identified: damper.mu")
+    assert "damper.mu:0.2" in page.url, "the values are set too"
+
+
+@pytest.mark.long
+def test_what_was_identified_becomes_a_robust_design(profile: Profile, site: Site) -> None:
+    truth = solver.load_scene("two-dof")
+    frequencies = np.linspace(0.9, 1.4, 9)
+    sizes = [
+        abs(complex(*solver.solve(truth, frequency_hz=f, harmonics=3).observed[1:3])) for f in frequencies
+    ]
+    text = "\n".join(
+        ["frequency,amplitude", *(f"{f:.4f},{a:.9g}" for f, a in zip(frequencies, sizes, strict=True))]
+    )
+    page = visit(profile[0], site, "?scene=two-dof&tab=identify&harmonics=3")
+    file = {"name": "rig.csv", "mimeType": "text/csv", "buffer": text.encode()}
+    page.set_input_files("#identify-file", [file])
+    expect(page.locator("#identify-files")).to_contain_text("rig.csv")
+    page.click("#identify-submit")
+    expect(page.locator("#identify-result")).to_be_visible()
+    page.click("#identify-robust-design")
+    page.click("#problem-submit")
+    expect(page.locator("#design-facts")).to_contain_text("Nominal and robust design", timeout=90_000)
+    assert set(request_of(site, page, "design")["uncertain"]) >= {"centre", "covariance"}
+
+
+def test_a_front_against_an_amplitude_of_ones_own(profile: Profile, site: Site) -> None:
+    page = visit(profile[0], site, "?scene=two-dof&tab=map&harmonics=1")
+    page.fill("#front-limit", "2200")
+    page.select_option("#front-unit", "mm")
+    page.fill("#front-points", "3")
+    page.click("#front-form button")
+    expect(page.locator("#front-status")).to_contain_text("3 designs", timeout=60_000)
+    expect(page.locator("#front-status")).to_contain_text("the band at 2.2 m")
+    request = request_of(site, page, "pareto")
+    assert (request["limit"], request["points"]) == (2.2, 3)
+    page.locator("#front-facts button").nth(1).click()
+    expect(page.locator("#front-facts button").nth(1)).to_have_text("Loaded")
+    expect(page.locator("#front-facts button").nth(1)).to_be_focused()
+    assert "set=damper.N0:" in page.url
+    expect(page.locator("#front-figure path.f2")).to_have_count(1)
