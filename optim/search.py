@@ -24,6 +24,7 @@ from optim.problem.typed import Limit, with_limits
 from optim.results.basins import SAME_PLACE, Basin
 from optim.results.best_so_far import OnBest
 from optim.results.design import DesignResult, DesignStatus
+from solver.results.default_bar import shows_progress
 from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene
 
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 SAME_HEIGHT = 1e-9  # relative, of two levels that are one
 
 
+@shows_progress("design")
 @keywords(DesignKeys, without=ROBUST)
 def design(
     scene: Scene,

@@ -25,6 +25,7 @@ from optim.problem.numbers import is_number
 from optim.problem.variables import Real
 from solver.balance.balance import check_harmonics
 from solver.balance.parameter import resolve
+from solver.results.default_bar import shows_progress
 from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene
 
@@ -34,6 +35,7 @@ _MOST_SCATTER = 0.25  # relative noise; responses of rigs repeat to a few per ce
 _MISFIT = 2.0  # reduced χ² of given noise above which the model does not describe the data
 
 
+@shows_progress("identify")
 def identify(
     scene: Scene,
     data: Sequence[Given],

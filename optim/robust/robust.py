@@ -37,6 +37,7 @@ from optim.robust.result import RobustResult, RobustStatus, Side
 from optim.robust.search import RobustSearch
 from optim.robust.worst_case import Aspect, UnknownScenarioError
 from optim.search import solve_problem
+from solver.results.default_bar import shows_progress
 from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene
 
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
 SAMPLES = {Aim.WORST_CASE: 32, Aim.MEAN: 64, Aim.QUANTILE: 64}
 
 
+@shows_progress("robust design")
 @keywords(DesignKeys)
 def robust_design(
     scene: Scene,

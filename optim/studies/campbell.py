@@ -26,6 +26,7 @@ from solver.linear.assembly import linear_model
 from solver.linear.model import LinearModel
 from solver.matrices.normal_modes import undamped_modes
 from solver.response.time_history import mass, matrices
+from solver.results.default_bar import shows_progress
 from solver.results.watch import OnProgress, ShouldStop, part_of
 from solver.scene.cyclic.annulus import written_out
 from solver.scene.scene import Scene
@@ -33,6 +34,7 @@ from solver.scene.scene import Scene
 _MOST_ORDERS = 100
 
 
+@shows_progress("campbell")
 def campbell_diagram(
     scene: Scene,
     *,

@@ -33,6 +33,7 @@ from optim.problem.variables import Variable, scaled, unscaled
 from optim.results.design import DesignResult, DesignStatus
 from optim.search import judge, local_search_of, solve_problem
 from optim.studies.pareto_result import ParetoPoint, ParetoResult, ParetoStatus, front_of
+from solver.results.default_bar import shows_progress
 from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene
 
@@ -47,6 +48,7 @@ MOST_EVALUATIONS = 5000
 FOUND = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK, DesignStatus.LOCAL)
 
 
+@shows_progress("front")
 @keywords(FrontKeys)
 def pareto_front(
     scene: Scene,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated
@@ -54,6 +55,8 @@ def command() -> LazyGroup:
 def run(arguments: Sequence[str] | None) -> int:
     """Run the command and return its exit status."""
     given = sys.argv[1:] if arguments is None else arguments
+    # The commands have bars of their own, and what a service computes is watched elsewhere.
+    os.environ.setdefault("STICKSLIP_PROGRESS", "0")
     try:
         command()(args=join_words(given), prog_name="stickslip")
     except REPORTED as error:

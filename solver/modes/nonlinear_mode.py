@@ -22,6 +22,7 @@ from solver.modes.equations import Equations
 from solver.modes.records import collect
 from solver.modes.results import NonlinearMode, NonlinearModeStatus
 from solver.modes.start import LinearMode, begin, equilibrium, linear_modes, slopes_at_rest
+from solver.results.default_bar import shows_progress
 from solver.scene.cyclic.annulus import written_out
 
 if TYPE_CHECKING:
@@ -51,6 +52,7 @@ class ModeProblem:
     turns: bool
 
 
+@shows_progress("nonlinear mode")
 def nonlinear_mode(
     scene: Scene, mode: int = 1, *, amplitudes: Sequence[float], nodal_diameter: int | None = None,
     harmonics: int = 11, errors: bool = True, most_points: int = MOST_POINTS,

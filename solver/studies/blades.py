@@ -21,6 +21,7 @@ from solver.jit.trig_polynomial import grid_size, grid_tables, on_grid
 from solver.response.solution import Solution
 from solver.response.time_history import motion
 from solver.results.base import Drawn
+from solver.results.default_bar import shows_progress
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import annulus, sectors_needed
 from solver.scene.parts import LumpedStructure, Mass, MatricesStructure
@@ -115,6 +116,7 @@ class BladePeaks(Drawn):
         return self.largest / tuned.largest
 
 
+@shows_progress("blades")
 def blade_peaks(
     scene: Scene,
     start: float | None = None,

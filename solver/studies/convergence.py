@@ -23,6 +23,7 @@ from solver.continuation.extrema.error_estimate import truncation_error
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.results.base import Drawn
+from solver.results.default_bar import shows_progress
 from solver.results.told import Piece
 from solver.results.views import Views
 from solver.results.watch import ShouldStop
@@ -157,6 +158,7 @@ def _ways(scene: Scene, harmonics: Sequence[int], samples: Sequence[int]) -> lis
     return [(h, 0) for h in harmonics] + sampled
 
 
+@shows_progress("accuracy")
 def accuracy_study(
     scene: Scene,
     frequency_hz: float | None = None,

@@ -19,6 +19,7 @@ from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.results.base import Drawn
+from solver.results.default_bar import shows_progress
 from solver.results.told import Piece
 from solver.results.views import Views
 from solver.results.watch import OnProgress, ShouldStop, part_of
@@ -177,6 +178,7 @@ def _until_stopped(
     return disks, branches, False
 
 
+@shows_progress("mistuning")
 def mistuning_study(
     scene: Scene,
     *,

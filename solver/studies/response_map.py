@@ -18,6 +18,7 @@ from solver.continuation.parameter_scale import Scale, scale_of
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.results.base import Drawn
+from solver.results.default_bar import shows_progress
 from solver.results.views import Views
 from solver.results.watch import part_of
 from solver.scene.scene import Scene
@@ -104,6 +105,7 @@ class ResponseMap(Drawn):
         }
 
 
+@shows_progress("map")
 def response_map(
     scene: Scene,
     parameter: str,

@@ -45,7 +45,7 @@ EVERY_KEY: dict[str, Any] = {
     "method": "minimax",
     "basins": 3,
 }
-NO_KEYS = {"scene", "on_progress", "should_stop"}
+NO_KEYS = {"limits", "on_best", "scene", "on_progress", "should_stop"}
 
 
 class Shipped:

@@ -32,6 +32,7 @@ from solver.continuation.segment import Stretch, go_on_from, joined, rows_of, st
 from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real, to_full
+from solver.results.default_bar import shows_progress
 from solver.scene.bodies.paths import SPEED
 from solver.scene.parameter_paths import FREQUENCY
 from solver.scene.scene import Scene
@@ -44,6 +45,7 @@ _MOST_FOLLOWED = 500  # points of a look at a resonance beside the branch
 _LOST = (BranchStatus.STALLED, BranchStatus.TURNED_BACK, BranchStatus.TOO_MANY_POINTS)
 
 
+@shows_progress("sweep")
 def sweep(
     scene: Scene,
     parameter: str = "frequency",

@@ -25,6 +25,7 @@ from solver.response.stability.floquet import Stability, stability
 from solver.response.stability.residual_forces import AmplitudeRange, amplitude_range
 from solver.response.stability.search import Search
 from solver.response.stability.uniqueness import Uniqueness, uniqueness
+from solver.results.default_bar import shows_progress
 from solver.results.told import Piece
 from solver.scene.scene import Scene
 
@@ -138,6 +139,7 @@ class AllSolutions(Piece):
         }
 
 
+@shows_progress("all solutions")
 def solve_all(
     scene: Scene,
     *,

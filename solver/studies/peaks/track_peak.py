@@ -17,6 +17,7 @@ from solver.balance.simplifications import Effects
 from solver.continuation.extrema.kernels.peak_continuation import DHEIGHT, HEIGHT, OMEGA, Z
 from solver.errors import SettingError
 from solver.jit.fourier import Real
+from solver.results.default_bar import shows_progress
 from solver.scene.scene import Scene
 from solver.studies.peaks.minimise_peak import COMPETES, MOST_LOOKS, THOROUGHLY, halted, prove
 from solver.studies.peaks.proof import EQUAL
@@ -29,6 +30,7 @@ BESIDE = 5e-3  # share of the range: how far beyond the end of a line is looked
 NARROW = 1.0 / 64.0  # share of the range: sweeps closer than that are not halved further
 
 
+@shows_progress("peaks")
 def track_peak(
     scene: Scene,
     parameter: str,
