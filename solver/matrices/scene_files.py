@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import coo_array
 
 from solver.errors import Issue, SceneError
-from solver.matrices.file_units import UNITS
+from solver.matrices.file_units import METRES, UNITS
 from solver.matrices.files import MatrixFileError, read_labelled, read_modes
 from solver.matrices.labels import label
 from solver.matrices.load_set import PART, MatrixSet, in_si, put_together
@@ -46,9 +46,10 @@ def with_files(raw: Mapping[str, object], folder: Path) -> dict[str, object]:
             tables["modes"] = read_modes(folder / tables["modes"])
     except MatrixFileError as error:
         raise SceneError([_issue("modes", f"`modes`: {error}")]) from error
+    metres = METRES.get(str(tables.get(IN_UNITS, "SI")), 1.0)
     found = read_matrices(tables, folder)
     if tables.get("sectors") is not None:
-        return {**raw, "structure": as_sector(tables, found, folder, _orders(raw))}
+        return {**raw, "structure": as_sector(tables, found, folder, _orders(raw), metres)}
     if isinstance(tables.get("modes"), Modes):
         tables = _rows_in_use(tables)
     return {**raw, "structure": as_kept(tables, found.matrices)[0]}
