@@ -19,7 +19,7 @@ from solver.matrices.sectors.elimination import Elimination, Group, elimination
 from solver.matrices.sectors.outline import SectorOutline, outline_of
 from solver.matrices.sectors.pairing import PAIR_BY, Pairs, groups, paired
 from solver.matrices.sectors.parts import WHOLE
-from solver.matrices.sectors.reduction import diameters_met, read_sector, reduce_sector
+from solver.matrices.sectors.reduction import ReducedSector, diameters_met, read_sector, reduce_sector
 from solver.matrices.validation import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix
 
@@ -140,10 +140,10 @@ def _nodes(key: str, given: object, deck: Deck | None) -> list[int] | None:
     return list(dict.fromkeys(deck.sets[given.upper()]))
 
 
-def as_sector(
+def sector_kept(
     tables: dict[str, Any], found: MatrixSet, folder: Path, orders: list[int], metres: float = 1.0
-) -> dict[str, Any]:
-    """The tables of a sector with its files read, as the scene keeps them.
+) -> tuple[dict[str, Any], ReducedSector | None]:
+    """The tables of a sector with its files read, as the scene keeps them, and the reduction if there is one.
 
     Parameters
     ----------
@@ -164,24 +164,24 @@ def as_sector(
         or not 1 <= sectors <= MOST_SECTORS
         or not isinstance(joined, dict)
     ):
-        return tables  # what is wrong is said with the rest of the scene
+        return tables, None  # what is wrong is said with the rest of the scene
     if isinstance(tables.get("diameters"), str):
         if found.matrices:
             message = f"`diameters` stands in place of {', '.join(found.matrices)}: remove one or the other"
             raise SceneError([Issue(pointer="/structure/diameters", message=message)])
-        return _from_file(tables, folder)
+        return _from_file(tables, folder), None
     if not found.matrices:
-        return tables
+        return tables, None
     _check_sizes(found)
     check_part_sizes(found)
     kept = {key: value for key, value in joined.items() if key not in FILE_KEYS}
     if "low_rows" in joined or "high_rows" in joined:
-        return {**tables, **_dense(found), "cyclic": kept}
+        return {**tables, **_dense(found), "cyclic": kept}, None
     ends = boundaries(joined, found, sectors, folder, metres)
     drawn = {} if ends.outline is None else {"outline": ends.outline}
     keep = joined.get("keep_modes")
     if keep is None:
-        return {**tables, **_dense(found), **drawn, "cyclic": {**kept, **ends.table()}}
+        return {**tables, **_dense(found), **drawn, "cyclic": {**kept, **ends.table()}}, None
     if isinstance(keep, bool) or not isinstance(keep, int) or not 0 <= keep <= MOST_DOFS:
         raise _refusal(
             "keep_modes", f"`keep_modes` must be a whole number from 0 to {MOST_DOFS}, got {keep!r}"
@@ -205,7 +205,7 @@ def as_sector(
         "reduction": {
             "dofs": matrices["M"].shape[0], "modes": reduced.modes, "highest_hz": reduced.highest_hz,
         },
-    }  # fmt: skip
+    }, reduced  # fmt: skip
 
 
 def parts_to_reduce(mistuning: object, found: MatrixSet) -> dict[str, Any]:
