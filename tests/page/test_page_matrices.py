@@ -85,7 +85,7 @@ def check_sector(page: Page, site: Site) -> None:
         page.get_by_role("button", name=f"Leave out {name.replace('_', ' ')}").click()
     page.set_input_files("#matrix-input", [file(name, data) for name, data in sector_files().items()])
     expect(page.locator("#matrix-report")).to_contain_text("HIGH (3 nodes), LOW (3 nodes)")
-    page.get_by_label("Sectors").fill(str(SECTORS))
+    page.locator("#matrix-sectors").fill(str(SECTORS))
     expect(page.locator("#matrix-low")).to_have_value("LOW")
     page.get_by_label("Engine order of the force").fill("2")
     page.get_by_label("Modes kept of the rest").fill("3")

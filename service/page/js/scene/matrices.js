@@ -58,7 +58,7 @@ function build(panel) {
   show(panel,
     el("fieldset", { id: "matrix-drop" }, el("legend", {}, "Files of matrices"),
       el("div", { class: "row" }, el("button", { type: "button", id: "matrix-choose", onclick: () => input.click() }, "Choose files…"), input,
-        el("span", {}, "or drop them here: mass and stiffness, and damping and the names of the rows if there are such.")),
+        el("span", {}, "or drop them here: mass and stiffness; damping, the names of the rows, and the deck of a sector of a disk if there are such.")),
       el("details", {}, el("summary", {}, "Which files?"), el("div", { id: "matrix-formats" })),
       list, el("p", { id: "matrix-status", class: "status", role: "status" }), el("div", { id: "matrix-report" })),
     rest, el("div", { class: "row" }, el("button", { type: "button", onclick: close }, "Close")));
