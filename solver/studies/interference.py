@@ -23,6 +23,7 @@ import numpy as np
 from solver.errors import SettingError
 from solver.linear.extra_terms import depends_on_speed
 from solver.modes.nonlinear_mode import at_nodal_diameter
+from solver.results.default_bar import shows_progress
 from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import MatricesStructure, Scene
 from solver.studies.interference_result import (
@@ -42,6 +43,7 @@ _ALIKE = 1e-9  # relative difference of the frequencies of both directions that 
 _REVOLUTIONS = 60.0
 
 
+@shows_progress("interference")
 def interference_diagram(
     scene: Scene,
     *,
