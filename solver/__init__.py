@@ -53,6 +53,15 @@ if TYPE_CHECKING:
     from solver.studies.blades import BladeAmplitudes, BladePeaks, blade_amplitudes, blade_peaks, mistuned
     from solver.studies.convergence import AccuracyRow, AccuracyStudy, accuracy_study
     from solver.studies.instant import start_of
+    from solver.studies.interference import interference_diagram
+    from solver.studies.interference_result import (
+        DiameterFrequencies,
+        FoldedOrder,
+        Interference,
+        InterferenceDiagram,
+        InterferenceStatus,
+        Wave,
+    )
     from solver.studies.mistuning import MistunedDisk, MistuningStatus, MistuningStudy, mistuning_study
     from solver.studies.peaks.minimise_peak import least_peak
     from solver.studies.peaks.results import Basin, LeastPeak, PeakTrack, TrackStatus
@@ -85,6 +94,10 @@ _HOME = {
     "uniqueness": "response.stability.uniqueness", "Switched": "response.stability.switching",
     "switch_branches": "response.stability.switching",
     "BladePeaks": "studies.blades", "blade_peaks": "studies.blades",
+    "interference_diagram": "studies.interference", "DiameterFrequencies": "studies.interference_result",
+    "FoldedOrder": "studies.interference_result", "Interference": "studies.interference_result",
+    "InterferenceDiagram": "studies.interference_result",
+    "InterferenceStatus": "studies.interference_result", "Wave": "studies.interference_result",
     "MistunedDisk": "studies.mistuning", "MistuningStatus": "studies.mistuning",
     "MistuningStudy": "studies.mistuning", "mistuning_study": "studies.mistuning",
     "BladeAmplitudes": "studies.blades", "blade_amplitudes": "studies.blades", "mistuned": "studies.blades",
@@ -133,13 +146,18 @@ __all__ = [
     "ContactWear",
     "ContinuationSettings",
     "Dataset",
+    "DiameterFrequencies",
     "EdgeHessian",
     "Effects",
     "ErrorEstimate",
     "Extent",
+    "FoldedOrder",
     "FoundSolution",
     "Gradient",
     "Growth",
+    "Interference",
+    "InterferenceDiagram",
+    "InterferenceStatus",
     "Issue",
     "LawParameter",
     "LeastPeak",
@@ -187,6 +205,7 @@ __all__ = [
     "TrackStatus",
     "Uniqueness",
     "Variable",
+    "Wave",
     "WearSensitivity",
     "WorstWear",
     "accuracy_study",
@@ -199,6 +218,7 @@ __all__ = [
     "branch_stability",
     "contact_wear",
     "hysteresis_loop",
+    "interference_diagram",
     "joined",
     "least_peak",
     "limit_cycles",

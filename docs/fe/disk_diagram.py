@@ -9,8 +9,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import solver
-from optim.problem.cases import with_engine_order
-from optim.studies.campbell import natural_frequencies
 
 HIGHEST = 900.0  # Hz
 
@@ -19,13 +17,16 @@ def main() -> None:
     """Draw."""
     disk = solver.load_scene("disk.toml")
     half = disk.structure.sector_count // 2
+    diagram = solver.interference_diagram(disk, families=6)
     figure = Figure(figsize=(6.0, 4.2), layout="constrained")
     axes = figure.subplots()
-    for stuck, colour, words in ((False, "tab:blue", "shrouds free"), (True, "tab:red", "shrouds stuck")):
-        found = [natural_frequencies(with_engine_order(disk, n), stuck=stuck) for n in range(half + 1)]
-        families = np.array([each[:6] for each in found])
+    for key, colour, words in (
+        ("open_hz", "tab:blue", "shrouds free"), ("stuck_hz", "tab:red", "shrouds stuck"),
+    ):  # fmt: skip
+        families = np.array([getattr(point, key) for point in diagram.points])
         families[families > HIGHEST] = np.nan
-        axes.plot(families, "o-", color=colour, markersize=3.5, linewidth=0.9)
+        diameters = [point.diameter for point in diagram.points]
+        axes.plot(diameters, families, "o-", color=colour, markersize=3.5, linewidth=0.9)
         axes.plot([], [], "o-", color=colour, markersize=3.5, linewidth=0.9, label=words)
     order = disk.engine_order
     low, high = disk.observe.band

@@ -38,6 +38,10 @@ COMMANDS = (
         "campbell", "commands.campbell.campbell",
         "Find the speeds at which orders of the running speed meet resonances.",
     ),
+    Entry(
+        "interference", "commands.interference.interference",
+        "Draw natural frequencies over the nodal diameter, with the engine orders that meet them.",
+    ),
     Entry("modes", "commands.modes.modes", "Follow a mode's frequency and damping over its amplitude."),
     Entry("mistuning", "commands.mistuning.mistuning", "Study disks whose blades are not quite equal."),
     Entry(

@@ -48,6 +48,21 @@ class MassAnswer(Answer):
     kg: float
 
 
+class SetAnswer(Answer):
+    """A set of nodes of a deck."""
+
+    name: str
+    nodes: int = Field(description="How many.")
+
+
+class KeptDiameterAnswer(Answer):
+    """What a reduced sector is at one nodal diameter."""
+
+    diameter: int
+    frequencies_hz: list[float] = Field(description="The lowest, without contacts.")
+    good_to_hz: float = Field(description="Frequencies up to here are estimated exact to 0.1 %.")
+
+
 class KeptAnswer(Answer):
     """What a reduction kept, and what it is good for."""
 
@@ -56,7 +71,8 @@ class KeptAnswer(Answer):
     good_to_hz: float = Field(description="Frequencies up to here are estimated exact to 0.1 %.")
     held_hz: list[float]
     static_residual: float
-    mass_carried: dict[str, float]
+    mass_carried: dict[str, float] = Field(description="By DOF; empty of a sector.")
+    diameters: list[KeptDiameterAnswer] | None = Field(default=None, description="Of a sector.")
 
 
 class MatricesAnswer(Answer):
@@ -72,6 +88,10 @@ class MatricesAnswer(Answer):
     frequencies_hz: list[float] | None = Field(
         description="The lowest, null before a large model is reduced."
     )
+    sets: list[SetAnswer] | None = Field(
+        default=None, description="Of the deck, for the boundaries of a sector."
+    )
+    diameters: list[int] | None = Field(default=None, description="Nodal diameters of a reduced sector.")
     notes: list[str] = Field(description="What looks wrong, and what to do.")
     reduction: KeptAnswer | None = None
     scene: dict[str, Any] | None = Field(default=None, description="Null until DOFs are named.")

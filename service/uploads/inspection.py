@@ -171,7 +171,7 @@ def _describe(name: str) -> list[dict[str, Any]]:
     from solver.matrices.files import array_names, read_matrix, read_modes
     from solver.matrices.load_set import labels_of
     from solver.matrices.readers import registry
-    from solver.matrices.sectors.reduction import read_diameters
+    from solver.matrices.sectors.reduction import read_sector
 
     file = Path(name)
     if file.suffix.lower() in registry.label_suffixes():
@@ -180,7 +180,7 @@ def _describe(name: str) -> list[dict[str, Any]]:
         return [{"name": "nodes", "rows": _nodes_of(file), "columns": 3, "entries": None}]
     names = array_names(file)
     if "diameters" in names:
-        reduced, _ = read_diameters(file)
+        reduced, _, _ = read_sector(file)
         count = len(reduced.diameters)
         return [{"name": "diameters", "rows": reduced.size, "columns": count, "entries": None}]
     if "modes" in names:

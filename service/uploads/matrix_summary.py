@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from solver.matrices.load_set import MatrixSet
     from solver.matrices.reduction.craig_bampton import Reduced
+    from solver.matrices.sectors.reduction import ReducedSector
     from solver.scene.scene import Scene
 
 MOST_LABELS = 400
@@ -41,31 +42,41 @@ def look(asked: Mapping[str, Any]) -> dict[str, Any]:
     SceneError
         With pointers into the scene that is asked for.
     """
+    from service.uploads.sector_summary import deck_of, reduced_sector
     from solver.matrices.files import read_modes
     from solver.matrices.load_set import MatrixSet
 
     structure = dict(asked["structure"] or _sorted(asked["files"]))
-    report: dict[str, Any] = {"structure": structure, "notes": []}
+    report: dict[str, Any] = {"structure": structure, "notes": [], "sets": deck_of(structure)}
     given = MatrixSet(matrices={})
     tables = {"kind": "matrices", **structure}
     if "modes" in structure:
         modes = read_modes(Path(structure["modes"]))
         report |= {"rows": modes.size, "modes": int(modes.omega2.size), "matrices": []}
         omega2: NDArray[Any] | None = modes.omega2
+    elif isinstance(structure.get("diameters"), str):
+        report |= reduced_sector(structure)
+        omega2 = None
     else:
         given = _read(tables)
         size = int(given.matrices["K"].shape[0])
         report |= {"rows": size, "matrices": _entries(given), "held": given.held, **_named(given)}
-        omega2 = None if structure.get("dofs") else _lowest(given, report["notes"])
+        # A sector alone is not held where it meets the others: its own frequencies say nothing.
+        known = structure.get("dofs") or structure.get("sectors") is not None
+        omega2 = None if known else _lowest(given, report["notes"])
     if structure.get("dofs"):
         return report | _scene(asked, structure, tables, given, report["notes"])
     return report | _frequencies(given, omega2, report["notes"])
 
 
 def _sorted(files: list[str]) -> dict[str, Any]:
+    from service.uploads.sector_summary import told_apart
     from solver.matrices.file_roles import sorted_files
 
-    return {role: path.name for role, path in sorted_files([Path(name) for name in files]).items()}
+    rest, found = told_apart(files)
+    if "diameters" in found:
+        return found
+    return found | {role: path.name for role, path in sorted_files([Path(name) for name in rest]).items()}
 
 
 def _read(tables: dict[str, Any]) -> MatrixSet:
@@ -157,10 +168,19 @@ def _scene(
 ) -> dict[str, Any]:
     """The scene that is asked for, on the structure as it is kept."""
     from service.uploads.scene_defaults import started
+    from service.uploads.sector_summary import kept_answer
     from solver.matrices.diagnostics import refuse
     from solver.matrices.scene_files import as_kept, with_files
     from solver.matrices.values import MOST_DOFS, as_json
 
+    if structure.get("sectors") is not None:
+        kept, disk = _sector(asked, structure, given)
+        answer = None if disk is None else kept_answer(disk)
+        scene, omega2 = started(asked, kept)
+        return {
+            "scene": {**scene.to_dict(), "structure": {"kind": "matrices", **structure}},
+            "resolved": as_json(kept), "reduction": answer, **_frequencies(given, omega2, notes),
+        }  # fmt: skip
     reduced = None
     if given.matrices:
         size = int(given.matrices["K"].shape[0])
@@ -181,6 +201,23 @@ def _scene(
         "reduction": None if reduced is None else _kept(reduced, scene),
         **_frequencies(given, omega2, notes),
     }
+
+
+def _sector(
+    asked: Mapping[str, Any], structure: dict[str, Any], given: MatrixSet
+) -> tuple[dict[str, Any], ReducedSector | None]:
+    """The structure of a sector as its scene keeps it, refused if its matrices are none."""
+    from service.uploads.sector_summary import kept_sector
+    from solver.matrices.diagnostics import refuse
+
+    if not given.matrices:
+        return kept_sector(structure, asked["excitation"], None)
+    cyclic = structure.get("cyclic")
+    try:
+        refuse(given, reduced=isinstance(cyclic, Mapping) and "keep_modes" in cyclic)
+    except ValueError as error:
+        raise SceneError([_about(str(error))]) from error
+    return kept_sector(structure, asked["excitation"], int(given.matrices["K"].shape[0]))
 
 
 _TOO_LARGE = (

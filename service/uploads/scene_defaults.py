@@ -27,7 +27,8 @@ def started(asked: Mapping[str, Any], structure: Mapping[str, Any]) -> tuple[Sce
 
     Parameters
     ----------
-    asked : `name`, `contacts` (each `name` and `between`), `excitation` and `observe` (each its `dof`).
+    asked : `name`, `contacts` (each `name` and `between`), `excitation` and `observe` (each its `dof`). Of
+        a sector the excitation also has its `engine_order`, whose nodal diameter counts.
     structure : its tables, files read.
 
     Raises
@@ -35,43 +36,43 @@ def started(asked: Mapping[str, Any], structure: Mapping[str, Any]) -> tuple[Sce
     SceneError
         Lists everything that is wrong.
     """
-    from solver.linear.matrix_model import matrix_model
+    from solver.linear.assembly import linear_model
     from solver.matrices.diagnostics import rigid_body_modes
     from solver.matrices.normal_modes import undamped_modes
     from solver.scene.parts import MatricesStructure
     from solver.scene.scene import Scene
 
+    given = {key: value for key, value in asked["excitation"].items() if value is not None}
     raw = {
         "name": asked["name"], "structure": dict(structure),
         "contacts": [{**contact, "kt": 1.0, "mu": FRICTION, "N0": 1.0} for contact in asked["contacts"]],
-        "excitation": {**asked["excitation"], "amplitude": FORCE},
+        "excitation": {**given, "amplitude": FORCE},
         "observe": {**asked["observe"], "band": [1.0, 2.0]},
     }  # fmt: skip
     scene = Scene.from_dict(raw)
     if not isinstance(scene.structure, MatricesStructure):
         raise TypeError(f"the structure is of kind {scene.structure.kind}")
-    model = matrix_model(scene.structure)
-    found = undamped_modes(model.K, model.M)
+    model = linear_model(scene)
+    at = model.diameters(np.ones(1, np.int64))
+    K, _, M = (each[0] for each in model.plain(at))
+    found = undamped_modes(K, M)
     order = np.argsort(found.omega2)
     omega2 = found.omega2[order]
-    moving = {
-        **dict(zip(scene.structure.dofs, model.shapes @ found.psi[:, order], strict=True)),
-        "ground": 0.0,
-    }
+    moving = dict(zip(scene.structure.dofs, model.shapes @ found.psi[:, order], strict=True))
     rigid = rigid_body_modes(omega2)
     first = min(rigid, omega2.size - 1)
-    at = math.sqrt(max(float(omega2[first]), 0.0)) / (2.0 * math.pi) or 1.0
-    pushed = abs(float(moving[asked["excitation"]["dof"]][first]))
-    rubbing = [moving[a] - moving[b] for a, b in (contact["between"] for contact in asked["contacts"])]
+    hz = math.sqrt(max(float(omega2[first]), 0.0)) / (2.0 * math.pi) or 1.0
+    pushed = float(abs(moving[given["dof"]][first]))
+    rubbing = model.ports_at(at)[0] @ found.psi[:, order]
     contacts = [
         {
-            **contact, "kt": _digits(1.0 / float(np.sum(moved[rigid:] ** 2) or 1.0)), "mu": FRICTION,
-            "N0": _digits(_load(pushed, abs(float(moved[first])))),
+            **contact, "kt": _digits(1.0 / float(np.sum(np.abs(moved[rigid:]) ** 2) or 1.0)), "mu": FRICTION,
+            "N0": _digits(_load(pushed, float(abs(moved[first])))),
         }
         for contact, moved in zip(asked["contacts"], rubbing, strict=True)
     ]  # fmt: skip
     raw |= {"contacts": contacts}
-    raw["observe"] = {**asked["observe"], "band": [_digits(0.5 * at, 6), _digits(2.0 * at, 6)]}
+    raw["observe"] = {**asked["observe"], "band": [_digits(0.5 * hz, 6), _digits(2.0 * hz, 6)]}
     return Scene.from_dict(raw), omega2
 
 

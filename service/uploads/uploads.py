@@ -143,7 +143,6 @@ class Uploads:
                 (f"{at}",): self._row("uploads", at, id, caller) for at, id in enumerate(asked["uploads"])
             }
         else:
-            _refuse_sector(structure)
             rows = self._rows(structure, caller)
         names = file_names(rows)
         uploaded = {names[place]: f"{UPLOAD}{row.id}" for place, row in rows.items()}
@@ -159,7 +158,7 @@ class Uploads:
                 raise InvalidRequestError([Issue(pointer=where, message=error.detail)]) from error
         resolved = found.pop("resolved", None)
         if resolved is not None:
-            self._remember(_digest(structure, rows, []), resolved)
+            self._remember(_digest(structure, rows, _engine_orders(asked)), resolved)
         for tables in (found, found.get("scene") or {}):
             if "structure" in tables:
                 named = named_files(tables["structure"])
@@ -267,17 +266,6 @@ def _engine_orders(body: Mapping[str, object]) -> list[int]:
     rows = given if isinstance(given, list) else [given]
     found = {row.get("engine_order", 0) for row in rows if isinstance(row, Mapping)}
     return sorted(order for order in found if type(order) is int)
-
-
-def _refuse_sector(structure: Mapping[str, Any]) -> None:
-    """Refuse to begin a scene of a sector: of it, matrices alone are looked at."""
-    if structure.get("sectors") is None or not (structure.get("dofs") or "diameters" in structure):
-        return
-    message = (
-        "`sectors`: a scene of a sector is not begun here: hand in the scene itself, with `cyclic` and "
-        "uploads; leave out `dofs` and `diameters` to look at the matrices"
-    )
-    raise InvalidRequestError([_issue(("sectors",), message)])
 
 
 def _is_reference(value: object) -> bool:

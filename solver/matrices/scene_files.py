@@ -10,12 +10,13 @@ import numpy as np
 from scipy.sparse import coo_array
 
 from solver.errors import Issue, SceneError
-from solver.matrices.file_units import UNITS
+from solver.matrices.file_units import METRES, UNITS
 from solver.matrices.files import MatrixFileError, read_labelled, read_modes
 from solver.matrices.labels import label
 from solver.matrices.load_set import PART, MatrixSet, in_si, put_together
 from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton
-from solver.matrices.sectors.loading import as_sector
+from solver.matrices.sectors.loading import sector_kept
+from solver.matrices.sectors.reduction import ReducedSector
 from solver.matrices.validation import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix, Modes
 
@@ -46,12 +47,32 @@ def with_files(raw: Mapping[str, object], folder: Path) -> dict[str, object]:
             tables["modes"] = read_modes(folder / tables["modes"])
     except MatrixFileError as error:
         raise SceneError([_issue("modes", f"`modes`: {error}")]) from error
-    found = read_matrices(tables, folder)
     if tables.get("sectors") is not None:
-        return {**raw, "structure": as_sector(tables, found, folder, _orders(raw))}
+        return {**raw, "structure": sector_with_files(tables, folder, _orders(raw))[0]}
+    found = read_matrices(tables, folder)
     if isinstance(tables.get("modes"), Modes):
         tables = _rows_in_use(tables)
     return {**raw, "structure": as_kept(tables, found.matrices)[0]}
+
+
+def sector_with_files(
+    tables: dict[str, Any], folder: Path, orders: list[int]
+) -> tuple[dict[str, Any], ReducedSector | None]:
+    """The tables of a sector with their files read, and the reduction if they ask for one.
+
+    Parameters
+    ----------
+    orders : engine orders of the excitation, which say at which nodal diameters it is reduced.
+
+    Raises
+    ------
+    SceneError
+        A file that cannot be used, boundaries that do not match; the pointer is that of the key.
+    """
+    given = dict(tables)
+    metres = METRES.get(str(given.get(IN_UNITS, "SI")), 1.0)
+    found = read_matrices(given, folder)
+    return sector_kept(given, found, folder, orders, metres)
 
 
 def _orders(raw: Mapping[str, object]) -> list[int]:

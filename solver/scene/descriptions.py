@@ -56,6 +56,7 @@ WORDS: dict[str, dict[str, str]] = {
         "mass_proportional_damping": "C gains this many times M [1/s].",
         "reduction": "What a model was before it was reduced; set when it is.",
         "diameters": "A reduced sector, in place of M, K and C: the file that `stickslip import` wrote.",
+        "outline": "What is drawn of the mesh of a sector; set where a deck or a reduced sector tells it.",
         "cyclic": "How the matrices of a sector are joined to the next one.",
     },
     "CyclicBoundary": {

@@ -152,6 +152,7 @@ def _matrices(properties: dict[str, Any]) -> None:
     properties["units"] = {"enum": list(UNITS), "default": "SI"}
     properties["mapping"] = {"type": "string"}
     properties["diameters"] |= {"anyOf": [{"type": "string"}, {"type": "object"}]}
+    properties["outline"] |= {"type": "object"}
     for key, text in WORDS["MatricesStructure"].items():
         properties[key]["description"] = text
 

@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 from solver.contacts.fields import NonNegative, Part, Vector
 from solver.matrices.sectors.diameters import DiameterMatrices
+from solver.matrices.sectors.outline import SectorOutline
 from solver.matrices.sectors.parts import PartMatrices
 from solver.matrices.sectors.validation import check_sector
 from solver.matrices.validation import DofTable, antisymmetric, check_matrices, symmetric
@@ -94,6 +95,8 @@ class MatricesStructure(Part):
         Stiffness [N/m] of parts of the sector, such as its blade, which `mistuning` may name; part of K.
     mistuning : Mistuning or None
         Factors that make the sectors differ.
+    outline : SectorOutline or None
+        Of the mesh of the sector, to be drawn; set where a deck or a reduced sector tells it.
     """
 
     kind: Literal["matrices"]
@@ -115,6 +118,7 @@ class MatricesStructure(Part):
     diameters: DiameterMatrices | None = None
     parts: PartMatrices | None = None
     mistuning: Mistuning | None = None
+    outline: SectorOutline | None = None
 
     @property
     def n_coordinates(self) -> int:
@@ -155,7 +159,7 @@ class MatricesStructure(Part):
 
     @model_validator(mode="after")
     def _fit(self) -> MatricesStructure:
-        of_a_disk = ("cyclic", "diameters", "parts", "mistuning")
+        of_a_disk = ("cyclic", "diameters", "parts", "mistuning", "outline")
         key = next((key for key in of_a_disk if getattr(self, key) is not None), None)
         if self.sectors is None and key is not None:
             raise ValueError(

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from solver.response.stability.floquet import Stability
     from solver.studies.blades import BladeAmplitudes, BladePeaks
     from solver.studies.convergence import AccuracyStudy
+    from solver.studies.interference_result import InterferenceDiagram
     from solver.studies.mistuning import MistuningStudy
     from solver.studies.peaks.results import LeastPeak, PeakTrack
     from solver.studies.plan import Plan
@@ -145,6 +146,27 @@ def of_mistuning(study: MistuningStudy) -> Summary:
     pairs.append(("time", units.duration(study.seconds)))
     title = f"{len(study.disks)} disks of {study.scene}, spread {study.spread:g} of {', '.join(study.of)}"
     return made(title, pairs, study.status.value)
+
+
+def of_interference(found: InterferenceDiagram) -> Summary:
+    """The range of the lowest families, and how many orders meet a family."""
+    pairs: Pairs = []
+    for i in range(min((len(point.open_hz) for point in found.points), default=0)):
+        free, stuck = ([values[i] for values in each] for each in (
+            [point.open_hz for point in found.points], [point.stuck_hz for point in found.points],
+        ))  # fmt: skip
+        pairs.append(
+            (f"family {i + 1}", f"{min(free):.5g} to {max(free):.5g} Hz open, "
+                                f"{min(stuck):.5g} to {max(stuck):.5g} Hz stuck")
+        )  # fmt: skip
+    if found.speed_rpm is not None:
+        inside = sum(one.inside for one in found.crossings)
+        met = f"{inside} within the range of a family, {len(found.crossings) - inside} near one"
+        pairs.append((f"orders at {found.speed_rpm:g} rpm", met))
+    if found.missing:
+        pairs.append(("missing", f"nodal diameters {', '.join(map(str, found.missing))}"))
+    pairs.append(("time", units.duration(found.seconds)))
+    return made(f"{found.scene.name}, {found.sectors} sectors", pairs, found.status.value)
 
 
 def of_mode(found: NonlinearMode) -> Summary:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from solver.scene.scene import Scene
     from solver.studies.blades import BladeAmplitudes, BladePeaks
     from solver.studies.convergence import AccuracyStudy
+    from solver.studies.interference_result import InterferenceDiagram
     from solver.studies.mistuning import MistuningStudy
     from solver.studies.peaks.results import LeastPeak, PeakTrack
     from solver.studies.plan import Plan
@@ -260,6 +261,33 @@ def mistuning_dataset(study: MistuningStudy) -> Dataset:
         tuned_peak=study.tuned.largest, scene_name=study.scene,
     )  # fmt: skip
     return Dataset(kind="mistuning", rows=("disk",), variables=variables, attributes=notes)
+
+
+def interference_dataset(found: InterferenceDiagram) -> Dataset:
+    """A family at a nodal diameter a row; beside them the orders with what they meet."""
+    rows = [
+        (point.diameter, point.wave.value, i, free, stuck)
+        for point in found.points
+        for i, (free, stuck) in enumerate(zip(point.open_hz, point.stuck_hz, strict=True), start=1)
+    ]
+    variables = {
+        "diameter": column("mode", np.array([row[0] for row in rows], np.int64), "", "nodal diameter"),
+        "wave": column("mode", np.array([row[1] for row in rows], np.str_), "", "direction"),
+        "family": column("mode", np.array([row[2] for row in rows], np.int64), "", "1 the lowest"),
+        "open": column("mode", np.array([row[3] for row in rows], np.float64), "Hz", "all contacts open"),
+        "stuck": column("mode", np.array([row[4] for row in rows], np.float64), "Hz", "all contacts stuck"),
+    }
+    for name, field, unit in (
+        ("order", "order", ""), ("order_diameter", "diameter", ""), ("order_family", "family", ""),
+        ("order_frequency", "frequency_hz", "Hz"), ("order_margin", "margin", ""),
+    ):  # fmt: skip
+        kind = np.float64 if unit or field == "margin" else np.int64
+        values = np.array([getattr(one, field) for one in found.crossings], kind)
+        variables[name] = column("crossing", values, unit)
+    notes = attributes(
+        found.status.value, found.scene, sectors=found.sectors, speed_rpm=found.speed_rpm, within=found.within
+    )
+    return Dataset(kind="interference", rows=("mode",), variables=variables, attributes=notes)
 
 
 def mode_dataset(found: NonlinearMode) -> Dataset:

@@ -13,9 +13,9 @@ from scene_cases import bladed_disk, mixed_disk, oscillator, two_dof
 import solver
 from optim import CampbellStatus, DesignError, campbell_diagram, forbidden_hz
 from optim.problem.cases import with_engine_order
-from optim.studies.campbell import natural_frequencies
 from service.cli import main
 from solver.errors import SettingError
+from solver.studies.natural_frequencies import natural_frequencies
 
 DISK = [
     "campbell",

@@ -61,7 +61,9 @@ def test_a_newcomer_presses_one_button_and_takes_results_away(profile: Profile, 
     page = visit(context, site)
     expect(page.locator("#structure-figure svg[role=img] circle.mass").first).to_be_visible()
     assert page.locator("#structure-figure circle.mass").count() >= 32
+    check_interference(page)
     page.select_option("#scene", "two-dof")
+    expect(page.locator("#interference")).to_be_hidden()
     expect(page.locator("#plan-facts")).to_contain_text("condensation")
     page.click("#study")
     expect(page.locator("#study-status")).to_have_text("Everything is there.", timeout=LONG_MS)
@@ -89,6 +91,26 @@ def test_a_newcomer_presses_one_button_and_takes_results_away(profile: Profile, 
     page.locator("#library-form").get_by_role("button", name="Show").click()
     expect(page.locator("#library-status")).not_to_contain_text(f"{fewer} sweeps")
     assert page.locator("#library-table tbody tr").count() >= fewer + 5, "sweeps on the way are folded away"
+
+
+def check_interference(page: Page) -> None:
+    """The diagram of the disk at a speed that is typed in, by keyboard: orders, what they meet, in words."""
+    page.fill("#interference-speed", "-3")
+    page.press("#interference-speed", "Enter")
+    expect(page.locator("#interference-wrong")).to_contain_text("must be a number above 0")
+    page.fill("#interference-speed", "11000")
+    page.press("#interference-speed", "Enter")
+    rows = page.locator("#interference-facts tbody").first.locator("tr")
+    expect(rows.first).to_have_text("33 forward5501513.86 – 781.25meets")
+    found = solver.interference_diagram(solver.load_scene("bladed-disk"), speed_rpm=11e3, up_to_hz=1800.0)
+    assert rows.count() == len(found.crossings)
+    figure = page.locator("#interference-figure svg.chart")
+    expect(figure.locator("g[clip-path] > path.f2")).not_to_have_count(0)
+    figure.press("End")
+    figure.press("ArrowLeft")
+    expect(page.locator("#interference-figure .chart-read")).to_contain_text(
+        "order 6: nodal diameter 2 backward"
+    )
 
 
 def check_files(page: Page) -> None:

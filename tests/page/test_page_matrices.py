@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from typing import TYPE_CHECKING
 
 import httpx
@@ -13,6 +14,7 @@ from matrix_cases import beam
 from page_matrices import ANSYS, K, M, file, place
 from page_site import Site, Watch
 from page_visits import visit
+from sector_files import SECTORS, sector_files
 
 from solver.matrices.readers.registry import readers
 
@@ -20,7 +22,7 @@ expect = pytest.importorskip("playwright.sync_api", reason="the package playwrig
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
 
 if TYPE_CHECKING:
-    from playwright.sync_api import BrowserContext
+    from playwright.sync_api import BrowserContext, Page
 
 Profile = tuple["BrowserContext", Watch]
 DROP = """([selector, name, text]) => {
@@ -73,6 +75,34 @@ def test_matrices_become_a_scene_and_its_response(profile: Profile, site: Site) 
     page.click("#edit-scene")
     expect(page.locator("#field-structure-damping-ratio")).to_have_value("0.001")
     assert page.locator("#editor input").count() < 40, "nobody edits a matrix number by number"
+    check_sector(page, site)
+
+
+def check_sector(page: Page, site: Site) -> None:
+    """One sector of a disk: its deck tells the sets and the places, and the sector is drawn."""
+    page.get_by_role("button", name="Matrices…").click()
+    for name in ("blade_K.matrix", "blade_M.matrix", "blade_K.mapping"):
+        page.get_by_role("button", name=f"Leave out {name.replace('_', ' ')}").click()
+    page.set_input_files("#matrix-input", [file(name, data) for name, data in sector_files().items()])
+    expect(page.locator("#matrix-report")).to_contain_text("HIGH (3 nodes), LOW (3 nodes)")
+    page.locator("#matrix-sectors").fill(str(SECTORS))
+    expect(page.locator("#matrix-low")).to_have_value("LOW")
+    page.get_by_label("Engine order of the force").fill("2")
+    page.get_by_label("Modes kept of the rest").fill("3")
+    page.get_by_label("Name of the scene").fill("ring")
+    page.locator("#matrix-low").fill("SIDE")
+    place(page, "6.UZ", "4.UX")
+    expect(page.locator("#matrix-low-message")).to_contain_text("there is no set 'SIDE'")
+    page.locator("#matrix-low").fill("LOW")
+    page.get_by_role("button", name="Make the scene").click()
+    expect(page.locator("#matrix-report")).to_contain_text("3 modes at each of 2 nodal diameters")
+    page.get_by_role("button", name="Use this scene").click()
+    expect(page.locator("#scene")).to_have_value("ring")
+    drawn = page.locator("#structure-figure svg[role=img]")
+    expect(drawn).to_have_attribute("aria-label", re.compile("one of 6 sectors.*3 nodes on the boundary"))
+    expect(page.locator("#structure-figure .note")).to_contain_text("no elements that can be drawn")
+    stored = httpx.get(f"{site.url}/v1/scenes/ring").json()["scene"]["structure"]
+    assert len(stored["outline"]["points"]) == 9
 
 
 @pytest.mark.long

@@ -48,6 +48,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "march": {"scene": "two-dof", "frequency_hz": 1.2},
     "accuracy": {"scene": "two-dof", "harmonics": [1, 3], "samples": [64], "repeats": 1},
     "campbell": {"scene": "two-dof", "speeds_rpm": [[60, 100]], "harmonics": 3},
+    "interference": {"scene": "bladed-disk", "speed_rpm": 11000},
     "mistuning": {
         "scene": DISK, "of": ["tip_middle", "tip"], "spread": 0.03, "samples": 6, "seed": 5, "from": 700,
         "to": 850, "harmonics": 1,

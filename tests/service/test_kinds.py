@@ -297,6 +297,7 @@ def test_the_description_is_whole(shipped: httpx.Client) -> None:
         "march",
         "accuracy",
         "campbell",
+        "interference",
         "mistuning",
         "identify",
         "modes",

@@ -25,6 +25,7 @@ BODIES: dict[str, tuple[str, Mapping[str, Any]]] = {
     "map without a ridge": ("map", {**OVER, "steps": 3, "frequencies": 5, "ridge": False}),
     "peaks": ("peaks", {**OVER, "checks": 1}),
     "campbell": ("campbell", {**TWO, "speeds_rpm": [[60, 100]]}),
+    "interference": ("interference", {"scene": "bladed-disk", "speed_rpm": 11000}),
     "mistuning": (
         "mistuning",
         {"scene": "bladed-disk", "of": "tip", "samples": 2, "harmonics": 1, "from": 740, "to": 780},

@@ -23,6 +23,7 @@ from service.cli import main
 from service.errors import InvalidRequestError, NotFoundError
 from service.uploads import inspection
 from service.uploads.uploads import file_names
+from solver.linear.assembly import linear_model
 from solver.matrices.scene_files import with_files
 from solver.scene.scene import Scene
 
@@ -289,14 +290,102 @@ def test_a_bad_reduced_sector_is_refused(case: str, tmp_path: Path, monkeypatch:
         from_files(tmp_path, {"diameters": "reduced.npz", "dofs": {"rim": 0, "hub": 1}})
 
 
-def test_a_scene_of_a_sector_is_not_begun(shipped: ServedClient, ids: dict[str, str]) -> None:
-    structure = {key: item for key, item in uploaded(ids).items() if key in NAMES}
-    found = shipped.post("/v1/matrices", json={"structure": {**structure, "sectors": SECTORS}})
-    assert found.status_code == 200, found.text
-    assert found.json()["rows"] == 27
-    asked = {"structure": {**uploaded(ids), "sectors": SECTORS}, "excitation": {"dof": "rim"}}
-    problem = is_problem(shipped.post("/v1/matrices", json=asked), 422)
-    assert problem["errors"][0]["pointer"] == "/structure/sectors"
+ASKED: dict[str, Any] = {
+    "name": "ring", "contacts": [{"name": "rub", "between": ["rim", "ground"]}],
+    "excitation": {"dof": "hub", "engine_order": 2}, "observe": {"dof": "rim"},
+}  # fmt: skip
+
+
+def begun(client: httpx.Client, structure: dict[str, Any], **asked: Any) -> dict[str, Any]:
+    answer = client.post("/v1/matrices", json={"structure": structure, **asked})
+    assert answer.status_code == 200, answer.text
+    found: dict[str, Any] = answer.json()
+    return found
+
+
+@pytest.mark.parametrize("keep", [{}, {"keep_modes": 3}], ids=["whole", "reduced"])
+def test_a_scene_of_a_sector_begins_as_import_begins_it(
+    shipped: ServedClient, ids: dict[str, str], folder: Path, keep: dict[str, int],
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(folder)
+    uploads = [name.removeprefix("upload:") for name in ids.values()]
+    seen = shipped.post("/v1/matrices", json={"uploads": uploads}).json()
+    assert seen["rows"] == 27
+    assert {one["name"]: one["nodes"] for one in seen["sets"]} == {"ALL": 9, "HIGH": 3, "LOW": 3}
+    assert seen["structure"] == {key: ids[name] for key, name in NAMES.items()} | {
+        "cyclic": {"nodes": ids["ring.inp"]}
+    }
+    cyclic = {**seen["structure"]["cyclic"], "low": "LOW", "high": "HIGH", **keep}
+    structure = {**seen["structure"], "sectors": SECTORS, "dofs": DOFS, "cyclic": cyclic}
+    structure["damping_ratio"] = 0.01
+    made = begun(shipped, structure, **ASKED)
+    assert made["scene"]["structure"] == {"kind": "matrices", **structure}
+    words = ["import", "ring.mas", "ring.sti", "--mapping", "ring.dof", "--nodes", "ring.inp", "--low", "LOW",
+             "--high", "HIGH", "--sectors", str(SECTORS), "--engine-order", "2", "--excite", "hub",
+             "--observe", "rim", "--json", "--out", "ring.toml"]  # fmt: skip
+    words += [text for name, label in DOFS.items() for text in ("--dof", f"{name}={label}")]
+    assert main([*words, *(["--reduce", "--modes", "3"] if keep else [])]) == 0
+    here = solver.load_scene("ring.toml")
+    assert made["scene"]["observe"]["band"] == pytest.approx(list(here.observe.band), rel=1e-5)
+    raw: dict[str, Any] = here.to_dict() | {"contacts": made["scene"]["contacts"]}
+    raw["structure"] = {**raw["structure"], "damping_ratio": 0.01}
+    at = {"frequency_hz": made["frequencies_hz"][0], "harmonics": 3}
+    wanted = solver.solve(Scene.from_dict(raw), **at)
+    job = shipped.post("/v1/jobs", json={"kind": "solve", "scene": made["scene"], **at}, headers=WAIT).json()
+    assert job["status"] == "successful", job
+    assert job["result"]["max_abs"] == pytest.approx(wanted.max_abs, rel=1e-9)
+    if keep:
+        assert [row["diameter"] for row in made["reduction"]["diameters"]] == [0, 2]
+        told = json.loads(capsys.readouterr().out)["reduction"]
+        for key in ("modes", "highest_hz", "good_to_hz"):
+            assert made["reduction"][key] == pytest.approx(told[key], rel=1e-9)
+        reduced = sent(shipped, "ring-reduced.npz", Path("ring-reduced.npz").read_bytes())
+        alone = {"uploads": [reduced.removeprefix("upload:")]}
+        again = shipped.post("/v1/matrices", json=alone).json()
+        assert again["structure"] == {"diameters": reduced}
+        assert (again["diameters"], again["rows"]) == ([0, 2], 5)
+        small = {"diameters": reduced, "sectors": SECTORS, "dofs": {"rim": 0, "hub": 1}}
+        third = begun(shipped, {**small, "damping_ratio": 0.01}, **ASKED)
+        assert third["frequencies_hz"] == pytest.approx(made["frequencies_hz"], rel=1e-9)
+        assert third["scene"]["contacts"] == made["scene"]["contacts"]
+
+
+def test_the_values_to_begin_with_are_those_of_the_wave(shipped: ServedClient, ids: dict[str, str]) -> None:
+    """A contact with the next sector is as stiff as the disk is where it acts, at this nodal diameter."""
+    for order in (1, 3):
+        structure = {**uploaded(ids), "sectors": SECTORS}
+        contact = {"name": "rub", "between": ["rim", "rim@next"]}
+        asked = ASKED | {"contacts": [contact], "excitation": {"dof": "hub", "engine_order": order}}
+        made = begun(shipped, structure, **asked)
+        model = linear_model(Scene.from_dict(shipped.service.uploads.resolved(made["scene"])))
+        K, _, M = (each[0] for each in model.plain(np.array([order])))
+        omega2 = np.sort(np.linalg.eigvals(np.linalg.solve(M, K)).real)
+        assert made["frequencies_hz"][0] == pytest.approx(np.sqrt(omega2[0]) / (2.0 * np.pi), rel=1e-6)
+        row = model.shapes[model.dofs.index("rim")] * (1.0 - np.exp(2j * np.pi * order / SECTORS))
+        compliance = (row @ np.linalg.solve(K, row.conj())).real
+        assert made["scene"]["contacts"][0]["kt"] == pytest.approx(1.0 / compliance, rel=6e-3)
+
+
+def test_what_does_not_fit_a_sector_that_begins_is_named(shipped: ServedClient, ids: dict[str, str]) -> None:
+    whole = {**uploaded(ids), "sectors": SECTORS}
+    wrong: list[tuple[dict[str, Any], str, str]] = [
+        ({"cyclic": {**whole["cyclic"], "low": "SIDE"}}, "/structure/cyclic/low", "there is no set 'SIDE'"),
+        ({"keep_modes": 3}, "/structure/keep_modes", "stands in `cyclic`"),
+        ({"sectors": 0}, "/structure/sectors", "must be a whole number from 1 to 10000, got 0"),
+        ({"dofs": {"rim": "8.UZ", "hub": "4.UX"}}, "/structure", "high boundary"),
+    ]
+    for change, pointer, words in wrong:
+        asked = {"structure": {**whole, **change}, **ASKED}
+        issue = is_problem(shipped.post("/v1/matrices", json=asked), 422)["errors"][0]
+        assert issue["pointer"].startswith(pointer), issue
+        assert words in issue["detail"]
+    asked = {"structure": whole, **ASKED, "excitation": {"dof": "hub"}}
+    assert shipped.post("/v1/matrices", json=asked).json()["scene"]["excitation"]["engine_order"] == 1
+    asked["structure"] = {key: item for key, item in whole.items() if key not in ("sectors", "cyclic")}
+    asked["excitation"] = {"dof": "hub", "engine_order": 2}
+    issue = is_problem(shipped.post("/v1/matrices", json=asked), 422)["errors"][0]
+    assert issue["pointer"].startswith("/excitation")
 
 
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")

@@ -130,7 +130,7 @@ def import_scene(
         if reduce_once:
             path = reduced_file(reduced, target) if of is None else sector_file(reduced, target)
             undo.callback(path.unlink, missing_ok=True)
-            written = _reduced(given, table, modes, up_to, path, of, tuple(found.parts))
+            written = _reduced(given, table, modes, up_to, path, of, found)
             structure = written.table(target)
             table = dict(written.rows)
         else:
@@ -177,14 +177,17 @@ class _Parts:
 
 def _reduced(
     given: MatrixSet | None, table: dict[str, int | str], modes: int | None, up_to: float | None, path: Path,
-    of: Disk | None, mistune: tuple[str, ...] = (),
+    of: Disk | None, found: Sources,
 ) -> Written | WrittenSector:  # fmt: skip
     if given is None:
         raise InputError("`--reduce` is for matrices; modes are reduced already")
     if of is not None and up_to is not None:
         raise InputError("`--up-to` is not for a sector: give --modes N, as many at each nodal diameter")
     if of is not None:
-        return reduce_disk(given, rows_of(table, given), modes, of, path, mistune)
+        from solver.matrices.file_units import METRES
+
+        mistune, metres = tuple(found.parts), METRES[found.units]
+        return reduce_disk(given, rows_of(table, given), modes, of, path, mistune, metres)
     return reduce(given, rows_of(table, given), modes, up_to, path)
 
 

@@ -182,13 +182,14 @@ class WrittenSector:
 
 def reduce_disk(
     given: MatrixSet, rows: Mapping[str, int], modes: int | None, of: Disk, path: Path,
-    mistune: Sequence[str] = (),
+    mistune: Sequence[str] = (), metres: float = 1.0,
 ) -> WrittenSector:  # fmt: skip
     """Reduce a sector at every nodal diameter its engine order meets, and write it to `path`.
 
     Parameters
     ----------
     mistune : names of what mistuning may scale; then all nodal diameters are built.
+    metres : the unit of the deck.
     """
     from scipy.sparse import csr_array
 
@@ -205,7 +206,8 @@ def reduce_disk(
     matrices: dict[str, Any] = {key: csr_array(matrix) for key, matrix in given.matrices.items()}
     try:
         refuse(given, reduced=True)
-        gone = checked_boundaries(given, of).elimination(matrices["M"].shape[0], of.sectors)
+        ends = checked_boundaries(given, of, metres)
+        gone = ends.elimination(matrices["M"].shape[0], of.sectors)
         check_part_sizes(given)
         parts = parts_to_reduce({"of": mistune}, given)
         met = range(of.sectors // 2 + 1) if parts else diameters_met([of.engine_order], of.sectors)
@@ -215,14 +217,14 @@ def reduce_disk(
     except ValueError as error:
         raise InputError(f"`--reduce`: {error}") from error
     with whole(path) as temporary:
-        write_diameters(temporary, reduced)
+        write_diameters(temporary, reduced, ends.outline)
     return WrittenSector(
         path=path, reduced=reduced, full=int(matrices["M"].shape[0]), axis=of.axis, sectors=of.sectors,
         pairs_of_rows=int(gone.here.shape[0] - gone.kept.size), seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
 
-def checked_boundaries(given: MatrixSet, of: Disk) -> Any:
+def checked_boundaries(given: MatrixSet, of: Disk, metres: float = 1.0) -> Any:
     """The boundaries of the sector as rows.
 
     Raises
@@ -236,7 +238,7 @@ def checked_boundaries(given: MatrixSet, of: Disk) -> Any:
     # Relative to the current folder: the scene's own may be another one.
     table = of.joined(Path.cwd() / "scene.toml")
     try:
-        return boundaries(table, given, of.sectors, Path.cwd())
+        return boundaries(table, given, of.sectors, Path.cwd(), metres)
     except SceneError as error:
         issue = error.issues[0]
         raise InputError(

@@ -17,6 +17,7 @@ router = APIRouter(prefix="/v1/matrices", tags=["uploads"])
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_@-]{1,100}$")]
 UploadId = Annotated[str, Field(max_length=100)]
+_USUAL_ORDER = 1  # as `stickslip import` has it
 _EXAMPLE: dict[str, Any] = {
     "name": "beam",
     "structure": {"M": "upload:1", "K": "upload:2", "dofs": {"tip": "8.UY", "middle": 3}, "keep_modes": 10},
@@ -45,6 +46,12 @@ class OfDof(_Strict):
     dof: Name
 
 
+class ForceOnDof(OfDof):
+    """A DOF by its name, and of a sector the wave of the force."""
+
+    engine_order: Annotated[int, Field(strict=True, ge=0, le=10_000)] | None = None
+
+
 class MatricesRequest(_Strict):
     """Uploads to be looked at, or a structure that refers to them; with its DOFs, the scene it begins.
 
@@ -53,16 +60,18 @@ class MatricesRequest(_Strict):
     uploads : list of str
         Ids, in place of `structure`: which is M, K, C or names the rows is found out.
     structure : dict or None
-        Tables of a structure of kind `matrices`.
+        Tables of a structure of kind `matrices`; of a sector with `sectors` and `cyclic`.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra={"examples": [_EXAMPLE]})
 
-    uploads: list[UploadId] = Field(default=[], max_length=4, description="Ids, in place of `structure`.")
+    uploads: list[UploadId] = Field(default=[], max_length=6, description="Ids, in place of `structure`.")
     structure: dict[Annotated[str, Field(max_length=100)], Any] | None = None
     name: Name = "my-model"
     contacts: list[ContactPlace] = Field(default=[], max_length=100)
-    excitation: OfDof | None = Field(default=None, description="Where the force acts.")
+    excitation: ForceOnDof | None = Field(
+        default=None, description="Where the force acts; of a sector also its engine order, 1 if null."
+    )
     observe: OfDof | None = Field(default=None, description="What is observed; where the force acts if null.")
 
 
@@ -88,7 +97,9 @@ async def look(body: JsonBody, service: ServiceDependency, caller: CallerDepende
     """Look at uploaded matrices: sizes, labels, mass, frequencies, what is wrong and what to do.
 
     With `dofs` in the structure the answer has a scene that refers to the uploads, with a band around the
-    first mode and contacts whose values are of the right size to begin with. Nothing is stored.
+    first mode and contacts whose values are of the right size to begin with. Of one sector of a disk the
+    structure has `sectors` and `cyclic` (`nodes`, `low`, `high`, `axis`, `keep_modes`), as in a scene file,
+    and the modes are those of the nodal diameter of the engine order. Nothing is stored.
     """
     request = validated(MatricesRequest, body)
     if bool(request.uploads) == (request.structure is not None):
@@ -101,6 +112,8 @@ async def look(body: JsonBody, service: ServiceDependency, caller: CallerDepende
             raise InvalidRequestError(
                 [Issue(pointer="/excitation/dof", message="a DOF for the force is needed")]
             )
-        asked["observe"] = asked["observe"] or asked["excitation"]
+        asked["observe"] = asked["observe"] or {"dof": request.excitation.dof}
+        if (request.structure or {}).get("sectors") is not None and request.excitation.engine_order is None:
+            asked["excitation"]["engine_order"] = _USUAL_ORDER
     found = await service.lanes.uploads.run(caller.owner, service.uploads.looked_at, asked, caller)
     return MatricesAnswer.model_validate(found)

@@ -8,6 +8,7 @@ from service.jobs.kinds.accuracy import ACCURACY
 from service.jobs.kinds.campbell import CAMPBELL
 from service.jobs.kinds.design import DESIGN
 from service.jobs.kinds.identify import IDENTIFY
+from service.jobs.kinds.interference import INTERFERENCE
 from service.jobs.kinds.map import MAP
 from service.jobs.kinds.march import MARCH
 from service.jobs.kinds.mistuning import MISTUNING
@@ -38,6 +39,7 @@ SHIPPED = Registry(
         MARCH,
         ACCURACY,
         CAMPBELL,
+        INTERFERENCE,
         MISTUNING,
         IDENTIFY,
         MODES,

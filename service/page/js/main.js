@@ -3,6 +3,7 @@
 import { read, state, write } from "./base/address.js";
 import { Problem, patiently } from "./network/api.js";
 import { byId, el, show } from "./base/dom.js";
+import { startInterference } from "./disk/interference.js";
 import { startAnswer } from "./views/answer.js";
 import { startDesign } from "./views/design.js";
 import { edit, editCurrent, openText } from "./scene/editor.js";
@@ -223,6 +224,7 @@ function start() {
   startStudies();
   startModes();
   startIdentify();
+  startInterference();
   startOthers();
   startLibrary();
   startSettings();

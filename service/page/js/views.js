@@ -1,6 +1,7 @@
 // The kinds of job with a view of their own: a further one is its module and a line here. The card "Other
 // studies" has a form and a view for every other kind the service knows.
 
+import { interferenceView } from "./disk/interference.js";
 import { designView } from "./views/design.js";
 import { frontView } from "./views/front.js";
 import { identifyView } from "./identify/view.js";
@@ -18,5 +19,6 @@ export const VIEWS = {
   campbell: campbellView,
   modes: modesView,
   identify: identifyView,
+  interference: interferenceView,
   march: null, // Follows the point that is looked at, which begins it.
 };

@@ -207,6 +207,7 @@ _HOMES = {
     "solve": "results.solution", "sweep": "results.branch", "design": "results.design",
     "pareto": "design.front", "march": "results.march", "map": "track.response_map",
     "peaks": "track.track", "accuracy": "results.accuracy", "campbell": "campbell.diagram",
+    "interference": "interference.diagram",
     "mistuning": "mistuning.report", "identify": "identify.report", "modes": "modes.report",
 }  # fmt: skip
 

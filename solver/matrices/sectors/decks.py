@@ -17,6 +17,7 @@ import numpy as np
 
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.readers.reader import Reader
+from solver.matrices.sectors.elements import Integer, Shape, elements_of, shape_of
 
 _MOST_NODES = 10_000_000
 _DEEPEST = 10  # files that include each other
@@ -33,14 +34,17 @@ class Deck:
         Position of each node, in the units of the deck.
     sets : dict
         Nodes of each set, by its name in capitals.
+    elements : list of (Shape, (n, nodes) array)
+        If they were asked for: those of ``*ELEMENT`` that can be drawn.
     """
 
     nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     sets: dict[str, list[int]] = field(default_factory=dict)
+    elements: list[tuple[Shape, Integer]] = field(default_factory=list)
 
 
-def read_deck(path: Path) -> Deck:
-    """Read the nodes and sets of a deck.
+def read_deck(path: Path, *, elements: bool = False) -> Deck:
+    """Read the nodes and sets of a deck, and the elements if they are asked for.
 
     Raises
     ------
@@ -51,7 +55,7 @@ def read_deck(path: Path) -> Deck:
     """
     deck = Deck()
     try:
-        _fill(deck, path)
+        _fill(deck, path, elements=elements)
     except FormatError:
         raise
     except (IndexError, ValueError, OverflowError) as error:
@@ -84,27 +88,27 @@ def check_alone(path: Path) -> None:
             )
 
 
-def _fill(deck: Deck, path: Path) -> None:
+def _fill(deck: Deck, path: Path, *, elements: bool) -> None:
     lines = _lines(path)
     if any(line.upper().startswith("NBLOCK") for line in lines):
         _ansys(lines, deck)
     elif any(line.upper().startswith("GRID") for line in lines):
         _nastran(lines, deck)
     else:
-        _abaqus(path, lines, deck, 0)
+        _abaqus(path, lines, deck, 0, elements=elements)
 
 
 def _lines(path: Path) -> list[str]:
     return path.read_text(encoding="latin-1").splitlines()
 
 
-def _abaqus(path: Path, lines: list[str], deck: Deck, depth: int) -> None:
+def _abaqus(path: Path, lines: list[str], deck: Deck, depth: int, *, elements: bool) -> None:
     for keyword, options, data in _keywords(lines):
         if keyword == "*INCLUDE" and "INPUT" in options:
             if depth == _DEEPEST:
                 raise FormatError(f"{path.name!r} includes {options['INPUT']!r} too deeply")
             other = path.parent / options["INPUT"].strip('"')
-            _abaqus(other, _lines(other), deck, depth + 1)
+            _abaqus(other, _lines(other), deck, depth + 1, elements=elements)
         elif keyword == "*NODE":
             found = [_node(number, text) for number, text in data]
             deck.nodes.update(found)
@@ -114,6 +118,10 @@ def _abaqus(path: Path, lines: list[str], deck: Deck, depth: int) -> None:
             members = deck.sets.setdefault(options["NSET"].upper(), [])
             for number, text in data:
                 members += _members(deck, text, number, generate="GENERATE" in options)
+        elif elements and keyword == "*ELEMENT" and data:
+            shape = shape_of(options.get("TYPE", ""))
+            if shape is not None:
+                deck.elements.append((shape, elements_of(shape, _whole(data), data[0][0])))
 
 
 def _keywords(lines: list[str]) -> Iterator[tuple[str, dict[str, str], list[tuple[int, str]]]]:
@@ -144,6 +152,17 @@ def _node(number: int, text: str) -> tuple[int, tuple[float, float, float]]:
         raise FormatError(f"line {number} must hold a node and its coordinates, got {text[:80]!r}") from error
     x, y, z = (*place, 0.0, 0.0, 0.0)[:3]
     return node, (x, y, z)
+
+
+def _whole(data: list[tuple[int, str]]) -> list[int]:
+    """All whole numbers of data lines, which may go on in the next one."""
+    found: list[int] = []
+    for number, text in data:
+        try:
+            found += [int(part) for part in text.split(",") if part.strip()]
+        except ValueError as error:
+            raise FormatError(f"line {number} must hold an element, got {text[:80]!r}") from error
+    return found
 
 
 def _members(deck: Deck, text: str, number: int, *, generate: bool) -> list[int]:

@@ -16,9 +16,10 @@ from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.readers.reader import MatrixFileError
 from solver.matrices.sectors.decks import Deck, read_deck
 from solver.matrices.sectors.elimination import Elimination, Group, elimination
-from solver.matrices.sectors.pairing import PAIR_BY, groups, paired
+from solver.matrices.sectors.outline import SectorOutline, outline_of
+from solver.matrices.sectors.pairing import PAIR_BY, Pairs, groups, paired
 from solver.matrices.sectors.parts import WHOLE
-from solver.matrices.sectors.reduction import diameters_met, read_diameters, reduce_sector
+from solver.matrices.sectors.reduction import ReducedSector, diameters_met, read_sector, reduce_sector
 from solver.matrices.validation import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix
 
@@ -36,11 +37,14 @@ class Boundaries:
     low, high : list of tuple of int
         Pairs of groups of rows.
     axis : (3,) tuple
+    outline : SectorOutline or None
+        Of the mesh, where there is a deck.
     """
 
     low: list[Group]
     high: list[Group]
     axis: tuple[float, float, float]
+    outline: SectorOutline | None = None
 
     def elimination(self, n: int, sectors: int) -> Elimination:
         """How the high boundary of a sector of n rows follows."""
@@ -55,8 +59,17 @@ class Boundaries:
         }
 
 
-def boundaries(given: Mapping[str, Any], found: MatrixSet, sectors: int, folder: Path) -> Boundaries:
+def boundaries(
+    given: Mapping[str, Any], found: MatrixSet, sectors: int, folder: Path, metres: float = 1.0
+) -> Boundaries:
     """The boundaries that a table [structure.cyclic] of a scene file names.
+
+    Parameters
+    ----------
+    given : the table.
+    found : the matrices with the labels of their rows.
+    folder : where relative names of files begin.
+    metres : the unit of the deck.
 
     Raises
     ------
@@ -78,7 +91,19 @@ def boundaries(given: Mapping[str, Any], found: MatrixSet, sectors: int, folder:
         ours, theirs = groups(pairs, found)
     except ValueError as error:
         raise _refusal("low", str(error)) from error
-    return Boundaries(low=ours, high=theirs, axis=(float(axis[0]), float(axis[1]), float(axis[2])))
+    return Boundaries(
+        low=ours, high=theirs, axis=(float(axis[0]), float(axis[1]), float(axis[2])),
+        outline=_outline(deck, pairs, metres),
+    )  # fmt: skip
+
+
+def _outline(deck: Deck | None, pairs: Pairs, metres: float) -> SectorOutline | None:
+    if deck is None:
+        return None
+    try:
+        return outline_of(deck, [one for one, _ in pairs], [other for _, other in pairs], metres)
+    except ValueError as error:
+        raise _refusal("nodes", f"`nodes`: {error}") from error
 
 
 def _is_direction(given: Sequence[object]) -> bool:
@@ -92,7 +117,7 @@ def _deck(name: object, folder: Path) -> Deck | None:
     if not isinstance(name, str):
         raise _refusal("nodes", f"`nodes` must be the name of a deck, got {name!r}")
     try:
-        return read_deck(folder / name)
+        return read_deck(folder / name, elements=True)
     except FormatError as error:
         raise _refusal("nodes", f"`nodes`: {name!r}: {error}") from error
     except OSError as error:
@@ -115,13 +140,16 @@ def _nodes(key: str, given: object, deck: Deck | None) -> list[int] | None:
     return list(dict.fromkeys(deck.sets[given.upper()]))
 
 
-def as_sector(tables: dict[str, Any], found: MatrixSet, folder: Path, orders: list[int]) -> dict[str, Any]:
-    """The tables of a sector with its files read, as the scene keeps them.
+def sector_kept(
+    tables: dict[str, Any], found: MatrixSet, folder: Path, orders: list[int], metres: float = 1.0
+) -> tuple[dict[str, Any], ReducedSector | None]:
+    """The tables of a sector with its files read, as the scene keeps them, and the reduction if there is one.
 
     Parameters
     ----------
     tables : of [structure], its labels already rows.
     orders : engine orders of the excitation.
+    metres : the unit of length of the files.
 
     Raises
     ------
@@ -136,23 +164,24 @@ def as_sector(tables: dict[str, Any], found: MatrixSet, folder: Path, orders: li
         or not 1 <= sectors <= MOST_SECTORS
         or not isinstance(joined, dict)
     ):
-        return tables  # what is wrong is said with the rest of the scene
+        return tables, None  # what is wrong is said with the rest of the scene
     if isinstance(tables.get("diameters"), str):
         if found.matrices:
             message = f"`diameters` stands in place of {', '.join(found.matrices)}: remove one or the other"
             raise SceneError([Issue(pointer="/structure/diameters", message=message)])
-        return _from_file(tables, folder)
+        return _from_file(tables, folder), None
     if not found.matrices:
-        return tables
+        return tables, None
     _check_sizes(found)
     check_part_sizes(found)
     kept = {key: value for key, value in joined.items() if key not in FILE_KEYS}
     if "low_rows" in joined or "high_rows" in joined:
-        return {**tables, **_dense(found), "cyclic": kept}
-    ends = boundaries(joined, found, sectors, folder)
+        return {**tables, **_dense(found), "cyclic": kept}, None
+    ends = boundaries(joined, found, sectors, folder, metres)
+    drawn = {} if ends.outline is None else {"outline": ends.outline}
     keep = joined.get("keep_modes")
     if keep is None:
-        return {**tables, **_dense(found), "cyclic": {**kept, **ends.table()}}
+        return {**tables, **_dense(found), **drawn, "cyclic": {**kept, **ends.table()}}, None
     if isinstance(keep, bool) or not isinstance(keep, int) or not 0 <= keep <= MOST_DOFS:
         raise _refusal(
             "keep_modes", f"`keep_modes` must be a whole number from 0 to {MOST_DOFS}, got {keep!r}"
@@ -169,13 +198,14 @@ def as_sector(tables: dict[str, Any], found: MatrixSet, folder: Path, orders: li
         raise SceneError([Issue(pointer="/structure/dofs", message=str(error))]) from error
     return {
         **{key: value for key, value in tables.items() if key not in matrices and key != "parts"},
+        **drawn,
         "diameters": reduced.matrices,
         "dofs": reduced.rows,
         "cyclic": {**kept, "axis": list(ends.axis)},
         "reduction": {
             "dofs": matrices["M"].shape[0], "modes": reduced.modes, "highest_hz": reduced.highest_hz,
         },
-    }  # fmt: skip
+    }, reduced  # fmt: skip
 
 
 def parts_to_reduce(mistuning: object, found: MatrixSet) -> dict[str, Any]:
@@ -224,11 +254,12 @@ def _refuse_unreduced(tables: Mapping[str, Any], found: MatrixSet) -> None:
 
 def _from_file(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
     try:
-        matrices, was = read_diameters(folder / tables["diameters"])
+        matrices, was, outline = read_sector(folder / tables["diameters"])
     except MatrixFileError as error:
         message = f"`diameters`: {error}"
         raise SceneError([Issue(pointer="/structure/diameters", message=message)]) from error
-    return {**tables, "diameters": matrices, "reduction": was}
+    drawn = {} if outline is None else {"outline": outline}
+    return {**tables, **drawn, "diameters": matrices, "reduction": was}
 
 
 def _dense(found: MatrixSet) -> dict[str, object]:

@@ -16,6 +16,7 @@ from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton
 from solver.matrices.reduction.reduction_error import Quality
 from solver.matrices.sectors.diameters import DiameterMatrices
 from solver.matrices.sectors.elimination import Elimination, phase_factor
+from solver.matrices.sectors.outline import SectorOutline
 from solver.matrices.sectors.parts import PartsAcross
 from solver.matrices.validation import DofTable
 
@@ -159,10 +160,11 @@ def _kept_rows(dofs: Mapping[str, int], eliminated: Elimination) -> DofTable:
     return DofTable.read(table)
 
 
-def write_diameters(path: Path, reduced: ReducedSector) -> None:
+def write_diameters(path: Path, reduced: ReducedSector, outline: SectorOutline | None = None) -> None:
     """Write a reduced sector: arrays `diameters`, `M`, `K`, maybe `C`, `names` and `good_to_hz` (.npz).
 
-    With parts `parts` has their names, `parts_ahead` and `parts_back` the matrices (`PartsAcross`).
+    With an outline also `outline_points`, `outline_edges`, `outline_low` and `outline_high`. With parts
+    `parts` has their names, `parts_ahead` and `parts_back` the matrices (`PartsAcross`).
 
     Raises
     ------
@@ -179,6 +181,7 @@ def write_diameters(path: Path, reduced: ReducedSector) -> None:
         path,
         allow_pickle=False,
         **arrays,
+        **({} if outline is None else outline.arrays()),
         diameters=np.array(found.diameters, np.int64),
         names=np.array(names),
         full=np.array(reduced.full),
@@ -187,8 +190,8 @@ def write_diameters(path: Path, reduced: ReducedSector) -> None:
     )
 
 
-def read_diameters(path: Path) -> tuple[DiameterMatrices, dict[str, Any]]:
-    """Read a reduced sector, and what it was: `dofs` of the full one, `modes` kept and `highest_hz`.
+def read_sector(path: Path) -> tuple[DiameterMatrices, dict[str, Any], SectorOutline | None]:
+    """Read a reduced sector, what it was (`dofs` of the full one, `modes` kept, `highest_hz`), its outline.
 
     Raises
     ------
@@ -215,7 +218,8 @@ def read_diameters(path: Path) -> tuple[DiameterMatrices, dict[str, Any]]:
         if not 0.0 <= highest < math.inf:
             raise ValueError(f"`held_hz` must hold finite frequencies >= 0, got {highest}")
         full = int(arrays.get("full", matrices.size))
-        return matrices, {"dofs": full, "modes": int(held.shape[1]), "highest_hz": highest}
+        was = {"dofs": full, "modes": int(held.shape[1]), "highest_hz": highest}
+        return matrices, was, SectorOutline.from_arrays(arrays)
     except OSError as error:
         raise MatrixFileError(f"{str(path)!r} cannot be read: {error.strerror or error}") from error
     except MemoryError as error:

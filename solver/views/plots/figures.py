@@ -15,11 +15,13 @@ from solver.response.stability.floquet import Stability
 from solver.scene.scene import Scene
 from solver.studies.blades import BladeAmplitudes, BladePeaks
 from solver.studies.convergence import AccuracyStudy
+from solver.studies.interference_result import InterferenceDiagram
 from solver.studies.mistuning import MistuningStudy
 from solver.studies.peaks.results import PeakTrack
 from solver.views.plots.accuracy import accuracy_figure
 from solver.views.plots.curves import Response
 from solver.views.plots.disks import blades_figure, mistuning_figure
+from solver.views.plots.interference import interference_figure
 from solver.views.plots.modes import mode_figure, performance_figure
 from solver.views.plots.motion import Motion, motion_figure
 from solver.views.plots.multipliers import multipliers_figure
@@ -71,6 +73,11 @@ def of_accuracy(study: AccuracyStudy, ax: Into = None) -> Figure:
 def of_mistuning(study: MistuningStudy, ax: Into = None) -> Figure:
     """Draw the magnifications and the worst disk."""
     return mistuning_figure(study.to_json(), ax=ax)
+
+
+def of_interference(found: InterferenceDiagram, ax: Into = None) -> Figure:
+    """Draw the natural frequencies over the nodal diameter, and the orders."""
+    return interference_figure(found.to_json(), ax=ax)
 
 
 def of_mode(found: NonlinearMode, ax: Into = None) -> Figure:

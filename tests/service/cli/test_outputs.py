@@ -22,6 +22,7 @@ COMMANDS = {
     "map": "two-dof --parameter damper.N0 --from 50 --to 200 --steps 3 --frequencies 5 --harmonics 3",
     "mistuning": "bladed-disk --of tip --samples 2 --harmonics 1 --from 740 --to 780",
     "modes": "two-dof --from 0.1 --to 3 --harmonics 3",
+    "interference": "bladed-disk --speed 11000 --up-to 1400",
     "campbell": "two-dof --speeds 50 80 --harmonics 3",
     "sensitivities": "two-dof --harmonics 3",
     "design": "two-dof --variable damper.N0 20 500 --harmonics 3",
@@ -29,7 +30,7 @@ COMMANDS = {
 }
 
 
-_QUICK = ("solve", "sweep", "march", "design")
+_QUICK = ("solve", "sweep", "march", "interference", "design")
 
 
 @pytest.mark.parametrize(
@@ -73,6 +74,7 @@ def results() -> dict[str, Any]:
         "mistuning": solver.mistuning_study(
             solver.load_scene("bladed-disk"), of=["tip"], samples=2, harmonics=1, start=740, stop=780
         ),
+        "interference": solver.interference_diagram(solver.load_scene("bladed-disk"), speed_rpm=11e3),
         "modes": solver.nonlinear_mode(scene, amplitudes=(0.1, 3.0), harmonics=3),
         "pareto": optim.pareto_front(
             scene, variables={"damper.N0": (20, 500)}, limit=2.0, points=3, harmonics=3
@@ -94,10 +96,11 @@ def test_a_stored_result_is_drawn_as_the_computed_one() -> None:
 
 
 @pytest.mark.parametrize(
-    "kind", ["sweep", "design", "campbell", "accuracy", "pareto", "solve", "mistuning", "modes"]
+    "kind",
+    ["sweep", "design", "campbell", "accuracy", "pareto", "solve", "mistuning", "modes", "interference"],
 )
 def test_nothing_to_draw_is_said(kind: str) -> None:
     empty = {"peak": None, "orders": [], "rows": [], "points": [], "harmonics": None, "worst": None}
-    empty |= {"amplitude": []}
+    empty |= {"amplitude": [], "diameters": []}
     with pytest.raises(NothingToDrawError):
         result_figure(kind, empty, [], lambda _: pytest.fail("no sweep is read"))

@@ -10,7 +10,6 @@ import pytest
 from sector_cases import ROWS, as_matrices, sector_matrices
 
 import solver
-from optim.studies.campbell import natural_frequencies
 from solver import Effects, Scene, SceneError, SettingError, load_scene
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace
@@ -19,6 +18,7 @@ from solver.linear.assembly import linear_model, structure_derivative
 from solver.linear.modal import decompose, matrices_of
 from solver.scene.cyclic.annulus import annulus
 from solver.sensitivity.gradient import Sensitivities
+from solver.studies.natural_frequencies import natural_frequencies
 
 LUMPED = load_scene("bladed-disk").to_dict()
 HZ = 690.0

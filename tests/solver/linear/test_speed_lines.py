@@ -10,12 +10,12 @@ import pytest
 
 import optim
 import solver
-from optim.studies.campbell import natural_frequencies
 from solver.balance.balance import build
 from solver.balance.workspace import Workspace
 from solver.errors import SceneError, SettingError
 from solver.scene.scene import Scene
 from solver.sensitivity.gradient import Sensitivities
+from solver.studies.natural_frequencies import natural_frequencies
 
 JT, JP, K = 0.02, 0.03, 4000.0
 ORDER = 3.0

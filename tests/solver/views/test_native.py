@@ -40,6 +40,7 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "mistuning": lambda: solver.mistuning_study(
         solver.load_scene("bladed-disk"), of=["tip"], samples=2, harmonics=1, start=740.0, stop=780.0
     ),
+    "interference": lambda: solver.interference_diagram(solver.load_scene("bladed-disk"), speed_rpm=11_000.0),
     "modes": lambda: solver.nonlinear_mode(two_dof(), amplitudes=(0.1, 3.0), harmonics=3),
     "least": lambda: solver.least_peak(two_dof(), "damper.N0", 50.0, 200.0, harmonics=3),
     "blade peaks": lambda: solver.blade_peaks(mistuned_disk(), 740.0, 780.0, harmonics=1),

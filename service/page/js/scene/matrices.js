@@ -5,6 +5,7 @@ import { byId, el, facts, say, show } from "../base/dom.js";
 import { edit } from "./editor.js";
 import { on } from "../base/events.js";
 import { number } from "../base/format.js";
+import { joined } from "../disk/sector_form.js";
 import { matrixFiles } from "./matrix_files.js";
 import { matrixForm } from "./matrix_form.js";
 
@@ -57,7 +58,7 @@ function build(panel) {
   show(panel,
     el("fieldset", { id: "matrix-drop" }, el("legend", {}, "Files of matrices"),
       el("div", { class: "row" }, el("button", { type: "button", id: "matrix-choose", onclick: () => input.click() }, "Choose files…"), input,
-        el("span", {}, "or drop them here: mass and stiffness, and damping and the names of the rows if there are such.")),
+        el("span", {}, "or drop them here: mass and stiffness; damping, the names of the rows, and the deck of a sector of a disk if there are such.")),
       el("details", {}, el("summary", {}, "Which files?"), el("div", { id: "matrix-formats" })),
       list, el("p", { id: "matrix-status", class: "status", role: "status" }), el("div", { id: "matrix-report" })),
     rest, el("div", { class: "row" }, el("button", { type: "button", onclick: close }, "Close")));
@@ -102,15 +103,16 @@ async function arrived(anew) {
 }
 
 function report(found) {
-  const [what] = found.modes ? [`${found.modes} modes of ${found.rows} rows`] : [`${found.matrices.map(({ name }) => name).join(", ")} with ${found.rows} rows`];
-  say("matrix-status", `${what} were read and fit together.`);
+  const [what] = found.diameters ? [`A sector of ${found.rows} coordinates at the nodal diameters ${found.diameters.join(", ")}`] : found.modes ? [`${found.modes} modes of ${found.rows} rows`] : [`${found.matrices.map(({ name }) => name).join(", ")} with ${found.rows} rows`];
+  say("matrix-status", found.diameters ? `${what} was read.` : `${what} were read and fit together.`);
   const { labels, mass, frequencies_hz: hz, reduction } = found;
   const rows = [
     ...found.matrices.map(({ name, rows: n, entries }) => [name, `${n} × ${n}, ${entries} entries`]),
     ["rows", labels ? `named: nodes ${labels.nodes[0]} to ${labels.nodes[1]}, ${labels.components.join(", ")}` : "not named by the files"],
     ...(mass ? [["mass", `${number(mass.kg)} kg in ${mass.direction}, without what is held`]] : []),
     ["first frequencies", hz ? `${hz.slice(0, 6).map((f) => number(f)).join(", ")} Hz, without contacts` : "known once the model is reduced"],
-    ...(reduction ? [["reduced to", `${Object.keys(reduction.mass_carried).length} DOFs and ${reduction.modes} modes up to ${number(reduction.highest_hz)} Hz`],
+    ...(found.sets ? [["sets of the deck", found.sets.map(({ name, nodes }) => `${name} (${nodes} nodes)`).join(", ") || "none"]] : []),
+    ...(reduction ? [["reduced to", `${Object.keys(found.scene.structure.dofs).length} DOFs and ${reduction.modes} modes${reduction.diameters ? ` at each of ${reduction.diameters.length} nodal diameters` : ""} up to ${number(reduction.highest_hz)} Hz`],
       ["good to", `${number(reduction.good_to_hz)} Hz: frequencies up to there are exact to 0.1 %; the harmonics that matter should lie below`]] : []),
   ];
   const notes = found.notes.length ? el("ul", { class: "issues", "aria-label": "What looks wrong" }, found.notes.map((note) => el("li", {}, note))) : null;
@@ -125,7 +127,7 @@ async function make() {
   }
   say("matrix-made", "The scene is being made …");
   try {
-    const found = await post("/v1/matrices", { structure: { ...files.structure(), ...form.structure() }, ...form.asked() });
+    const found = await post("/v1/matrices", { structure: joined(files.structure(), form.structure()), ...form.asked() });
     form.blame([]);
     report(found);
     say("matrix-made", "The scene is below: its contacts begin as stiff as the structure is where they act, under a load of the size of the force.");

@@ -4,7 +4,7 @@ import { Problem, request } from "../network/api.js";
 import { el, show } from "../base/dom.js";
 
 export const SCENES = /\.(toml|json)$/i;
-const ROLES = { M: "the mass matrix M", K: "the stiffness matrix K", C: "the damping matrix C", mapping: "the names of the rows", modes: "modes", "": "not used" };
+const ROLES = { M: "the mass matrix M", K: "the stiffness matrix K", C: "the damping matrix C", mapping: "the names of the rows", nodes: "the deck: places and sets of nodes", diameters: "a reduced sector of a disk", modes: "modes", "": "not used" };
 const LONGEST_NAME = 200;
 
 // The name as the service takes it: letters, digits and what is usual between them.
@@ -40,7 +40,7 @@ export function matrixFiles(host, changed) {
   }
 
   const contentsOf = ({ name, rows, columns, entries }) =>
-    (name === "mapping" ? `names ${rows} rows` : name === "modes" ? `${columns} modes of ${rows} rows` : `${name ? `${name}: ` : ""}${rows} × ${columns}, ${entries} entries`);
+    (name === "mapping" ? `names ${rows} rows` : name === "nodes" ? `${rows} nodes` : name === "diameters" ? `${rows} coordinates at ${columns} nodal diameters` : name === "modes" ? `${columns} modes of ${rows} rows` : `${name ? `${name}: ` : ""}${rows} × ${columns}, ${entries} entries`);
 
   function draw() {
     const focus = document.activeElement?.id;
@@ -75,16 +75,20 @@ export function matrixFiles(host, changed) {
     add,
     ids: () => files.filter(({ id }) => id).map(({ id }) => id),
     // The keys of a structure that refer to the files.
-    structure: () => Object.fromEntries(files.flatMap(({ id, roles }) => (id ? roles.map((role) => [role, `upload:${id}`]) : []))),
+    structure() {
+      const { nodes, ...found } = Object.fromEntries(files.flatMap(({ id, roles }) => (id ? roles.map((role) => [role, `upload:${id}`]) : [])));
+      return nodes ? { ...found, cyclic: { nodes } } : found;
+    },
     take(structure) {
-      for (const entry of files) entry.roles = Object.keys(ROLES).filter((role) => role && structure[role] === `upload:${entry.id}`);
+      const named = { ...structure, nodes: structure.cyclic?.nodes };
+      for (const entry of files) entry.roles = Object.keys(ROLES).filter((role) => role && named[role] === `upload:${entry.id}`);
       draw();
     },
     // Says what is wrong beside the files it is about; returns what is about none of them.
     blame(issues) {
       for (const entry of files) if (entry.id) entry.error = "";
       const left = issues.filter(({ pointer, detail }) => {
-        const [, top, key] = pointer.split("/");
+        const [, top, key] = pointer.replace("/cyclic/nodes", "/nodes").split("/");
         const sent = files.filter(({ id }) => id);
         const entry = top === "uploads" ? sent[Number(key)] : top === "structure" ? files.find(({ roles }) => roles.includes(key)) : null;
         if (entry) entry.error = detail;

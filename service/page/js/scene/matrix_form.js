@@ -1,6 +1,7 @@
 // What a scene of matrices needs beside its files: DOFs by name, what acts on them, what is kept.
 
 import { el, show } from "../base/dom.js";
+import { sectorForm } from "../disk/sector_form.js";
 
 const GROUND = "ground";
 const FEW_ROWS = 300;
@@ -44,6 +45,7 @@ export function matrixForm(host, { onUnits }) {
   const observed = el("select", {});
   let named = [];
   let rubbing = [];
+  let disk = null;
 
   units.addEventListener("change", onUnits);
 
@@ -90,12 +92,12 @@ export function matrixForm(host, { onUnits }) {
     offer(observed, names, names[0]);
     for (const { ends } of rubbing) {
       offer(ends[0], names, names[0]);
-      offer(ends[1], [GROUND, ...names], GROUND);
+      offer(ends[1], [GROUND, ...names, ...(disk?.isDisk() ? names.map((name) => `${name}@next`) : [])], GROUND);
     }
   }
 
   const unitsField = field("Units of the files", units, () => ["/structure/units"]);
-  const modesField = field("Modes kept of the rest", modes, () => ["/structure/keep_modes"], "Craig-Bampton: the DOFs named below stay, the rest moves in so many of its modes. Left empty, nothing is reduced.");
+  const modesField = field("Modes kept of the rest", modes, () => ["/structure/keep_modes", "/structure/cyclic/keep_modes"], "Craig-Bampton: the DOFs named below stay, the rest moves in so many of its modes. Left empty, nothing is reduced.");
   const others = [
     unitsField,
     modesField,
@@ -105,10 +107,12 @@ export function matrixForm(host, { onUnits }) {
     field("Name of the scene", name, () => ["/name"]),
   ];
 
+  disk = sectorForm(field, choices);
   const group = (title, ...content) => el("fieldset", {}, el("legend", {}, title), ...content);
   const more = (words, add) => el("button", { type: "button", onclick: () => add().focus() }, words);
   show(host, places,
     group("Units and reduction", el("div", { class: "fields" }, others.slice(0, 3))),
+    disk.node,
     group("DOFs in use", el("p", { class: "note", id: "matrix-rows-note" }), dofs, more("Add a DOF", () => addDof(`dof${named.length + 1}`))),
     group("Friction contacts", contacts, more("Add a contact", () => addContact(`contact${rubbing.length + 1}`))),
     group("Force and observation", el("div", { class: "fields" }, others.slice(3))));
@@ -117,12 +121,14 @@ export function matrixForm(host, { onUnits }) {
   addContact("damper");
   force.value = "middle";
 
-  const all = () => [...others, ...[...dofs.children, ...contacts.children].flatMap((row) => [...row.children])].filter((node) => node.blame);
+  const all = () => [...others, ...disk.fields, ...[...dofs.children, ...contacts.children].flatMap((row) => [...row.children])].filter((node) => node.blame);
 
   return {
     units: () => units.value,
     // What was read tells what may be typed.
-    learn({ labels, rows }, file) {
+    learn(found, file) {
+      const { labels, rows } = found;
+      disk.learn(found);
       const first = labels?.first ?? [];
       show(places, first.map((label) => el("option", { value: label })));
       const example = labels ? `such as ${first[first.length - 1]}: nodes ${labels.nodes[0]} to ${labels.nodes[1]}, ${labels.components.join(", ")}; a row from 0 to ${rows - 1} will do too` : `rows 0 to ${rows - 1}; the files do not name them, a .mapping or .dof file would`;
@@ -134,14 +140,16 @@ export function matrixForm(host, { onUnits }) {
       const rows = named.map(({ label, row }) => [label.value.trim(), row.value.trim()]).map(([key, at]) => [key, /^\d+$/.test(at) ? Number(at) : at]);
       const found = { dofs: Object.fromEntries(rows) };
       if (units.value !== "SI") found.units = units.value;
-      if (modes.value !== "") found.keep_modes = modes.valueAsNumber;
+      const kept = modes.value === "" ? undefined : modes.valueAsNumber;
+      if (disk.isDisk()) Object.assign(found, disk.structure(kept));
+      else if (kept !== undefined) found.keep_modes = kept;
       if (damping.valueAsNumber > 0) found.damping_ratio = damping.valueAsNumber;
       return found;
     },
     asked: () => ({
       name: name.value.trim(),
       contacts: rubbing.map(({ label, ends }) => ({ name: label.value.trim(), between: ends.map((end) => end.value) })),
-      excitation: { dof: force.value },
+      excitation: { dof: force.value, ...disk.excitation() },
       observe: { dof: observed.value },
     }),
     // Says what is wrong beside its field, the first of which takes the focus; returns what is about none.

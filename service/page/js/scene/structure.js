@@ -2,6 +2,7 @@
 
 import { el, show, svg, table } from "../base/dom.js";
 import { number } from "../base/format.js";
+import { drawSector } from "../disk/sector.js";
 import { parametersOf } from "./laws.js";
 import { GROUND, chain, ownName, partsOf, ring } from "./layout.js";
 
@@ -23,13 +24,14 @@ const wordsOf = (state) => STATES[state]?.[1] ?? "not computed yet";
 
 // Draws `scene`; `states` are those of its contacts by name.
 export function drawStructure(host, scene, states) {
+  if (scene.structure.outline) return drawSector(host, scene, states, { pattern, classOf, wordsOf, plates, key: stateKey });
   const parts = partsOf(scene);
   const names = parts.contacts.map((c) => `${c.name} ${statesOf(states, c.name)}`).join(", ");
   const label = `${scene.name}: ${parts.cyclic ? `${parts.sectors} sectors of ` : ""}${parts.dofs.length} masses, ${parts.springs.length} springs; ${names || "no contacts"}`;
   const drawing = svg("svg", { role: "img", "aria-label": label }, pattern());
   if (parts.cyclic) disk(drawing, scene, parts, states);
   else lumped(drawing, scene, parts, states, Math.min(Math.max(host.clientWidth, NARROWEST), WIDEST));
-  show(host, drawing, legend());
+  return show(host, drawing, legend());
 }
 
 const pattern = () =>
@@ -44,7 +46,10 @@ const pattern = () =>
     ),
   );
 
-function legend() {
+const legend = () => el("ul", { class: "legend" }, stateKey(), el("li", {}, "double ring: observed · arrow: force"));
+
+// What the plates of a contact say.
+function stateKey() {
   const entry = (state, words) =>
     el(
       "li",
@@ -52,8 +57,7 @@ function legend() {
       svg("svg", { width: 30, height: 16, "aria-hidden": "true" }, plates({ x: 4, y: 8 }, { x: 26, y: 8 }, 11, classOf(state))),
       ` ${words}`,
     );
-  return el("ul", { class: "legend" }, entry("stuck", "sticks"), entry("stick and slip", "sticks and slips"),
-    entry("separated", "opens"), el("li", {}, "double ring: observed · arrow: force"));
+  return [entry("stuck", "sticks"), entry("stick and slip", "sticks and slips"), entry("separated", "opens")];
 }
 
 // The contacts as a table, with what they do at the frequency `at` [Hz].
@@ -158,7 +162,7 @@ function box(places, size) {
   const [right, bottom] = [Math.max(...xs) + size + 16, Math.max(...ys) + size + 10];
   return [
     svg("rect", { class: "earth", x: left, y: top, width: right - left, height: bottom - top, rx: 10, "stroke-dasharray": "5 4" }),
-    svg("text", { class: "soft", x: left + 6, y: bottom + 16 }, "given by its matrices"),
+    svg("text", { class: "soft", x: left + 6, y: bottom + 16 }, "given by its matrices, which tell no places"),
   ];
 }
 

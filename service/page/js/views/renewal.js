@@ -4,7 +4,7 @@ import { byId, el, show } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
 import { differences } from "../scene/inputs.js";
 
-const CARDS = { sweep: "response", design: "design", map: "map", pareto: "front", accuracy: "accuracy", campbell: "campbell", modes: "modes", identify: "identify" };
+const CARDS = { sweep: "response", design: "design", map: "map", pareto: "front", accuracy: "accuracy", campbell: "campbell", interference: "interference", modes: "modes", identify: "identify" };
 const WAYS = ["settled", "values", "settings", "contact", "scene-contact"];
 const computed = new Map();
 const underway = new Set();

@@ -3,6 +3,7 @@
 import { state, write } from "../base/address.js";
 import { byId, say } from "../base/dom.js";
 import { on, tell } from "../base/events.js";
+import { interferenceBody, isDisk } from "../disk/interference.js";
 import { run } from "../network/jobs.js";
 import { asked, current, variable } from "../scene/scenes.js";
 import { readSettings } from "../scene/settings.js";
@@ -12,7 +13,7 @@ import { computedFor } from "./renewal.js";
 import { campbellBody } from "./studies.js";
 
 // The most wanted first.
-const PRIORITY = { sweep: 6, design: 5, map: 4, accuracy: 3, campbell: 3, pareto: 2 };
+const PRIORITY = { sweep: 6, design: 5, map: 4, accuracy: 3, campbell: 3, interference: 3, pareto: 2 };
 const NOT_ASKED_AGAIN = ["kind", "fresh", "priority", "scene", "set", "harmonics", "project", "name", "notes", "tags"];
 const OF_THE_FORM = ["variables", "parameter", "from", "to", "steps", "frequencies", "ridge", "speeds_rpm", "orders", "band_hz"];
 const OWN_FORM = ["modes", "identify"];
@@ -41,6 +42,7 @@ function bodyOf(kind) {
     map: () => ({ ...body, parameter: path, from: low, to: high, steps: 60, frequencies: 400, ridge: tracked }),
     accuracy: () => ({ scene, set }),
     campbell: () => ({ ...body, ...campbellBody() }),
+    interference: () => ({ scene, set, ...interferenceBody() }),
     pareto: () => ({ ...body, variables: { [path]: [low, high] } }),
   };
   return bodies[kind]();
@@ -53,10 +55,10 @@ function study() {
   if (!readSettings()) return;
   state.at = null;
   write();
-  say("study-status", "The jobs are under way: response, design, map, front, accuracy, Campbell diagram.");
+  say("study-status", `The jobs are under way: response, design, map, front, accuracy, Campbell diagram${isDisk() ? ", interference diagram" : ""}.`);
   const all = [
     begin("sweep").then(async (done) => done && (await referee(5))),
-    ...["design", "map", "accuracy", "campbell", "pareto"].map((kind) => begin(kind)),
+    ...["design", "map", "accuracy", "campbell", ...(isDisk() ? ["interference"] : []), "pareto"].map((kind) => begin(kind)),
   ];
   const mine = (studies += 1);
   Promise.all(all).then((done) => {

@@ -5,7 +5,7 @@ import { byId, el, show } from "../base/dom.js";
 import { on } from "../base/events.js";
 
 const TABS = [["response", "Response"], ["map", "Map"], ["design", "Design"], ["disk", "Disk"], ["modes", "Modes"], ["identify", "Identification"], ["accuracy", "Accuracy"], ["data", "Data"], ["all", "All"]];
-const OF_KIND = { sweep: "response", march: "response", map: "map", pareto: "map", design: "design", accuracy: "accuracy", campbell: "disk", modes: "modes", identify: "identify" };
+const OF_KIND = { sweep: "response", march: "response", map: "map", pareto: "map", design: "design", accuracy: "accuracy", campbell: "disk", interference: "disk", modes: "modes", identify: "identify" };
 const MOVES = { ArrowRight: 1, ArrowLeft: -1 };
 
 // The tab that shows what a kind of job found.

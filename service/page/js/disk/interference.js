@@ -1,0 +1,192 @@
+// The interference diagram of a disk: natural frequencies over the nodal diameter, and the engine orders there.
+
+import { byId, el, say, show, table } from "../base/dom.js";
+import { on, tell } from "../base/events.js";
+import { number } from "../base/format.js";
+import { chart } from "../charts/chart.js";
+import { current } from "../scene/scenes.js";
+
+const WITHIN = 0.05;
+const ABOVE_BAND = 2;
+const HEADROOM = 1.05;
+const MOST_NAMED = 40;
+const SHIFT = { forward: 0.07, backward: -0.07 };
+const ABOUT = "Natural frequencies over the nodal diameter, with what the engine orders excite at a speed.";
+let diagram = null;
+
+export const isDisk = () => Boolean(current.body?.structure.sectors);
+
+const ownOrder = () => [current.body?.excitation].flat().map((force) => force?.engine_order).find((order) => order !== undefined && order !== null) ?? 0;
+
+export function startInterference() {
+  diagram = chart(byId("interference-figure"), { label: "Interference diagram", file: "interference", height: 380 });
+  byId("interference-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    if (read()) tell("renew", "interference");
+  });
+  on("scene", () => {
+    byId("interference").hidden = !isDisk();
+    diagram.clear();
+    say("interference-status", ABOUT);
+    show(byId("interference-facts"));
+    if (isDisk()) fill(current.body.speed || usualSpeed(), WITHIN);
+  });
+}
+
+// The speed that brings the order of the scene into the middle of its band.
+function usualSpeed() {
+  const [low, high] = current.body.observe.band;
+  return Number(((60 * Math.sqrt(low * high)) / Math.max(ownOrder(), 1)).toPrecision(3));
+}
+
+function fill(speed, within) {
+  byId("interference-speed").value = speed;
+  byId("interference-within").value = Number((100 * within).toPrecision(6));
+  read();
+}
+
+// Says what is wrong beside the fields; whether nothing is.
+function read() {
+  const [speed, within] = ["speed", "within"].map((name) => byId(`interference-${name}`));
+  const wrong = [
+    [speed, speed.valueAsNumber > 0 ? "" : "The speed must be a number above 0."],
+    [within, within.valueAsNumber >= 0 && within.valueAsNumber <= 100 ? "" : "The distance must be from 0 to 100 %."],
+  ];
+  for (const [input, words] of wrong) {
+    if (words) input.setAttribute("aria-invalid", "true");
+    else input.removeAttribute("aria-invalid");
+  }
+  byId("interference-wrong").textContent = wrong.map(([, words]) => words).filter(Boolean).join(" ");
+  return !wrong.some(([, words]) => words);
+}
+
+export function interferenceBody() {
+  const found = { up_to_hz: ABOVE_BAND * current.body.observe.band[1] };
+  const [speed, within] = ["speed", "within"].map((name) => byId(`interference-${name}`).valueAsNumber);
+  return { ...found, speed_rpm: speed > 0 ? speed : usualSpeed(), within: within >= 0 ? within / 100 : WITHIN };
+}
+
+export const interferenceView = {
+  waiting: () => say("interference-status", "The diagram waits for a worker."),
+  progress: ({ took }) => say("interference-status", `Nodal diameters:${took}.`),
+  result(found) {
+    if (found.speed_rpm !== null) fill(found.speed_rpm, found.within);
+    draw(found);
+    const inside = found.crossings.filter((one) => one.inside).length;
+    const missing = found.missing.length ? ` The sector was not reduced for the nodal diameters ${found.missing.join(", ")}.` : "";
+    const met = found.speed_rpm === null ? "" : ` At ${number(found.speed_rpm, 6)} /min engine orders meet families at ${inside} places and come near them at ${found.crossings.length - inside} more.`;
+    say("interference-status", `${found.sectors} sectors. Friction moves each natural frequency between open and stuck.${met}${missing}`);
+    show(byId("interference-facts"), crossings(found), frequencies(found));
+  },
+  failed: (text) => say("interference-status", text, true),
+};
+
+const place = (point) => point.diameter + (SHIFT[point.wave] ?? 0);
+
+// The i-th frequencies of all nodal diameters as lines, with gaps between them; each direction has its own.
+function families(points, key) {
+  const [x, y] = [[], []];
+  const ways = points.some(({ wave }) => wave === "backward") ? ["forward", "backward"] : ["forward"];
+  const most = Math.max(0, ...points.map((point) => point[key].length));
+  for (const way of ways) {
+    const mine = points.filter(({ wave }) => wave === way || wave === "standing" || wave === "both");
+    for (let i = 0; i < most; i += 1) {
+      x.push(...mine.map(place), null);
+      y.push(...mine.map((point) => point[key][i] ?? null), null);
+    }
+  }
+  return { x, y };
+}
+
+// From open to stuck at each nodal diameter: where friction may put the resonance.
+function ranges(points) {
+  const [x, y] = [[], []];
+  for (const point of points) {
+    point.open_hz.forEach((open, i) => {
+      x.push(place(point), place(point), null);
+      y.push(open, point.stuck_hz[i], null);
+    });
+  }
+  return { x, y };
+}
+
+// The line that the orders lie on, folded at 0 and at half the sectors.
+function folded({ sectors, speed_rpm: speed }, top) {
+  const half = sectors / 2;
+  const perOrder = speed / 60;
+  const [x, y] = [[0], [0]];
+  for (let fold = 1; y[y.length - 1] < top; fold += 1) {
+    x.push(fold % 2 ? half : 0);
+    y.push(fold * half * perOrder);
+  }
+  return { x, y };
+}
+
+function draw(found) {
+  const points = found.diameters;
+  const highest = Math.max(...points.flatMap((point) => [...point.open_hz, point.stuck_hz[0] ?? 0]), 0);
+  const top = HEADROOM * Math.max(highest, 1e-9);
+  const orders = found.orders.filter((one) => one.frequency_hz <= top);
+  const met = new Map();
+  for (const one of found.crossings) met.set(one.order, [...(met.get(one.order) ?? []), one]);
+  const kind = ({ order }) => (!met.has(order) ? "clear" : met.get(order).some(({ inside }) => inside) ? "meets" : "near");
+  const of = (which) => {
+    const mine = orders.filter((one) => kind(one) === which);
+    return { x: mine.map((one) => one.diameter), y: mine.map((one) => one.frequency_hz) };
+  };
+  const flagged = orders.filter((one) => kind(one) !== "clear");
+  diagram.draw({
+    x: { name: "nodal diameter", low: -0.35, high: Math.floor(found.sectors / 2) + 0.35, whole: true },
+    y: { name: "frequency [Hz]", low: 0, high: top },
+    series: [
+      { x: orders.map((one) => one.diameter), y: orders.map((one) => one.frequency_hz), colour: 7, shape: "circle", size: 2.6, width: 0 },
+      { ...ranges(points), paint: "range", name: "what friction may reach" },
+      ...(found.speed_rpm === null ? [] : [{ ...folded(found, top), colour: 7, name: "engine orders", bare: true }]),
+      { ...families(points, "open_hz"), colour: 4, dash: "dashed", shape: "square", size: 2.8, name: "all open" },
+      { ...families(points, "stuck_hz"), colour: 3, shape: "circle", name: "all stuck", bare: true },
+      { ...of("meets"), colour: 2, shape: "diamond", size: 4.5, width: 0, name: "meets a family" },
+      { ...of("near"), colour: 5, shape: "triangle", size: 4.5, width: 0, name: `within ${number(100 * found.within)} %` },
+    ],
+    marks: (flagged.length <= MOST_NAMED ? flagged : []).map((one) => ({
+      x: one.diameter, y: one.frequency_hz, text: String(one.order),
+      ...(kind(one) === "meets" ? { shape: "diamond", colour: 2 } : { shape: "triangle", colour: 5 }),
+    })),
+    describe: (x, y, i) => described(orders[i], met.get(orders[i].order) ?? []),
+  });
+}
+
+const way = ({ wave }) => (wave === "standing" ? "" : ` ${wave}`);
+
+function described(one, found) {
+  const what = found.map((each) => (each.inside ? `meets family ${each.family}` : `${number(100 * each.margin, 3)} % from family ${each.family}`));
+  return `order ${one.order}: nodal diameter ${one.diameter}${way(one)}, ${number(one.frequency_hz, 5)} Hz, ${what.join(", ") || "meets none"}`;
+}
+
+// Engine orders that meet a family, or are near one.
+function crossings(found) {
+  if (found.speed_rpm === null) return null;
+  if (!found.crossings.length) return el("p", { class: "note" }, "No engine order meets a family or is near one.");
+  const rows = found.crossings.map((one) => [
+    { text: String(one.order), number: true },
+    `${one.diameter}${way(one)}`,
+    { text: number(one.frequency_hz, 5), number: true },
+    { text: String(one.family), number: true },
+    { text: `${number(one.open_hz, 5)} – ${number(one.stuck_hz, 5)}`, number: true },
+    one.inside ? el("strong", {}, "meets") : `${number(100 * one.margin, 3)} % away`,
+  ]);
+  const heads = [{ text: "order", number: true }, "nodal diameter", { text: "at [Hz]", number: true }, { text: "family", number: true }, { text: "open – stuck [Hz]", number: true }, ""];
+  return el("div", { class: "scroll disk-table", role: "region", tabindex: 0, "aria-label": "Engine orders that meet a family" },
+    table(heads, rows, `Engine orders at ${number(found.speed_rpm, 6)} /min that meet a family or are within ${number(100 * found.within)} % of one`));
+}
+
+function frequencies({ diameters }) {
+  const most = Math.max(0, ...diameters.map((point) => point.open_hz.length));
+  const heads = ["nodal diameter", ...Array.from({ length: most }, (_, i) => ({ text: `family ${i + 1}`, number: true }))];
+  const rows = diameters.map((point) => [
+    `${point.diameter}${point.wave === "both" ? "" : way(point)}`,
+    ...Array.from({ length: most }, (_, i) => ({ text: point.open_hz[i] === undefined ? "" : `${number(point.open_hz[i], 5)} – ${number(point.stuck_hz[i], 5)}`, number: true })),
+  ]);
+  return el("details", {}, el("summary", {}, "Natural frequencies [Hz], open – stuck"),
+    el("div", { class: "scroll disk-table", role: "region", tabindex: 0, "aria-label": "Natural frequencies at each nodal diameter" },
+      table(heads, rows, "Natural frequencies [Hz] at each nodal diameter, with all contacts open and stuck")));
+}

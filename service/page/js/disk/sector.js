@@ -1,0 +1,127 @@
+// The sector of a disk from finite elements: the outline of its mesh, its boundaries and its contacts, in two views.
+
+import { el, show, svg } from "../base/dom.js";
+
+const WIDE = 560;
+const HIGH = 330;
+const PAD = 26;
+const TURN = (50 * Math.PI) / 180;
+const TILT = (22 * Math.PI) / 180;
+const DOT = 2.6;
+const PLATE = 11;
+const SIDEWAYS = 4;
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const times = (a, k) => a.map((value) => k * value);
+const plus = (a, b) => a.map((value, i) => value + b[i]);
+const unit = (a) => times(a, 1 / (Math.hypot(...a) || 1));
+
+// Radius, circumference and axis where the sector is: blades stand upright in both views.
+function frameOf(points, axis) {
+  const along = unit(axis);
+  const mean = times(points.reduce(plus, [0, 0, 0]), 1 / points.length);
+  const out = plus(mean, times(along, -dot(mean, along)));
+  const up = Math.hypot(...out) > 1e-9 ? unit(out) : unit(cross(along, Math.abs(along[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]));
+  return { along, up, round: cross(along, up) };
+}
+
+const views = ({ along, up, round }) => [
+  { words: "the axis towards you", at: (p) => [-dot(p, round), -dot(p, up)] },
+  {
+    words: "from the side",
+    at(p) {
+      const [r, t, a] = [dot(p, up), -dot(p, round), dot(p, along)];
+      return [t * Math.cos(TURN) + a * Math.sin(TURN), -(r * Math.cos(TILT) + (t * Math.sin(TURN) - a * Math.cos(TURN)) * Math.sin(TILT))];
+    },
+  },
+];
+
+// A place turned by the pitch about the axis (Rodrigues): where the next sector has it.
+function turned(p, axis, angle) {
+  const k = unit(axis);
+  return plus(plus(times(p, Math.cos(angle)), times(cross(k, p), Math.sin(angle))), times(k, dot(k, p) * (1 - Math.cos(angle))));
+}
+
+// Where a contact is: its own place, else that of the node it holds.
+function placeOf(contact, scene) {
+  if (contact.at) return contact.at;
+  const names = contact.between ?? [];
+  const node = (scene.nodes ?? []).find(({ name, dofs }) => names.some((end) => !end.endsWith("@next") && (end === name || Object.values(dofs ?? {}).includes(end))));
+  return node?.at ?? null;
+}
+
+// Scale and shift that bring a view into its half of the drawing.
+function fitted(view, points, left, width) {
+  const flat = points.map(view.at);
+  const [xs, ys] = [0, 1].map((i) => flat.map((p) => p[i]));
+  const [low, high] = [[Math.min(...xs), Math.min(...ys)], [Math.max(...xs), Math.max(...ys)]];
+  const scale = Math.min((width - 2 * PAD) / (high[0] - low[0] || 1), (HIGH - 2 * PAD) / (high[1] - low[1] || 1));
+  const shift = [left + width / 2 - (scale * (low[0] + high[0])) / 2, HIGH / 2 - (scale * (low[1] + high[1])) / 2];
+  return (p) => {
+    const [x, y] = view.at(p);
+    return { x: shift[0] + scale * x, y: shift[1] + scale * y };
+  };
+}
+
+const lines = (edges, places) =>
+  edges.map(([a, b]) => `M${places[a].x.toFixed(1)} ${places[a].y.toFixed(1)}L${places[b].x.toFixed(1)} ${places[b].y.toFixed(1)}`).join("");
+
+const low = ({ x, y }) => svg("circle", { class: "f1", cx: x.toFixed(1), cy: y.toFixed(1), r: DOT });
+const high = ({ x, y }) => svg("rect", { class: "f2", x: (x - DOT).toFixed(1), y: (y - DOT).toFixed(1), width: 2 * DOT, height: 2 * DOT });
+
+// Draws the sector; `look` has what the drawing of a structure says of contacts: {pattern, classOf, wordsOf, plates, key}.
+export function drawSector(host, scene, states, look) {
+  const { outline, sectors, cyclic } = scene.structure;
+  const axis = cyclic?.axis ?? [0, 0, 1];
+  const pitch = (2 * Math.PI) / sectors;
+  const contacts = (scene.contacts ?? []).map((contact) => ({ contact, at: placeOf(contact, scene) }));
+  const placed = contacts.filter(({ at }) => at);
+  const words = contacts.map(({ contact }) => `${contact.name} ${look.wordsOf(states?.[contact.name])}`).join(", ");
+  const drawing = svg("svg", {
+    role: "img", viewBox: `0 0 ${WIDE} ${HIGH + 18}`,
+    "aria-label": `${scene.name}: one of ${sectors} sectors from finite elements, seen along the axis and from the side; ${outline.low.length} nodes on the boundary to the sector before, ${outline.high.length} on that to the next one; ${words || "no contacts"}`,
+  }, look.pattern());
+  const next = outline.points.map((p) => turned(p, axis, pitch));
+  views(frameOf(outline.points, axis)).forEach((view, i) => {
+    const at = fitted(view, i ? outline.points : [...outline.points, ...next], (i * WIDE) / 2, WIDE / 2);
+    const places = outline.points.map(at);
+    if (!i) drawing.append(svg("path", { class: "mesh next", d: lines(outline.edges, next.map(at)) }));
+    drawing.append(svg("path", { class: "mesh", d: lines(outline.edges, places) }));
+    if (!outline.edges.length) drawing.append(...places.map(({ x, y }) => svg("circle", { class: "mesh-node", cx: x.toFixed(1), cy: y.toFixed(1), r: 1 })));
+    drawing.append(...outline.low.map((k) => low(places[k])), ...outline.high.map((k) => high(places[k])));
+    drawing.append(...marks(placed, at, states, look, i === 1));
+    drawing.append(svg("text", { class: "soft", x: (i + 0.5) * (WIDE / 2), y: HIGH + 10, "text-anchor": "middle" }, view.words));
+  });
+  show(host, drawing, legend(look, placed.length > 0), note(outline, contacts, placed));
+}
+
+// Contacts as plates at their places, named in one view.
+function marks(placed, at, states, look, named) {
+  return placed.flatMap(({ contact, at: place }) => {
+    const [state, { x, y }] = [states?.[contact.name], at(place)];
+    const side = x < 0.75 * WIDE ? -1 : 1;
+    const half = PLATE / 1.4;
+    const [from, to] = [{ x: x - half, y }, { x: x + half, y }];
+    return [
+      look.plates(from, to, PLATE, look.classOf(state), `${contact.name} ${look.wordsOf(state)}`),
+      named ? svg("text", { class: "halo", x: x + side * (PLATE + 3), y: y + SIDEWAYS, "text-anchor": side < 0 ? "end" : "start" }, contact.name) : null,
+    ].filter(Boolean);
+  });
+}
+
+function legend(look, rubbing) {
+  const entry = (shape, words) => el("li", {}, svg("svg", { width: 16, height: 16, class: "key", "aria-hidden": "true" }, shape), ` ${words}`);
+  return el("ul", { class: "legend" },
+    entry(low({ x: 8, y: 8 }), "boundary to the sector before"), entry(high({ x: 8, y: 8 }), "boundary to the next one"),
+    entry(svg("path", { class: "mesh next", d: "M1 8H15" }), "the next sector"), rubbing ? look.key() : null);
+}
+
+function note(outline, contacts, placed) {
+  const missing = contacts.filter((each) => !placed.includes(each)).map(({ contact }) => contact.name);
+  const said = [
+    outline.edges.length ? "" : "The deck tells no elements that can be drawn: the nodes stand for the mesh.",
+    missing.length ? `Without a place, so not drawn: ${missing.join(", ")}.` : "",
+  ].filter(Boolean);
+  return said.length ? el("p", { class: "note" }, said.join(" ")) : null;
+}

@@ -1,0 +1,179 @@
+"""The outline of a sector's mesh, to be drawn: some places, edges between them, and the two boundaries."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from solver.matrices.sectors.elements import drawn_edges
+
+if TYPE_CHECKING:
+    from solver.matrices.sectors.decks import Deck
+
+MOST_POINTS = 10_000
+MOST_EDGES = 20_000
+KEYS = ("points", "edges", "low", "high")
+_MOST_LOOSE = 1_500  # nodes of a mesh without elements
+_MOST_OF_A_BOUNDARY = 400
+_DIGITS = 5  # of a place, relative to the size of the sector: enough for a drawing
+
+Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SectorOutline:
+    """What is drawn of a sector; nothing is computed with it. Equal to another with the same content.
+
+    Attributes
+    ----------
+    points : (n, 3) array
+        Places of nodes [m], read-only.
+    edges : (m, 2) array
+        Pairs of points that a line joins; none where the deck tells no elements.
+    low, high : (k,) arrays
+        Points of the boundaries to the sector before and to the next one.
+    digest : str
+        Hash of the content.
+    """
+
+    points: Real
+    edges: Integer
+    low: Integer
+    high: Integer
+    digest: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        found = hashlib.sha256()
+        for key, kind, shape, most in (
+            ("points", np.float64, (-1, 3), MOST_POINTS), ("edges", np.int64, (-1, 2), MOST_EDGES),
+            ("low", np.int64, (-1,), MOST_POINTS), ("high", np.int64, (-1,), MOST_POINTS),
+        ):  # fmt: skip
+            given = np.asarray(getattr(self, key))
+            if given.size == 0:
+                given = np.zeros([max(length, 0) for length in shape])
+            if given.ndim != len(shape) or given.shape[1:] != shape[1:] or len(given) > most:
+                row = "numbers" if len(shape) == 1 else f"rows of {shape[1]} numbers"
+                raise ValueError(f"`{key}` of the outline must be at most {most} {row}")
+            if kind is np.int64 and (given.dtype.kind not in "iuf" or np.any(given != np.floor(given))):
+                raise ValueError(f"`{key}` of the outline must hold whole numbers")
+            array = np.array(given, dtype=kind)
+            if kind is np.float64 and not np.isfinite(array).all():
+                raise ValueError(f"`{key}` of the outline must hold finite numbers")
+            array.setflags(write=False)
+            object.__setattr__(self, key, array)
+            found.update(key.encode() + repr(array.shape).encode() + array.tobytes())
+        for key in KEYS[1:]:
+            rows = getattr(self, key)
+            if rows.size and not 0 <= rows.min() <= rows.max() < len(self.points):
+                raise ValueError(f"`{key}` of the outline must name points from 0 to {len(self.points) - 1}")
+        object.__setattr__(self, "digest", found.hexdigest())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, SectorOutline) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __repr__(self) -> str:
+        return f"SectorOutline({len(self.points)} points, {len(self.edges)} edges, {self.digest[:12]})"
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """The arrays of a file, under the names that `from_arrays` reads."""
+        return {f"outline_{key}": getattr(self, key) for key in KEYS}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, Any]) -> SectorOutline | None:
+        """The outline that a file has, if it has one.
+
+        Raises
+        ------
+        ValueError
+            Arrays that are none.
+        """
+        names = [f"outline_{key}" for key in KEYS]
+        if not any(name in arrays for name in names):
+            return None
+        missing = next((name for name in names if name not in arrays), None)
+        if missing is not None:
+            raise ValueError(f"it has no array {missing!r} beside the others of the outline")
+        return cls(*(arrays[name] for name in names))
+
+    @classmethod
+    def read(cls, data: object) -> SectorOutline:
+        """Read a table of `points`, `edges`, `low` and `high`."""
+        if isinstance(data, SectorOutline):
+            return data
+        if not isinstance(data, dict) or set(data) != set(KEYS):
+            got = ", ".join(map(str, data))[:200] if isinstance(data, dict) else type(data).__name__
+            raise ValueError(f"`outline` must be a table with the keys {', '.join(KEYS)}, got {got}")
+        return cls(*(_numbers(key, data[key]) for key in KEYS))
+
+    def write(self) -> dict[str, object]:
+        """The table that `read` reads."""
+        return {key: getattr(self, key).tolist() for key in KEYS}
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(
+            cls.read, serialization=core_schema.plain_serializer_function_ser_schema(cls.write)
+        )
+
+
+def _numbers(key: str, data: object) -> NDArray[Any]:
+    """A list of numbers or of rows of them; texts and truth values are refused."""
+    rows = data if isinstance(data, list | tuple) else None
+    if rows is None or len(rows) > MOST_EDGES:
+        raise ValueError(f"`{key}` of the outline must be a list of at most {MOST_EDGES}")
+    flat = [value for row in rows for value in (row if isinstance(row, list | tuple) else (row,))]
+    if any(isinstance(value, bool) or not isinstance(value, int | float) for value in flat):
+        raise ValueError(f"`{key}` of the outline must hold numbers")
+    try:
+        return np.array(rows, dtype=np.float64) if rows else np.zeros(0)
+    except (ValueError, OverflowError) as error:
+        raise ValueError(f"`{key}` of the outline must have rows of one length, finite") from error
+
+
+def outline_of(deck: Deck, low: Sequence[int], high: Sequence[int], metres: float = 1.0) -> SectorOutline:
+    """The outline of the mesh of a deck.
+
+    Parameters
+    ----------
+    deck : with the places, and maybe the elements; without these some of the nodes stand for them.
+    low, high : nodes of the boundaries.
+    metres : the unit of the deck.
+
+    Raises
+    ------
+    ValueError
+        An element has a node without a place.
+    """
+    edges = drawn_edges(deck.elements, deck.nodes)[:MOST_EDGES]
+    own = np.unique(edges) if edges.size else _some(sorted(deck.nodes), _MOST_LOOSE)
+    ends = [_some(nodes, _MOST_OF_A_BOUNDARY) for nodes in (low, high)]
+    ends = [np.array([node for node in each if node in deck.nodes], np.int64) for each in ends]
+    room = MOST_POINTS - sum(each.size for each in ends)
+    edges = edges[np.all(np.isin(edges, own[:room]), axis=1)]
+    shown = np.unique(np.concatenate([own[:room], *ends]).astype(np.int64))
+    points = metres * np.array([deck.nodes[int(node)] for node in shown]).reshape(-1, 3)
+    if points.size and (size := float(np.ptp(points, axis=0).max())) > 0.0:
+        points = np.round(points, _DIGITS - math.floor(math.log10(size)))
+    return SectorOutline(
+        points, np.searchsorted(shown, edges), *(np.searchsorted(shown, each) for each in ends)
+    )
+
+
+def _some(nodes: Sequence[int], most: int) -> Integer:
+    """Nodes, evenly chosen where there are too many."""
+    listed = np.array(nodes, np.int64)
+    if listed.size <= most:
+        return listed
+    return np.asarray(listed[np.linspace(0, listed.size - 1, most).round().astype(np.int64)])

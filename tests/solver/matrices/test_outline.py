@@ -1,0 +1,133 @@
+"""The outline of a sector's mesh: edges counted by hand, files that keep it, what is wrong with one."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sector_files import DOFS, SECTORS, sector_files
+
+import solver
+from service.cli import main
+from solver.matrices.readers.numbers_in_text import FormatError
+from solver.matrices.sectors.decks import read_deck
+from solver.matrices.sectors.outline import SectorOutline, outline_of
+from solver.matrices.sectors.reduction import read_sector
+
+CUBE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+HIGHER = [(x, y, 2) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+MESHES: dict[str, tuple[list[tuple[int, ...]], str, list[list[int]], int]] = {
+    "a brick": (CUBE, "C3D8R", [[1, 2, 3, 4, 5, 6, 7, 8]], 12),
+    # The faces of both are in one plane where they meet: the four edges there are not drawn.
+    "two bricks": (CUBE + HIGHER, "C3D8", [[1, 2, 3, 4, 5, 6, 7, 8], [5, 6, 7, 8, 9, 10, 11, 12]], 16),
+    "a tetrahedron": (CUBE[:2] + CUBE[3:5], "C3D4", [[1, 2, 3, 4]], 6),
+    "a wedge": (CUBE[:3] + CUBE[4:7], "C3D6", [[1, 2, 3, 4, 5, 6]], 9),
+    "flat shells": (CUBE[:4] + [(2, 0, 0), (2, 1, 0)], "S4", [[1, 2, 3, 4], [2, 5, 6, 3]], 6),
+    "bent shells, one of them turned over": (CUBE[:6], "S4", [[1, 2, 3, 4], [1, 2, 6, 5]], 7),
+    "nothing that is drawn": (CUBE, "B31", [[1, 2]], 0),
+}
+
+
+def written(folder: Path, places: list[tuple[int, ...]], kind: str, elements: list[list[int]]) -> Path:
+    lines = ["*NODE", *(f"{i}, {x}., {y}., {z}." for i, (x, y, z) in enumerate(places, start=1))]
+    lines.append(f"*Element, type={kind}, elset=ALL")
+    for number, nodes in enumerate(elements, start=1):
+        text = [str(one) for one in (number, *nodes)]
+        # A long element goes on in the next line.
+        lines += [", ".join(text[:6]) + ",", ", ".join(text[6:])] if len(text) > 6 else [", ".join(text)]
+    (folder / "mesh.inp").write_text("\n".join(lines) + "\n")
+    return folder / "mesh.inp"
+
+
+@pytest.mark.parametrize("mesh", MESHES)
+def test_edges_are_drawn_where_a_surface_ends_or_is_bent(mesh: str, tmp_path: Path) -> None:
+    places, kind, elements, count = MESHES[mesh]
+    deck = read_deck(written(tmp_path, places, kind, elements), elements=True)
+    found = outline_of(deck, [1], [2], metres=1e-3)
+    assert len(found.edges) == count
+    length = np.linalg.norm(found.points[found.edges[:, 0]] - found.points[found.edges[:, 1]], axis=1)
+    assert np.all(length > 0.0)
+    if count:
+        assert length.max() < 1.5e-3  # edges, no diagonals of faces but those of triangles
+    else:
+        assert len(found.points) == len(places)  # the nodes stand for the mesh
+    np.testing.assert_allclose(found.points[found.high], [[1e-3, 0.0, 0.0]])
+    assert not read_deck(tmp_path / "mesh.inp").elements  # which costs nothing unless it is asked for
+
+
+def test_the_shipped_sector_meets_the_next_one() -> None:
+    structure: Any = solver.load_scene("fe-disk").structure
+    found: SectorOutline = structure.outline
+    angle = 2.0 * math.pi / structure.sectors
+    turn = [
+        [math.cos(angle), -math.sin(angle), 0.0],
+        [math.sin(angle), math.cos(angle), 0.0],
+        [0.0, 0.0, 1.0],
+    ]
+    low, high = found.points[found.low] @ np.array(turn).T, found.points[found.high]
+    away = np.linalg.norm(low[:, None] - high[None], axis=2)
+    assert away.min(axis=0).max() < 2e-5
+    assert away.min(axis=1).max() < 2e-5
+    radius = np.hypot(*found.points[:, :2].T)
+    assert (radius.min(), radius.max()) == pytest.approx((0.09, 0.305), rel=1e-4)  # docs/fe/disk.py
+    for contact in solver.load_scene("fe-disk").contacts:
+        place = np.array(contact.at)  # type: ignore[attr-defined]
+        assert np.linalg.norm(found.points - place, axis=1).min() < 2e-5
+
+
+def test_a_reduced_sector_and_a_scene_keep_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name, data in sector_files().items():
+        Path(name).write_bytes(data)
+    words = ["import", "ring.mas", "ring.sti", "--mapping", "ring.dof", "--nodes", "ring.inp", "--low", "LOW",
+             "--high", "HIGH", "--sectors", str(SECTORS)]  # fmt: skip
+    words += [text for name, label in DOFS.items() for text in ("--dof", f"{name}={label}")]
+    assert main([*words, "--out", "whole.toml"]) == 0
+    assert main([*words, "--out", "small.toml", "--reduce", "--modes", "3"]) == 0
+    outlines = [solver.load_scene(name).structure.outline for name in ("whole.toml", "small.toml")]  # type: ignore[union-attr]
+    kept = read_sector(tmp_path / "small-reduced.npz")[2]
+    assert outlines[0] == outlines[1] == kept
+    assert kept is not None
+    assert (len(kept.points), len(kept.edges), kept.low.tolist(), kept.high.tolist()) == (
+        9, 0, [0, 1, 2], [6, 7, 8]
+    )  # fmt: skip
+    scene = solver.load_scene("small.toml")
+    assert solver.Scene.from_dict(scene.to_dict()) == scene
+
+
+BAD: dict[str, tuple[Any, str]] = {
+    "no table": ([], "must be a table"),
+    "a key": ({"points": []}, "the keys points, edges, low, high"),
+    "flat": ({"points": [1.0, 2.0], "edges": [], "low": [], "high": []}, "rows of 3 numbers"),
+    "ragged": ({"points": [[1.0], [2.0, 3.0]], "edges": [], "low": [], "high": []}, "rows of one length"),
+    "text": ({"points": [["a", 0, 0]], "edges": [], "low": [], "high": []}, "must hold numbers"),
+    "not finite": ({"points": [[math.nan, 0, 0]], "edges": [], "low": [], "high": []}, "finite"),
+    "not whole": ({"points": [[0, 0, 0]], "edges": [], "low": [0.5], "high": []}, "whole numbers"),
+    "nowhere": ({"points": [[0, 0, 0]], "edges": [[0, 1]], "low": [], "high": []}, "points from 0 to 0"),
+    "too many": ({"points": [[0, 0, 0]] * 10_001, "edges": [], "low": [], "high": []}, "at most 10000"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_is_wrong_with_an_outline_is_said(case: str) -> None:
+    given, words = BAD[case]
+    raw: dict[str, Any] = solver.load_scene("fe-disk").to_dict()
+    raw["structure"] = {**raw["structure"], "outline": given}
+    with pytest.raises(solver.SceneError, match=words):
+        solver.Scene.from_dict(raw)
+
+
+def test_an_element_that_is_damaged_is_named(tmp_path: Path) -> None:
+    for elements, words in (
+        ([[1, 2, 3]], "must have 8 nodes each"),
+        ([[1, 2, 3, 4, 5, 6, 7, 99]], "node 99"),
+    ):
+        path = written(tmp_path, CUBE, "C3D8", elements)
+        with pytest.raises((FormatError, ValueError), match=words):
+            outline_of(read_deck(path, elements=True), [1], [2])
+    path.write_text(path.read_text().replace("1, 1, 2", "1, one, 2"))
+    with pytest.raises(FormatError, match="line 11 must hold an element"):
+        read_deck(path, elements=True)
