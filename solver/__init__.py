@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
     from solver.marching.march import march
     from solver.marching.start import MarchStart
+    from solver.modes.controlled import HeldAmplitude, HeldStatus, held_amplitude
     from solver.modes.gradient import ModeGradient, mode_gradient
     from solver.modes.limit_cycles import LimitCycle, LimitCycles, limit_cycles
     from solver.modes.nonlinear_mode import nonlinear_mode
@@ -112,6 +113,8 @@ _HOME = {
     "PerformanceCurve": "modes.performance", "performance_curve": "modes.performance",
     "LimitCycle": "modes.limit_cycles", "LimitCycles": "modes.limit_cycles",
     "limit_cycles": "modes.limit_cycles",
+    "HeldAmplitude": "modes.controlled", "HeldStatus": "modes.controlled",
+    "held_amplitude": "modes.controlled",
     "ModeGradient": "modes.gradient", "mode_gradient": "modes.gradient",
     "PhaseResonance": "modes.phase_resonance", "phase_resonance": "modes.phase_resonance",
     "NonlinearModeStatus": "modes.results", "nonlinear_mode": "modes.nonlinear_mode",
@@ -140,6 +143,8 @@ __all__ = [
     "FoundSolution",
     "Gradient",
     "Growth",
+    "HeldAmplitude",
+    "HeldStatus",
     "Issue",
     "LawParameter",
     "LeastPeak",
@@ -198,6 +203,7 @@ __all__ = [
     "branch_errors",
     "branch_stability",
     "contact_wear",
+    "held_amplitude",
     "hysteresis_loop",
     "joined",
     "least_peak",

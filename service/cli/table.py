@@ -39,6 +39,10 @@ COMMANDS = (
         "Find the speeds at which orders of the running speed meet resonances.",
     ),
     Entry("modes", "commands.modes.modes", "Follow a mode's frequency and damping over its amplitude."),
+    Entry(
+        "controlled", "commands.controlled.controlled",
+        "Follow the response over the frequency with one amplitude held, as rigs do.",
+    ),
     Entry("mistuning", "commands.mistuning.mistuning", "Study disks whose blades are not quite equal."),
     Entry(
         "schema", "commands.schema.schema",

@@ -78,6 +78,14 @@ class Equations:
         self.span = system.span if system.span.shape[1] else None
         self._blocks = _block_places(balance)
 
+    def over(self, balance: Balance) -> Equations:
+        """Return the same question to another balance of the scene."""
+        return Equations(balance)
+
+    def follows(self, _before: Real, _y: Real) -> bool:
+        """Return whether unknowns may follow others on one curve, beside being near to them."""
+        return True
+
     def motions(self, w: Real) -> Real:
         """Return the motions of all ports, (nc, n), of those of the leading ones (r, n)."""
         return w if self.span is None else np.asarray(self.span @ w)

@@ -134,9 +134,22 @@ class LimitCycles(Piece):
             return math.inf if self.aero_damping < 0.0 else 0.0
         return disturbance / max(bounds) if bounds else 0.0
 
-    def to_json(self) -> dict[str, Any]:
-        """Return them as one JSON object."""
-        return {
+    def held_by(self, disturbance: float) -> dict[str, Any]:
+        """Return `load_for` as a JSON object: the factor, None for none that holds, and in words."""
+        factor = self.load_for(disturbance)
+        if factor == 0.0:
+            words = "whatever the loads are"
+        elif math.isfinite(factor):
+            words = f"with {factor:.5g} times the loads"
+        else:
+            words = "with no load: no cycle attracts"
+        load = factor if math.isfinite(factor) else None
+        return {"disturbance": float(disturbance), "load": load, "words": words}
+
+    def to_json(self, disturbance: float | None = None) -> dict[str, Any]:
+        """Return them as one JSON object, with what holds a disturbance [√kg m] if that is given."""
+        asked = {} if disturbance is None else {"load_for": self.held_by(disturbance)}
+        return asked | {
             "aero_damping": self.aero_damping,
             "most_damping": self.most_damping if math.isfinite(self.most_damping) else None,
             "most_at": self.most_at if math.isfinite(self.most_at) else None,
@@ -177,7 +190,7 @@ def limit_cycles(
     if not problem.turns:
         names = [c.name for c in found.scene.contacts if c.load is not None and c.load.amplitude != 0.0]
         raise SettingError("N1", names, "must be 0: a limit cycle has no phase that a load could follow")
-    missing = _missing(found.scene, stability)
+    missing = stability_left_out(found.scene, stability)
     surplus = found.damping_ratio + aero_damping
     cycles = []
     for i in range(len(found.points) - 1):
@@ -192,7 +205,7 @@ def limit_cycles(
     )  # fmt: skip
 
 
-def _missing(scene: Scene, stability: bool | None) -> str:
+def stability_left_out(scene: Scene, stability: bool | None) -> str:
     """Return why no multipliers are computed; empty if they are."""
     if stability is False:
         return "not asked for"

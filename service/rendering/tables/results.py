@@ -208,6 +208,7 @@ _HOMES = {
     "pareto": "design.front", "march": "results.march", "map": "track.response_map",
     "peaks": "track.track", "accuracy": "results.accuracy", "campbell": "campbell.diagram",
     "mistuning": "mistuning.report", "identify": "identify.report", "modes": "modes.report",
+    "controlled": "modes.held",
 }  # fmt: skip
 
 

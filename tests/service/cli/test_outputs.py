@@ -22,6 +22,7 @@ COMMANDS = {
     "map": "two-dof --parameter damper.N0 --from 50 --to 200 --steps 3 --frequencies 5 --harmonics 3",
     "mistuning": "bladed-disk --of tip --samples 2 --harmonics 1 --from 740 --to 780",
     "modes": "two-dof --from 0.1 --to 3 --harmonics 3",
+    "controlled": "two-dof --amplitude 1 --harmonics 3",
     "campbell": "two-dof --speeds 50 80 --harmonics 3",
     "sensitivities": "two-dof --harmonics 3",
     "design": "two-dof --variable damper.N0 20 500 --harmonics 3",
