@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from solver.modes.gradient import ModeGradient, mode_gradient
     from solver.modes.limit_cycles import LimitCycle, LimitCycles, limit_cycles
     from solver.modes.nonlinear_mode import nonlinear_mode
+    from solver.modes.peak_correction import PeakCorrection, corrected_peak
     from solver.modes.performance import PerformanceCurve, performance_curve
     from solver.modes.phase_resonance import PhaseResonance, phase_resonance
     from solver.modes.results import NonlinearMode, NonlinearModeStatus
@@ -116,6 +117,7 @@ _HOME = {
     "HeldAmplitude": "modes.controlled", "HeldStatus": "modes.controlled",
     "held_amplitude": "modes.controlled",
     "ModeGradient": "modes.gradient", "mode_gradient": "modes.gradient",
+    "PeakCorrection": "modes.peak_correction", "corrected_peak": "modes.peak_correction",
     "PhaseResonance": "modes.phase_resonance", "phase_resonance": "modes.phase_resonance",
     "NonlinearModeStatus": "modes.results", "nonlinear_mode": "modes.nonlinear_mode",
 }  # fmt: skip
@@ -164,6 +166,7 @@ __all__ = [
     "NonlinearMode",
     "NonlinearModeStatus",
     "Peak",
+    "PeakCorrection",
     "PeakGradient",
     "PeakHessian",
     "PeakKind",
@@ -203,6 +206,7 @@ __all__ = [
     "branch_errors",
     "branch_stability",
     "contact_wear",
+    "corrected_peak",
     "held_amplitude",
     "hysteresis_loop",
     "joined",

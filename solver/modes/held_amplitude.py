@@ -9,7 +9,8 @@ The equations are those of the balance under the force z c f, with z as one more
 
     ln (|o x_1| / A) = 0,   ln ω − λ = 0,                     o the row of the DOF,
 
-in place of phase and modal amplitude (`solver.modes.equations`); the curve is followed over λ = ln ω.
+in place of phase and modal amplitude (`solver.modes.equations`); the curve is followed over λ = ln ω. In
+place of |o x_1| it may be max|x| of the DOF that is held.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from solver.balance.balance import Balance
+from solver.balance.kernels.output import extremes
+from solver.contacts.kernels.system import System, by_reference
 from solver.jit.fourier import Complex, Real, cosine_position
 from solver.modes.corrector import Corrected, State, correct
 from solver.modes.equations import Equations, Evaluated
@@ -36,22 +39,24 @@ _CLOSE, _MOST_TRIES = 1e-9, 60  # of ln ω, where the force is least
 
 
 class Held(Equations):
-    """The responses whose harmonic 1 has a given amplitude at the observed DOF; the last unknown is z.
+    """The responses with a given harmonic 1, or max|x|, of the observed DOF; the last unknown is z.
 
     Attributes
     ----------
     target : A [m].
     unit : c, the factor on the excitation that z counts in.
+    whole : max|x| is held, not harmonic 1 alone.
     """
 
     def __init__(self, balance: Balance) -> None:
         super().__init__(balance)
-        self.target, self.unit = 1.0, 1.0
+        self.target, self.unit, self.whole = 1.0, 1.0, False
+        self._kernel: System = by_reference(balance.system)
 
     def over(self, balance: Balance) -> Held:
         """Return the same question to another balance of the scene."""
         other = Held(balance)
-        other.target, other.unit = self.target, self.unit
+        other.target, other.unit, other.whole = self.target, self.unit, self.whole
         return other
 
     def follows(self, before: Real, y: Real) -> bool:
@@ -81,18 +86,34 @@ class Held(Equations):
         force[s.first] = self.unit * s.force
         return force
 
+    def _seen(self, x: Complex) -> tuple[float, Complex]:
+        """Return what is held [m], and c (nk, N) of its change Re Σ c_kᴴ dx_k."""
+        s = self.structure
+        if not self.whole:
+            seen = complex(np.sum(s.observe[s.first] * x[s.first]))
+            row = np.zeros_like(x)
+            row[s.first] = s.observe[s.first].conj() * seen / max(abs(seen), 1e-300)
+            return abs(seen), row
+        observed = self.amplitudes.coefficients(np.einsum("kn,kn->k", s.observe, x))
+        high, at_high, low, at_low = extremes(self._kernel, observed)
+        sign, tau = (1.0, at_high) if high >= -low else (-1.0, at_low)
+        # The extreme of a smooth motion changes as the motion does at its instant.
+        return max(high, -low), sign * (s.observe * self.amplitudes.turn(tau)[:, None]).conj()
+
+    def _second_last(self, x: Complex, _turned: Complex) -> Complex:
+        """Return c of the change of the logarithm of what is held."""
+        size, row = self._seen(x)
+        return row / max(size, 1e-300)
+
     def _assemble(
         self, w: Real, q: complex, forces: Real, x: Complex, by_omega: Complex, dynamics: Dynamics,
-        log_amplitude: float, _phase: Complex,
+        log_amplitude: float, phase: Complex,
     ) -> Evaluated:  # fmt: skip
         """Put residual and Jacobian together; `log_amplitude` is λ."""
         s, size, omega = self.structure, self.size, math.exp(log_amplitude)
-        seen = complex(np.sum(s.observe[s.first] * x[s.first]))
-        square = max(abs(seen) ** 2, 1e-300)
-        row = np.asarray(s.observe[s.first].conj() * seen / square)  # ln|o x_1| changes by Re rowᴴ dx_1
-        at = super()._assemble(w, q, forces, x, by_omega, dynamics, log_amplitude, row)
+        at = super()._assemble(w, q, forces, x, by_omega, dynamics, log_amplitude, phase)
         residual, J = at.residual, at.jacobian
-        residual[size + 2] = 0.5 * math.log(square) - math.log(self.target)
+        residual[size + 2] = math.log(max(self._seen(x)[0], 1e-300) / self.target)
         # q is counted in what moves; `relative_residual` counts it in e^λ.
         unit = omega / max(math.sqrt(s.squared_amplitude(x)), 1e-300)
         residual[size : size + 2] *= unit

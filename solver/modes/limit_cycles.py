@@ -216,7 +216,7 @@ def stability_left_out(scene: Scene, stability: bool | None) -> str:
     return ""
 
 
-def _between(found: NonlinearMode, i: int, share: float) -> State:
+def between(found: NonlinearMode, i: int, share: float) -> State:
     """Return a guess between points i and i + 1."""
     one, other = found.points[i], found.points[i + 1]
     # q is of one mode alone.
@@ -231,7 +231,7 @@ def _at_damping(equations: Equations, found: NonlinearMode, i: int, zeta: float)
     border = np.zeros(found.points[i].y.size + 1)
     border[-2] = 1.0
     for share in ((zeta - one) / (other - one), 0.0, 1.0, 0.5):
-        guess = _between(found, i, share)
+        guess = between(found, i, share)
         y = guess.y.copy()
         y[-1] = zeta
         solved = correct(equations, replace(guess, y=y), border, most=40)
@@ -302,7 +302,7 @@ def _most_damping(equations: Equations, found: NonlinearMode) -> tuple[float, fl
     def at(log_amplitude: float) -> Corrected:
         j = i - 1 if log_amplitude < logs[1] else i
         share = (log_amplitude - found.points[j].log_amplitude) / (logs[j - i + 2] - logs[j - i + 1])
-        return correct(equations, _between(found, j, share), most=40)
+        return correct(equations, between(found, j, share), most=40)
 
     def slope(log_amplitude: float) -> float:
         point = at(log_amplitude)
