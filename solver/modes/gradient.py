@@ -122,7 +122,7 @@ class ModeSensitivities:
             adjoint = np.linalg.lstsq((scaled / rows[:, None]).T, units, rcond=1e-13)[0] / rows[:, None]
         except np.linalg.LinAlgError:
             return nothing, nothing
-        changes = np.array([self._residual(i, state, at) for i in range(count)]).reshape(count, -1)
+        changes = np.array([self._residual(i, state, at) for i in range(count)]).reshape(count, state.y.size)
         found = -changes @ adjoint
         return found[:, 0], found[:, 1]
 
