@@ -48,7 +48,10 @@ COMMANDS = (
         "schema", "commands.schema.schema",
         "Print the JSON Schema of scene files, design problems or jobs, for editors.",
     ),
-    Entry("report", "commands.report.report", "Write the report of a design that the service computed."),
+    Entry(
+        "report", "commands.report.report",
+        "Write the report of a design or an identification that the service computed.",
+    ),
     Entry("import", "commands.import_matrices.import_scene", "Make a scene of matrices or modes in files."),
 )  # fmt: skip
 

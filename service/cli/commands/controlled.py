@@ -39,7 +39,10 @@ def controlled(
     out: options.Out = None,
     as_json: options.Json = False,
 ) -> None:
-    """Follow the response over the frequency with one amplitude held, as rigs do: which force it takes."""
+    """Follow the response over the frequency with one amplitude held, as rigs do.
+
+    It says which force that takes, and what the contacts do.
+    """
     import solver
 
     outputs = Outputs.asked(plot, out)
