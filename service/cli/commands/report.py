@@ -38,8 +38,8 @@ def report(
         asked = client.job(job)
         if asked.kind not in KINDS:
             raise InputError(
-                f"`JOB` must be a design, pareto or identify job, {job!r} is of the kind {asked.kind!r} and "
-                f"has nothing to report: `stickslip results {job} --plot F` draws it, without --plot prints it"
+                f"`JOB` must be a design, pareto or identify job, {job!r} is of the kind {asked.kind!r}, "
+                f"which has no report: `stickslip results {job} --plot F` draws it, without --plot prints it"
             )
         answer = client.results(job)
         scene = solver.Scene.from_dict(client.job_scene(job))
