@@ -121,10 +121,7 @@ def performance_curve(found: NonlinearMode) -> PerformanceCurve:
         scene = found.scene
         wanted = "must have a force of harmonic 1 that drives the mode"
         raise SettingError("excitation", [force.place for force in scene.excitation], wanted)
-    omega, zeta = 2.0 * math.pi * found.frequency_hz, found.damping_ratio
-    # Of ζ above 1/√2 there is no peak but at rest, of ζ ≤ 0 none is bounded.
-    damped = np.clip(zeta, 0.0, math.sqrt(0.5))
-    factor = 2.0 * damped * np.sqrt(1.0 - damped**2) * omega**2 * found.amplitude / forcing
+    factor, damped = excitations_of(found)
     with np.errstate(divide="ignore"):
         load = 1.0 / factor
     scales = bool(found.points) and grows_together(found)
@@ -134,6 +131,17 @@ def performance_curve(found: NonlinearMode) -> PerformanceCurve:
         frequency_hz=found.frequency_hz * np.sqrt(np.maximum(1.0 - 2.0 * damped**2, 0.0)), scales=scales,
         load=load if scales else unknown, peak_at_load=found.max_abs * load if scales else unknown,
     )  # fmt: skip
+
+
+def excitations_of(found: NonlinearMode) -> tuple[Real, Real]:
+    """Return the factor on the excitation that each point of a mode is the peak of, and its damping ratio.
+
+    Of ζ above 1/√2 there is no peak but at rest, of ζ ≤ 0 none is bounded.
+    """
+    omega = 2.0 * math.pi * found.frequency_hz
+    damped = np.clip(found.damping_ratio, 0.0, math.sqrt(0.5))
+    factor = 2.0 * damped * np.sqrt(1.0 - damped**2) * omega**2 * found.amplitude / found.forcing
+    return factor, damped
 
 
 def with_loads(scene: Scene, factor: float) -> Scene:

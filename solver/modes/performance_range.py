@@ -10,12 +10,12 @@ import numpy as np
 from solver.errors import SettingError
 from solver.jit.fourier import Real
 from solver.modes.nonlinear_mode import nonlinear_mode, pose
-from solver.modes.performance import PerformanceCurve, performance_curve
+from solver.modes.performance import PerformanceCurve, excitations_of, performance_curve
 from solver.modes.start import LinearMode, coordinates_of, linear_modes
 from solver.scene.scene import Scene
 
 _BELOW, _BEYOND = 0.5, 3.0  # of the amplitudes that the least and the largest excitation make
-_AGAIN, _LOWER, _HIGHER = 3, 0.1, 30.0  # times that a range is widened, and by how much
+_LOOKS, _AGAIN, _LOWER, _HIGHER = 8, 3, 0.2, 30.0  # times that a range is widened, and by how much
 _WEAK = 1e-6  # damping ratio that a mode without any is given: its peak is not bounded
 
 
@@ -70,6 +70,14 @@ def performance_over(
     """
     number = carrying_mode(scene, harmonics=harmonics) if mode is None else mode
     low, high = _amplitudes(scene, number, factors, harmonics)
+    for _ in range(_LOOKS):
+        # Contacts that slip at once take more force for the same amplitude than those at rest.
+        begun = nonlinear_mode(
+            scene, number, amplitudes=(low, high), harmonics=harmonics, errors=False, most_points=1
+        )
+        if begun.points and begun.forcing[0] > 0.0 and excitations_of(begun)[0][0] <= factors[0]:
+            break
+        low *= _LOWER
     for again in range(_AGAIN):
         found = nonlinear_mode(
             scene, number, amplitudes=(low, high), harmonics=harmonics, errors=False, should_stop=should_stop
