@@ -80,6 +80,8 @@ def solve_problem(
     on_best: OnBest = None,
 ) -> DesignResult:
     """Search the best design of a problem; see `design`."""
+    if problem.method is Method.PERFORMANCE_CURVE:
+        return _by_curve(problem, on_progress, should_stop)
     tally = Tally(on_progress)
     found = looked_after(_solved(problem, tally.searching, should_stop, on_best), should_stop, tally.further)
     if found.evaluation is not None:
@@ -194,6 +196,25 @@ def _result(search: Search, whole: WholeRange, status: DesignStatus, begun: floa
         conditions=None if best is None else best.conditions, basins=basins_of(search, whole.found),
         looked_at=whole.looked_at, history=tuple(search.history), evaluations=responses,
         work=float(responses), seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def _by_curve(problem: Problem, on_progress: OnProgress, should_stop: ShouldStop) -> DesignResult:
+    """Search on the performance curve of one mode; the response at its optimum is judged like any other."""
+    from optim.methods.performance_curve import curve_optimum
+
+    begun = time.perf_counter()
+    by_curve = curve_optimum(problem, on_progress=on_progress, should_stop=should_stop)
+    evaluation, found = by_curve.evaluation, None
+    if evaluation is not None and evaluation.good:
+        model = model_of(evaluation, problem.variables, evaluation.objective, natural_scales(problem))
+        found = conditions(model, problem.variables)
+    return DesignResult(
+        problem=problem, method=Method.PERFORMANCE_CURVE, status=by_curve.status, evaluation=evaluation,
+        conditions=found, basins=(), curve=by_curve.check,
+        history=() if evaluation is None else (evaluation,),
+        evaluations=0 if evaluation is None else 1, work=0.0 if evaluation is None else 1.0,
+        seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
 

@@ -22,9 +22,11 @@ if TYPE_CHECKING:
     from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
     from solver.marching.march import march
     from solver.marching.start import MarchStart
+    from solver.modes.controlled import HeldAmplitude, HeldStatus, held_amplitude
     from solver.modes.gradient import ModeGradient, mode_gradient
     from solver.modes.limit_cycles import LimitCycle, LimitCycles, limit_cycles
     from solver.modes.nonlinear_mode import nonlinear_mode
+    from solver.modes.peak_correction import PeakCorrection, corrected_peak
     from solver.modes.performance import PerformanceCurve, performance_curve
     from solver.modes.phase_resonance import PhaseResonance, phase_resonance
     from solver.modes.results import NonlinearMode, NonlinearModeStatus
@@ -125,7 +127,10 @@ _HOME = {
     "PerformanceCurve": "modes.performance", "performance_curve": "modes.performance",
     "LimitCycle": "modes.limit_cycles", "LimitCycles": "modes.limit_cycles",
     "limit_cycles": "modes.limit_cycles",
+    "HeldAmplitude": "modes.controlled", "HeldStatus": "modes.controlled",
+    "held_amplitude": "modes.controlled",
     "ModeGradient": "modes.gradient", "mode_gradient": "modes.gradient",
+    "PeakCorrection": "modes.peak_correction", "corrected_peak": "modes.peak_correction",
     "PhaseResonance": "modes.phase_resonance", "phase_resonance": "modes.phase_resonance",
     "NonlinearModeStatus": "modes.results", "nonlinear_mode": "modes.nonlinear_mode",
 }  # fmt: skip
@@ -158,6 +163,8 @@ __all__ = [
     "Interference",
     "InterferenceDiagram",
     "InterferenceStatus",
+    "HeldAmplitude",
+    "HeldStatus",
     "Issue",
     "LawParameter",
     "LeastPeak",
@@ -177,6 +184,7 @@ __all__ = [
     "NonlinearMode",
     "NonlinearModeStatus",
     "Peak",
+    "PeakCorrection",
     "PeakGradient",
     "PeakHessian",
     "PeakKind",
@@ -217,6 +225,8 @@ __all__ = [
     "branch_errors",
     "branch_stability",
     "contact_wear",
+    "corrected_peak",
+    "held_amplitude",
     "hysteresis_loop",
     "interference_diagram",
     "joined",

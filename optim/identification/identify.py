@@ -127,15 +127,15 @@ def _check_plausible(runs: Runs, best: LocalFit) -> None:
         computed = float(np.abs(best.fitted.values[part][reached]).max())
         ratio = seen / computed if computed > 0.0 else math.inf
         if not 1.0 / _IMPLAUSIBLE < ratio < _IMPLAUSIBLE:
-            unit = "displacements [m]" if isinstance(run, ResponseRun) else "forces [N]"
             wanted = (
-                f"must be {unit} such as the scene has under {run.words}, at most {computed:.3g} with the "
+                f"must be {run.unit_words} such as the scene has under {run.words}, at most {computed:.3g} "
+                "with the "
                 f"best "
                 "values within the bounds: give the unit in the head of the column, `amplitude [mm]`, and "
                 "look at "
                 "the excitation"
             )
-            size = seen / (1.0 if isinstance(run, ResponseRun) else run.scale)  # type: ignore[attr-defined]
+            size = seen / run.scale
             raise DataError(run.source, float(f"{size:.4g}"), wanted)
 
 

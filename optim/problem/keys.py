@@ -28,6 +28,7 @@ POINTS, FEWEST_POINTS = 9, 3
 QUANTILE = 0.95
 FEWEST_SAMPLES = 2
 SEED = 0
+TOLERANCE = 0.05
 
 
 def _observed(value: object) -> object:
@@ -135,7 +136,7 @@ class ProblemKeys(BaseModel):
             Form.WORD,
             "--method",
             "M",
-            help="auto, tracked, minimax or ipopt; auto.",
+            help="auto, tracked, minimax, ipopt or performance-curve; auto.",
             words=get_args(MethodWord),
         ),
     ] = Field(default="auto", description="How the optimum is searched.")
@@ -148,6 +149,16 @@ class NominalAndRobustKeys(ProblemKeys):
         Annotated[int, Field(strict=True, ge=1, le=MOST_BASINS)] | None,
         Option(Form.WHOLE_NUMBER, "--basins", "N", help=f"Local optima looked for; {BASINS}."),
     ] = Field(default=None, description=f"How many local optima are looked for; {BASINS}.")
+    tolerance: Annotated[
+        Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None,
+        Option(
+            Form.NUMBER, "--tolerance", "E",
+            help=f"Relative error of the peak up to which a performance curve suffices; {TOLERANCE}.",
+        ),
+    ] = Field(
+        default=None,
+        description=f"Relative error of the peak up to which a performance curve suffices; {TOLERANCE}.",
+    )  # fmt: skip
     uncertain: Uncertain | None = Field(
         default=None,
         description="What is not known: a table of intervals, a table of an ellipsoid, or a list of samples.",

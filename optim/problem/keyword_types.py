@@ -47,6 +47,8 @@ class DesignKeywords(ProblemKeywords, total=False):
 
     basins: int | None
     """How many local optima are looked for; 2."""
+    tolerance: float | None
+    """Relative error of the peak up to which a performance curve suffices; 0.05."""
     max_band_hz: float | None
     """Largest width of the resonance band allowed [Hz]."""
     weights: Mapping[str, float] | None

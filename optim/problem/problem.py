@@ -11,7 +11,7 @@ from optim.criteria.peak import PEAK
 from optim.criteria.registry import by_weight, criteria, limit_keys, weight_words
 from optim.errors import DesignError
 from optim.problem.cases import Case, read_cases
-from optim.problem.keys import BASINS, HARMONICS, MOST_BASINS
+from optim.problem.keys import BASINS, HARMONICS, MOST_BASINS, TOLERANCE
 from optim.problem.numbers import is_number, positive
 from optim.problem.variables import Variable, check_variables
 from optim.problem.words import Method as Method
@@ -39,6 +39,8 @@ class Problem(Goals):
         How it is searched.
     basins : int
         How many local optima are looked for.
+    tolerance : float
+        Relative error of the peak up to which a performance curve suffices.
     """
 
     scene: Scene
@@ -47,6 +49,7 @@ class Problem(Goals):
     start: Mapping[str, float] | None
     method: Method
     basins: int
+    tolerance: float = TOLERANCE
 
     @property
     def plain(self) -> bool:
@@ -74,6 +77,17 @@ class Problem(Goals):
         others = without_second(self.scene.contacts)
         if others:
             return f"tracked needs laws with second derivatives, which {others} has not"
+        return None
+
+    @property
+    def why_no_curve(self) -> str | None:
+        """Why this is no problem for a performance curve; None if it is one."""
+        if not self.plain:
+            return "performance-curve is for the highest peak of one case alone, without limits"
+        if self.scene.speed_order is not None:
+            return "performance-curve takes no engine-order line (`speed_order`)"
+        if any(force.harmonic != 1 for force in self.cases[0].scene.excitation):
+            return "performance-curve takes an excitation of harmonic 1 alone"
         return None
 
 
@@ -105,8 +119,13 @@ def pose(scene: Scene, **given: Any) -> Problem:
     problem = Problem(
         scene=scene, variables=chosen, cases=cases, limit=limit, weights=_weights(keys["weights"]),
         limits=limits, harmonics=_harmonics(keys["harmonics"]), start=read_start(chosen, keys["start"]),
-        method=_method(keys["method"]), basins=basins,
+        method=_method(keys["method"]), basins=basins, tolerance=_tolerance(keys["tolerance"]),
     )  # fmt: skip
+    if problem.method is Method.PERFORMANCE_CURVE:
+        if problem.why_no_curve is not None:
+            raise DesignError("method", keys["method"], f"must be another one: {problem.why_no_curve}")
+    elif keys["tolerance"] is not None:
+        raise DesignError("tolerance", keys["tolerance"], "is for the method performance-curve alone")
     if problem.method is Method.TRACKED and problem.why_not_tracked is not None:
         raise DesignError("method", keys["method"], f"must be another one: {problem.why_not_tracked}")
     return problem
@@ -186,8 +205,17 @@ def _basins(basins: object) -> int:
     return basins
 
 
+def _tolerance(tolerance: object) -> float:
+    if tolerance is None:
+        return TOLERANCE
+    if not is_number(tolerance) or not 0.0 < tolerance <= 1.0:
+        raise DesignError("tolerance", tolerance, "must be a relative error above 0, at most 1")
+    return float(tolerance)
+
+
 READERS: Mapping[str, Callable[[Any], object]] = {
     "weights": _weights, "harmonics": _harmonics, "method": _method, "basins": _basins,
+    "tolerance": _tolerance,
 }  # fmt: skip
 """The keys whose values stand alone, with what reads them."""
 WITH_OTHERS = ("variables", "scaling", "cases", "limit", "start")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Literal
 
-MethodWord = Literal["auto", "tracked", "minimax", "ipopt"]
+MethodWord = Literal["auto", "tracked", "minimax", "ipopt", "performance-curve"]
 ScalingWord = Literal["auto", "linear", "logarithmic"]
 AimWord = Literal["worst-case", "mean", "quantile"]
 
@@ -17,6 +17,7 @@ class Method(Enum):
     TRACKED = "tracked"
     MINIMAX = "minimax"
     IPOPT = "ipopt"
+    PERFORMANCE_CURVE = "performance-curve"
 
 
 class Scaling(Enum):

@@ -15,6 +15,7 @@ from optim.criteria.peak import PEAK
 from optim.criteria.rows import Evaluation
 from optim.problem.problem import Method, Problem
 from optim.results.basins import Basin, Checked
+from optim.results.curve_check import CurveCheck
 from optim.results.doubts import doubts_of
 from optim.results.json import (
     bands_json,
@@ -68,6 +69,18 @@ class DesignStatus(Enum):
         "The peaks could not be followed over the whole range; the best design seen is given: use the method "
         "minimax, or a narrower range."
     )
+    APPROXIMATE = (
+        "The performance curve of one mode is least here, and its peak is that of the whole response within "
+        "the tolerance. That no other design is better is as sure as the curve is."
+    )
+    CURVE_OFF = (
+        "The performance curve of one mode is least here, but its peak is not that of the whole response "
+        "within the tolerance: use the method auto, or a wider tolerance."
+    )
+    NO_CURVE = (
+        "No performance curve reaches the excitation within the bounds: use the method auto, or see with "
+        "`stickslip modes` where the curve ends."
+    )
     TOO_MANY = "The largest number of responses was used up before the search settled: allow more."
     STOPPED = "The search was stopped by the caller."
 
@@ -110,6 +123,8 @@ class DesignResult(Drawn):
         What the design was chosen by on a plateau.
     checked : tuple of Checked
         The local optima again with twice the harmonics, where the estimated error of a peak is large.
+    curve : CurveCheck or None
+        Of the method performance-curve: the curve beside the whole response.
     evaluations : int
         Frequency responses computed.
     work : float
@@ -128,6 +143,7 @@ class DesignResult(Drawn):
     plateau: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     chosen_by: str | None = None
     checked: tuple[Checked, ...] = ()
+    curve: CurveCheck | None = None
     history: tuple[Evaluation, ...]
     evaluations: int
     work: float
@@ -146,7 +162,7 @@ class DesignResult(Drawn):
     @property
     def reached(self) -> bool:
         """Whether the goal was reached."""
-        return self.status in (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND)
+        return self.status in (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.APPROXIMATE)
 
     @property
     def peak(self) -> DesignPeak | None:
@@ -287,6 +303,7 @@ class DesignResult(Drawn):
             "plateau": {name: list(ends) for name, ends in self.plateau.items()},
             "chosen_by": self.chosen_by,
             "checked": [checked_json(one) for one in self.checked],
+            "curve": None if self.curve is None else self.curve.to_json(),
             "looked_at": [looked_json(one) for one in self.looked_at if one.good],
             "evaluations": self.evaluations,
             "newton_iterations": sum(branch.newton_iterations for branch in self.sweeps),

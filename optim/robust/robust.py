@@ -28,7 +28,7 @@ from optim.problem.problem import pose
 from optim.problem.typed import Limit, with_limits
 from optim.problem.uncertainty_input import check_settings, read_uncertain
 from optim.problem.uncertainty_set import Scenario
-from optim.problem.words import Aim
+from optim.problem.words import Aim, Method
 from optim.results.best_so_far import OnBest
 from optim.results.design import DesignResult, DesignStatus
 from optim.robust.assessment import side_of
@@ -96,6 +96,8 @@ def robust_design(
     """
     begun = time.perf_counter()
     posed = pose(scene, **with_limits(problem, limits))
+    if posed.method is Method.PERFORMANCE_CURVE:
+        raise DesignError("method", posed.method.value, "must be another one: a curve knows no uncertainty")
     over = read_uncertain(scene, posed.variables, uncertain)
     search = RobustSearch(posed, over, _aim(aim), _quantile(quantile), on_progress, should_stop, on_best)
     wanted = SAMPLES[search.aim] if samples is None else whole("samples", samples, least=FEWEST_SAMPLES)

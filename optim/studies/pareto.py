@@ -87,6 +87,8 @@ def pareto_front(
     posed = pose(scene, **with_limits(problem, limits))
     if isinstance(points, bool) or not isinstance(points, int) or points < FEWEST_POINTS:
         raise DesignError("points", points, f"must be a whole number >= {FEWEST_POINTS}")
+    if posed.method is Method.PERFORMANCE_CURVE:
+        raise DesignError("method", posed.method.value, "must be another one: a curve knows no band")
     front = _Front(posed, points, on_progress, should_stop)
     status = front.run()
     if on_progress is not None:

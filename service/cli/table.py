@@ -43,12 +43,19 @@ COMMANDS = (
         "Draw natural frequencies over the nodal diameter, with the engine orders that meet them.",
     ),
     Entry("modes", "commands.modes.modes", "Follow a mode's frequency and damping over its amplitude."),
+    Entry(
+        "controlled", "commands.controlled.controlled",
+        "Follow the response over the frequency with one amplitude held, as rigs do.",
+    ),
     Entry("mistuning", "commands.mistuning.mistuning", "Study disks whose blades are not quite equal."),
     Entry(
         "schema", "commands.schema.schema",
         "Print the JSON Schema of scene files, design problems or jobs, for editors.",
     ),
-    Entry("report", "commands.report.report", "Write the report of a design that the service computed."),
+    Entry(
+        "report", "commands.report.report",
+        "Write the report of a design or an identification that the service computed.",
+    ),
     Entry("import", "commands.import_matrices.import_scene", "Make a scene of matrices or modes in files."),
 )  # fmt: skip
 

@@ -90,20 +90,23 @@ def step(J: Real, rhs: Real, columns: Real, *, least_squares: bool) -> Real | No
 
 
 def correct(
-    equations: Equations, guess: State, border: Real | None = None, *, most: int = MOST_ITERATIONS
-) -> Corrected:
+    equations: Equations, guess: State, border: Real | None = None, *, most: int = MOST_ITERATIONS,
+    fine: float = _FINE, good: float = TOLERANCE,
+) -> Corrected:  # fmt: skip
     """Solve from a guess: at its amplitude, or along the plane through it whose normal is `border`.
 
     Parameters
     ----------
     border : (m + 1,) row over the unknowns and ln a; None: the amplitude is kept.
+    fine : relative residual at which no further step is taken.
+    good : relative residual that counts as solved.
     """
     start, size = guess, equations.size
     state, at = guess, equations.evaluate(guess.y, guess.log_amplitude, guess.phase, guess.mode)
     iterations, norm = 0, _left(at, state, size)
     norms = [norm]
     while at is not None:
-        if norm <= _FINE or iterations >= most:
+        if norm <= fine or iterations >= most:
             break
         if border is not None and len(norms) > _PATIENCE and norm > _HOPE * norms[-1 - _PATIENCE]:
             break  # a shorter step costs less
@@ -111,11 +114,11 @@ def correct(
         if move is None:
             break
         left, new, there = _damped(equations, state, move, norm)
-        if norm <= TOLERANCE and left > 0.1 * norm:
+        if norm <= good and left > 0.1 * norm:
             break
         state, at, norm, iterations = new, there, left, iterations + 1
         norms.append(norm)
-    if norm <= TOLERANCE:
+    if norm <= good:
         return Corrected(state=state, at=at, converged=True, iterations=iterations, residual=norm)
     return Corrected(state=state, at=at, converged=False, iterations=iterations, residual=norm)
 

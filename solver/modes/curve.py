@@ -118,7 +118,8 @@ def _advance(
             found = correct(equations, replace(guess, log_amplitude=high))
         else:
             found = correct(equations, guess, _border(here.state, tangent, equations.size))
-        if found.converged and _is_near(here, found, size, equations.size):
+        followed = found.converged and equations.follows(here.state.y, found.state.y)
+        if followed and _is_near(here, found, size, equations.size):
             if size > _RESOLVED and _bends(guess, found.state):
                 size = max(0.4 * size, _RESOLVED)
                 continue
@@ -148,6 +149,8 @@ def _leap(
             y[: equations.size + 2] *= math.exp(rise)
             found = correct(equations, replace(here.state, y=y, log_amplitude=to), most=40)
             if not found.converged or share_of_first(equations, found) < least_share:
+                continue
+            if not equations.follows(here.state.y, found.state.y):
                 continue
             if _is_near(here, found, rise, equations.size):
                 return carried_anew(equations, found)

@@ -78,6 +78,14 @@ class Equations:
         self.span = system.span if system.span.shape[1] else None
         self._blocks = _block_places(balance)
 
+    def over(self, balance: Balance) -> Equations:
+        """Return the same question to another balance of the scene."""
+        return Equations(balance)
+
+    def follows(self, _before: Real, _y: Real) -> bool:
+        """Return whether unknowns may follow others on one curve, beside being near to them."""
+        return True
+
     def motions(self, w: Real) -> Real:
         """Return the motions of all ports, (nc, n), of those of the leading ones (r, n)."""
         return w if self.span is None else np.asarray(self.span @ w)
@@ -154,6 +162,10 @@ class Equations:
         phi[s.first] += dynamics.rho * dynamics.b * q
         return phi, by_omega
 
+    def pushes_by_omega(self, forces: Real, omega: float, q: complex, dynamics: Dynamics) -> Complex:
+        """Return the derivative by ω of what pushes the coordinates, (nk, N), where last evaluated."""
+        return self._pushes(forces, omega, q, dynamics)[1]
+
     def _assemble(
         self, w: Real, q: complex, forces: Real, x: Complex, by_omega: Complex, dynamics: Dynamics,
         log_amplitude: float, phase: Complex,
@@ -187,7 +199,9 @@ class Equations:
         seen = (s.contact @ changes[..., None])[..., 0]  # (3, nk, r)
         for column, value in ((0, seen[0]), (1, 1j * seen[0]), (2, seen[1]), (3, seen[2])):
             J[:size, size + column] = -hat.coefficients(value.T).reshape(-1)
-        self._functionals(J, x, mass, squared, phase, dF, changes, dynamics)
+        turned = np.zeros_like(x)
+        turned[s.first] = phase
+        self._functionals(J, x, mass, squared, self._second_last(x, turned), dF, changes, dynamics)
         by_log_amplitude = np.zeros(size + BESIDES)
         by_log_amplitude[-1] = -1.0
         reach = np.abs(A).max(axis=(1, 2)) if self.r else np.zeros(len(s.ks))
@@ -200,14 +214,18 @@ class Equations:
             dynamics=dynamics,
         )  # fmt: skip
 
+    def _second_last(self, _x: Complex, turned: Complex) -> Complex:
+        """Return c (nk, N) of the equation before the last, Re Σ c_kᴴ x_k: `turned` is that of the phase."""
+        return turned
+
     def _functionals(
-        self, J: Real, x: Complex, mass: Complex, squared: float, phase: Complex, dF: Complex,
+        self, J: Real, x: Complex, mass: Complex, squared: float, second_last: Complex, dF: Complex,
         changes: Complex, dynamics: Dynamics,
     ) -> None:  # fmt: skip
         """Fill the rows of q, of the phase and of the amplitude, each a sum cᴴ x over the harmonics."""
         s, size = self.structure, self.size
         rows = np.zeros((3, *x.shape), np.complex128)
-        rows[0, s.first], rows[1, s.first], rows[2] = dynamics.b, phase, mass / squared
+        rows[0, s.first], rows[1], rows[2] = dynamics.b, second_last, mass / squared
         by_w = np.empty((3, size), np.complex128)
         for i, row in enumerate(rows):
             pull = np.einsum("kn,kna->ka", dynamics.solve_adjoint(row).conj(), s.back)

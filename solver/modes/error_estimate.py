@@ -25,10 +25,10 @@ class Wider:
             whole_matrices=balance.system.form == DENSE, even_harmonics=int(balance.system.ks[0]) == 0
         )
         self._given = equations
-        self._wide = Equations(build(balance.scene, harmonics=harmonics, effects=effects))
+        self._wide = equations.over(build(balance.scene, harmonics=harmonics, effects=effects))
 
     def estimate(self, found: Corrected) -> tuple[float, float]:
-        """Return the changes of frequency [Hz] and damping ratio by a Newton step; NaN if there is none.
+        """Return the changes of frequency [Hz] and of the last unknown by a Newton step; NaN if none.
 
         The step begins at the point with the harmonics it lacks at 0.
         """

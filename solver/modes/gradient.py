@@ -122,9 +122,16 @@ class ModeSensitivities:
             adjoint = np.linalg.lstsq((scaled / rows[:, None]).T, units, rcond=1e-13)[0] / rows[:, None]
         except np.linalg.LinAlgError:
             return nothing, nothing
-        changes = np.array([self._residual(i, state, at) for i in range(count)]).reshape(count, -1)
+        changes = np.array([self._residual(i, state, at) for i in range(count)]).reshape(count, state.y.size)
         found = -changes @ adjoint
         return found[:, 0], found[:, 1]
+
+    def changes(self, state: State, at: Evaluated) -> tuple[Real, list[Complex]]:
+        """Return ∂r/∂p of every path, (n_paths, m), and what it pushes on the coordinates, (nk, N) each."""
+        count = len(self._parameters)
+        rows = [self._residual(i, state, at) for i in range(count)]
+        pushes = [self._change(i, state, at).pushes for i in range(count)]
+        return np.array(rows).reshape(count, state.y.size), pushes
 
     def _residual(self, i: int, state: State, at: Evaluated) -> Real:
         """Return ∂r/∂p of path i."""

@@ -134,9 +134,22 @@ class LimitCycles(Piece):
             return math.inf if self.aero_damping < 0.0 else 0.0
         return disturbance / max(bounds) if bounds else 0.0
 
-    def to_json(self) -> dict[str, Any]:
-        """Return them as one JSON object."""
-        return {
+    def held_by(self, disturbance: float) -> dict[str, Any]:
+        """Return `load_for` as a JSON object: the factor, None for none that holds, and in words."""
+        factor = self.load_for(disturbance)
+        if factor == 0.0:
+            words = "whatever the loads are"
+        elif math.isfinite(factor):
+            words = f"with {factor:.5g} times the loads"
+        else:
+            words = "with no load: no cycle attracts"
+        load = factor if math.isfinite(factor) else None
+        return {"disturbance": float(disturbance), "load": load, "words": words}
+
+    def to_json(self, disturbance: float | None = None) -> dict[str, Any]:
+        """Return them as one JSON object, with what holds a disturbance [√kg m] if that is given."""
+        asked = {} if disturbance is None else {"load_for": self.held_by(disturbance)}
+        return asked | {
             "aero_damping": self.aero_damping,
             "most_damping": self.most_damping if math.isfinite(self.most_damping) else None,
             "most_at": self.most_at if math.isfinite(self.most_at) else None,
@@ -177,7 +190,7 @@ def limit_cycles(
     if not problem.turns:
         names = [c.name for c in found.scene.contacts if c.load is not None and c.load.amplitude != 0.0]
         raise SettingError("N1", names, "must be 0: a limit cycle has no phase that a load could follow")
-    missing = _missing(found.scene, stability)
+    missing = stability_left_out(found.scene, stability)
     surplus = found.damping_ratio + aero_damping
     cycles = []
     for i in range(len(found.points) - 1):
@@ -192,7 +205,7 @@ def limit_cycles(
     )  # fmt: skip
 
 
-def _missing(scene: Scene, stability: bool | None) -> str:
+def stability_left_out(scene: Scene, stability: bool | None) -> str:
     """Return why no multipliers are computed; empty if they are."""
     if stability is False:
         return "not asked for"
@@ -203,7 +216,7 @@ def _missing(scene: Scene, stability: bool | None) -> str:
     return ""
 
 
-def _between(found: NonlinearMode, i: int, share: float) -> State:
+def between(found: NonlinearMode, i: int, share: float) -> State:
     """Return a guess between points i and i + 1."""
     one, other = found.points[i], found.points[i + 1]
     # q is of one mode alone.
@@ -218,7 +231,7 @@ def _at_damping(equations: Equations, found: NonlinearMode, i: int, zeta: float)
     border = np.zeros(found.points[i].y.size + 1)
     border[-2] = 1.0
     for share in ((zeta - one) / (other - one), 0.0, 1.0, 0.5):
-        guess = _between(found, i, share)
+        guess = between(found, i, share)
         y = guess.y.copy()
         y[-1] = zeta
         solved = correct(equations, replace(guess, y=y), border, most=40)
@@ -289,7 +302,7 @@ def _most_damping(equations: Equations, found: NonlinearMode) -> tuple[float, fl
     def at(log_amplitude: float) -> Corrected:
         j = i - 1 if log_amplitude < logs[1] else i
         share = (log_amplitude - found.points[j].log_amplitude) / (logs[j - i + 2] - logs[j - i + 1])
-        return correct(equations, _between(found, j, share), most=40)
+        return correct(equations, between(found, j, share), most=40)
 
     def slope(log_amplitude: float) -> float:
         point = at(log_amplitude)

@@ -44,10 +44,12 @@ class ModeProblem:
     ----------
     rest : (r, n) the equilibrium at the leading ports.
     turns : no load varies with a phase of its own: the motion may begin at any instant.
+    all_modes : the linear modes, slowest first.
     """
 
     equations: Equations
     mode: LinearMode
+    all_modes: list[LinearMode]
     rest: Real
     turns: bool
 
@@ -150,7 +152,9 @@ def pose(
         found = _begin(equations, mode)
     loads = [contact.load for contact in equations.balance.scene.contacts]
     turns = not any(load is not None and load.amplitude != 0.0 for load in loads)
-    return ModeProblem(equations=equations, mode=found[0], rest=found[1], turns=turns)
+    return ModeProblem(
+        equations=equations, mode=found[0], rest=found[1], turns=turns, all_modes=found[2]
+    )  # fmt: skip
 
 
 def _balance(scene: Scene, harmonics: int, *, whole: bool) -> Balance:
@@ -160,8 +164,8 @@ def _balance(scene: Scene, harmonics: int, *, whole: bool) -> Balance:
     return balance
 
 
-def _begin(equations: Equations, mode: int) -> tuple[LinearMode, Real]:
-    """Return the linear mode about the equilibrium, and that."""
+def _begin(equations: Equations, mode: int) -> tuple[LinearMode, Real, list[LinearMode]]:
+    """Return the linear mode about the equilibrium, that, and all linear modes."""
     guess = 1.0
     nc = equations.balance.n_ports
     modes = linear_modes(equations.balance, np.zeros((nc, nc), np.complex128))
@@ -172,7 +176,8 @@ def _begin(equations: Equations, mode: int) -> tuple[LinearMode, Real]:
         raise SettingError(
             "scene", equations.balance.scene.name, "must have an equilibrium under its constant forces"
         )
-    return linear_modes(equations.balance, slopes)[mode - 1], rest
+    found = linear_modes(equations.balance, slopes)
+    return found[mode - 1], rest, found
 
 
 def check_mode(scene: Scene, mode: int) -> None:

@@ -13,6 +13,7 @@ homogeneous: forces, loads and motions grow together, so one curve serves every 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -120,19 +121,27 @@ def performance_curve(found: NonlinearMode) -> PerformanceCurve:
         scene = found.scene
         wanted = "must have a force of harmonic 1 that drives the mode"
         raise SettingError("excitation", [force.place for force in scene.excitation], wanted)
-    omega, zeta = 2.0 * math.pi * found.frequency_hz, found.damping_ratio
-    # Of ζ above 1/√2 there is no peak but at rest, of ζ ≤ 0 none is bounded.
-    damped = np.clip(zeta, 0.0, math.sqrt(0.5))
-    factor = 2.0 * damped * np.sqrt(1.0 - damped**2) * omega**2 * found.amplitude / forcing
+    factor, damped = excitations_of(found)
     with np.errstate(divide="ignore"):
         load = 1.0 / factor
     scales = bool(found.points) and grows_together(found)
     unknown = np.full(load.size, math.nan)
     return PerformanceCurve(
         mode=found, excitation=factor, peak=found.max_abs,
-        frequency_hz=found.frequency_hz * np.sqrt(1.0 - 2.0 * damped**2), scales=scales,
+        frequency_hz=found.frequency_hz * np.sqrt(np.maximum(1.0 - 2.0 * damped**2, 0.0)), scales=scales,
         load=load if scales else unknown, peak_at_load=found.max_abs * load if scales else unknown,
     )  # fmt: skip
+
+
+def excitations_of(found: NonlinearMode) -> tuple[Real, Real]:
+    """Return the factor on the excitation that each point of a mode is the peak of, and its damping ratio.
+
+    Of ζ above 1/√2 there is no peak but at rest, of ζ ≤ 0 none is bounded.
+    """
+    omega = 2.0 * math.pi * found.frequency_hz
+    damped = np.clip(found.damping_ratio, 0.0, math.sqrt(0.5))
+    factor = 2.0 * damped * np.sqrt(1.0 - damped**2) * omega**2 * found.amplitude / found.forcing
+    return factor, damped
 
 
 def with_loads(scene: Scene, factor: float) -> Scene:
@@ -162,17 +171,31 @@ def grows_together(found: NonlinearMode) -> bool:
     return bool(np.abs(forces[1] - forces[0]).max(initial=0.0) <= _SAME * size)
 
 
-def _highest(places: Real, heights: Real, frequencies: Real, at: float) -> tuple[float, float]:
-    """Return the highest of a curve's crossings of a place, which it may pass several times."""
+def crossing(curve: PerformanceCurve, factor: float) -> tuple[int, float] | None:
+    """Return the number of the point before the highest crossing of an excitation and the share beyond it."""
+    best, where = math.nan, None
+    for i, share, height in _crossings(curve.excitation, curve.peak, factor):
+        if not best >= height:
+            best, where = height, (i, share)
+    return where
+
+
+def _crossings(places: Real, heights: Real, at: float) -> Iterator[tuple[int, float, float]]:
+    """Yield the number of the point before every crossing of a place, the share beyond it, and the height."""
     if not at > 0.0:
-        return math.nan, math.nan
-    best, where = math.nan, math.nan
+        return
     for i in range(places.size - 1):
         one, other = places[i], places[i + 1]
         if not (0.0 < one < math.inf and 0.0 < other < math.inf) or (one - at) * (other - at) > 0.0:
             continue
         share = 0.0 if one == other else math.log(at / one) / math.log(other / one)
-        height = heights[i] ** (1.0 - share) * heights[i + 1] ** share
+        yield i, share, float(heights[i] ** (1.0 - share) * heights[i + 1] ** share)
+
+
+def _highest(places: Real, heights: Real, frequencies: Real, at: float) -> tuple[float, float]:
+    """Return the highest of a curve's crossings of a place, which it may pass several times."""
+    best, where = math.nan, math.nan
+    for i, share, height in _crossings(places, heights, at):
         if not best >= height:
             best, where = height, (1.0 - share) * frequencies[i] + share * frequencies[i + 1]
     return float(best), float(where)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, cast
 
@@ -31,7 +31,8 @@ from solver.modes.results import NonlinearModeStatus
 from solver.modes.start import begin, coordinates_of
 from solver.modes.structure import Dynamics
 from solver.response.contact_response import ContactState, state_of
-from solver.results.told import Piece
+from solver.results.base import Drawn
+from solver.results.views import Views
 
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
@@ -73,7 +74,7 @@ class Driven(Equations):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class PhaseResonance(Piece):
+class PhaseResonance(Drawn):
     """Responses in phase resonance over the amplitude; n points along the curve.
 
     Attributes
@@ -100,7 +101,7 @@ class PhaseResonance(Piece):
         What it took.
     """
 
-    UNITS: ClassVar = {"amplitude": "√kg m", "frequency_hz": "Hz", "max_abs": "m", "seconds": "s"}
+    VIEWS: ClassVar = Views("solver.views", "of_resonance", "resonance_dataset", "of_resonance")
 
     scene: Scene
     mode: int
@@ -133,7 +134,9 @@ class PhaseResonance(Piece):
             "amplitude": self.amplitude.tolist(),
             "frequency": self.frequency_hz.tolist(),
             "excitation": self.excitation.tolist(),
+            "dof": self.scene.observe.dof,
             "max_abs": self.max_abs.tolist(),
+            "contacts": [contact.name for contact in self.scene.contacts],
             "states": [[state_of(int(code)).value for code in row] for row in self.states],
             "seconds": self.seconds,
         }
@@ -142,6 +145,8 @@ class PhaseResonance(Piece):
 def phase_resonance(
     scene: Scene, mode: int = 1, *, amplitudes: Sequence[float], nodal_diameter: int | None = None,
     harmonics: int = 11, most_points: int = MOST_POINTS,
+    on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
 ) -> PhaseResonance:  # fmt: skip
     """Follow the responses in phase resonance over their amplitude: frequency and force that they take.
 
@@ -151,6 +156,7 @@ def phase_resonance(
     Parameters
     ----------
     scene, mode, amplitudes, nodal_diameter, harmonics, most_points : as of `nonlinear_mode`.
+    on_progress, should_stop : as of `nonlinear_mode`.
 
     Raises
     ------
@@ -176,7 +182,14 @@ def phase_resonance(
     end = [End.NOT_BEGUN]
     if first.converged:
         walked = walk(equations, first, high, turns=False, most_points=most_points, ended=end.append)
-        points = [each.point for each in walked]
+        for each in walked:
+            points.append(each.point)
+            if on_progress is not None:
+                done = (each.point.state.log_amplitude - low) / (high - low)
+                on_progress(min(max(done, 0.0), 1.0), len(points))
+            if should_stop is not None and should_stop():
+                end.append(End.CANCELLED)
+                break
     return _collect(equations, points, mode=int(mode), status=STATUS[end[-1]], begun=begun)
 
 

@@ -33,6 +33,7 @@ class Record:
     max_abs: float
     states: Integer
     forcing: float
+    observed: Real
 
 
 class Recorder:
@@ -72,6 +73,7 @@ class Recorder:
             motions=turned(equations.motions(w)), forces=turned(equations.point.F),
             dofs=to_full(hat.coefficients(moved.T), s.ks, top), max_abs=max(high, -low),
             states=equations.point.states.copy(), forcing=forcing,
+            observed=to_full(observed, s.ks, top),
         )  # fmt: skip
 
     def _angles(self, x: Complex) -> Complex:

@@ -190,8 +190,9 @@ def begin(equations: Equations, mode: LinearMode, rest: Real, low: float, *, tur
 def _raised(equations: Equations, found: Corrected, rest: Real, low: float) -> Corrected:
     """Return the next point on the way up to ln a = `low`, a third of a decade on, or less if it must."""
     rise = min(_DECADE / 3.0, low - found.state.log_amplitude)
-    size, better = equations.size, found
-    while rise > _DECADE / 100.0:
+    # The last rise may be as short as it will.
+    size, better, least = equations.size, found, min(_DECADE / 100.0, 0.5 * rise)
+    while rise > least:
         y, still = found.state.y.copy(), rest.reshape(-1)
         y[:size] = still + (y[:size] - still) * math.exp(rise)
         y[size : size + 2] *= math.exp(rise)

@@ -23,6 +23,7 @@ from solver.linear.kernels.receptance import receptance
 from solver.linear.leading_ports import FEWEST_PORTS
 from solver.results.base import Shown
 from solver.results.views import Views
+from solver.scene.bodies.kinematics import static_forces
 from solver.scene.cyclic.annulus import sectors_needed
 from solver.scene.parts import MatricesStructure
 from solver.scene.scene import (
@@ -82,6 +83,8 @@ class Plan(Shown):
         Estimated cost of a point of a branch [s].
     dense_bytes : int
         Estimated memory of the dense matrices of a response [bytes].
+    performance_curve : str
+        Whether the performance curve of one mode may stand in for responses in a design, and when it does.
     """
 
     scene: str
@@ -92,6 +95,7 @@ class Plan(Shown):
     harmonics: int
     seconds_a_point: float
     dense_bytes: int
+    performance_curve: str = ""
 
     VIEWS: ClassVar = Views("solver.views", "of_plan", "plan_dataset")
 
@@ -108,7 +112,29 @@ class Plan(Shown):
             "n_harmonics": self.harmonics,
             "estimated_seconds_a_point": self.seconds_a_point,
             "estimated_dense_bytes": self.dense_bytes,
+            "performance_curve": self.performance_curve,
         }
+
+
+def performance_curve_words(scene: Scene) -> str:
+    """Return whether a performance curve may stand in for responses in a design, and what that depends on."""
+    if scene.speed_order is not None:
+        return "no: loads follow the speed along an engine-order line"
+    if any(force.harmonic != 1 for force in scene.excitation):
+        return "no: a harmonic of the excitation other than the first drives no single mode"
+    loads = [contact.load for contact in scene.contacts]
+    tied = all(
+        load is not None
+        and (load.amplitude == 0.0 or getattr(contact, "N1_ratio", None) is not None)
+        for contact, load in zip(scene.contacts, loads, strict=True)
+    )  # fmt: skip
+    grows = bool(loads) and tied and not static_forces(scene)
+    names = ",".join(f"{contact.name}.N0" for contact in scene.contacts)
+    how = f"one curve for all values of `{names}` if laws scale" if grows else "one for each design"
+    return (
+        f"{how}. Whether it suffices depends on other modes, the phase of loads that vary and the steepness "
+        "of the curve: its result says so, with an estimated error next to the optimum"
+    )
 
 
 def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -> Plan:
@@ -157,6 +183,7 @@ def plan(scene: Scene, *, harmonics: int = 11, effects: Effects | None = None) -
         harmonics=harmonics,
         seconds_a_point=_ITERATIONS_A_POINT * iteration,
         dense_bytes=dense_bytes(scene, harmonics, every_sector=asked.every_sector).total,
+        performance_curve=performance_curve_words(balance.scene),
     )
 
 

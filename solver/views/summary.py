@@ -16,7 +16,9 @@ from solver.views.parameter_units import parameter
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
     from solver.marching.result import MarchResult
+    from solver.modes.controlled import HeldAmplitude
     from solver.modes.performance import PerformanceCurve
+    from solver.modes.phase_resonance import PhaseResonance
     from solver.modes.results import NonlinearMode
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
@@ -194,6 +196,32 @@ def of_performance(curve: PerformanceCurve) -> Summary:
         pairs.append(("excitation", f"from {low:.3g} to {high:.3g} times the scene's"))
     title = f"{curve.mode.scene.name}, mode {curve.mode.mode}"
     return made(title, pairs, curve.mode.status.value)
+
+
+def of_held(found: HeldAmplitude) -> Summary:
+    """The least force and its frequency, kinks, and what is not stable."""
+    pairs: Pairs = []
+    factor, at = found.least
+    if math.isfinite(factor):
+        pairs.append(("least force", f"{factor:.4g} times the excitation at {at:.6g} Hz"))
+    pairs.append(("kinks", str(len(found.changes))))
+    unstable = sum(one is False for one in found.stable)
+    pairs.append(("unstable points", found.unknown or str(unstable)))
+    pairs += [("points", str(found.frequency_hz.size)), ("time", units.duration(found.seconds))]
+    title = f"{found.scene.name}, |{found.scene.observe.dof}| held at {units.length(found.held)}"
+    return made(title, pairs, found.status.value)
+
+
+def of_resonance(found: PhaseResonance) -> Summary:
+    """Frequency and force at both ends."""
+    pairs: Pairs = []
+    if found.amplitude.size:
+        for name, i in (("smallest", 0), ("largest", -1)):
+            force = f"{found.frequency_hz[i]:.6g} Hz, {found.excitation[i]:.4g} times the excitation"
+            pairs.append((name, f"{force} at a = {found.amplitude[i]:.4g} √kg m"))
+    pairs += [("points", str(found.amplitude.size)), ("time", units.duration(found.seconds))]
+    title = f"{found.scene.name}, phase resonance of mode {found.mode}"
+    return made(title, pairs, found.status.value)
 
 
 def of_plan(found: Plan) -> Summary:

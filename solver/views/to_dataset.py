@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from solver.continuation.branch import Branch
     from solver.jit.fourier import Real
     from solver.marching.result import MarchResult
+    from solver.modes.controlled import HeldAmplitude
     from solver.modes.performance import PerformanceCurve
+    from solver.modes.phase_resonance import PhaseResonance
     from solver.modes.results import NonlinearMode
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability
@@ -326,6 +328,40 @@ def performance_dataset(curve: PerformanceCurve) -> Dataset:
     }
     notes = attributes(curve.mode.status.value, curve.mode.scene, mode_number=curve.mode.mode)
     return Dataset(kind="performance", rows=("point",), variables=variables, attributes=notes)
+
+
+def held_dataset(found: HeldAmplitude) -> Dataset:
+    """A frequency a row: the force that holds the amplitude, and the response to it."""
+    names = np.array([contact.name for contact in found.scene.contacts], dtype=np.str_)
+    states = [[state.value for state in found.contact_states(i).values()] for i in range(len(found.states))]
+    stable = ["" if one is None else "yes" if one else "no" for one in found.stable]
+    variables = {
+        "frequency": column("point", found.frequency_hz, "Hz"),
+        "excitation": column("point", found.excitation, "", "factor on every force"),
+        "excitation_error": column("point", found.excitation_error, "", "estimate by more harmonics"),
+        "phase": column("point", found.phase_deg, "deg", "of harmonic 1, ahead of the excitation"),
+        "max_abs": column("point", found.max_abs, "m", AMPLITUDE),
+        "stable": column("point", np.array(stable, dtype=np.str_), "", "while the force is held"),
+        "contact": column("contact", names),
+        "state": Variable(
+            dims=("point", "contact"), values=np.array(states, np.str_).reshape(len(states), names.size)
+        ),
+        **harmonics(found.observed, ("point", "harmonic"), "observed", "m"),
+    }
+    notes = attributes(found.status.value, found.scene, amplitude=found.held, harmonics=found.n_harmonics)
+    return Dataset(kind="controlled", rows=("point",), variables=variables, attributes=notes)
+
+
+def resonance_dataset(found: PhaseResonance) -> Dataset:
+    """An amplitude a row: frequency and force of phase resonance."""
+    variables = {
+        "amplitude": column("point", found.amplitude, "√kg m", "a² = Σ Q_kᴴ M Q_k"),
+        "frequency": column("point", found.frequency_hz, "Hz"),
+        "excitation": column("point", found.excitation, "", "factor on every force"),
+        "max_abs": column("point", found.max_abs, "m", AMPLITUDE),
+    }
+    notes = attributes(found.status.value, found.scene, mode_number=found.mode)
+    return Dataset(kind="phase-resonance", rows=("point",), variables=variables, attributes=notes)
 
 
 def plan_dataset(found: Plan) -> Dataset:

@@ -301,6 +301,7 @@ def test_the_description_is_whole(shipped: httpx.Client) -> None:
         "mistuning",
         "identify",
         "modes",
+        "controlled",
     }
     for kind, schema in kinds.items():
         assert schema["examples"], kind

@@ -64,7 +64,7 @@ def pointers(change: dict[str, Any]) -> list[str]:
 
 
 def test_every_key_of_the_design_layer_is_one_of_the_body_and_arrives() -> None:
-    keys = set(inspect.signature(optim.design).parameters) - NO_KEYS
+    keys = set(inspect.signature(optim.design).parameters) - NO_KEYS - {"tolerance"}
     assert keys == set(EVERY_KEY) - {"scene", "set"}, "a key of the design layer that the service lacks"
     assert keys <= set(DesignRequest.model_fields)
     assert DesignRequest.model_json_schema()["examples"]
@@ -74,6 +74,14 @@ def test_every_key_of_the_design_layer_is_one_of_the_body_and_arrives() -> None:
     assert scene.value("shroud.mu") == 0.25
     problem = pose(scene, **problem_of(spec))
     assert [case.name for case in problem.cases] == ["first", "twice", "case 3, tip", "case 3, middle"]
+
+
+def test_the_key_of_a_performance_curve_arrives() -> None:
+    body = {"scene": "two-dof", "method": "performance-curve", "tolerance": 0.02}
+    spec = resolve(validated(DesignRequest, body), Shipped()).spec
+    problem = pose(solver.Scene.from_dict(spec["scene"]), **problem_of(spec))
+    assert (problem.method.value, problem.tolerance) == ("performance-curve", 0.02)
+    assert pointers({"tolerance": 0.02}) == ["/tolerance"]
 
 
 def test_the_example_of_the_reference_is_one() -> None:

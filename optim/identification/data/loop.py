@@ -69,6 +69,11 @@ class LoopRun(Measured):
         return math.sqrt(0.5 * self.samples)
 
     @property
+    def unit_words(self) -> str:
+        """As the base says."""
+        return "forces [N]"
+
+    @property
     def observations(self) -> Real:
         """The coefficients of the force but for the mean, times `scale`, (2H,) [N]."""
         return self.scale * self.force[1:]

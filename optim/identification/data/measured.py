@@ -97,6 +97,16 @@ class Measured(ABC):
         """Return data, fit and standard deviation of the fit, (n,) each, as curves for people."""
 
     @property
+    def unit_words(self) -> str:
+        """What the observations are, with their unit."""
+        return "displacements [m]"
+
+    @property
+    def scale(self) -> float:
+        """What an observation is the multiple of, in that unit."""
+        return 1.0
+
+    @property
     def words(self) -> str:
         """The run in a few words: conditions, or the file."""
         told = ", ".join(f"{path} = {value:.6g}" for path, value in self.conditions.items())

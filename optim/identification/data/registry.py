@@ -7,7 +7,11 @@ from importlib import import_module
 
 from optim.identification.data.measured import Column, DataKind
 
-SHIPPED = ("optim.identification.data.response", "optim.identification.data.loop")
+SHIPPED = (
+    "optim.identification.data.response",
+    "optim.identification.data.loop",
+    "optim.identification.data.mode",
+)
 
 
 @cache

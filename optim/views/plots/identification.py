@@ -19,7 +19,7 @@ from solver.views.plots.style import Into
 Run = Mapping[str, Any]
 _BAND = 1.96
 _NAMED = 8  # runs up to which each is in the legend
-LOOP = "loop"
+LOOP, MODE = "loop", "mode"
 
 
 def identification_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
@@ -31,12 +31,14 @@ def identification_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figu
     """
     runs: Sequence[Run] = answer["runs"]
     loops = [run for run in runs if run["kind"] == LOOP]
-    responses = [run for run in runs if run["kind"] != LOOP]
-    panels = [shown for shown in (responses, loops) if shown]
+    modes = [run for run in runs if run["kind"] == MODE]
+    responses = [run for run in runs if run["kind"] not in (LOOP, MODE)]
+    panels = [shown for shown in (responses, loops, modes) if shown]
     with style.styled():
         page, axes = style.figure(5.6 * len(panels), 3.9, columns=len(panels), into=ax)
         for one, shown in zip(axes, panels, strict=False):
-            (_draw_loops if shown is loops else _draw_responses)(one, shown)
+            draw = _draw_responses if shown is responses else _draw_modes if shown is modes else _draw_loops
+            draw(one, shown)
             one.set_title(f"{answer['scene']}: data, fit and 95 % band")
     return page
 
@@ -62,6 +64,15 @@ def _draw_loops(axes: Axes, runs: Sequence[Run]) -> None:
         scaled = {**run, "x": (np.asarray(run["x"]) * unit.per_metre).tolist()}
         _draw(axes, scaled, colour, 1.0, np.arange(len(run["x"])), markers=".")
     style.label(axes, f"motion [{unit.name}]", "force [N]")
+    _legend(axes, runs)
+
+
+def _draw_modes(axes: Axes, runs: Sequence[Run]) -> None:
+    """Draw damping ratios, or frequencies, over the modal amplitude."""
+    for run, colour in zip(runs, _colours(len(runs)), strict=True):
+        _draw(axes, run, colour, 1.0, np.argsort(run["x"]), markers="o")
+    axes.set_xscale("log")
+    style.label(axes, "modal amplitude a [√kg m]", ", ".join(dict.fromkeys(run["quantity"] for run in runs)))
     _legend(axes, runs)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from service.cli.commands.report import SUFFIXES, write
 from service.cli.failures import end
 from service.cli.options import inputs
 from service.cli.options import shared as options
@@ -70,6 +71,16 @@ Uncertain = Annotated[
 ]  # fmt: skip
 
 
+Report = Annotated[
+    str | None,
+    typer.Option(
+        "--report", metavar="F",
+        help="Write a report: .html or .pdf. The fit over the data, intervals, correlations, what is not "
+        "told, what to measure next.",
+    ),
+]  # fmt: skip
+
+
 def identify(
     name: options.Scene,
     data: Data,
@@ -84,6 +95,7 @@ def identify(
     starts: Starts = 16,
     seed: Seed = 0,
     uncertain: Uncertain = None,
+    report: Report = None,
     plot: options.Plot = None,
     out: options.Out = None,
     as_json: options.Json = False,
@@ -95,6 +107,7 @@ def identify(
     """
     outputs = Outputs.asked(plot, out)
     problem = inputs.output_path("--uncertain", uncertain, (".toml",))
+    told = inputs.output_path("--report", report, SUFFIXES)
     scene = inputs.scene(name, values)
     bounds = inputs.bounds("--unknown", unknown)
     known = inputs.bounds("--prior", prior or (), "MEAN SD")
@@ -110,6 +123,10 @@ def identify(
     outputs.write(found, found.plot if found.fitted else None)
     if problem is not None and found.fitted:
         _write(problem, name, inputs.settings(values), found)
+    if told is not None:
+        from service.rendering.report.sections import Designed
+
+        write(Designed(scene=scene, problem={"harmonics": harmonics}, result=found.to_json()), told)
     show(found.to_json(), tables.report, as_json=as_json)
     end(found.reached, found.status.value)
 

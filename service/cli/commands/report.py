@@ -25,7 +25,7 @@ def report(
     ] = "report.html",
     url: options.Url = options.DEFAULT_URL,
 ) -> None:
-    """Write the report of a design that the service computed.
+    """Write the report of a design or an identification that the service computed.
 
     A page that needs nothing else, or a PDF of a few sheets (with the extra `pdf`).
     """
@@ -38,8 +38,8 @@ def report(
         asked = client.job(job)
         if asked.kind not in KINDS:
             raise InputError(
-                f"`JOB` must be a design or a pareto job, {job!r} is of the kind {asked.kind!r} and has no "
-                f"optimum to report: `stickslip results {job} --plot F` draws it, without --plot prints it"
+                f"`JOB` must be a design, pareto or identify job, {job!r} is of the kind {asked.kind!r}, "
+                f"which has no report: `stickslip results {job} --plot F` draws it, without --plot prints it"
             )
         answer = client.results(job)
         scene = solver.Scene.from_dict(client.job_scene(job))

@@ -58,8 +58,7 @@ def _designed(service: Service, caller: Caller, job_id: str) -> tuple[Json, Json
         row = service.job(job_id, caller)
         if row.kind not in KINDS:
             raise ConflictError(
-                f"job {job_id} is of the kind {row.kind!r}, which has no optimum to report: "
-                f"only {' and '.join(KINDS)} have"
+                f"job {job_id} is of the kind {row.kind!r}, which has no report: only {', '.join(KINDS)} have"
             )
         found = service.results(job_id, caller)
         scene = service.scene_of(job_id, caller)

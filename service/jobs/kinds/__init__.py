@@ -6,6 +6,7 @@ import optim
 import solver
 from service.jobs.kinds.accuracy import ACCURACY
 from service.jobs.kinds.campbell import CAMPBELL
+from service.jobs.kinds.controlled import CONTROLLED
 from service.jobs.kinds.design import DESIGN
 from service.jobs.kinds.identify import IDENTIFY
 from service.jobs.kinds.interference import INTERFERENCE
@@ -43,6 +44,7 @@ SHIPPED = Registry(
         MISTUNING,
         IDENTIFY,
         MODES,
+        CONTROLLED,
     ],
     warm_up,
 )

@@ -72,6 +72,7 @@ class OptimumResult(ReachedResult):
     plateau: Table
     chosen_by: str | None
     checked: list[Any]
+    curve: Table | None
     looked_at: list[Any]
     evaluations: int
     newton_iterations: int

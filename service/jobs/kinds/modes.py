@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, RootModel
 
 import solver
 from service.jobs.common.modes import MOST_PEAKS, MOST_POINTS, exact_peaks, excitations, motions_of
@@ -55,6 +55,10 @@ class ModesRequest(HarmonicRequest):
         Loops and shapes too.
     exact_peaks : int
         How many excitations the performance curve is compared at.
+    disturbance : float or None
+        Modal amplitude that is to die down.
+    phase_resonance : bool
+        The forced responses instead.
     """
 
     model_config = ConfigDict(validate_by_alias=True, json_schema_extra={"examples": [_EXAMPLE]})
@@ -79,30 +83,52 @@ class ModesRequest(HarmonicRequest):
     exact_peaks: Annotated[int, Field(strict=True, ge=0, le=MOST_PEAKS)] = Field(
         default=0, description="With `performance`: of so many excitations the whole response as well."
     )
+    disturbance: PositiveNumber | None = Field(
+        default=None, description="Modal amplitude [√kg m] that is to die down: the least loads that do it."
+    )
+    phase_resonance: Annotated[bool, Field(strict=True)] = Field(
+        default=False,
+        description="In place of the mode the forced responses that lag by 90°: which force each takes.",
+    )
 
 
-class ModesResult(EndedResult):
-    """Frequency and damping ratio over the amplitude, and what the contacts do."""
+class _AmplitudeCurve(EndedResult):
+    """A curve over the modal amplitude, and what the contacts do along it."""
 
     scene: str
     mode: int
-    nodal_diameter: int | None
     amplitude: Curve
     frequency: Curve
-    damping_ratio: Curve
-    frequency_error: Curve
-    damping_error: Curve
     dof: str
     max_abs: Curve
     contacts: list[str]
     states: list[list[str]]
+    seconds: float
+
+
+class PhaseResonanceResult(_AmplitudeCurve):
+    """Frequency and force of phase resonance over the amplitude."""
+
+    excitation: Curve
+
+
+class NonlinearModeResult(_AmplitudeCurve):
+    """Frequency and damping ratio over the amplitude."""
+
+    nodal_diameter: int | None
+    damping_ratio: Curve
+    frequency_error: Curve
+    damping_error: Curve
     n_harmonics: int
     newton_iterations: int
     rejected_steps: int
-    seconds: float
     performance: Table | None = None
     limit_cycles: Table | None = None
     motions: Table | None = None
+
+
+class ModesResult(RootModel[NonlinearModeResult | PhaseResonanceResult]):
+    """A nonlinear mode; with `phase_resonance` the forced responses."""
 
 
 def resolve(request: ModesRequest, source: SceneSource) -> Resolved:
@@ -121,6 +147,8 @@ def resolve(request: ModesRequest, source: SceneSource) -> Resolved:
         aero_damping=request.aero_damping,
         motions=request.motions,
         exact_peaks=request.exact_peaks,
+        disturbance=request.disturbance,
+        phase_resonance=request.phase_resonance,
     )
 
 
@@ -138,6 +166,7 @@ def _issues(request: ModesRequest, scene: Scene) -> list[Issue]:
         issues.append(refusal("/to", words))
     if request.harmonics < 1:
         issues.append(refusal("/harmonics", f"`harmonics` must be from 1, got {request.harmonics!r}"))
+    issues += _of_questions(request)
     try:
         check_mode(at_nodal_diameter(scene, request.nodal_diameter), request.mode)
     except SettingError as error:
@@ -145,8 +174,22 @@ def _issues(request: ModesRequest, scene: Scene) -> list[Issue]:
     return issues
 
 
+def _of_questions(request: ModesRequest) -> list[Issue]:
+    """Questions that do not go together."""
+    issues = []
+    if request.disturbance is not None and request.aero_damping is None:
+        words = "`disturbance` needs `aero_damping`: without gas that feeds, every disturbance dies down"
+        issues.append(refusal("/disturbance", words))
+    if request.phase_resonance and (request.performance or request.aero_damping is not None):
+        words = "`phase_resonance` is a curve of its own: leave `performance` and `aero_damping` out"
+        issues.append(refusal("/phase_resonance", words))
+    return issues
+
+
 def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
-    """Follow the mode."""
+    """Follow the mode, or the phase resonances."""
+    if spec["phase_resonance"]:
+        return _resonance(spec, progress, should_stop)
     scene = Scene.from_dict(spec["scene"])
     checked = spec["exact_peaks"]
     found = solver.nonlinear_mode(
@@ -168,19 +211,34 @@ def run(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) ->
             exact = exact_peaks(found.scene, factors, spec["harmonics"], rest, should_stop)
             answer["performance"]["exact"] = exact
     if spec["aero_damping"] is not None:
-        answer["limit_cycles"] = solver.limit_cycles(found, spec["aero_damping"]).to_json()
+        cycles = solver.limit_cycles(found, spec["aero_damping"])
+        answer["limit_cycles"] = cycles.to_json(spec["disturbance"])
     if spec["motions"]:
         answer["motions"] = motions_of(found)
     return JobOutput(result=answer, shortfall=None if found.completed else found.status.value)
 
 
+def _resonance(spec: Mapping[str, Any], progress: Progress, should_stop: ShouldStop) -> JobOutput:
+    """Follow the phase resonances."""
+    found = solver.phase_resonance(
+        Scene.from_dict(spec["scene"]),
+        spec["mode"],
+        amplitudes=(spec["start"], spec["stop"]),
+        nodal_diameter=spec["nodal_diameter"],
+        harmonics=spec["harmonics"],
+        on_progress=progress,
+        should_stop=should_stop,
+    )
+    return JobOutput(result=found.to_json(), shortfall=None if found.completed else found.status.value)
+
+
 def draw(result: Json, _sweeps: Sequence[StoredSweep], _read: ReadSweep) -> Figure:
-    """Frequency and damping ratio over the amplitude."""
-    from solver.views.plots.modes import mode_figure
+    """Frequency and damping ratio over the amplitude, or frequency and force of phase resonances."""
+    from solver.views.plots.modes import mode_figure, resonance_figure
 
     if not result["amplitude"]:
         raise NothingToDrawError("no point of the mode was found")
-    return mode_figure(result)
+    return mode_figure(result) if result.get("damping_ratio") is not None else resonance_figure(result)
 
 
 MODES = JobKind(

@@ -10,7 +10,7 @@ FORMS = {PAGE: "text/html", PDF: "application/pdf"}
 
 
 def report_of(given: Designed, form: str) -> bytes:
-    """The report of a design, of a front or of a robust design.
+    """The report of a design, of a front, of a robust design or of an identification.
 
     Parameters
     ----------
@@ -25,11 +25,15 @@ def report_of(given: Designed, form: str) -> bytes:
         The optimum does not fit the scene.
     """
     from service.rendering.report.design import design_report
+    from service.rendering.report.identification import identification_report
     from service.rendering.report.pdf import pdf_of, require_pdf
     from service.rendering.report.robust import robust_report
     from solver.views.plots.html import pictures_as_png
 
-    made = robust_report if "nominal" in given.result else design_report
+    if "estimates" in given.result:
+        made = identification_report
+    else:
+        made = robust_report if "nominal" in given.result else design_report
     if form != PDF:
         return made(given).encode()
     require_pdf()

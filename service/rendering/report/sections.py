@@ -35,7 +35,8 @@ class Designed:
     problem : mapping
         The arguments of the design layer.
     result : mapping
-        The JSON of `optim.DesignResult`, of `optim.ParetoResult` or of `optim.RobustResult`.
+        The JSON of `optim.DesignResult`, `optim.ParetoResult`, `optim.RobustResult` or
+        `optim.Identification`.
     """
 
     scene: Scene
@@ -48,8 +49,8 @@ class Designed:
         return int(self.problem.get("harmonics", 11))
 
 
-KINDS = ("design", "pareto")
-"""Kinds of job with an optimum to report."""
+KINDS = ("design", "pareto", "identify")
+"""Kinds of job with a report."""
 _NOT_OF_A_PROBLEM = ("kind", "scene", "set", "fresh", "priority", "max_seconds", *ABOUT_THE_RUN)
 
 
@@ -148,14 +149,18 @@ def plan_section(scene: Scene, harmonics: int) -> str:
 def again_section(given: Designed, command: str) -> str:
     """The files and the command that give the same, and the versions."""
     problem = toml_text({"scene": "scene.toml", **given.problem})
-    packages = [("Python", platform.python_version()), *((name, _version(name)) for name in _PACKAGES)]
     return (
         "<h2>To have it again</h2>"
         f"<pre>stickslip {command} --problem problem.toml</pre>"
         f"<h3>problem.toml</h3><pre>{escape(problem)}</pre>"
         f"<h3>scene.toml</h3><pre>{escape(toml_text(given.scene.to_dict()))}</pre>"
-        f"<h3>Versions</h3>{pairs(packages)}"
+        f"<h3>Versions</h3>{versions()}"
     )
+
+
+def versions() -> str:
+    """The packages that computed, with their versions."""
+    return pairs([("Python", platform.python_version()), *((name, _version(name)) for name in _PACKAGES)])
 
 
 def _version(name: str) -> str:

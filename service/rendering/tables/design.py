@@ -103,7 +103,7 @@ def _pairs(found: Json) -> Pairs:
         of = f" ({peak['case']})" if several else ""
         name = "further peak" if index else "peak"
         pairs.append((name, f"{units.length(peak['value'])} at {peak['at']:.6g} Hz{of}"))
-    pairs += _errors(found)
+    pairs += [*_errors(found), *_curve(found.get("curve"))]
     if found["band_hz"] is not None:
         pairs.append(("band", f"{units.number(found['band_hz'])} Hz above {units.length(found['limit'])}"))
     for row in further(found):
@@ -125,6 +125,28 @@ def _pairs(found: Json) -> Pairs:
         effort += f", the work of {units.number(work, 3)}"
     by = f", method {found['method']}" if "method" in found else ""
     return [*pairs, ("effort", effort + by)]
+
+
+def _curve(check: Json | None) -> Pairs:
+    """What a performance curve is worth: its peak beside the exact one, the estimate, and the time."""
+    if check is None:
+        return []
+
+    def percent(key: str) -> str:
+        return "not known" if check[key] is None else f"{100.0 * check[key]:+.2g} %"
+
+    one = "one curve for all designs" if check["shared"] else f"{check['curves']} curves"
+    told = "suffices" if check["suffices"] else "does not suffice"
+    spent = (
+        f"{units.duration(check['curve_seconds'])}, estimate {units.duration(check['correction_seconds'])}"
+    )
+    saved = check["seconds_saved"]
+    return [
+        ("performance curve", f"mode {check['mode']}, {one}: off by {percent('error')} here"),
+        ("estimated before", f"{percent('estimate')}: {told} for {100.0 * check['tolerance']:g} %"),
+        ("time of curves", f"{spent}, a whole response {units.duration(check['response_seconds'])}"),
+        ("time saved", "none" if saved is None or saved <= 0.0 else units.duration(saved)),
+    ]
 
 
 def further(found: Json) -> list[Json]:

@@ -15,8 +15,23 @@ _TELLING = 0.99  # of an error, above which a measurement lowers none
 def report(found: Mapping[str, Any]) -> None:
     """The estimates, what the data do not tell, and which measurement would tell most."""
     title = f"{found['scene']}, {len(found['runs'])} runs, {found['n_harmonics']} harmonics"
-    rows = [_row(one) for one in found["estimates"]]
+    rows = [estimate_row(one) for one in found["estimates"]]
     print_table(title, ("parameter", "estimate", "± error", "95 % interval", ""), rows, right="12")
+    pairs = told_pairs(found)
+    known = [one for one in found["candidates"] if one["gain"] is not None]
+    telling = [one for one in known if one["factor"] < _TELLING]
+    for place, one in enumerate(telling[:_CANDIDATES]):
+        pairs.append(("measure next" if place == 0 else "  or", candidate_words(one)))
+    if known and not telling:
+        tried = f"none of the {len(known)} conditions tried lowers an error by 1 %"
+        pairs.append(("measure next", f"{tried}: try others (--candidate), or another DOF"))
+    pairs.append(("starts", f"{found['starts']}, of the best {found['agreeing']} ended at the same place"))
+    pairs.append(("time", units.duration(found["seconds"])))
+    print_pairs("", pairs)
+
+
+def told_pairs(found: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Noise, what the data do not tell or hardly keep apart, what does not count, other optima."""
     pairs: list[tuple[str, str]] = []
     if found["noise"] is not None:
         pairs.append(("noise", f"{100.0 * found['noise']:.3g} %"))
@@ -31,19 +46,11 @@ def report(found: Mapping[str, Any]) -> None:
     for one in found["other_optima"]:
         values = ", ".join(f"{name} = {value:.5g}" for name, value in one.items() if name != "misfit")
         pairs.append(("another optimum", f"{values}; misfit {one['misfit']:.3g} times as large"))
-    known = [one for one in found["candidates"] if one["gain"] is not None]
-    telling = [one for one in known if one["factor"] < _TELLING]
-    for place, one in enumerate(telling[:_CANDIDATES]):
-        pairs.append(("measure next" if place == 0 else "  or", _candidate(one)))
-    if known and not telling:
-        tried = f"none of the {len(known)} conditions tried lowers an error by 1 %"
-        pairs.append(("measure next", f"{tried}: try others (--candidate), or another DOF"))
-    pairs.append(("starts", f"{found['starts']}, of the best {found['agreeing']} ended at the same place"))
-    pairs.append(("time", units.duration(found["seconds"])))
-    print_pairs("", pairs)
+    return pairs
 
 
-def _row(one: Mapping[str, Any]) -> tuple[str, ...]:
+def estimate_row(one: Mapping[str, Any]) -> tuple[str, ...]:
+    """An unknown: estimate, error, interval, and whether it lies at a bound."""
     if not one["told"]:
         low, high = one["bounds"]
         return one["name"], "not told", "", f"{low:.6g} to {high:.6g} {one['unit']}", "its bounds"
@@ -58,6 +65,7 @@ def _lost(one: Mapping[str, Any]) -> str:
     return f"{one['run']}: no response found at {places} Hz; these points do not count"
 
 
-def _candidate(one: Mapping[str, Any]) -> str:
+def candidate_words(one: Mapping[str, Any]) -> str:
+    """Conditions of a measurement, and what it would tell."""
     conditions = ", ".join(f"{path} = {value:.4g}" for path, value in one["conditions"].items())
     return f"{conditions}: error of {one['tells']} times {one['factor']:.2g} (gain {one['gain']:.3g})"

@@ -11,8 +11,56 @@ from solver.results import units
 _MOST_ROWS = 40
 
 
+def held(found: Mapping[str, Any]) -> None:
+    """Frequency, force, phase and states of the contacts where one amplitude is held."""
+    size = units.length(found["amplitude"])
+    title = f"{found['scene']}, |{found['dof']}| held at {size}, {found['n_harmonics']} harmonics"
+    count = len(found["frequency"])
+    if count:
+        rows = [
+            [
+                f"{found['frequency'][i]:.6g}", f"{found['excitation'][i]:.4g}", f"{found['phase'][i]:.1f}",
+                units.length(found["max_abs"][i]), {None: "?", True: "yes", False: "no"}[found["stable"][i]],
+                _states(found, i),
+            ]
+            for i in _thinned(count)
+        ]  # fmt: skip
+        heads = [
+            "frequency [Hz]", "× excitation", "phase [deg]", f"max |{found['dof']}|", "stable", "contacts",
+        ]  # fmt: skip
+        print_table(title, heads, rows, right="0123")
+    pairs = [("points", str(count)), ("time", units.duration(found["seconds"]))]
+    if found["least"] is not None:
+        best = found["least"]
+        pairs.insert(0, ("least force", f"{best['excitation']:.5g} times, at {best['frequency']:.6g} Hz"))
+    if found["stability_unknown"]:
+        pairs.append(("stability", found["stability_unknown"]))
+    print_pairs("" if count else title, pairs)
+
+
+def resonance(found: Mapping[str, Any]) -> None:
+    """Amplitude, frequency, force and states of the contacts in phase resonance."""
+    title = f"{found['scene']}, phase resonance of mode {found['mode']}"
+    count = len(found["amplitude"])
+    if count:
+        rows = [
+            [
+                f"{found['amplitude'][i]:.4g}", units.length(found["max_abs"][i]),
+                f"{found['frequency'][i]:.6g}", f"{found['excitation'][i]:.4g}", _states(found, i),
+            ]
+            for i in _thinned(count)
+        ]  # fmt: skip
+        heads = ["a [√kg m]", f"max |{found['dof']}|", "frequency [Hz]", "× excitation", "contacts"]
+        print_table(title, heads, rows, right="0123")
+    pairs = [("points", str(count)), ("time", units.duration(found["seconds"]))]
+    print_pairs("" if count else title, pairs)
+
+
 def report(found: Mapping[str, Any]) -> None:
     """Amplitude, frequency, damping ratio and states of the contacts, a point a row, thinned to a page."""
+    if found.get("damping_ratio") is None:
+        resonance(found)
+        return
     of = "" if found["nodal_diameter"] is None else f", nodal diameter {found['nodal_diameter']}"
     title = f"{found['scene']}, mode {found['mode']}{of}, {found['n_harmonics']} harmonics"
     count = len(found["amplitude"])
@@ -64,19 +112,28 @@ def _cycles(found: Mapping[str, Any], dof: str) -> None:
         pairs.append((name, f"{size}, {cycle['frequency']:.6g} Hz"))
     if not found["cycles"]:
         pairs.append(("limit cycles", "none between these amplitudes"))
+    if found.get("load_for") is not None:
+        asked = found["load_for"]
+        pairs.append((f"holds a = {asked['disturbance']:.6g} √kg m", asked["words"]))
     print_pairs(f"Aerodynamic damping ratio {found['aero_damping']:g}", pairs)
 
 
-def _row(found: Mapping[str, Any], i: int) -> list[str]:
+def _states(found: Mapping[str, Any], i: int) -> str:
+    """What the contacts do at a point, in words."""
     names, states = found["contacts"], found["states"][i]
+    if not states:
+        return "none"
     same = len(set(states)) == 1
-    said = states[0] if same else ", ".join(f"{n}: {s}" for n, s in zip(names, states, strict=True))
+    return states[0] if same else ", ".join(f"{n}: {s}" for n, s in zip(names, states, strict=True))
+
+
+def _row(found: Mapping[str, Any], i: int) -> list[str]:
     return [
         f"{found['amplitude'][i]:.4g}",
         units.length(found["max_abs"][i]),
         f"{found['frequency'][i]:.6g}",
         f"{found['damping_ratio'][i]:.5g}",
-        said if states else "none",
+        _states(found, i),
     ]
 
 

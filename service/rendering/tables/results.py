@@ -52,6 +52,7 @@ def plan(found: Json) -> None:
             ),
             ("linear DOFs", str(found["linear_dofs"])),
             ("dense matrices", f"{found['estimated_dense_bytes'] / 1e6:.3g} MB"),
+            ("performance curve", found["performance_curve"]),
             ("estimated cost", f"{units.duration(found['estimated_seconds_a_point'])} a point of a branch"),
         ],
     )
@@ -209,6 +210,7 @@ _HOMES = {
     "peaks": "track.track", "accuracy": "results.accuracy", "campbell": "campbell.diagram",
     "interference": "interference.diagram",
     "mistuning": "mistuning.report", "identify": "identify.report", "modes": "modes.report",
+    "controlled": "modes.held",
 }  # fmt: skip
 
 

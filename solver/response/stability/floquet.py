@@ -103,7 +103,7 @@ def stability(solution: Solution) -> Stability:
     if not solution.converged:
         raise SettingError("solution", solution.status.value, "must have converged")
     motions = tuple(np.array(contact.motions) for contact in solution.contacts)
-    return _stability(solution.scene, solution.frequency_hz, motions)
+    return motions_stability(solution.scene, solution.frequency_hz, motions)
 
 
 def branch_stability(branch: Branch, points: Iterable[int] | None = None) -> tuple[Stability, ...]:
@@ -127,14 +127,15 @@ def branch_stability(branch: Branch, points: Iterable[int] | None = None) -> tup
         every = fourier.to_full(branch.coefficients[i], balance.system.ks, balance.highest_harmonic)
         motions = tuple(np.split(every, balance.system.first_port[1:-1]))
         if branch.parameter == "frequency":
-            found.append(_stability(balance.scene.at_frequency(value), value, motions))
+            found.append(motions_stability(balance.scene.at_frequency(value), value, motions))
         else:
             scene = balance.scene.with_values({branch.parameter: value})
-            found.append(_stability(scene, balance.system.omega / PERIOD, motions))
+            found.append(motions_stability(scene, balance.system.omega / PERIOD, motions))
     return tuple(found)
 
 
-def _stability(scene: Scene, frequency_hz: float, motions: Motions) -> Stability:
+def motions_stability(scene: Scene, frequency_hz: float, motions: Motions) -> Stability:
+    """Return the stability of a response of a scene at a frequency with given motions of its contacts."""
     begun = time.perf_counter()
     found = scene_monodromy(scene, frequency_hz, motions)
     values = np.linalg.eigvals(found.reduced).astype(np.complex128)

@@ -8,7 +8,9 @@ from matplotlib.figure import Figure
 
 from solver.continuation.branch import Branch
 from solver.marching.result import MarchResult
+from solver.modes.controlled import HeldAmplitude
 from solver.modes.performance import PerformanceCurve
+from solver.modes.phase_resonance import PhaseResonance
 from solver.modes.results import NonlinearMode
 from solver.response.solution import Solution
 from solver.response.stability.floquet import Stability
@@ -22,7 +24,7 @@ from solver.views.plots.accuracy import accuracy_figure
 from solver.views.plots.curves import Response
 from solver.views.plots.disks import blades_figure, mistuning_figure
 from solver.views.plots.interference import interference_figure
-from solver.views.plots.modes import mode_figure, performance_figure
+from solver.views.plots.modes import held_figure, mode_figure, performance_figure, resonance_figure
 from solver.views.plots.motion import Motion, motion_figure
 from solver.views.plots.multipliers import multipliers_figure
 from solver.views.plots.responses import Demands, response_figure
@@ -88,6 +90,16 @@ def of_mode(found: NonlinearMode, ax: Into = None) -> Figure:
 def of_performance(curve: PerformanceCurve, ax: Into = None) -> Figure:
     """Draw the peak over the load, or over the excitation."""
     return performance_figure(curve.to_json(), dof=curve.mode.scene.observe.dof, ax=ax)
+
+
+def of_held(found: HeldAmplitude, ax: Into = None) -> Figure:
+    """Draw force and phase over the frequency."""
+    return held_figure(found.to_json(), ax=ax)
+
+
+def of_resonance(found: PhaseResonance, ax: Into = None) -> Figure:
+    """Draw frequency and force over the amplitude."""
+    return resonance_figure(found.to_json(), ax=ax)
 
 
 def of_amplitudes(blades: BladeAmplitudes, ax: Into = None) -> Figure:

@@ -63,3 +63,52 @@ def performance_figure(answer: Mapping[str, Any], *, dof: str = "x", ax: Into = 
         axes.loglog(places[good], heights[good] * unit.per_metre, color=style.BLUE, label="one mode")
         style.label(axes, f"factor on the {over}", f"peak of max |{dof}| [{unit.name}]")
     return page
+
+
+def held_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
+    """The factor on the excitation beside the phase, where one amplitude is held; what is unstable dashed.
+
+    Parameters
+    ----------
+    answer : the JSON of `solver.HeldAmplitude`, with at least one point.
+    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    """
+    frequency = np.array(answer["frequency"])
+    growing = np.array([one is False for one in answer["stable"]], dtype=bool)
+    size = units.length(answer["amplitude"])
+    with style.styled():
+        page, (left, right) = style.figure(8.0, 3.3, columns=2, into=ax)
+        for axes, key, words in (
+            (left, "excitation", "factor on the excitation"), (right, "phase", "phase [deg]"),
+        ):  # fmt: skip
+            values = np.array(answer[key])
+            axes.plot(frequency, np.where(growing, np.nan, values), color=style.BLUE)
+            if growing.any():
+                axes.plot(
+                    frequency, np.where(growing, values, np.nan), "--", color=style.SKY, label="unstable"
+                )
+            style.label(axes, "frequency [Hz]", words)
+        left.set_yscale("log")
+        left.set_title(f"{answer['scene']}, |{answer['dof']}| held at {size}")
+        if growing.any():
+            right.legend()
+    return page
+
+
+def resonance_figure(answer: Mapping[str, Any], *, ax: Into = None) -> Figure:
+    """The frequency of phase resonance beside the factor on the excitation it takes.
+
+    Parameters
+    ----------
+    answer : the JSON of `solver.PhaseResonance`, with at least one point.
+    ax : axes to draw into, as `solver.views.plots.style.figure`.
+    """
+    amplitude = np.array(answer["amplitude"])
+    with style.styled():
+        page, (left, right) = style.figure(8.0, 3.3, columns=2, into=ax)
+        left.semilogx(amplitude, np.array(answer["frequency"]), color=style.BLUE)
+        style.label(left, _AMPLITUDE, "frequency [Hz]")
+        right.loglog(amplitude, np.abs(np.array(answer["excitation"])), color=style.BLUE)
+        style.label(right, _AMPLITUDE, "factor on the excitation")
+        left.set_title(f"{answer['scene']}, phase resonance of mode {answer['mode']}")
+    return page

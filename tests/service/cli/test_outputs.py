@@ -23,6 +23,7 @@ COMMANDS = {
     "mistuning": "bladed-disk --of tip --samples 2 --harmonics 1 --from 740 --to 780",
     "modes": "two-dof --from 0.1 --to 3 --harmonics 3",
     "interference": "bladed-disk --speed 11000 --up-to 1400",
+    "controlled": "two-dof --amplitude 1 --harmonics 3",
     "campbell": "two-dof --speeds 50 80 --harmonics 3",
     "sensitivities": "two-dof --harmonics 3",
     "design": "two-dof --variable damper.N0 20 500 --harmonics 3",

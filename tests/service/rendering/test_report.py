@@ -89,7 +89,7 @@ def test_a_report_of_another_kind_is_refused(server: str, capsys: pytest.Capture
     job = re.search(r'"id": "([^"]+)"', capsys.readouterr().out)
     assert job is not None
     assert main(["report", job[1], "--url", server]) == 2
-    assert "must be a design or a pareto job" in capsys.readouterr().err
+    assert "must be a design, pareto or identify job" in capsys.readouterr().err
 
 
 def submitted(server: str, capsys: pytest.CaptureFixture[str], *words: str) -> str:

@@ -1,0 +1,312 @@
+"""Responses over the frequency at a held amplitude, as rigs with amplitude control run: `held_amplitude`."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, Any, ClassVar, cast
+
+import numpy as np
+
+from solver.balance.speed_line import check_no_line
+from solver.errors import SettingError
+from solver.jit.fourier import Integer, Real
+from solver.modes.corrector import Corrected
+from solver.modes.curve import End, walk
+from solver.modes.error_estimate import Wider
+from solver.modes.held_amplitude import Held, first_held, least_force
+from solver.modes.limit_cycles import stability_left_out
+from solver.modes.nonlinear_mode import MOST_POINTS, pose
+from solver.modes.records import Record, Recorder
+from solver.response.contact_response import ContactState, state_of
+from solver.response.stability.floquet import motions_stability
+from solver.results.base import Drawn
+from solver.results.views import Views
+
+if TYPE_CHECKING:
+    from solver.scene.scene import Scene
+
+LEVEL = "excitation.amplitude"
+_FAINT = 1e-12  # share of a motion in phase with the force below which the amplitude has no force to hold it
+_SAME = 1e-9  # relative distance of an end of the range within which a point is at it
+
+
+class HeldStatus(Enum):
+    """How a curve ended; the value is a sentence a user can act on."""
+
+    COMPLETED = "The curve reaches the end of the range."
+    NOT_BEGUN = (
+        "No response with this amplitude was found at the first frequency: begin elsewhere, with a smaller "
+        "amplitude, or fewer harmonics."
+    )
+    STOPPED = "The curve could not be followed beyond its last point: try other harmonics."
+    TURNED_BACK = (
+        "The curve turned back and left the range where it began: no response has this amplitude beyond."
+    )
+    TOO_LONG = "The end of the range was not reached within the points allowed: ask for more of them."
+    CANCELLED = "It was cancelled; the points up to then are there."
+
+
+_STATUS = {
+    End.REACHED: HeldStatus.COMPLETED, End.NOT_BEGUN: HeldStatus.NOT_BEGUN, End.STOPPED: HeldStatus.STOPPED,
+    End.TURNED_BACK: HeldStatus.TURNED_BACK, End.TOO_LONG: HeldStatus.TOO_LONG,
+    End.CANCELLED: HeldStatus.CANCELLED,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class HeldAmplitude(Drawn):
+    """Responses of one amplitude over the frequency; n points along the curve.
+
+    Attributes
+    ----------
+    scene : Scene
+        As it was solved; it observes the DOF whose amplitude is held.
+    held : float
+        Amplitude of harmonic 1 of the observed DOF [m].
+    status : HeldStatus
+        How the curve ended.
+    frequency_hz : (n,) array
+        Of the excitation.
+    excitation : (n,) array
+        Factor on the scene's excitation that this response takes.
+    excitation_error : (n,) array
+        Estimate of what more harmonics would change of it: a Newton step with twice as many.
+    phase_deg : (n,) array
+        By which harmonic 1 of the observed DOF is ahead of the excitation.
+    max_abs : (n,) array
+        max|x| of the observed DOF [m].
+    states : (n, n_contacts) array
+        What each contact does over the period, see `contact_states` and `changes`.
+    stable : tuple of bool or None
+        Whether the response is stable while its force is held; None where `unknown` says why it is not known.
+    residual : (n,) array
+        Relative residual of the equations.
+    observed : (n, 2H + 1) array
+        Coefficients of the observed DOF [m].
+    least : (float, float)
+        The least factor on the excitation, solved for between points, and its frequency [Hz]: the peak of the
+        response to that force. NaN without a point.
+    seconds : float
+        What it took.
+    """
+
+    VIEWS: ClassVar = Views("solver.views", "of_held", "held_dataset", "of_held")
+
+    scene: Scene
+    held: float
+    n_harmonics: int
+    status: HeldStatus
+    frequency_hz: Real
+    excitation: Real
+    excitation_error: Real
+    phase_deg: Real
+    max_abs: Real
+    states: Integer
+    stable: tuple[bool | None, ...]
+    unknown: str
+    residual: Real
+    observed: Real
+    least: tuple[float, float]
+    seconds: float
+
+    @property
+    def completed(self) -> bool:
+        """Whether the curve reaches the end of the range."""
+        return self.status is HeldStatus.COMPLETED
+
+    def contact_states(self, i: int) -> dict[str, ContactState]:
+        """What each contact does at point i."""
+        names = [contact.name for contact in self.scene.contacts]
+        return {name: state_of(int(code)) for name, code in zip(names, self.states[i], strict=True)}
+
+    @property
+    def changes(self) -> tuple[tuple[float, float, str], ...]:
+        """Where the curve has a kink: two frequencies [Hz] between which a contact changes its state."""
+        found = []
+        for i in range(len(self.states) - 1):
+            for c in np.flatnonzero(self.states[i] != self.states[i + 1]).tolist():
+                ends = float(self.frequency_hz[i]), float(self.frequency_hz[i + 1])
+                found.append((*ends, self.scene.contacts[c].name))
+        return tuple(found)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the curve as one JSON object."""
+        factor, at = self.least
+        return {
+            "scene": self.scene.name,
+            "dof": self.scene.observe.dof,
+            "amplitude": self.held,
+            "completed": self.completed,
+            "status": self.status.value,
+            "frequency": self.frequency_hz.tolist(),
+            "excitation": self.excitation.tolist(),
+            "excitation_error": [float(e) if math.isfinite(e) else None for e in self.excitation_error],
+            "phase": self.phase_deg.tolist(),
+            "max_abs": self.max_abs.tolist(),
+            "contacts": [contact.name for contact in self.scene.contacts],
+            "states": [[state_of(int(code)).value for code in row] for row in self.states],
+            "changes": [{"from": low, "to": high, "contact": name} for low, high, name in self.changes],
+            "stable": list(self.stable),
+            "stability_unknown": self.unknown,
+            "least": {"excitation": factor, "frequency": at} if self.excitation.size else None,
+            "n_harmonics": self.n_harmonics,
+            "seconds": self.seconds,
+        }
+
+
+def held_amplitude(
+    scene: Scene, amplitude: float, *, start: float | None = None, stop: float | None = None,
+    dof: str | None = None, harmonics: int = 11, errors: bool = True, stability: bool | None = None,
+    most_points: int = MOST_POINTS, on_progress: Callable[[float, int], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> HeldAmplitude:  # fmt: skip
+    """Follow the responses whose amplitude at one DOF is held, over the frequency: which force they take.
+
+    Every point is a response to the scene's excitation times a factor, exact but for the harmonics left out.
+
+    Parameters
+    ----------
+    scene : what vibrates; the size of its excitation does not matter.
+    amplitude : of harmonic 1 of the DOF [m].
+    start, stop : frequencies [Hz], the scene's band if left out; from low to high.
+    dof : the DOF; that of the scene's `observe` if left out.
+    harmonics : highest harmonic kept.
+    errors : estimate what more harmonics would change, for about as much time again.
+    stability : Floquet multipliers of every point; of a disk they are of all its sectors. Left out, they are
+        computed of structures of at most 200 coordinates: of more they take minutes.
+    most_points : of the curve.
+    on_progress : is told the share of the range that is done and the number of points.
+    should_stop : is asked at every point whether to stop there.
+
+    Raises
+    ------
+    SettingError
+        An amplitude, range, DOF or number of harmonics that cannot be; an excitation that is not of harmonic
+        1 alone, does not move the DOF, or follows the speed along an engine-order line.
+    """
+    begun = time.perf_counter()
+    scene = _checked(scene, amplitude, dof)
+    low, high = _range(scene, start, stop)
+    problem = pose(scene, 1, None, harmonics, kind=Held)
+    equations = cast(Held, problem.equations)
+    equations.target = float(amplitude)
+    _check_moves(equations, scene, 2.0 * math.pi * low)
+    first = first_held(equations, problem.rest, 2.0 * math.pi * low)
+    points: list[Corrected] = []
+    end = [End.NOT_BEGUN]
+    if first.converged:
+        last = math.log(2.0 * math.pi * high)
+        for each in walk(
+            equations, first, last, turns=False, most_points=most_points, least_share=0.0, ended=end.append
+        ):
+            here = math.exp(each.point.state.log_amplitude) / (2.0 * math.pi)
+            if here < low * (1.0 - _SAME):
+                end.append(End.TURNED_BACK)
+                break
+            points.append(each.point)
+            if on_progress is not None:
+                on_progress(min(max((here - low) / (high - low), 0.0), 1.0), len(points))
+            if should_stop is not None and should_stop():
+                end.append(End.CANCELLED)
+                break
+    return _collect(
+        equations, points, _STATUS[end[-1]], errors=errors, unknown=stability_left_out(scene, stability),
+        begun=begun,
+    )  # fmt: skip
+
+
+def _checked(scene: Scene, amplitude: float, dof: str | None) -> Scene:
+    """Return the scene that observes the DOF."""
+    number = isinstance(amplitude, (int, float)) and not isinstance(amplitude, bool)
+    if not number or not 0.0 < amplitude < math.inf:
+        raise SettingError("amplitude", amplitude, "must be an amplitude > 0 m")
+    check_no_line(scene)
+    if any(force.harmonic != 1 for force in scene.excitation):
+        wanted = "must be of harmonic 1 alone: its size is what holds the amplitude"
+        raise SettingError("excitation", [force.place for force in scene.excitation], wanted)
+    if dof is None:
+        return scene
+    if dof not in scene.dofs:
+        raise SettingError("dof", dof, f"must be one of {', '.join(scene.dofs)}")
+    return scene.model_copy(update={"observe": scene.observe.model_copy(update={"dof": dof})})
+
+
+def _range(scene: Scene, start: float | None, stop: float | None) -> tuple[float, float]:
+    """Return the frequencies [Hz]."""
+    ends = [scene.observe.band[i] if end is None else end for i, end in enumerate((start, stop))]
+    for name, value in zip(("start", "stop"), ends, strict=True):
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not number or not 0.0 < value < math.inf:
+            raise SettingError(name, value, "must be a frequency > 0 Hz")
+    if not ends[0] < ends[1]:
+        raise SettingError("stop", ends[1], f"must be above the start {ends[0]!r}")
+    return float(ends[0]), float(ends[1])
+
+
+def _check_moves(equations: Held, scene: Scene, omega: float) -> None:
+    """Raise SettingError where the excitation does not move the DOF."""
+    s = equations.structure
+    dynamics = s.at(omega, 0.0, s.nearest(omega, 0.0))
+    x = dynamics.solve(equations.by_force())[s.first]
+    seen = abs(complex(np.sum(s.observe[s.first] * x)))
+    if not seen > _FAINT * float(np.linalg.norm(s.observe[s.first]) * np.linalg.norm(x)):
+        wanted = f"must move {scene.observe.dof!r}: no force of it holds an amplitude there"
+        raise SettingError("excitation", [force.place for force in scene.excitation], wanted)
+
+
+def _collect(
+    equations: Held, points: list[Corrected], status: HeldStatus, *, errors: bool, unknown: str, begun: float
+) -> HeldAmplitude:
+    """Return the result of a curve."""
+    balance, n = equations.balance, len(points)
+    scene, size = balance.scene, 2 * balance.highest_harmonic + 1
+    recorder = Recorder(equations, turns=False)
+    rows = [recorder.of(point) for point in points]
+    observed = np.array([row.observed for row in rows]).reshape(n, size)
+    error = np.full(n, math.nan)
+    if errors and points:
+        wider = Wider(equations)
+        error = np.array([wider.estimate(point)[1] for point in points])
+    y = np.array([point.state.y[-2:] for point in points], dtype=np.float64).reshape(n, 2)
+    least = least_force(equations, points)
+    stable, unknown = _stable(equations, y, rows, unknown)
+    return HeldAmplitude(
+        scene=scene, held=equations.target, n_harmonics=balance.n_harmonics, status=status,
+        frequency_hz=y[:, 0] / (2.0 * math.pi), excitation=y[:, 1] * equations.unit,
+        excitation_error=error * equations.unit,
+        phase_deg=np.degrees(np.angle(observed[:, 1] - 1j * observed[:, 2])),
+        max_abs=np.array([row.max_abs for row in rows], dtype=np.float64),
+        states=np.array([row.states for row in rows], dtype=np.int64).reshape(n, len(scene.contacts)),
+        stable=stable, unknown=unknown, observed=observed, least=_force_of(equations, least),
+        residual=np.array([point.residual for point in points], dtype=np.float64),
+        seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def _force_of(equations: Held, point: Corrected | None) -> tuple[float, float]:
+    """Return the factor on the excitation and the frequency [Hz]; NaN without a point."""
+    if point is None:
+        return math.nan, math.nan
+    return float(point.state.y[-1]) * equations.unit, float(point.state.y[-2]) / (2.0 * math.pi)
+
+
+def _stable(
+    equations: Held, y: Real, rows: list[Record], unknown: str
+) -> tuple[tuple[bool | None, ...], str]:
+    """Return whether each point is stable while its force is held, and why that is not known."""
+    if unknown:
+        return (None,) * len(rows), unknown
+    scene, found = equations.balance.scene, []
+    ends = np.cumsum([len(contact.end_keys) for contact in scene.contacts])[:-1]
+    for row, (omega, z) in zip(rows, y.tolist(), strict=True):
+        there = scene.with_values({LEVEL: z * equations.unit * scene.value(LEVEL)})
+        motions = tuple(np.split(row.motions, ends))
+        try:
+            found.append(motions_stability(there, omega / (2.0 * math.pi), motions).stable)
+        except SettingError as error:  # a law or a term without a motion in time
+            return (None,) * len(rows), str(error)
+    return tuple(found), ""

@@ -1,0 +1,231 @@
+"""What the peak of a performance curve is off by: the whole balance solved near the synthesised motion.
+
+At a peak of the response to a held force |x| is stationary over the frequency. Where the amplitude is held
+instead, so is the force: the response of the least force p(A) = min over Ω of p(A, Ω) is a peak of the
+response to that force. p(A, Ω) is smooth and flat there whatever the peak over Ω looks like at a held force,
+so Newton's method finds it from the motion that one mode alone would have, and the amplitude at which
+p(A) is the force asked for follows by secants. That is the peak with all modes and harmonics of the balance,
+next to the synthesised one; peaks elsewhere in the band it does not see.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar, cast
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from solver.errors import SettingError
+from solver.jit.fourier import Complex
+from solver.modes.corrector import Corrected, State, correct
+from solver.modes.held_amplitude import Held
+from solver.modes.nonlinear_mode import pose
+from solver.modes.records import Recorder
+from solver.results.told import Piece
+
+if TYPE_CHECKING:
+    from solver.modes.performance import PerformanceCurve
+
+_NEAREST, _FARTHEST = 2, 8  # half widths of the resonance looked at to both sides of it, at least and at most
+_CLOSE = 0.02  # of a half width, to which the frequency of the least force is sought: 2e-4 of the force
+_TRIES, _SECANTS, _HALVINGS = 12, 10, 3
+_NEWTON, _FINE = 12, 1e-6  # steps, and the residual that an estimate of some per mille asks for
+_SAME = 5e-4  # ln of the force within which it is the one asked for
+_LONGEST = 0.3  # of ln A a secant step
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class PeakCorrection(Piece):
+    """The peak of a performance curve beside that of the whole balance next to it.
+
+    Attributes
+    ----------
+    synthesised : float
+        Peak of the curve [m].
+    peak, frequency_hz : float
+        With all modes and harmonics, and where [Hz]; NaN if it was not found.
+    solves : int
+        Responses solved for.
+    """
+
+    UNITS: ClassVar = {"synthesised": "m", "peak": "m", "frequency_hz": "Hz"}
+
+    synthesised: float
+    peak: float
+    frequency_hz: float
+    solves: int
+
+    @property
+    def error(self) -> float:
+        """Estimated error of the curve's peak, relative: (synthesised − peak) / peak; NaN if not known."""
+        return self.synthesised / self.peak - 1.0
+
+    def suffices(self, tolerance: float) -> bool:
+        """Whether the curve is good to a relative tolerance, as far as is known."""
+        return abs(self.error) <= tolerance
+
+    def to_json(self) -> dict[str, float | int | None]:
+        """Return it as a JSON object."""
+        numbers = {
+            "synthesised": self.synthesised, "peak": self.peak, "frequency": self.frequency_hz,
+            "error": self.error,
+        }  # fmt: skip
+        return {k: v if math.isfinite(v) else None for k, v in numbers.items()} | {"solves": self.solves}
+
+
+def corrected_peak(curve: PerformanceCurve, factor: float) -> PeakCorrection:
+    """Return what the peak at a factor on the excitation is with the whole balance, next to the curve's.
+
+    Raises
+    ------
+    SettingError
+        An excitation beyond harmonic 1, which one mode's synthesis leaves out.
+    """
+    scene = curve.mode.scene
+    if any(force.harmonic > 1 for force in scene.excitation):
+        wanted = "must have no harmonic above the first to be corrected"
+        raise SettingError("excitation", [force.place for force in scene.excitation], wanted)
+    synthesised, _ = curve.at_excitation(factor)
+    if not math.isfinite(synthesised):
+        return PeakCorrection(synthesised=math.nan, peak=math.nan, frequency_hz=math.nan, solves=0)
+    near = _Neighbourhood(curve)
+    found = near.peak_under(factor, synthesised)
+    peak, frequency = math.nan, math.nan
+    if found is not None:
+        peak = Recorder(near.equations, turns=False).of(found).max_abs
+        frequency = math.exp(found.state.log_amplitude) / (2.0 * math.pi)
+    return PeakCorrection(synthesised=synthesised, peak=peak, frequency_hz=frequency, solves=near.solves)
+
+
+class _Neighbourhood:
+    """Responses near the synthesised one, at held amplitudes."""
+
+    def __init__(self, curve: PerformanceCurve) -> None:
+        found = curve.mode
+        self._curve, self._found = curve, found
+        how = found.scene, found.mode, None, found.n_harmonics
+        self._mode = pose(*how, whole=found.whole_matrices).equations
+        problem = pose(*how, whole=found.whole_matrices, kind=Held)
+        self.equations, self._turns = cast(Held, problem.equations), problem.turns
+        self.equations.whole = True
+        self.width, self.solves = 0.0, 0
+
+    def peak_under(self, factor: float, synthesised: float) -> Corrected | None:
+        """Return the peak of the response to the excitation times a factor; None if it was not found."""
+        curve = self._curve
+        i = int(
+            np.argmin(np.abs(np.log(curve.excitation / factor)) + np.abs(np.log(curve.peak / synthesised)))
+        )
+        state = self._synthesised(i)
+        log_peak = math.log(synthesised)
+        tried: list[tuple[float, float]] = []
+        for _ in range(_SECANTS):
+            least = self._least_force(state, math.exp(log_peak))
+            if least is None:
+                return None
+            state = least.state
+            off = math.log(float(state.y[-1]) * self.equations.unit / factor)
+            tried.append((log_peak, off))
+            move = -self._slope(i, tried) * off
+            if abs(off) <= _SAME and abs(move) <= 2.0 * _SAME:
+                return least
+            log_peak += min(max(move, -_LONGEST), _LONGEST)
+        return None
+
+    def _slope(self, i: int, tried: Sequence[tuple[float, float]]) -> float:
+        """Return d ln A / d ln p: of the curve at first, then by secants."""
+        if len(tried) >= 2 and tried[-1][1] != tried[-2][1]:
+            return (tried[-1][0] - tried[-2][0]) / (tried[-1][1] - tried[-2][1])
+        j = min(max(i, 1), self._curve.peak.size - 2)
+        rise = math.log(self._curve.excitation[j + 1] / self._curve.excitation[j - 1])
+        return math.log(self._curve.peak[j + 1] / self._curve.peak[j - 1]) / rise if rise else 1.0
+
+    def _synthesised(self, i: int) -> State:
+        """Return the motion of point i turned as its force turns it: (ω² − Ω² + 2iζωΩ) a = Qᴴ f."""
+        mode, held, curve = self._mode, self.equations, self._curve
+        point, s = self._found.points[i], held.structure
+        omega, zeta = float(point.y[-2]), float(point.y[-1])
+        damped = min(max(zeta, 1e-9), 0.7)
+        at = omega * math.sqrt(1.0 - 2.0 * damped**2)
+        evaluated = mode.evaluate(point.y, point.log_amplitude, point.phase, point.mode)
+        if evaluated is None:
+            raise ValueError("a point without a value is none of a curve")
+        x: Complex = evaluated.x
+        turned = 0.0
+        if self._turns:
+            lag = omega**2 - at**2 + 2j * damped * omega * at
+            turned = float(np.angle(complex(np.vdot(x[s.first], s.force)) / lag))
+        turns = np.exp(1j * s.ks * turned)
+        hat, n = held.amplitudes, mode.size
+        w = hat.coefficients(hat.of(point.y[:n].reshape(mode.r, mode.n)) * turns)
+        q = complex(point.y[n], point.y[n + 1]) * turns[s.first]
+        self.width = damped * math.sqrt(1.0 - damped**2)
+        held.unit, held.target = float(curve.excitation[i]), float(curve.peak[i])
+        y = np.concatenate([w.reshape(-1), [q.real, q.imag, at, 1.0]])
+        return State(y=y, log_amplitude=math.log(at), mode=point.mode, phase=np.zeros_like(s.force))
+
+    def _at(self, near: State, log_omega: float, depth: int = 0) -> Corrected | None:
+        """Return the response at ln Ω from one nearby, in smaller steps where it must; None if not found."""
+        y = near.y.copy()
+        y[-2] = math.exp(log_omega)
+        self.solves += 1
+        guess = replace(near, y=y, log_amplitude=log_omega)
+        found = correct(self.equations, guess, most=_NEWTON, fine=_FINE, good=_FINE)
+        if found.converged and found.state.y[-1] > 0.0:
+            return found
+        if depth == _HALVINGS or log_omega == near.log_amplitude:
+            return None
+        half = self._at(near, 0.5 * (near.log_amplitude + log_omega), depth + 1)
+        return None if half is None else self._at(half.state, log_omega, depth + 1)
+
+    def _scaled_to(self, state: State, amplitude: float, depth: int = 0) -> Corrected | None:
+        """Return the response of an amplitude at the same Ω, in smaller steps where it must."""
+        held, before = self.equations, self.equations.target
+        y, ratio = state.y.copy(), amplitude / before
+        y[: held.size + 2] *= ratio
+        held.target = amplitude
+        found = self._at(replace(state, y=y), state.log_amplitude)
+        if found is not None or depth == _HALVINGS or ratio == 1.0:
+            return found
+        held.target = before
+        half = self._scaled_to(state, math.sqrt(before * amplitude), depth + 1)
+        return None if half is None else self._scaled_to(half.state, amplitude, depth + 1)
+
+    def _least_force(self, state: State, amplitude: float) -> Corrected | None:
+        """Return the response of an amplitude with the least force, from one near it."""
+        centre = self._scaled_to(state, amplitude)
+        if centre is None:
+            return None
+        known = [centre]
+        for way in (1.0, -1.0):
+            near = centre
+            for k in range(1, _FARTHEST + 1):
+                there = centre.state.log_amplitude + way * k * self.width
+                beside = self._at(near.state, there)
+                if beside is None:
+                    break
+                known.append(beside)
+                rises = beside.state.y[-1] > near.state.y[-1]
+                near = beside
+                if rises and k >= _NEAREST:
+                    break
+        known.sort(key=lambda one: one.state.log_amplitude)
+        i = int(np.argmin([one.state.y[-1] for one in known]))
+        if not 0 < i < len(known) - 1:
+            return None  # the least force is not between places that were looked at
+        ends = known[i - 1].state.log_amplitude, known[i + 1].state.log_amplitude
+
+        def force(log_omega: float) -> float:
+            near = min(known, key=lambda one: abs(one.state.log_amplitude - log_omega))
+            found = self._at(near.state, log_omega)
+            if found is None:
+                return math.inf
+            known.append(found)
+            return float(found.state.y[-1])
+
+        options = {"xatol": _CLOSE * self.width, "maxiter": _TRIES}
+        minimize_scalar(force, bounds=ends, method="bounded", options=options)
+        return min(known, key=lambda one: float(one.state.y[-1]))
