@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
-_MOST_INLINE = 88
+MOST_INLINE = 88
 
 
 def toml_text(raw: Mapping[str, Any], comments: tuple[str, ...] = ()) -> str:
@@ -62,7 +62,7 @@ def value_text(item: object) -> str:
     if isinstance(item, (list, tuple)):
         entries = [value_text(entry) for entry in item]
         short = f"[{', '.join(entries)}]"
-        if len(short) <= _MOST_INLINE:
+        if len(short) <= MOST_INLINE:
             return short
         return "[\n" + "".join(f"  {entry},\n" for entry in entries) + "]"
     return json.dumps(item, ensure_ascii=False)

@@ -14,7 +14,7 @@ from difflib import SequenceMatcher
 from typing import Any
 
 from solver.scene.editing.places import Kind, Place, places
-from solver.scene.toml import key_text, toml_text, value_text
+from solver.scene.toml import MOST_INLINE, key_text, toml_text, value_text
 
 Tables = Mapping[str, Any]
 _MOST_COMPARED = 250_000
@@ -208,27 +208,25 @@ class _Edits:
 
     def _list(self, place: Place, held: list[Any], wanted: list[Any]) -> str:
         """Entries with what stands around them: comments above and behind, and how far they are moved in."""
-        around, rest = self._around(place)
-        lines = "\n" in self._text[place.first : place.last]
-        indent = around[0][0].rpartition("\n")[2] if lines else " "
-        out: list[str] = []
         sources = _paired(held, wanted)
-        for j, (source, value) in enumerate(zip(sources, wanted, strict=True)):
-            if source is None:
-                lead, words, trail = indent, value_text(value), ",\n" if lines else ","
-            else:
-                lead, trail = around[source]
-                words = self._value(place.items[source], held[source], value)
+        words = [
+            value_text(value) if source is None else self._value(place.items[source], held[source], value)
+            for source, value in zip(sources, wanted, strict=True)
+        ]
+        if "\n" not in self._text[place.first : place.last]:
+            return _in_a_line(words, may_break=None in sources)
+        around, rest = self._around(place)
+        indent = around[0][0].rpartition("\n")[2]
+        out: list[str] = []
+        for j, source in enumerate(sources):
+            lead, trail = (indent, ",\n") if source is None else around[source]
             if j + 1 < len(wanted) and "," not in trail.partition("#")[0]:
                 trail = f",{trail}"
-            if lines and source is None and out and not out[-1].endswith("\n"):
+            if source is None and out and not out[-1].endswith("\n"):
                 lead = f"\n{lead}"
-            out.append(lead + words + trail)
-        inner = "".join(out)
-        if not lines:
-            return f"[{inner.strip(', ')}]"
+            out.append(lead + words[j] + trail)
         opening = "\n" if self._text[place.first + 1] == "\n" else ""
-        return f"[{opening}{inner}{rest}]"
+        return f"[{opening}{''.join(out)}{rest}]"
 
     def _around(self, place: Place) -> tuple[list[tuple[str, str]], str]:
         """What stands before and behind each entry of a list, and what is left behind the last one.
@@ -247,6 +245,14 @@ class _Edits:
             at = line + 1 if line >= 0 else comma + 1 if comma >= 0 else item.last
             found.append((lead, self._text[item.last : at]))
         return found, self._text[at : place.last - 1]
+
+
+def _in_a_line(words: list[str], *, may_break: bool) -> str:
+    """Entries of a list in one line, or a line each where it grew long."""
+    line = f"[{', '.join(words)}]"
+    if may_break and len(line) > MOST_INLINE:
+        return "[\n" + "".join(f"  {word},\n" for word in words) + "]"
+    return line
 
 
 def _is_table(value: object) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from solver.scene.templates.template import BLADE, Size, Template, Word, rounded
+from solver.scene.templates.template import BLADE, Size, Template, Word
 
 
 class GroundDamper(Template):
@@ -29,7 +29,7 @@ class GroundDamper(Template):
 
     def tables(self) -> dict[str, Any]:
         """One mass, one spring, one contact."""
-        load = self.normal_load or rounded(self.force / self.mu)
+        load = self.normal_load or self.usual_load
         contact = {"name": "damper", "between": [BLADE, "ground"], "kt": self.kt, "mu": self.mu, "N0": load}
         masses = {BLADE: self.modal_mass}
         return {

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from solver.scene.templates.template import DiskTemplate, Size, Word, rounded
+from solver.scene.templates.template import DiskTemplate, Size, Word
 
 
 class ShroudContact(DiskTemplate):
@@ -40,7 +40,7 @@ class ShroudContact(DiskTemplate):
 
     def tables(self) -> dict[str, Any]:
         """One sector with its shroud contact."""
-        load = self.normal_load or rounded(self.force / self.mu)
+        load = self.normal_load or self.usual_load
         face = {
             "shape": "shroud", "law": "coulomb-3d", "angle": self.angle, "kt": self.kt, "kn": self.kn,
             "mu": self.mu, "N0": load,

@@ -19,7 +19,7 @@ _BELOW, _ABOVE = 0.8, 1.2
 
 def rounded(value: float) -> float:
     """A number with the digits that a person may want to read."""
-    return float(f"{value:.12g}")
+    return float(f"{value:.9g}")
 
 
 class Template(BaseModel):
@@ -64,6 +64,11 @@ class Template(BaseModel):
     def dashpot(self) -> float:
         """Dashpot that gives the mode its damping ratio: 2 D m 2 pi f [N s/m]."""
         return 2.0 * self.damping_ratio * self.modal_mass * 2.0 * math.pi * self.frequency_hz
+
+    @property
+    def usual_load(self) -> float:
+        """A load whose friction is of the size of the force, in round numbers [N]."""
+        return float(f"{self.force / self.mu:.3g}")
 
     @property
     @abstractmethod

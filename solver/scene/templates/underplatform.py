@@ -36,17 +36,26 @@ class _Body(DiskTemplate):
     speed: Size = 4000.0
 
     @property
-    def face(self) -> float:
-        """Stiffness of one face in the direction around the disk [N/m]."""
-        return self.kt
+    def inclination(self) -> float:
+        """Of the faces [rad]."""
+        return 0.0
 
     @property
     def stiffening(self) -> float:
-        """Both faces in a row between neighbours whose phases differ, the body free to follow.
+        """An upper bound, after Rayleigh: the body follows the mean of both blades around the disk alone.
 
-        Two springs K in a row are K/2, and K/2 |1 - exp(i phase)|² = 2 K sin²(phase / 2).
+        What is left are the halves of the difference around the disk, a motion of each blade along its face
+        turned by half the pitch, and what the blades move outward against each other.
         """
-        return 2.0 * self.face * math.sin(self.half_phase) ** 2
+        directions = (self.inclination - self.half_pitch, self.inclination + self.half_pitch)
+        around = max(self._face(direction) for direction in directions)
+        outward = self._face(self.inclination + 0.5 * math.pi) * math.sin(self.half_pitch) ** 2
+        phase = self.half_phase
+        return 2.0 * (around * math.sin(phase) ** 2 + outward * math.cos(phase) ** 2)
+
+    def _face(self, angle: float) -> float:
+        """Stiffness of a face in a direction at an angle with it [N/m]."""
+        return self.kt * math.cos(angle) ** 2 + self.kn * math.sin(angle) ** 2
 
     def damped(self, place: str, shape: dict[str, Any], arm: float) -> dict[str, Any]:
         """The scene with a body of a shape.
@@ -97,9 +106,9 @@ class PlatformDamper(_Body):
     angle: Annotated[float, Field(strict=True, ge=0.0, le=1.2)] = 0.5
 
     @property
-    def face(self) -> float:
-        """Both stiffnesses of an inclined face take part [N/m]."""
-        return self.kt * math.cos(self.angle) ** 2 + self.kn * math.sin(self.angle) ** 2
+    def inclination(self) -> float:
+        """The angle of the faces."""
+        return self.angle
 
     def tables(self) -> dict[str, Any]:
         """One sector with a wedge or a cylinder."""

@@ -177,6 +177,16 @@ def test_any_change_gives_what_is_wanted(name: str, most: int, monkeypatch: pyte
     assert len(anew) <= most
 
 
+def test_a_list_in_one_line_breaks_where_it_grows_long() -> None:
+    row = '{ name = "a", between = ["x", "ground"], k = 4.0e5, c = 2.0 }'
+    text = f"springs = [{row}] # by test\n"
+    scene = read(text)
+    scene["springs"].append({**scene["springs"][0], "name": "b"})
+    assert changed(text, scene).startswith(f'springs = [\n  {row},\n  {{ name = "b"')
+    scene["springs"] = [{**scene["springs"][0], "name": "a-rather-long-name-for-a-spring-in-one-line"}]
+    assert "\n" not in changed(text, scene).strip()
+
+
 def test_a_text_with_other_line_ends_or_none_is_changed() -> None:
     assert edited("a = 1\r\nb = 2", {"a": 1, "b": 3}) == "a = 1\nb = 3\n"
     assert edited("", {"name": "x", "observe": {"dof": "a"}}) == 'name = "x"\n\n[observe]\ndof = "a"\n'
