@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from solver.scene.builder import SceneBuilder
     from solver.scene.cyclic.annulus import Extent, annulus, sectors_needed
     from solver.scene.scene import Scene, load_scene, shipped_scenes
+    from solver.scene.templates.registry import new_scene
     from solver.sensitivity.gradient import Gradient, Sensitivities
     from solver.sensitivity.hessian import AmplitudeHessian, EdgeHessian, PeakHessian
     from solver.sensitivity.nonsmooth import PeakGradient, PeakKind, peak_gradient
@@ -85,6 +86,7 @@ _HOME = {
     "Effects": "balance.simplifications", "Plan": "studies.plan", "plan": "studies.plan",
     "SceneBuilder": "scene.builder",
     "Scene": "scene.scene", "load_scene": "scene.scene", "shipped_scenes": "scene.scene",
+    "new_scene": "scene.templates.registry",
     "Solution": "response.solution", "SolutionStatus": "response.solution", "solve": "response.solve",
     "Growth": "response.stability.floquet", "Stability": "response.stability.floquet",
     "branch_stability": "response.stability.floquet", "stability": "response.stability.floquet",
@@ -160,11 +162,11 @@ __all__ = [
     "FoundSolution",
     "Gradient",
     "Growth",
+    "HeldAmplitude",
+    "HeldStatus",
     "Interference",
     "InterferenceDiagram",
     "InterferenceStatus",
-    "HeldAmplitude",
-    "HeldStatus",
     "Issue",
     "LawParameter",
     "LeastPeak",
@@ -239,6 +241,7 @@ __all__ = [
     "mistuning_study",
     "mode_gradient",
     "motion",
+    "new_scene",
     "nonlinear_mode",
     "peak_gradient",
     "performance_curve",

@@ -38,7 +38,7 @@ from service.http.routes import (
     sweeps,
     uploads,
 )
-from service.http.routes.texts import measurements, scene_text
+from service.http.routes.texts import measurements, scene_text, templates
 from service.http.workbench import projects, reports, runs, shares
 from service.jobs.registry import Registry
 from service.queue.core import SOLVER_VERSION, Service
@@ -102,8 +102,8 @@ def create_app(settings: Settings | None = None, registry: Registry | None = Non
     events.install(app)
     app.include_router(jobs.submissions(service.registry))
     for module in (
-        jobs, kinds, laws, events, designs, sweeps, scene_text, scenes, uploads, matrices, measurements, plan,
-        previews, projects, reports, runs, shares, health, metrics, reference, page,
+        jobs, kinds, laws, events, designs, sweeps, scene_text, templates, scenes, uploads, matrices,
+        measurements, plan, previews, projects, reports, runs, shares, health, metrics, reference, page,
     ):  # fmt: skip
         app.include_router(module.router)
     openapi.install(app, service.registry)

@@ -63,6 +63,8 @@ _OF: dict[tuple[str, str], tuple[str, ...]] = {
     ("post", "/v1/previews"): (*_BODY, "Overtaken", "Preview", "QueueFull"),
     ("post", "/v1/scenes/read"): (*_BODY, "QueueFull"),
     ("post", "/v1/scenes/text"): (*_BODY, "QueueFull"),
+    ("post", "/v1/scenes/edit"): (*_BODY, "QueueFull"),
+    ("post", "/v1/templates"): _BODY,
     ("post", "/v1/uploads"): (
         "BodyTooSlow", "BodyTooLarge", "UnsupportedMedia", "UnreadableUpload", "QueueFull",
     ),

@@ -14,7 +14,10 @@ from solver.scene.scene import Scene, load_scene
 
 _REFERENCE = "#/components/schemas/{model}"
 # Bodies whose schema stands in the operation itself.
-_ITSELF = ("/v1/jobs", "/v1/designs", "/v1/previews", "/v1/plan", "/v1/scenes/read", "/v1/scenes/text")
+_ITSELF = (
+    "/v1/jobs", "/v1/designs", "/v1/previews", "/v1/plan", "/v1/scenes/read", "/v1/scenes/text",
+    "/v1/scenes/edit", "/v1/templates",
+)  # fmt: skip
 _FILE: dict[str, Any] = {"type": "string", "contentMediaType": "application/octet-stream"}
 _MATRIX = {
     "MatrixMarket": {"value": "%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 1 1.0\n2 2 2.0\n"}

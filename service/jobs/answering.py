@@ -13,6 +13,7 @@ from typing import Any
 
 from service.errors import BodyTooLargeError, InvalidRequestError, MalformedBodyError
 from service.jobs.common.measurements import read_measurements
+from service.jobs.common.scene_editing import side_by_side
 from service.jobs.common.scene_text import issues_of_scene, read_text
 from service.jobs.common.scenes import (
     HarmonicRequest,
@@ -30,7 +31,7 @@ from service.jobs.validation import validated
 from solver.errors import Issue
 
 PLAN, READ, TEXT, STORE, RESOLVE, PREVIEW = "plan", "read", "text", "store", "resolve", "preview"
-MEASURED = "measured"
+MEASURED, EDIT = "measured", "edit"
 
 Words = Mapping[str, Any]
 Answer = Callable[[Words, SceneSource], Any]
@@ -162,6 +163,10 @@ def _read(words: Words, source: SceneSource) -> JsonText:
     return encoded({"scene": raw, "issues": issues})
 
 
+def _edit(words: Words, source: SceneSource) -> JsonText:
+    return encoded(side_by_side(words["text"], words["scene"], source))
+
+
 def _text(words: Words, source: SceneSource) -> str:
     from solver.scene.toml import toml_text
 
@@ -210,7 +215,7 @@ class Answering:
 def runs(jobs: Registry, previews: Registry) -> dict[str, RunOn]:
     """The functions of the processes, by the names of the tasks."""
     tasks: dict[str, Answer] = {
-        PLAN: _plan, READ: _read, TEXT: _text, STORE: _store, MEASURED: _measured,
+        PLAN: _plan, READ: _read, TEXT: _text, EDIT: _edit, STORE: _store, MEASURED: _measured,
         RESOLVE: _Resolving.of(jobs),
         PREVIEW: _Resolving.of(previews),
     }  # fmt: skip

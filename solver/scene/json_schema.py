@@ -103,8 +103,7 @@ def _model(name: str) -> type[BaseModel]:
 
 def _describe(definition: dict[str, Any], model: type[BaseModel], name: str) -> None:
     """Put the words of a model's docstring, and of those it is made from, into its schema."""
-    words = {key: text for base in reversed(model.__mro__) for key, text in _words(base).items()}
-    words |= WORDS.get("*", {}) | WORDS.get(name, {})
+    words = words_of(model) | WORDS.get("*", {}) | WORDS.get(name, {})
     if issubclass(model, AnyContact):
         words |= {"law": _law_words(), **model.WORDS}
     text = _docstring(model)
@@ -120,6 +119,11 @@ def _law_words() -> str:
     """What is said of the key `law`: every law there is."""
     first, *others, last = laws()
     return f"{', '.join([f'{first} (also if left out)', *others])} or {last}."
+
+
+def words_of(model: type[BaseModel]) -> dict[str, str]:
+    """What the docstrings of a model, and of those it is made from, say of every attribute."""
+    return {key: text for base in reversed(model.__mro__) for key, text in _words(base).items()}
 
 
 def _words(model: type) -> dict[str, str]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
-_MOST_INLINE = 88
+MOST_INLINE = 88
 
 
 def toml_text(raw: Mapping[str, Any], comments: tuple[str, ...] = ()) -> str:
@@ -26,12 +26,12 @@ def toml_text(raw: Mapping[str, Any], comments: tuple[str, ...] = ()) -> str:
 
 def _table(table: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
     """A table's own values, then the tables below it, as TOML wants them."""
-    lines = [f"{_key(key)} = {_value(item)}" for key, item in table.items() if not _below(item, path)]
+    lines = [f"{key_text(key)} = {value_text(item)}" for key, item in table.items() if not _below(item, path)]
     for key, item in table.items():
         if not _below(item, path):
             continue
         here = (*path, key)
-        name = ".".join(_key(part) for part in here)
+        name = ".".join(key_text(part) for part in here)
         if isinstance(item, Mapping):
             lines += ["", f"[{name}]", *_table(item, here)]
         else:
@@ -49,18 +49,20 @@ def _below(item: object, path: tuple[str, ...]) -> bool:
     )
 
 
-def _key(key: str) -> str:
+def key_text(key: str) -> str:
+    """A key as TOML, quoted where it has to be."""
     return key if _BARE.fullmatch(key) else json.dumps(key)
 
 
-def _value(item: object) -> str:
+def value_text(item: object) -> str:
+    """A value as TOML in one place: tables in braces."""
     if isinstance(item, Mapping):
-        inner = ", ".join(f"{_key(key)} = {_value(value)}" for key, value in item.items())
+        inner = ", ".join(f"{key_text(key)} = {value_text(value)}" for key, value in item.items())
         return f"{{ {inner} }}" if inner else "{}"
     if isinstance(item, (list, tuple)):
-        entries = [_value(entry) for entry in item]
+        entries = [value_text(entry) for entry in item]
         short = f"[{', '.join(entries)}]"
-        if len(short) <= _MOST_INLINE:
+        if len(short) <= MOST_INLINE:
             return short
         return "[\n" + "".join(f"  {entry},\n" for entry in entries) + "]"
     return json.dumps(item, ensure_ascii=False)

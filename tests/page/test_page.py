@@ -215,13 +215,14 @@ def test_what_is_wrong_with_a_scene_is_said_beside_its_field(profile: Profile, s
     page = visit(context, site)
     file = {"name": "mine.toml", "mimeType": "application/toml", "buffer": BAD_SCENE.encode()}
     page.set_input_files("#file", [file])
-    friction = page.get_by_label("mu", exact=True)
+    friction = page.get_by_label("mu of damper", exact=True)
     expect(friction).to_be_focused()
     expect(friction).to_have_attribute("aria-invalid", "true")
     expect(page.locator("#field-contacts-0-mu-message")).to_contain_text("`mu` must be >= 0, got -0.3")
     expect(page.locator("#field-excitation-dof-message")).to_contain_text("wing")
     friction.fill("0.3")
     page.locator("#field-excitation-dof").fill("blade")
+    expect(page.locator("#editor-status")).to_contain_text("Nothing is wrong")
     page.get_by_role("button", name="Use this scene").click()
     expect(page.locator("#scene")).to_have_value("my-damper")
     expect(page.locator("#editor")).to_be_hidden()
@@ -231,9 +232,7 @@ def test_what_is_wrong_with_a_scene_is_said_beside_its_field(profile: Profile, s
 
 @pytest.mark.parametrize("text", ["name = = 3", "{", "<script>alert(1)</script>"])
 def test_a_file_that_is_no_scene_is_refused(profile: Profile, site: Site, text: str) -> None:
-    context, watch = profile
-    watch.allowed = ("status of 400",)
-    page = visit(context, site)
+    page = visit(profile[0], site)
     page.set_input_files("#file", [{"name": "a.toml", "mimeType": "text/plain", "buffer": text.encode()}])  # type: ignore[list-item]
     expect(page.locator("#editor [role=alert]")).to_contain_text(
         "The file cannot be read: this is not valid TOML"

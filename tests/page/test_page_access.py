@@ -85,7 +85,7 @@ def test_axe_finds_nothing_serious(browser: Browser, site: Site, studied: str, s
         expect(page.locator("#front-facts tbody tr").first).to_be_visible()
         compute_further(page)
         page.click("#edit-scene")
-        expect(page.locator("#editor form")).to_be_visible()
+        expect(page.locator("#editor-status")).to_contain_text("Nothing is wrong")
         unfold(page)
         found = axe.Axe().run(page).response["violations"]
         serious = [

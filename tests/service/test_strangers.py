@@ -111,6 +111,10 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     # A scene's name is one owner's.
     "POST /v1/scenes/text": ((401, 401, 422, 401, 401, 403, 200, 422), {"scene": "mine"}),
     "POST /v1/scenes/read": (PLANNED, {"text": "name = 'mine'"}),
+    "POST /v1/scenes/edit": (PLANNED, {"text": "name = 'mine'"}),
+    "GET /v1/scenes-schema": (LISTED, None),
+    "GET /v1/templates": (LISTED, None),
+    "POST /v1/templates": (PLANNED, {"template": "shroud"}),
     # The page itself, which asks for a key.
     "GET /": (OPEN, None),
     "GET /page/{hashed}/{path:path}": (OPEN, None),

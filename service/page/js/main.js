@@ -6,7 +6,7 @@ import { byId, el, show } from "./base/dom.js";
 import { startInterference } from "./disk/interference.js";
 import { startAnswer } from "./views/answer.js";
 import { startDesign } from "./views/design.js";
-import { edit, editCurrent, openText } from "./scene/editor.js";
+import { edit, editCurrent, newScene, openText } from "./editor/editor.js";
 import { on, tell } from "./base/events.js";
 import { startFront } from "./views/front.js";
 import { loadLaws } from "./scene/laws.js";
@@ -145,7 +145,8 @@ function controls() {
   });
   byId("open-matrices").addEventListener("click", () => openMatrices());
   startDrops();
-  byId("edit-scene").addEventListener("click", editCurrent);
+  byId("new-scene").addEventListener("click", () => newScene().catch(failed));
+  byId("edit-scene").addEventListener("click", () => editCurrent().catch(failed));
   byId("save-toml").addEventListener("click", () => saveToml(`${state.scene}.toml`));
   byId("share").addEventListener("click", share);
   // Beside the views where there is room, folded above them where there is not.

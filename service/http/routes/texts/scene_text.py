@@ -1,4 +1,4 @@
-"""``/v1/scenes/read`` and ``/v1/scenes/text``: scenes from and to the text of a file."""
+"""``/v1/scenes/read``, ``/text`` and ``/edit``: scenes from and to the text of a file."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from solver.scene.examples import DAMPER_LOAD
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"], route_class=TypedRoute)
 
 _FILE: dict[str, Any] = {"text": 'name = "half a scene"', "form": "toml"}
+_EDIT: dict[str, Any] = {"text": 'name = "a" # mine', "scene": {"name": "b"}}
 _SCENE: dict[str, Any] = {"scene": "two-dof", "set": {DAMPER_LOAD: 80}, "comments": ["as set"]}
 MOST_CHARACTERS = 4_000_000
 
@@ -38,8 +39,20 @@ class TextRequest(SceneRequest):
     comments: list[Annotated[str, Field(max_length=2000)]] = Field(default=[], max_length=50)
 
 
+class EditRequest(BaseModel):
+    """The TOML of a scene, and the tables it is to hold if these were changed."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra={"examples": [_EDIT]})
+
+    text: str = Field(max_length=MOST_CHARACTERS)
+    scene: dict[str, Any] | None = None
+
+
 ReadBody = Annotated[ReadRequest, Body(openapi_examples={"read": {"value": _FILE}})]
 TextBody = Annotated[TextRequest, Body(openapi_examples={"text": {"value": _SCENE}})]
+
+
+EditBody = Annotated[EditRequest, Body(openapi_examples={"edit": {"value": _EDIT}})]
 
 
 class SceneIssue(BaseModel):
@@ -56,6 +69,21 @@ class SceneRead(BaseModel):
     issues: list[SceneIssue]
 
 
+class PlacedIssue(SceneIssue):
+    """The same with its place in the text: line and column, from 1."""
+
+    line: int
+    column: int | None
+
+
+class SceneEdited(BaseModel):
+    """The text and the tables it holds (null where it cannot be read), and everything wrong with them."""
+
+    text: str
+    scene: dict[str, Any] | None
+    issues: list[PlacedIssue]
+
+
 @router.post("/read", response_model=SceneRead)
 async def read(body: ReadBody, service: ServiceDependency, caller: CallerDependency) -> Response:
     """Read the text of a scene file and list everything that is wrong with it; nothing is stored."""
@@ -68,3 +96,13 @@ async def text(body: TextBody, service: ServiceDependency, caller: CallerDepende
     """The TOML of a scene with its values set: the file that reproduces what was computed."""
     words = {"scene": body.model_dump(exclude={"comments"}), "comments": body.comments}
     return Response(await computed(service, caller, answering.TEXT, words), media_type="application/toml")
+
+
+@router.post("/edit", response_model=SceneEdited)
+async def edit(body: EditBody, service: ServiceDependency, caller: CallerDependency) -> Response:
+    """Text and tables side by side: `text` read, or changed so that it holds `scene`; nothing is stored.
+
+    Comments, order and spelling of what stays the same are kept.
+    """
+    found = await computed(service, caller, answering.EDIT, body.model_dump(), about="/text")
+    return Response(found, media_type="application/json")

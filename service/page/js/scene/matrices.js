@@ -2,7 +2,7 @@
 
 import { Problem, post, request } from "../network/api.js";
 import { byId, el, facts, say, show } from "../base/dom.js";
-import { edit } from "./editor.js";
+import { edit } from "../editor/editor.js";
 import { on } from "../base/events.js";
 import { number } from "../base/format.js";
 import { joined } from "../disk/sector_form.js";

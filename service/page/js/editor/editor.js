@@ -1,0 +1,211 @@
+// The editor of a scene: tables of its parts and its text side by side, what is wrong at the field and at the line.
+
+import { saveText } from "../base/exports.js";
+import { byId, el, say, show } from "../base/dom.js";
+import { tell } from "../base/events.js";
+import { Problem, post } from "../network/api.js";
+import { current } from "../scene/scenes.js";
+import { idOf } from "./cells.js";
+import { sceneDocument } from "./document.js";
+import { issueList, markFields } from "./issues.js";
+import { drawTables, forgetOpened, openMissing } from "./tables.js";
+import { tidied } from "./scene_data.js";
+import { loadSchema } from "./schema.js";
+import { tomlPane } from "./toml_pane.js";
+import { openChooser } from "./wizard.js";
+
+let doc = null;
+let pane = null;
+let back = "edit-scene";
+
+export async function openText(text, form) {
+  if (form === "toml") return begin({ text });
+  try {
+    return await begin({ scene: (await post("/v1/scenes/read", { text, form })).scene });
+  } catch (error) {
+    const panel = byId("editor");
+    panel.hidden = false;
+    show(panel, el("p", { class: "issues", role: "alert", tabindex: -1 }, `The file cannot be read: ${error.message}`), el("button", { type: "button", onclick: close }, "Close"));
+    panel.firstChild.focus();
+  }
+  return undefined;
+}
+
+export const edit = (scene) => begin({ scene });
+
+// The scene that is shown, under another name.
+export async function editCurrent() {
+  if (!current.body) return;
+  await loadSchema();
+  await begin({ scene: tidied({ ...current.body, name: `${current.body.name}-2` }) });
+}
+
+export async function newScene() {
+  byId("editor").hidden = false;
+  back = "new-scene";
+  await openChooser(byId("editor"), { made: (scene) => begin({ scene }, "new-scene"), close });
+}
+
+async function begin(given, from = "edit-scene") {
+  back = from;
+  await loadSchema();
+  forgetOpened();
+  build();
+  say("editor-status", "The scene is being read …");
+  await doc.open(given);
+  const first = byId("editor").querySelector("[aria-invalid]") ?? (doc.unreadable ? pane.field : byId("editor").querySelector("input"));
+  first?.focus();
+  byId("editor").scrollIntoView({ block: "start" });
+}
+
+function close() {
+  byId("editor").hidden = true;
+  byId(back).focus();
+}
+
+function build() {
+  const panel = byId("editor");
+  panel.hidden = false;
+  const tables = el("div", { id: "editor-tables" });
+  const text = el("div", { class: "toml-pane" });
+  const form = el("form", { novalidate: true, id: "editor-form" },
+    el("div", { class: "editor-bar" },
+      el("button", { type: "submit", class: "main-button" }, "Use this scene"),
+      el("button", { type: "button", id: "editor-undo", title: "Undo (Ctrl+Z)", onclick: () => doc.undo() }, "Undo"),
+      el("button", { type: "button", id: "editor-redo", title: "Redo (Ctrl+Shift+Z)", onclick: () => doc.redo() }, "Redo"),
+      el("button", { type: "button", onclick: () => saveText(doc.text, `${doc.scene.name || "scene"}.toml`, "application/toml") }, "Save as TOML"),
+      el("button", { type: "button", onclick: close }, "Close"),
+      el("p", { id: "editor-status", role: "status", class: "note" })),
+    el("div", { id: "editor-issues" }),
+    el("div", { class: "editor-sides" },
+      el("div", { class: "editor-left" }, tables, el("p", { id: "editor-help", class: "help note" }, "What a value means is said here while its field is in use.")),
+      text));
+  show(panel, form);
+  doc = sceneDocument(shown);
+  pane = tomlPane(text, (words) => {
+    busy(true);
+    doc.type(words);
+  });
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    store();
+  });
+  form.addEventListener("keydown", keys);
+  tables.addEventListener("focusin", help);
+}
+
+// Until the service has looked at the last change.
+const busy = (is) => byId("editor-form").setAttribute("aria-busy", String(is));
+
+function keys(event) {
+  if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+  const pressed = event.key.toLowerCase();
+  if (pressed !== "z" && pressed !== "y") return;
+  event.preventDefault();
+  if (pressed === "y" || event.shiftKey) doc.redo();
+  else doc.undo();
+}
+
+// What the column of a field says of it, and the line it stands at.
+function help({ target }) {
+  const words = target.closest("[data-words]")?.dataset.words ?? headOf(target)?.title ?? target.selectedOptions?.[0]?.title ?? target.title;
+  if (words) say("editor-help", words);
+}
+
+function headOf(target) {
+  const box = target.closest("td, th");
+  return box ? box.closest("table").tHead?.rows[0].cells[box.cellIndex] : null;
+}
+
+// A change of the tables; `focus` says where to go on if they are drawn anew.
+function changed(how, focus) {
+  if (how) {
+    busy(true);
+    doc.change(how);
+  }
+  if (focus === undefined) return;
+  if (focus.startsWith("renamed:")) return later(focus);
+  draw();
+  go(focus);
+}
+
+const later = (focus) => { setTimeout(renamed, 0, ...focus.split(":").slice(1)); };
+
+// The focus has gone on already, maybe to a field that is called after the name.
+function renamed(was, is) {
+  const { id } = document.activeElement;
+  draw();
+  if (!byId(id)) byId(id.replace(was, is))?.focus();
+}
+
+function go(focus) {
+  const [kind, path, index, key] = focus.split(":");
+  const tables = byId("editor-tables");
+  const row = tables.querySelector(`[data-row="${CSS.escape(`${path}:${index}`)}"]`);
+  const found = kind === "row" ? row?.querySelector("input, select") ?? byId(`add-${idOf(`/${path}`)}`)
+    : kind === "cell" ? (row ?? byId(idOf(`/${path}`))).querySelector(`[data-key="${CSS.escape(key)}"]`) : byId(focus);
+  (found?.matches("fieldset") ? found.querySelector("input") : found)?.focus();
+}
+
+function draw() {
+  const tables = byId("editor-tables");
+  const active = tables.contains(document.activeElement) ? document.activeElement : null;
+  const kept = active && { id: active.id, ends: [active.selectionStart, active.selectionEnd] };
+  openMissing(doc.scene, doc.issues);
+  drawTables(tables, doc.scene, changed);
+  tables.inert = doc.unreadable;
+  if (!kept?.id || !byId(kept.id)) return;
+  byId(kept.id).focus({ preventScroll: true });
+  if (kept.ends[0] !== null && kept.ends[0] !== undefined) byId(kept.id).setSelectionRange(...kept.ends);
+}
+
+function shown({ from, before = false, failed = "", errors = [] }) {
+  if (failed) {
+    const words = errors.map(({ detail }) => detail).join(" ");
+    say("editor-status", words || failed, true);
+    busy(false);
+    return;
+  }
+  const missing = doc.issues.some(({ pointer }) => pointer && !byId("editor-tables").querySelector(`[data-pointer="${CSS.escape(pointer)}"]`));
+  // What is being typed into a field that counts when it is left stays as it is.
+  const typing = document.activeElement?.dataset?.late && byId("editor-tables").contains(document.activeElement);
+  if (from !== "tables" || (missing && !typing)) draw();
+  byId("editor-tables").inert = doc.unreadable;
+  if (from !== "text" || before) pane.set(doc.text);
+  byId("editor-undo").disabled = !doc.canUndo;
+  byId("editor-redo").disabled = !doc.canRedo;
+  if (before) return;
+  busy(!doc.settled);
+  const { issues, unreadable } = doc;
+  pane.mark(issues.filter(({ line }) => line), unreadable);
+  if (!unreadable) markFields(byId("editor-tables"), issues);
+  show(byId("editor-issues"), unreadable ? null : issueList(issues, (issue) => find(issue)));
+  const count = issues.length === 1 ? "One thing is" : `${issues.length} things are`;
+  say("editor-status", unreadable ? "The tables show what the text last held." : issues.length ? `${count} wrong; each is said at its field and marked at its line.` : "Nothing is wrong with this scene.", issues.length > 0);
+}
+
+// Goes to the field of an issue, and shows its line.
+function find({ pointer, line, column }) {
+  const field = [...byId("editor-tables").querySelectorAll("[aria-invalid]")].find((node) => (node.dataset.issues ?? "").split(" ").includes(pointer));
+  field?.focus();
+  if (line) pane.go(line, column, !field);
+}
+
+async function store() {
+  await doc.settle();
+  if (doc.issues.length) {
+    const [first] = doc.issues;
+    return doc.unreadable ? pane.go(first.line, first.column) : find(first);
+  }
+  try {
+    const stored = await post("/v1/scenes", doc.scene);
+    byId("editor").hidden = true;
+    tell("scene-stored", stored.name);
+  } catch (error) {
+    if (error instanceof Problem && error.status === 409) doc.blame([{ pointer: "/name", detail: error.message, line: 1, column: 1 }]);
+    else if (error instanceof Problem && error.errors.length) doc.blame(error.errors);
+    else return say("editor-status", error.message, true);
+    byId("editor").querySelector("[aria-invalid]")?.focus();
+  }
+  return undefined;
+}

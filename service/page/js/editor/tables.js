@@ -1,0 +1,184 @@
+// The sections of a scene as tables: a row for each mass, spring, contact …, a column for each value.
+
+import { el, show, svg } from "../base/dom.js";
+import { cell, idOf, nameCell, textOf } from "./cells.js";
+import { addRow, completed, dofsOf, doubleRow, endsOf, escaped, isKept, removeRow, rename, rowsOf, setCell } from "./scene_data.js";
+import { keyOf, keysOf, oneOf, requiredKeys, sectionsOf, titleOf, wordsOf } from "./schema.js";
+
+const ALWAYS = ["", "structure", "structure/masses", "structure/springs", "contacts", "excitation", "observe"];
+const LEAST = { names: 10, any: 6, numbers: 8, number: 6, text: 7, pair: 5 };
+const MOST = 26;
+// What a row is: these have a column even where they are left out.
+const TELLING = ["law", "shape", "kind"];
+let opened = new Map();
+
+export const forgetOpened = () => { opened = new Map(); };
+
+const openedIn = (path) => opened.get(path) ?? opened.set(path, new Set()).get(path);
+
+// A value that is said to be missing gets a column.
+export function openMissing(scene, issues) {
+  for (const { pointer } of issues) {
+    const section = sectionsOf(scene).filter(({ path }) => path === "" || pointer.startsWith(`/${path}/`)).pop();
+    if (!section) continue;
+    for (const { row, pointer: at } of rowsOf(scene, section)) {
+      const key = pointer.startsWith(`${at}/`) ? pointer.slice(at.length + 1) : "";
+      if (key && !key.includes("/") && row !== null && typeof row === "object" && keyOf(scene, section.path, row, key)) openedIn(section.path).add(key);
+    }
+  }
+}
+
+const asTable = (row) => (row !== null && typeof row === "object" && !Array.isArray(row) ? row : {});
+
+// The keys that have a column: those in use, those a row may not be without, and those that were asked for.
+function columnsOf(scene, path, rows) {
+  const shown = [];
+  for (const { row } of rows) {
+    const table = asTable(row);
+    const wanted = [...TELLING, ...Object.keys(table), ...requiredKeys(scene, path, table), ...openedIn(path)];
+    const known = keysOf(scene, path, table);
+    for (const key of known) if (wanted.includes(key) && !shown.includes(key)) shown.push(key);
+    for (const key of Object.keys(table)) if (!known.includes(key) && !shown.includes(key)) shown.push(key);
+  }
+  const order = rows.length ? keysOf(scene, path, asTable(rows[0].row)) : [];
+  const place = (key) => (order.includes(key) ? order.indexOf(key) : 500);
+  return path === "" || path === "observe" || path === "structure" ? shown : shown.sort((a, b) => place(a) - place(b));
+}
+
+// As wide as the longest value of its column, within limits.
+function widthOf(rows, known) {
+  const texts = rows.flatMap(({ row }) => {
+    const value = row !== null && typeof row === "object" ? row[known.key] : row;
+    return known.type === "pair" && Array.isArray(value) ? value.map((end) => textOf(end, "text")) : [textOf(value, known.type)];
+  });
+  return Math.min(Math.max(LEAST[known.type] ?? 6, ...texts.map((text) => text.length)), MOST);
+}
+
+const COPY = "M3 5.5h7.5V13H3zM5.5 5.5V3H13v7.5h-2.5";
+const CROSS = "M4 4l8 8M12 4l-8 8";
+const icon = (path) => svg("svg", { viewBox: "0 0 16 16", width: 15, height: 15, "aria-hidden": "true", fill: "none", stroke: "currentColor", "stroke-width": 1.4 }, svg("path", { d: path }));
+
+const nameOf = (path, { row, name, index }) => name ?? asTable(row).name ?? `${oneOf(path)} ${index + 1}`;
+
+// A value that no field can show: a table of tables, a matrix.
+const isSection = (scene, path, key) => sectionsOf(scene).some((section) => section.path === (path === "" ? key : `${path}/${key}`));
+
+// Draws the tables of `scene`; `edit(change, redraw)` has a change made, with the tables drawn again if they have other rows.
+export function drawTables(host, scene, edit) {
+  const sections = sectionsOf(scene);
+  const used = sections.filter((section) => ALWAYS.includes(section.path) || rowsOf(scene, section).some(({ row }) => Object.keys(asTable(row)).length));
+  const unused = sections.filter((section) => !used.includes(section) && section.form !== "fields");
+  const lists = [["editor-ends", endsOf(scene)], ["editor-dofs", dofsOf(scene)]].map(([id, names]) => el("datalist", { id }, names.map((name) => el("option", { value: name }))));
+  const add = unused.length
+    ? el("fieldset", { class: "add-section" }, el("legend", {}, "Add"), el("div", { class: "row" }, unused.map((section) =>
+      el("button", { type: "button", title: wordsOf(scene, section.path), id: `add-${idOf(`/${section.path}`)}`, onclick: () => edit((draft) => { addRow(draft, section); }, `${idOf(`/${section.path}`)}`) }, titleOf(section.path)))))
+    : null;
+  show(host, lists, used.map((section) => (section.form === "fields" ? fields(scene, section, edit) : rowTable(scene, section, edit))), add);
+}
+
+function keyWords({ key, unit, words, range, required }) {
+  const parts = [`${key}${unit ? ` [${unit}]` : ""}`, words, range ? `Range: ${range}.` : "", required ? "" : "May be left out."];
+  return parts.filter(Boolean).join(" — ").replace(" — Range", " Range").replace(" — May", " May");
+}
+
+function fields(scene, section, edit) {
+  const { path } = section;
+  const [{ row, pointer }] = rowsOf(scene, section);
+  const shown = columnsOf(scene, path, [{ row }]).filter((key) => !isSection(scene, path, key) && !(path === "" && ["structure", "observe"].includes(key)));
+  const groups = shown.map((key) => {
+    const at = `${pointer}/${escaped(key)}`;
+    if (isKept(scene && path, key, row[key])) return el("div", { class: "field kept" }, el("span", {}, key), el("span", { class: "note" }, sizeOf(row[key])));
+    const known = keyOf(scene, path, row, key) ?? { key, type: "any", words: "The service does not know this key.", unit: "" };
+    const input = valueCell(known, row, at, `${key} of ${titleOf(path).toLowerCase()}`, edit, path, 0, scene);
+    return el("div", { class: "field", "data-words": keyWords(known) }, el("label", { for: known.type === "pair" ? idOf(`${at}/0`) : idOf(at) }, key, known.unit ? ` [${known.unit}]` : ""), input);
+  });
+  const more = moreKeys(scene, path, row, shown, edit, 0);
+  return el("fieldset", { class: "section", id: idOf(`/${path}`) }, el("legend", {}, titleOf(path)), el("div", { class: "fields narrow" }, groups, more ? el("div", { class: "field" }, more) : null));
+}
+
+const sizeOf = (value) => (Array.isArray(value) ? `${value.length} × ${value[0]?.length ?? 1}, kept as it is` : "kept as it is");
+
+function rowTable(scene, section, edit) {
+  const { path, form } = section;
+  const rows = rowsOf(scene, section);
+  const columns = columnsOf(scene, path, rows);
+  const heads = columns.map((key) => {
+    const known = rows.map(({ row }) => keyOf(scene, path, asTable(row), key)).find(Boolean) ?? { key, unit: "", words: "" };
+    return el("th", { scope: "col", title: keyWords(known), class: known.type === "number" ? "number" : undefined }, key, known.unit ? el("span", { class: "unit" }, ` [${known.unit}]`) : null);
+  });
+  const first = form === "names" ? el("th", { scope: "col" }, path === "structure/masses" ? "DOF" : "name") : null;
+  const body = rows.map((each) => rowOf(scene, section, each, columns, edit));
+  const table = rows.length
+    ? el("div", { class: "scroll" }, el("table", { class: "grid" }, el("caption", { class: "unseen" }, titleOf(path)),
+      el("thead", {}, el("tr", {}, first, heads, el("th", { scope: "col" }, el("span", { class: "unseen" }, "Change the row")))), el("tbody", {}, body)))
+    : el("p", { class: "note" }, `None. ${wordsOf(scene, path)}`);
+  const last = rows.length;
+  return el("fieldset", { class: "section", id: idOf(`/${path}`) }, el("legend", {}, titleOf(path), rows.length ? el("span", { class: "count" }, ` ${rows.length}`) : null), table,
+    el("button", { type: "button", class: "add", id: `add-${idOf(`/${path}`)}`, onclick: () => edit((draft) => { addRow(draft, section); }, `row:${path}:${last}`) }, `Add ${oneOf(path)}`));
+}
+
+function rowOf(scene, section, each, columns, edit) {
+  const { path, form } = section;
+  const { row, pointer, index, name } = each;
+  const who = nameOf(path, each);
+  const scalar = form === "names" && (row === null || typeof row !== "object");
+  const naming = form === "names"
+    ? el("th", { scope: "row" }, nameCell({ pointer, about: `Name of ${oneOf(path)} ${index + 1}`, value: name }, (is) => {
+      if (dofsOf(scene).includes(is)) return false;
+      edit((draft) => rename(draft, path, name, is), `renamed:${idOf(pointer)}:${idOf(`/${path}/${escaped(is)}`)}`);
+      return true;
+    }))
+    : null;
+  const cells = columns.map((key) => el("td", {}, oneCell(scene, section, each, key, scalar, who, edit)));
+  if (form === "names" && !columns.length) cells.push(el("td", {}, oneCell(scene, section, each, "row", true, who, edit)));
+  const act = (words, sign, change, focus) => el("button", { type: "button", class: "icon", "aria-label": `${words} ${who}`, title: words, onclick: () => edit(change, focus) }, icon(sign));
+  const more = path === "structure/dofs" ? null : moreKeys(scene, path, asTable(row), columns, edit, index);
+  return el("tr", { "data-row": `${path}:${index}`, "data-pointer": pointer }, naming, cells, el("td", { class: "acts" }, more,
+    act("Duplicate", COPY, (draft) => { doubleRow(draft, section, index); }, `row:${path}:${index + 1}`),
+    act("Remove", CROSS, (draft) => { removeRow(draft, section, index); }, `row:${path}:${Math.max(index - 1, 0)}`)));
+}
+
+function oneCell(scene, { path, form }, { row, pointer, name, index }, key, scalar, who, edit) {
+  const whole = form === "names" && scalar && (key === "m" || key === "row");
+  const known = keyOf(scene, path, asTable(row), key);
+  if (whole) {
+    const [top, table] = path.split("/");
+    return cell({ ...known, pointer, name: key, about: `${key} of ${who}`, type: "number", value: row, width: widthOf(rowsOf(scene, { path, form }), { key, type: "number" }) }, (value) => edit((draft) => { draft[top][table][name] = value ?? ""; }));
+  }
+  if (!known && asTable(row)[key] === undefined) return el("span", { class: "none", "aria-label": "not a value of this row" }, "·");
+  const at = `${pointer}/${escaped(key)}`;
+  return valueCell(known ?? { key, type: "any", words: "", unit: "" }, asTable(row), at, `${key} of ${who}`, edit, path, index, scene, name);
+}
+
+const formOf = (path) => (path === "structure/masses" ? "names" : ["", "structure", "observe"].includes(path) ? "fields" : "rows");
+
+function valueCell(known, row, pointer, about, edit, path, index, scene, name) {
+  const list = known.type === "pair" ? "editor-ends" : known.key === "dof" ? "editor-dofs" : known.key === "on" ? "editor-ends" : "";
+  // Another law or shape has other columns.
+  const redraw = known.type === "choice" && TELLING.includes(known.key) ? idOf(pointer) : undefined;
+  return cell({ ...known, pointer, name: known.key, about, value: row[known.key], list, width: formOf(path) === "fields" ? undefined : widthOf(rowsOf(scene, { path, form: formOf(path) }), known) }, (value) =>
+    edit((draft) => {
+      const form = formOf(path);
+      const each = rowsOf(draft, { path, form }).find((one) => (form === "names" ? one.name === name : one.index === index));
+      let owner = each?.row;
+      if (form === "names" && (owner === null || typeof owner !== "object")) owner = draft.structure.masses[name] = { m: owner };
+      if (form === "fields" && path !== "" && !draft[path]) owner = draft[path] = {};
+      setCell(owner, known.key, value);
+      if (redraw) completed(draft, path, owner);
+      if (form === "names" && Object.keys(owner).length === 1 && "m" in owner) draft.structure.masses[name] = owner.m;
+    }, redraw));
+}
+
+// What a row may have besides.
+function moreKeys(scene, path, row, shown, edit, index) {
+  const left = keysOf(scene, path, row).filter((key) => !shown.includes(key) && !isSection(scene, path, key) && !(path === "" && ["structure", "observe"].includes(key)));
+  if (!left.length) return null;
+  const about = path === "" || path === "structure" || path === "observe" ? titleOf(path).toLowerCase() : row.name ?? `${oneOf(path)} ${index + 1}`;
+  const select = el("select", { class: "more", "aria-label": `Add a value to ${about}`, title: "Add a value", id: `more-${idOf(`/${path}/${index}`)}` },
+    el("option", { value: "" }, formOf(path) === "fields" ? "+ value" : "+"), left.map((key) => el("option", { value: key, title: keyOf(scene, path, row, key)?.words }, key)));
+  select.addEventListener("change", () => {
+    openedIn(path).add(select.value);
+    edit(null, `cell:${path}:${index}:${select.value}`);
+  });
+  return select;
+}

@@ -1,0 +1,268 @@
+"""A TOML text changed so that it holds other tables: what stays the same keeps its words, order and comments.
+
+The text and the tables it holds are walked together with the tables wanted. What is equal is copied letter by
+letter; entries of lists that were added or taken out are told by the longest common parts of both lists. The
+result is read again: where it would not hold exactly what is wanted, the whole is written anew instead.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from difflib import SequenceMatcher
+from typing import Any
+
+from solver.scene.editing.places import Kind, Place, places
+from solver.scene.toml import MOST_INLINE, key_text, toml_text, value_text
+
+Tables = Mapping[str, Any]
+_MOST_COMPARED = 250_000
+"""Pairs of entries of two lists; longer ones are paired in their order."""
+
+
+class _UnwritableError(Exception):
+    """The way the text is written has no place for the change."""
+
+
+def edited(text: str, wanted: Tables, read: Callable[[str], Tables] = tomllib.loads) -> str:
+    """Return the text changed so that it holds `wanted`.
+
+    Parameters
+    ----------
+    text : TOML.
+    wanted : tables, lists, texts, numbers and booleans, without null.
+    read : reads the tables of a text, as both are compared.
+    """
+    lines = text.replace("\r\n", "\n")
+    lines += "" if not lines or lines.endswith("\n") else "\n"
+    held = read(lines)
+    if _same(held, wanted):
+        return lines
+    try:
+        changed = _Edits(lines).of_document(held, wanted)
+        if _same(read(changed), wanted):
+            return changed
+    except (_UnwritableError, tomllib.TOMLDecodeError):
+        pass  # written anew below: comments are lost, nothing else
+    return toml_text(wanted, _leading_comments(lines))
+
+
+def _leading_comments(text: str) -> tuple[str, ...]:
+    found = []
+    for line in text.splitlines():
+        if not line.startswith("#"):
+            break
+        found.append(line[1:].removeprefix(" "))
+    return tuple(found)
+
+
+def _same(one: object, other: object) -> bool:
+    """Whether two values of JSON are equal; 1 and 1.0 are, 1 and true are not."""
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return one.keys() == other.keys() and all(_same(value, other[key]) for key, value in one.items())
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(_same, one, other))
+    return isinstance(one, bool) == isinstance(other, bool) and one == other
+
+
+def _paired(held: Sequence[Any], wanted: Sequence[Any]) -> list[int | None]:
+    """For every entry wanted the one held that it comes from, in rising order; None of a new one."""
+    if len(held) == len(wanted) or len(held) * len(wanted) > _MOST_COMPARED:
+        return [i if i < len(held) else None for i in range(len(wanted))]
+    a, b = ([json.dumps(one, sort_keys=True, default=str) for one in many] for many in (held, wanted))
+    found: list[int | None] = [None] * len(wanted)
+    for word, low, high, start, end in SequenceMatcher(None, a, b, autojunk=False).get_opcodes():
+        if word in ("equal", "replace"):
+            for i in range(min(high - low, end - start)):
+                found[start + i] = low + i
+    return found
+
+
+class _Edits:
+    """Changes of one text."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._cuts: list[tuple[int, int, str]] = []
+        self._root = places(text)
+        blocks = [block[0] for place in self._root.parts() for block in place.blocks]
+        # Behind the lines of the whole, before the first header and what is said above it.
+        self._root_end = self._root.last or min(blocks, default=len(text))
+
+    def of_document(self, held: Tables, wanted: Tables) -> str:
+        """Return the text that holds `wanted` in place of `held`."""
+        self._table(self._root, held, wanted, ())
+        out, at = [], 0
+        for begin, end, new in sorted(self._cuts, key=lambda cut: cut[:2]):
+            if begin < at:
+                raise _UnwritableError
+            out += [self._text[at:begin], new]
+            at = end
+        return "".join(out).lstrip("\n") + self._text[at:]
+
+    # Tables under headers
+
+    def _table(self, place: Place, held: Tables, wanted: Tables, path: tuple[str, ...]) -> None:
+        for key, below in place.keys.items():
+            if key not in wanted:
+                self._remove(below)
+            elif not _same(held[key], wanted[key]):
+                self._change(below, held[key], wanted[key], (*path, key))
+        added = {key: value for key, value in wanted.items() if key not in held}
+        if not path:
+            self._add(added)
+        elif added:
+            if not place.blocks:
+                raise _UnwritableError
+            self._cuts.append((place.last, place.last, _lines(added)))
+
+    def _add(self, added: Tables) -> None:
+        """Keys of the whole: lines before the first header, tables at the end."""
+        lines = {key: value for key, value in added.items() if not _has_header(value)}
+        sections = {key: value for key, value in added.items() if key not in lines}
+        if lines:
+            self._cuts.append((self._root_end, self._root_end, _lines(lines)))
+        if sections:
+            end = len(self._text)
+            self._cuts.append((end, end, "\n" + toml_text(sections)))
+
+    def _change(self, place: Place, held: Any, wanted: Any, path: tuple[str, ...]) -> None:
+        if place.kind in (Kind.TABLE, Kind.DOTTED) and isinstance(wanted, Mapping):
+            self._table(place, held, wanted, path)
+        elif (
+            place.kind is Kind.TABLES and isinstance(wanted, list) and all(map(_is_table, wanted)) and wanted
+        ):
+            self._tables(place, held, wanted, path)
+        elif len(path) == 1 and (place.blocks or place.kind is Kind.TABLES or held == []):
+            self._remove(place)
+            self._add({path[0]: wanted})
+        elif place.kind in (Kind.VALUE, Kind.LIST, Kind.INLINE):
+            self._cuts.append((place.first, place.last, self._value(place, held, wanted)))
+        else:
+            raise _UnwritableError
+
+    def _tables(self, place: Place, held: list[Any], wanted: list[Any], path: tuple[str, ...]) -> None:
+        """The entries of ``[[path]]``."""
+        sources = _paired(held, wanted)
+        for i, item in enumerate(place.items):
+            if i not in sources:
+                self._remove(item)
+        last = max(block[1] for part in place.items[0].parts() for block in part.blocks)
+        at = place.items[0].blocks[0][0] if sources[0] is None else last
+        name = ".".join(map(key_text, path))
+        new: dict[int, list[str]] = {}
+        for source, value in zip(sources, wanted, strict=True):
+            if source is None:
+                new.setdefault(at, []).append(f"[[{name}]]\n{_lines(value)}")
+                continue
+            item = place.items[source]
+            at = max(block[1] for part in item.parts() for block in part.blocks)
+            if not _same(held[source], value):
+                self._table(item, held[source], value, path)
+        for where, texts in new.items():
+            before = "" if not where or self._text[:where].endswith("\n\n") else "\n"
+            after = "\n" if where < len(self._text) else ""
+            self._cuts.append((where, where, before + "\n".join(texts) + after))
+
+    def _remove(self, place: Place) -> int:
+        """Take out what stands at a place; where it began."""
+        blocks = sorted(block for part in place.parts() for block in part.blocks)
+        if blocks:
+            self._cuts += [(begin, end, "") for begin, end in blocks]
+            return blocks[0][0]
+        if place.kind is Kind.DOTTED:
+            for below in place.keys.values():
+                self._remove(below)
+            return place.start
+        begin = self._text.rfind("\n", 0, place.start) + 1
+        end = self._text.find("\n", place.last)
+        self._cuts.append((begin, end + 1, ""))
+        return begin
+
+    # Values
+
+    def _value(self, place: Place, held: Any, wanted: Any) -> str:
+        """The text of a value."""
+        if _same(held, wanted):
+            return self._text[place.first : place.last]
+        if place.kind is Kind.INLINE and isinstance(wanted, Mapping) and wanted:
+            return self._inline(place, held, wanted)
+        if place.kind is Kind.LIST and isinstance(wanted, list) and wanted and held:
+            return self._list(place, held, wanted)
+        if isinstance(held, float) and isinstance(wanted, int) and not isinstance(wanted, bool):
+            return value_text(float(wanted))
+        return value_text(wanted)
+
+    def _inline(self, place: Place, held: Tables, wanted: Tables) -> str:
+        if any(below.kind is Kind.DOTTED for below in place.keys.values()):
+            return value_text(wanted)
+        pieces = []
+        for key, value in wanted.items():
+            if key in held:
+                below = place.keys[key]
+                pieces.append(self._text[below.start : below.first] + self._value(below, held[key], value))
+            else:
+                pieces.append(f"{key_text(key)} = {value_text(value)}")
+        return f"{{ {', '.join(pieces)} }}"
+
+    def _list(self, place: Place, held: list[Any], wanted: list[Any]) -> str:
+        """Entries with what stands around them: comments above and behind, and how far they are moved in."""
+        sources = _paired(held, wanted)
+        words = [
+            value_text(value) if source is None else self._value(place.items[source], held[source], value)
+            for source, value in zip(sources, wanted, strict=True)
+        ]
+        if "\n" not in self._text[place.first : place.last]:
+            return _in_a_line(words, may_break=None in sources)
+        around, rest = self._around(place)
+        indent = around[0][0].rpartition("\n")[2]
+        out: list[str] = []
+        for j, source in enumerate(sources):
+            lead, trail = (indent, ",\n") if source is None else around[source]
+            if j + 1 < len(wanted) and "," not in trail.partition("#")[0]:
+                trail = f",{trail}"
+            if source is None and out and not out[-1].endswith("\n"):
+                lead = f"\n{lead}"
+            out.append(lead + words[j] + trail)
+        opening = "\n" if self._text[place.first + 1] == "\n" else ""
+        return f"[{opening}{''.join(out)}{rest}]"
+
+    def _around(self, place: Place) -> tuple[list[tuple[str, str]], str]:
+        """What stands before and behind each entry of a list, and what is left behind the last one.
+
+        The end of a line belongs to its last entry.
+        """
+        found = []
+        at = place.first + 1
+        if self._text[at] == "\n":
+            at += 1
+        for i, item in enumerate(place.items):
+            lead = self._text[at : item.first]
+            following = place.items[i + 1].first if i + 1 < len(place.items) else place.last - 1
+            line = self._text.find("\n", item.last, following)
+            comma = self._text.find(",", item.last, following)
+            at = line + 1 if line >= 0 else comma + 1 if comma >= 0 else item.last
+            found.append((lead, self._text[item.last : at]))
+        return found, self._text[at : place.last - 1]
+
+
+def _in_a_line(words: list[str], *, may_break: bool) -> str:
+    """Entries of a list in one line, or a line each where it grew long."""
+    line = f"[{', '.join(words)}]"
+    if may_break and len(line) > MOST_INLINE:
+        return "[\n" + "".join(f"  {word},\n" for word in words) + "]"
+    return line
+
+
+def _is_table(value: object) -> bool:
+    return isinstance(value, Mapping)
+
+
+def _has_header(value: object) -> bool:
+    """Whether `toml_text` gives it headers."""
+    return _is_table(value) or (isinstance(value, list) and bool(value) and all(map(_is_table, value)))
+
+
+def _lines(table: Tables) -> str:
+    return "".join(f"{key_text(key)} = {value_text(value)}\n" for key, value in table.items())
