@@ -1,4 +1,4 @@
-"""Pictures of every view of the page, 1400 × 900, light and dark: docs/img/page/views/NAME-light.png, -dark.png.
+"""Pictures of every view of the page, 1400 × 900, light and dark: docs/img/page/views/NAME-THEME.png.
 
 python docs/page_pictures.py [VIEW …] starts a service with an empty database, computes the shipped disk and
 the finite-element disk, and needs playwright and Chromium.

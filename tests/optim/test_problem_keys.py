@@ -18,7 +18,8 @@ from optim.problem.problem import pose
 from optim.problem.words import Aim, AimWord, Method, MethodWord, Scaling, ScalingWord
 
 TWO = solver.load_scene("two-dof")
-OF_NO_PROBLEM = {"scene", "on_progress", "should_stop", "on_best"}
+# `limits` sets keys that have words of their own, with types; it is none itself.
+OF_NO_PROBLEM = {"scene", "limits", "on_progress", "should_stop", "on_best"}
 
 
 @pytest.mark.parametrize(

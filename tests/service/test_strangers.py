@@ -53,6 +53,8 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     "POST /v1/jobs": (MADE, {"kind": "iteration", "fresh": True, "seconds": 0.1}),
     "GET /v1/jobs/{job_id}": (OWNED, None),
     "GET /v1/jobs/{job_id}/results": (OWNED, None),
+    # They have no results that a report tells either.
+    "GET /v1/jobs/{job_id}/report": ((401, 401, 404, 401, 401, 409, 409, 409), None),
     # The jobs of these tests have no scene, as is said to those who may see them.
     "GET /v1/jobs/{job_id}/scene": ((401, 401, 404, 401, 401, 404, 404, 404), None),
     "GET /v1/jobs/{job_id}/events": (OWNED, None),
@@ -113,6 +115,10 @@ TABLE: dict[str, tuple[tuple[int, ...], Any]] = {
     "POST /v1/scenes/read": (PLANNED, {"text": "name = 'mine'"}),
     "POST /v1/scenes/edit": (PLANNED, {"text": "name = 'mine'"}),
     "GET /v1/scenes-schema": (LISTED, None),
+    "POST /v1/measurements/read": (
+        PLANNED,
+        {"scene": "two-dof", "files": [{"name": "rig.csv", "text": "frequency [Hz],amplitude [m]\n1,2\n"}]},
+    ),
     "GET /v1/templates": (LISTED, None),
     "POST /v1/templates": (PLANNED, {"template": "shroud"}),
     # The page itself, which asks for a key.

@@ -1,4 +1,4 @@
-"""Templates: the natural frequency, the damping and the stuck resonance that were asked for; random answers."""
+"""Templates: the natural frequency, damping and stuck resonance that were asked for; random answers."""
 
 from __future__ import annotations
 
