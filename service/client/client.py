@@ -266,6 +266,27 @@ class Client(Workbench):
         answer: dict[str, Any] = self._transport.json("POST", "/v1/measurements/read", json=dict(body))
         return answer
 
+    def edit_scene(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        """The text of a scene with its tables changed, comments kept: ``POST /v1/scenes/edit``."""
+        answer: dict[str, Any] = self._transport.json("POST", "/v1/scenes/edit", json=dict(body))
+        return answer
+
+    def scenes_schema(self) -> dict[str, Any]:
+        """The JSON Schema of scenes, ``GET /v1/scenes-schema``."""
+        answer: dict[str, Any] = self._transport.json("GET", "/v1/scenes-schema")
+        return answer
+
+    def templates(self) -> list[dict[str, Any]]:
+        """The common cases that scenes begin with, each with its questions: ``GET /v1/templates``."""
+        items: list[dict[str, Any]] = self._transport.json("GET", "/v1/templates")["items"]
+        return items
+
+    def scene_from(self, template: str, answers: Mapping[str, Any]) -> dict[str, Any]:
+        """The scene of a common case: ``POST /v1/templates``, nothing is stored."""
+        body = {"template": template, "answers": dict(answers)}
+        scene: dict[str, Any] = self._transport.json("POST", "/v1/templates", json=body)["scene"]
+        return scene
+
     def scene_text(self, body: Mapping[str, Any]) -> str:
         """A scene with its values set, as TOML: the body of ``POST /v1/scenes/text``."""
         return self._transport.send("POST", "/v1/scenes/text", json=dict(body)).text

@@ -11,8 +11,9 @@ from service.jobs.arrays import decode
 from service.jobs.strict_json import digest
 from solver.results.dataset import Dataset
 from solver.scene.scene import Scene
+from solver.views.columns import attributes
 from solver.views.parameter_units import parameter_unit
-from solver.views.to_dataset import attributes, point_variables
+from solver.views.to_dataset import point_variables
 
 _COLUMNS = ("parameter", "amplitude", "half_peak_to_peak", "mean", "residual")
 

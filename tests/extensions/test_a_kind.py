@@ -264,7 +264,7 @@ def test_the_command_submits_prints_and_draws_it(
 @pytest.mark.usefixtures("registered")
 def test_the_command_says_what_it_takes(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["submit", "--help"]) == 0
-    assert f"distortion  {DISTORTION.summary}" in capsys.readouterr().out
+    assert f"distortion {DISTORTION.summary}" in " ".join(capsys.readouterr().out.split())
     assert main(["submit", "distortion", "--help"]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     for words in (

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 from math import log10
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import httpx
 import pytest
 from page_site import Site, Watch
-from page_visits import BAD_SCENE, visit
+from page_visits import visit
 
 import solver
 
@@ -187,28 +187,6 @@ def test_a_length_has_a_unit_of_its_size(profile: Profile, site: Site) -> None:
         }"""
     )
     assert said == ["4.8e-14 m", "3 nm", "25 µm", "509000 N/m", "92.7 N"]
-
-
-def test_a_file_without_a_value_shows_where_it_goes(profile: Profile, site: Site) -> None:
-    context, _ = profile
-    page = visit(context, site, "?scene=two-dof")
-    text = (
-        BAD_SCENE.replace("mu = -0.3\n", "")
-        .replace('dof = "wing"', 'dof = "blade"')
-        .replace("my-damper", "no-mu")
-    )
-    assert "mu =" not in text
-    file: Any = {"name": "mine.toml", "mimeType": "application/toml", "buffer": text.encode()}
-    page.set_input_files("#file", [file])
-    friction = page.get_by_label("mu", exact=True)
-    expect(friction).to_be_focused()
-    expect(friction).to_have_value("")
-    expect(page.locator("#field-contacts-0-mu-message")).to_contain_text("`mu` is missing")
-    page.get_by_role("button", name="Use this scene").click()
-    expect(page.locator("#field-contacts-0-mu-message")).to_contain_text("`mu` is missing")
-    friction.fill("0.3")
-    page.get_by_role("button", name="Use this scene").click()
-    expect(page.locator("#scene")).to_have_value("no-mu")
 
 
 @pytest.mark.parametrize("harmonics", ["2.5", "0", "201", ""])

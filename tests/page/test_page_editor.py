@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Profile = tuple["BrowserContext", Watch]
 MINE = """# the blade of May
-name = "my-damper"
+name = "blade-of-may"
 
 [structure]
 kind = "lumped"
@@ -101,10 +101,10 @@ def test_what_is_wrong_is_said_at_its_field_and_its_line(profile: Profile, site:
     expect(page.locator("#field-contacts-0-between-1")).to_have_value("ground")
     settled(page)
     page.get_by_role("button", name="Use this scene").click()
-    expect(page.locator("#scene")).to_have_value("my-damper")
+    expect(page.locator("#scene")).to_have_value("blade-of-may")
     expect(page.locator("#editor")).to_be_hidden()
     expect(page.locator("#live-status")).to_contain_text("peak")
-    stored = httpx.get(f"{site.url}/v1/scenes/my-damper").json()["scene"]
+    stored = httpx.get(f"{site.url}/v1/scenes/blade-of-may").json()["scene"]
     assert (stored["contacts"][0]["kt"], stored["contacts"][0]["mu"]) == (6e5, 0.3)
 
 

@@ -187,3 +187,14 @@ def test_waiting_has_an_end(client: Client) -> None:
     assert not client.job(job.id).status.finished
     client.dismiss(job.id)
     assert client.wait(job.id).status is JobState.DISMISSED
+
+
+def test_scenes_are_drawn_up_and_changed_by_the_client(shipped_client: Client) -> None:
+    case = shipped_client.templates()[0]
+    scene = shipped_client.scene_from(case["name"], {"name": "drawn-up"})
+    assert scene["name"] == "drawn-up"
+    assert set(scene) <= set(shipped_client.scenes_schema()["properties"])
+    text = f"{shipped_client.scene_text({'scene': scene})}# of May\n"
+    changed = shipped_client.edit_scene({"text": text, "scene": {**scene, "name": "another"}})
+    assert "# of May" in changed["text"]
+    assert shipped_client.read_scene(changed["text"])["scene"]["name"] == "another"

@@ -27,11 +27,11 @@ def test_a_report_is_a_page_or_a_pdf(shipped: httpx.Client) -> None:
     is_problem(shipped.get("/v1/jobs/none/report"), 404)
 
 
-def test_only_an_optimum_is_reported(shipped: httpx.Client) -> None:
+def test_only_what_has_a_report_is_reported(shipped: httpx.Client) -> None:
     body = {"kind": "solve", "scene": "two-dof", "frequency_hz": 1.0, "harmonics": 1}
     job = shipped.post("/v1/jobs", json=body, headers={"Prefer": "wait=60"}).json()
     problem = is_problem(shipped.get(f"/v1/jobs/{job['id']}/report"), 409)
-    assert "'solve', which has no optimum" in problem["detail"]
+    assert "'solve', which has no report: only design, pareto" in problem["detail"]
 
 
 def test_measured_data_become_tables_of_a_job(shipped: httpx.Client) -> None:
