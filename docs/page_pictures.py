@@ -6,6 +6,7 @@ the finite-element disk, and needs playwright and Chromium.
 
 from __future__ import annotations
 
+import io
 import shutil
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 from playwright.sync_api import sync_playwright
 
 import solver
@@ -54,7 +56,7 @@ def main() -> int:
                     for name in asked:
                         VIEWS[name](page)
                         page.wait_for_timeout(700)
-                        page.screenshot(path=FOLDER / f"{name}-{scheme}.png")
+                        take(page, f"{name}-{scheme}.png")
                         print(f"{name}-{scheme}.png")
                 browser.close()
         finally:
@@ -82,13 +84,19 @@ def prepare(page: Any, *, first: bool) -> None:
     page.locator("#study:enabled").wait_for()
     if first:
         page.locator("#live-status").get_by_text("peak").wait_for()
-        page.screenshot(path=FOLDER / "nothing-yet-light.png")
+        take(page, "nothing-yet-light.png")
         study(page)
         # A second run, to be compared with the first.
         page.fill("#high", "60")
         study(page)
         page.goto(f"{URL}/?scene=bladed-disk")
     study(page)
+
+
+def take(page: Any, name: str) -> None:
+    """Keep what the window shows, in as many colours as a palette has: a third of the size."""
+    with Image.open(io.BytesIO(page.screenshot())) as picture:
+        picture.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(FOLDER / name, optimize=True)
 
 
 def study(page: Any) -> None:
@@ -131,10 +139,11 @@ def follow_mode(page: Any) -> None:
 
 def identify(page: Any) -> None:
     """Identify the friction of the two masses from responses with 2 % of noise."""
-    page.goto(f"{URL}/?scene=two-dof&tab=identify&harmonics=3")
+    anew(page, "two-dof", "&tab=identify&harmonics=3")
     page.locator("#identify summary", has_text="Paste a table").click()
     page.fill("#identify-paste", measured())
     page.click("#identify-paste-take")
+    page.locator("#identify-files").get_by_text("30 points").wait_for()
     page.get_by_role("button", name="Remove parameter 1").click()
     page.click("#identify-submit")
     page.locator("#identify-result").wait_for()
@@ -153,9 +162,9 @@ def measured() -> str:
     return "\n".join(lines)
 
 
-def anew(page: Any, rest: str = "") -> None:
+def anew(page: Any, scene: str = "bladed-disk", rest: str = "") -> None:
     """Open the page anew, and wait until its buttons answer."""
-    page.goto(f"{URL}/?scene=bladed-disk{rest}")
+    page.goto(f"{URL}/?scene={scene}{rest}")
     page.locator("#study:enabled").wait_for()
 
 
@@ -189,14 +198,14 @@ def matrices(page: Any) -> None:
 
 def sector(page: Any) -> None:
     """Show the finite-element sector with its boundaries and contacts."""
-    page.goto(f"{URL}/?scene=fe-disk&tab=disk")
+    anew(page, "fe-disk", "&tab=disk")
     page.locator("#structure svg").first.wait_for()
     page.locator("#structure").evaluate("card => card.scrollIntoView()")
 
 
 def interference(page: Any) -> None:
     """Show the interference diagram of the finite-element disk."""
-    page.goto(f"{URL}/?scene=fe-disk&tab=disk")
+    anew(page, "fe-disk", "&tab=disk")
     page.fill("#interference-speed", "11000")
     page.locator("#interference-form button").click()
     page.locator("#interference-figure svg").wait_for()
@@ -206,10 +215,14 @@ def interference(page: Any) -> None:
 def compare(page: Any) -> None:
     """Show two runs side by side."""
     anew(page)
-    boxes = page.locator("#runs-list input[type=checkbox]")
-    boxes.nth(1).wait_for()
-    for i in range(2):
-        boxes.nth(i).check()
+    runs = page.locator("#runs-list li", has_text="design of bladed-disk")
+    page.locator("#runs-list li").first.wait_for()
+    while page.locator("#runs-more").is_visible():
+        page.locator("#runs-more").click()
+        page.wait_for_timeout(500)
+    # The last but one is that of the smaller range.
+    for one in (runs.first, runs.nth(runs.count() - 2)):
+        one.locator("input[type=checkbox]").first.check()
     page.locator("#runs-compare-body table").first.wait_for()
     page.locator("#runs-compare").evaluate("card => card.scrollIntoView()")
 
