@@ -6,6 +6,7 @@ the finite-element disk, and needs playwright and Chromium.
 
 from __future__ import annotations
 
+import io
 import shutil
 import subprocess
 import sys
@@ -17,7 +18,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from PIL import Image
 from playwright.sync_api import sync_playwright
+
+import solver
 
 FOLDER = Path(__file__).resolve().parent / "img" / "page" / "views"
 SIZE = {"width": 1400, "height": 900}
@@ -51,7 +56,7 @@ def main() -> int:
                     for name in asked:
                         VIEWS[name](page)
                         page.wait_for_timeout(700)
-                        page.screenshot(path=FOLDER / f"{name}-{scheme}.png")
+                        take(page, f"{name}-{scheme}.png")
                         print(f"{name}-{scheme}.png")
                 browser.close()
         finally:
@@ -73,44 +78,182 @@ def _wait() -> None:
 
 
 def prepare(page: Any, *, first: bool) -> None:
-    """Open the shipped disk, and at the first time let everything be computed."""
+    """Open the shipped disk; at the first time take the page that has nothing yet, and compute everything."""
     page.goto(f"{URL}/?scene=bladed-disk")
     page.locator("#study").wait_for()
+    page.locator("#study:enabled").wait_for()
+    if first:
+        page.locator("#live-status").get_by_text("peak").wait_for()
+        take(page, "nothing-yet-light.png")
+        study(page)
+        # A second run, to be compared with the first.
+        page.fill("#high", "60")
+        study(page)
+        page.goto(f"{URL}/?scene=bladed-disk")
+    study(page)
+
+
+def take(page: Any, name: str) -> None:
+    """Keep what the window shows, in as many colours as a palette has: a third of the size."""
+    with Image.open(io.BytesIO(page.screenshot())) as picture:
+        picture.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(FOLDER / name, optimize=True)
+
+
+def study(page: Any) -> None:
+    """Press the one button, and wait until everything is there."""
     page.locator("#study").click()
     page.get_by_text("Everything is there.").wait_for()
-    if first:
-        page.wait_for_timeout(500)
 
 
-def tab(name: str, scroll_to: str | None = None) -> Callable[[Any], None]:
-    """Return what opens a tab, and scrolls a card of it to the top."""
+Show = Callable[[Any], None]
+
+
+def tab(name: str, scroll_to: str | None = None, do: Show | None = None) -> Show:
+    """Return what opens a tab, does something there, and scrolls a card of it to the top."""
 
     def show(page: Any) -> None:
         page.locator(f"#tab-{name}").click()
         page.mouse.move(5, 5)
         page.evaluate("window.scrollTo(0, 0)")
+        if do is not None:
+            do(page)
         if scroll_to is not None:
             page.locator(f"#{scroll_to}").evaluate("card => card.scrollIntoView()")
 
     return show
 
 
-VIEWS: dict[str, Callable[[Any], None]] = {
-    "response": tab("response"),
+def top(page: Any) -> None:
+    """Show the answer, with the pointer away from everything."""
+    page.locator("#tab-response").click()
+    page.mouse.move(5, 5)
+    page.evaluate("window.scrollTo(0, 0)")
+
+
+def follow_mode(page: Any) -> None:
+    """Follow a nonlinear mode, with whole responses beside the peaks of its curve."""
+    page.fill("#modes-exact_peaks", "5")
+    page.click("#modes-submit")
+    page.locator("#modes-status").get_by_text("points in").wait_for()
+
+
+def identify(page: Any) -> None:
+    """Identify the friction of the two masses from responses with 2 % of noise."""
+    anew(page, "two-dof", "&tab=identify&harmonics=3")
+    page.locator("#identify summary", has_text="Paste a table").click()
+    page.fill("#identify-paste", measured())
+    page.click("#identify-paste-take")
+    page.locator("#identify-files").get_by_text("30 points").wait_for()
+    page.get_by_role("button", name="Remove parameter 1").click()
+    page.click("#identify-submit")
+    page.locator("#identify-result").wait_for()
+
+
+def measured() -> str:
+    """Return a table of responses at two loads, with noise that is the same every time."""
+    scene, noise = solver.load_scene("two-dof"), np.random.default_rng(1)
+    lines = ["damper.N0,frequency [Hz],amplitude [mm]"]
+    for load in (100, 50):
+        for hertz in np.linspace(0.9, 1.4, 15):
+            here = scene.with_values({"damper.N0": load, "damper.mu": 0.27})
+            _, cosine, sine = solver.solve(here, frequency_hz=hertz, harmonics=3).observed[:3]
+            size = 1e3 * abs(complex(cosine, sine)) * (1.0 + 0.02 * noise.standard_normal())
+            lines.append(f"{load},{hertz:.4f},{size:.6g}")
+    return "\n".join(lines)
+
+
+def anew(page: Any, scene: str = "bladed-disk", rest: str = "") -> None:
+    """Open the page anew, and wait until its buttons answer."""
+    page.goto(f"{URL}/?scene={scene}{rest}")
+    page.locator("#study:enabled").wait_for()
+
+
+def edit(page: Any) -> None:
+    """Open the editor of the scene."""
+    anew(page)
+    page.locator("#edit-scene").click()
+    page.locator("#editor-form[aria-busy=false]").wait_for()
+    page.locator("#editor").evaluate("card => card.scrollIntoView()")
+
+
+def choose(page: Any) -> None:
+    """Open the choice of cases for a new scene."""
+    anew(page)
+    page.locator("#new-scene").click()
+    page.locator(".choice-card").first.wait_for()
+
+
+def question(page: Any) -> None:
+    """Open the questions of a platform damper."""
+    choose(page)
+    page.locator(".choice-card", has_text="platform").first.click()
+    page.locator("#wizard-form").wait_for()
+
+
+def matrices(page: Any) -> None:
+    """Open the form for the matrices of a finite-element program."""
+    anew(page)
+    page.locator("#open-matrices").click()
+
+
+def sector(page: Any) -> None:
+    """Show the finite-element sector with its boundaries and contacts."""
+    anew(page, "fe-disk", "&tab=disk")
+    page.locator("#structure svg").first.wait_for()
+    page.locator("#structure").evaluate("card => card.scrollIntoView()")
+
+
+def interference(page: Any) -> None:
+    """Show the interference diagram of the finite-element disk."""
+    anew(page, "fe-disk", "&tab=disk")
+    page.fill("#interference-speed", "11000")
+    page.locator("#interference-form button").click()
+    page.locator("#interference-figure svg").wait_for()
+    page.locator("#interference").evaluate("card => card.scrollIntoView()")
+
+
+def compare(page: Any) -> None:
+    """Show two runs side by side."""
+    anew(page)
+    runs = page.locator("#runs-list li", has_text="design of bladed-disk")
+    page.locator("#runs-list li").first.wait_for()
+    while page.locator("#runs-more").is_visible():
+        page.locator("#runs-more").click()
+        page.wait_for_timeout(500)
+    # The last but one is that of the smaller range.
+    for one in (runs.first, runs.nth(runs.count() - 2)):
+        one.locator("input[type=checkbox]").first.check()
+    page.locator("#runs-compare-body table").first.wait_for()
+    page.locator("#runs-compare").evaluate("card => card.scrollIntoView()")
+
+
+VIEWS: dict[str, Show] = {
+    "answer": top,
+    "response": tab("response", "tabs"),
     "live": tab("response", "live"),
     "curve": tab("response", "response"),
     "point": tab("response", "point"),
-    "map": tab("map"),
+    "map": tab("map", "tabs"),
     "front": tab("map", "front"),
-    "design": tab("design"),
+    "design": tab("design", "tabs"),
     "result": tab("design", "design"),
-    "disk": tab("disk"),
+    "disk": tab("disk", "tabs"),
     "campbell": tab("disk", "campbell"),
-    "modes": tab("modes"),
-    "identify": tab("identify"),
-    "accuracy": tab("accuracy"),
-    "data": tab("data"),
+    "modes": tab("modes", "tabs", follow_mode),
+    "mode-peaks": tab("modes", "modes-frequency"),
+    "accuracy": tab("accuracy", "tabs"),
+    "data": tab("data", "tabs"),
     "library": tab("data", "library"),
+    # From here on each opens the page anew.
+    "identify": identify,
+    "estimates": lambda page: page.locator("#identify-response").evaluate("card => card.scrollIntoView()"),
+    "editor": edit,
+    "new-scene": choose,
+    "wizard": question,
+    "matrices": matrices,
+    "sector": sector,
+    "interference": interference,
+    "compare": compare,
 }
 
 

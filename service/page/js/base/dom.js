@@ -45,7 +45,7 @@ export function table(headings, rows, caption) {
   const cell = (tag, item) => {
     const entry = item !== null && typeof item === "object" && !(item instanceof Node) ? item : { text: item };
     const scope = tag === "th" ? { scope: "col" } : {};
-    return el(tag, { ...scope, class: entry.number ? "number" : undefined }, entry.text ?? "");
+    return el(tag, { ...scope, class: entry.number ? "number" : undefined, title: entry.title }, entry.text ?? "");
   };
   return el(
     "table",

@@ -165,7 +165,7 @@ function results() {
   ];
   show(byId("identify-estimates"), estimatesTable(result), facts([
     ["noise", result.noise === null ? "–" : `${number(100 * result.noise, 3)} % of the amplitude`],
-    ["left over", result.reduced_chi2 === null ? "–" : `χ² of a degree of freedom ${number(result.reduced_chi2, 3)}`],
+    ["left over", result.reduced_chi2 === null ? "–" : `χ² ${number(result.reduced_chi2, 3)} for each degree of freedom`],
     ["starts", `${result.agreeing} of the best searches agree; ${result.starts} places tried`], ...doubts,
   ]));
   const heat = correlationTable(result);

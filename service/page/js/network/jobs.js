@@ -167,7 +167,7 @@ function list() {
 function line(kind, job) {
   const name = `${kind} of ${job.scene ?? "a scene"}`;
   const bar = el("progress", { class: "bar", max: 1, value: 0, "aria-label": `Progress of ${name}` });
-  const words = el("span", {});
+  const words = el("span", { class: "note" });
   const stop = el("button", { type: "button", "aria-label": `Stop ${name}`, onclick: () => dismiss(job.id) }, "Stop");
   return { id: job.id, bar, words, stop, node: el("li", { class: "row" }, el("span", { class: "job-name" }, name), bar, words, stop) };
 }

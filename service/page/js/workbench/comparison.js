@@ -3,9 +3,12 @@
 import { request } from "../network/api.js";
 import { byId, el, show, table } from "../base/dom.js";
 import { tell } from "../base/events.js";
-import { number, quantity, when } from "../base/format.js";
+import { length, number, quantity, seconds, when } from "../base/format.js";
 
-const MOST = 60;
+const MOST = 60, LONGEST = 48;
+// Units of settings and results, which may have the names of parameters of contacts but are others.
+const LENGTH = /(^|\.)(peak\.value|limit|max_peak|error_estimate|max_abs|half_peak_to_peak)$/;
+const HERTZ = /_hz$/, SECONDS = /(^|[._])seconds$/, PARAMETERS = /^(optimum|start|set)\./;
 
 export async function compareRuns(a, b) {
   const host = byId("runs-compare");
@@ -34,12 +37,16 @@ function body({ a, b, inputs, more_inputs: further, results }) {
   const heads = (first) => [first, { text: heading(a), number: true }, { text: heading(b), number: true }];
   const differing = results.filter((one) => one.a !== one.b);
   const equal = results.length - differing.length;
+  const others = a.scene === b.scene ? inputs : inputs.filter((one) => !ofAScene(one));
+  const scenes = a.scene === b.scene ? [] : inputs.filter(ofAScene);
+  const inputTable = (label, found) => scrolled(label, table(heads("input"), found.map((one) => [one.path, toldInput(one, one.a), toldInput(one, one.b)]), "Inputs that differ"));
   const rows = (figures) => figures.slice(0, MOST).map((one) => [one.name, told(one.name, one.a), told(one.name, one.b)]);
   return [
     el("h3", {}, "What differs in the inputs"),
-    inputs.length
-      ? scrolled("Inputs of two runs", table(heads("input"), inputs.map((one) => [one.path, told(one.path, one.a), told(one.path, one.b)]), "Inputs that differ"))
-      : el("p", { class: "note" }, "Nothing: both computed the same."),
+    scenes.length ? el("p", { class: "note" }, `The scenes are different ones: ${a.scene ?? "none"} and ${b.scene ?? "none"}.`) : null,
+    inputs.length ? null : el("p", { class: "note" }, "Nothing: both computed the same."),
+    others.length ? inputTable("Inputs of two runs", others) : null,
+    scenes.length ? el("details", {}, el("summary", {}, `${scenes.length} values of the scenes`), inputTable("Values of two scenes", scenes)) : null,
     further ? el("p", { class: "note" }, `${further} further inputs differ.`) : null,
     el("h3", {}, "Results"),
     differing.length ? scrolled("Results of two runs", table(heads("figure"), rows(differing), "Results that differ")) : el("p", { class: "note" }, "No figure differs."),
@@ -50,8 +57,22 @@ function body({ a, b, inputs, more_inputs: further, results }) {
 
 const scrolled = (label, node) => el("div", { class: "scroll", role: "region", "aria-label": label, tabindex: 0 }, node);
 
+// The values of two different scenes fill the table without telling much.
+const ofAScene = ({ part }) => part === "scene";
+
 function told(path, value) {
   if (value === null || value === undefined) return { text: "not given", number: true };
-  if (typeof value === "number") return { text: quantity(path, value), number: true };
-  return { text: typeof value === "object" ? JSON.stringify(value) : String(value), number: true };
+  if (typeof value === "number") return { text: figure(path, value), number: true };
+  const words = typeof value === "object" ? JSON.stringify(value) : String(value);
+  if (words.length <= LONGEST) return { text: words, number: true };
+  return { text: `${words.slice(0, LONGEST)}…`, title: words.slice(0, 2000), number: true };
+}
+
+const toldInput = (one, value) => (ofAScene(one) && typeof value === "number" ? { text: quantity(one.path, value), number: true } : told(one.path, value));
+
+function figure(path, value) {
+  if (PARAMETERS.test(path)) return quantity(path, value);
+  if (LENGTH.test(path)) return length(value);
+  if (HERTZ.test(path)) return `${number(value, 5)} Hz`;
+  return SECONDS.test(path) ? seconds(value) : number(value, 5);
 }
