@@ -19,7 +19,7 @@ from solver.modes.curve import End, walk
 from solver.modes.error_estimate import Wider
 from solver.modes.held_amplitude import Held, first_held, least_force
 from solver.modes.limit_cycles import stability_left_out
-from solver.modes.nonlinear_mode import MOST_POINTS, pose
+from solver.modes.nonlinear_mode import LEAST, MOST_POINTS, pose
 from solver.modes.records import Record, Recorder
 from solver.response.contact_response import ContactState, state_of
 from solver.response.stability.floquet import motions_stability
@@ -222,8 +222,9 @@ def held_amplitude(
 def _checked(scene: Scene, amplitude: float, dof: str | None) -> Scene:
     """Return the scene that observes the DOF."""
     number = isinstance(amplitude, (int, float)) and not isinstance(amplitude, bool)
-    if not number or not 0.0 < amplitude < math.inf:
-        raise SettingError("amplitude", amplitude, "must be an amplitude > 0 m")
+    if not number or not LEAST <= amplitude <= 1.0 / LEAST:
+        wanted = f"must be an amplitude > 0, from {LEAST:g} to {1.0 / LEAST:g} m"
+        raise SettingError("amplitude", amplitude, wanted)
     check_no_line(scene)
     if any(force.harmonic != 1 for force in scene.excitation):
         wanted = "must be of harmonic 1 alone: its size is what holds the amplitude"

@@ -28,6 +28,7 @@ from solver.scene.cyclic.annulus import written_out
 if TYPE_CHECKING:
     from solver.scene.scene import Scene
 
+LEAST = 1e-100  # amplitude whose square, and that of its inverse, floating-point numbers can tell
 MOST_POINTS = 2000
 STATUS = {
     End.REACHED: NonlinearModeStatus.COMPLETED, End.NOT_BEGUN: NonlinearModeStatus.NOT_BEGUN,
@@ -117,14 +118,14 @@ def check_amplitudes(amplitudes: Sequence[float]) -> tuple[float, float]:
     Raises
     ------
     SettingError
-        Not two finite numbers with 0 < smallest < largest.
+        Not two numbers with 0 < smallest < largest whose squares can be told.
     """
-    wanted = "must be two numbers, 0 < smallest < largest [√kg m]"
+    wanted = f"must be two numbers, {LEAST:g} <= smallest < largest <= {1.0 / LEAST:g} [√kg m]"
     try:
         low, high = (float(each) for each in amplitudes)
     except (TypeError, ValueError):
         raise SettingError("amplitudes", amplitudes, wanted) from None
-    if not (0.0 < low < high < math.inf):
+    if not LEAST <= low < high <= 1.0 / LEAST:
         raise SettingError("amplitudes", tuple(amplitudes), wanted)
     return low, high
 

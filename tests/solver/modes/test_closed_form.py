@@ -74,7 +74,8 @@ def test_a_mode_without_contacts_is_the_linear_one() -> None:
     [
         ({"mode": 0}, "mode"), ({"mode": 2}, "mode"), ({"mode": True}, "mode"), ({"mode": 1.5}, "mode"),
         ({"amplitudes": (1.0, 1.0)}, "amplitudes"), ({"amplitudes": (-1.0, 1.0)}, "amplitudes"),
-        ({"amplitudes": (1.0,)}, "amplitudes"), ({"amplitudes": (1.0, math.inf)}, "amplitudes"),
+        ({"amplitudes": (1e-300, 1e300)}, "amplitudes"), ({"amplitudes": (1.0,)}, "amplitudes"),
+        ({"amplitudes": (1.0, math.inf)}, "amplitudes"),
         ({"amplitudes": ("a", 1.0)}, "amplitudes"), ({"harmonics": 0}, "harmonics"),
         ({"nodal_diameter": 1}, "nodal_diameter"), ({"most_points": 0}, "most_points"),
     ],

@@ -89,6 +89,7 @@ def test_the_error_estimate_holds_what_more_harmonics_change() -> None:
     ("given", "name"),
     [
         ({"amplitude": 0.0}, "amplitude"),
+        ({"amplitude": 1e-300}, "amplitude"),
         ({"amplitude": 1.0, "start": 2.0, "stop": 1.0}, "stop"),
         ({"amplitude": 1.0, "start": -1.0}, "start"),
         ({"amplitude": 1.0, "dof": "m9"}, "dof"),
