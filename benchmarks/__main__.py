@@ -25,6 +25,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         large,
         mistuned,
         modes,
+        new_user,
         page,
         reduction,
         responses,
@@ -74,6 +75,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "pruning": service_pruning.pruning,
         "scale": service_scale.scale,
         "page": page.page,
+        "new-user": new_user.new_user,
         "cluster": cluster.mistuning_study,
         "mistuned": mistuned.mistuned_disks,
     }
