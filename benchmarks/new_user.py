@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import shlex
 import shutil
 import subprocess
@@ -30,7 +31,13 @@ THINK_SECONDS = 1.0
 COMMAND = "import sys; from service.cli import main; sys.exit(main())"
 # The key of a line that the page wants changed, and the line it stands for if that has another beginning.
 _CHANGE = re.compile(r"`((\w+) = [^`]+)`(?: takes the place of the line that begins with `(# \w+)`)?")
-_OPTIMUM = re.compile(r"^\s*optimum\b|\bN0\b.*\d N\b")
+# A design variable with the value found for it.
+_OPTIMUM = re.compile(r"^\s*\S+\.N0\s+[\d.]+ N\b")
+# What make says as it begins a stage.
+_STAGES = (
+    ("-m venv", "environment"), ("pip install", "packages"), ("compileall", "bytecode"),
+    ("service.warm_up", "kernels"), ("stickslip demo", "demo"),
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,32 +84,54 @@ def first_optimum() -> tuple[str, ...]:
     first = blocks((ROOT / "README.md").read_text("utf-8"), "sh")[0].splitlines()[0]
     with tempfile.TemporaryDirectory() as folder:
         environment = _own_environment(Path(folder) / "caches")
-        begun = time.perf_counter()
-        subprocess.run(
-            ["git", "clone", "--quiet", str(ROOT), "clone"], check=True, cwd=folder, env=environment
-        )
-        cloned = time.perf_counter() - begun
-        lines: list[str] = []
-        ready = optimum = None
+        before, begun = _processor_seconds(), time.perf_counter()
+        cloning = ["git", "clone", "--quiet", str(ROOT), "clone"]
+        subprocess.run(cloning, check=True, cwd=folder, env=environment)
         process = subprocess.Popen(
             shlex.split(first), cwd=Path(folder) / "clone", env=environment, text=True,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         )  # fmt: skip
-        for line in process.stdout or ():
-            lines.append(line)
-            if ready is None and line.rstrip().endswith("stickslip demo"):
-                ready = time.perf_counter() - begun
-            elif ready is not None and optimum is None and _OPTIMUM.search(line):
-                optimum, said = time.perf_counter() - begun, line
+        lines = [(time.perf_counter() - begun, line) for line in process.stdout or ()]
         ended = time.perf_counter() - begun
-        expect(f"`{first}` ends well:\n{''.join(lines[-20:])}", process.wait() == 0)
-    if ready is None or optimum is None:
-        raise WrongResultError(f"`{first}` printed no optimum:\n{''.join(lines[-20:])}")
+        end = "".join(line for _, line in lines[-20:])
+        expect(f"`{first}` ends well:\n{end}", process.wait() == 0)
+        used = _processor_seconds() - before
+    begins, optimum, said = stages(lines)
+    (_, ready), after = begins[-1], [*(at for _, at in begins[1:]), optimum]
+    parts = ", ".join(f"{name} {end - at:.0f}" for (name, at), end in zip(begins, after, strict=True))
     how = (
-        f"git clone {cloned:.1f} s, set-up {ready - cloned:.0f} s, compute {optimum - ready:.1f} s until "
-        f"«{' '.join(said.split())}»; all of `{first}` {ended:.0f} s"
+        f"git clone, `{first}`: set-up {ready:.0f} s, compute {optimum - ready:.0f} s until «{said}» "
+        f"({parts}); pictures too after {ended:.0f} s, {used:.0f} s of processor time in all"
     )
     return ("first optimum after clone, nothing cached", "60", f"{optimum:.0f}", how)
+
+
+def stages(lines: list[tuple[float, str]]) -> tuple[list[tuple[str, float]], float, str]:
+    """Return when each stage of the set-up began, when the first optimum was printed, and its line.
+
+    Parameters
+    ----------
+    lines : seconds since the beginning, and what was printed then.
+
+    Raises
+    ------
+    WrongResultError
+        A stage did not begin, or nothing was found.
+    """
+    begins: list[tuple[str, float]] = []
+    for at, line in lines:
+        if len(begins) < len(_STAGES):
+            word, name = _STAGES[len(begins)]
+            if word in line:
+                begins.append((name, at))
+        elif _OPTIMUM.search(line):
+            return begins, at, " ".join(line.split())
+    raise WrongResultError(f"no optimum was printed after {begins}")
+
+
+def _processor_seconds() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def _own_environment(caches: Path) -> dict[str, str]:
