@@ -20,8 +20,8 @@ start(n + (1:n)) = task.shape;
 [~, fixed] = max(abs(task.shape));
 scale = mean(abs(task.K * task.shape(:)));
 residual = @(X) HB_residual(X, structure, H, task.samples, "nma", fixed, scale);
-options = struct("Dscale", [1e-2 * ones((2 * H + 1) * n, 1); task.omega; max(task.zeta, 1e-2); 1], ...
-                 "dynamicDscale", 1, "dsmin", 1e-4 * task.step, "dsmax", task.step, "errmax", 15, "stepmax", 4000);
+% Its own scales and least step serve best.
+options = struct("dsmax", task.step, "stepmax", 4000);
 % As NLvib's own, which Octave does not read.
 solving = optimset("Display", "off", "Jacobian", "on", "MaxIter", 50);
 clock = tic();
