@@ -36,7 +36,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(PIP) --constraint constraints.txt setuptools
 	$(PIP) --constraint constraints.txt --no-build-isolation -e '.[fast]'
 	$(BYTECODE)
-	@echo "Compiling the kernels on all cores: about half a minute on two, once."
+	@echo "Compiling the kernels on all cores: a minute or more on two, once."
 	$(BIN)/python -m service.warm_up
 	@touch $@
 

@@ -351,3 +351,5 @@ def test_the_peaks_the_readme_quotes() -> None:
     assert peak(shroud=185.0) == pytest.approx(0.100, abs=5e-4)
     assert peak(shroud=0.0, root=1e9) == pytest.approx(14.0, abs=0.5)
     assert peak(shroud=1e9, root=1e9) == pytest.approx(0.66, abs=5e-3)
+    assert peak(shroud=0.0) == pytest.approx(4.5, abs=5e-2)
+    assert peak(shroud=1e9) == pytest.approx(0.41, abs=5e-3)
