@@ -9,6 +9,7 @@ import numpy as np
 
 from solver.jit.fourier import Complex, Real
 from solver.modes.equations import Equations, Evaluated
+from solver.modes.kernels import steps as kernels
 
 TOLERANCE = 1e-9  # of motions relative to the largest, and of the equations beside them
 _FINE = 1e-13  # below it nothing is left but rounding; between the two, steps go on as long as they help
@@ -64,29 +65,23 @@ def scales(y: Real, size: int) -> Real:
 
 def relative_residual(at: Evaluated, y: Real, a: float, size: int) -> float:
     """Return the largest residual, each relative to what it is a difference of."""
-    r = np.abs(at.residual)
-    motion = max(float(np.abs(y[:size]).max(initial=0.0)), 1e-300)
-    moved = float(np.max(r[:size] / np.maximum(motion, _CANCELLED * at.rough), initial=0.0))
-    q = max(math.hypot(y[size], y[size + 1]), a)
-    return float(max(moved, r[size] / q, r[size + 1] / q, r[size + 2] / max(at.lag, 1e-300), r[size + 3]))
+    return float(kernels.relative_residual(at.residual, at.rough, y, size, a, at.lag, _CANCELLED))
 
 
 def step(J: Real, rhs: Real, columns: Real, *, least_squares: bool) -> Real | None:
     """Solve J δ = rhs in units `columns` of the unknowns, rows brought to one size; None if singular."""
+    found = np.array(rhs)
+    if not least_squares:
+        good = kernels.scaled_step(J, found, columns, np.empty_like(J), np.empty(rhs.size, np.int32))
+        return found if good else None
     scaled = J * columns
     rows = np.abs(scaled).max(axis=1)
     rows[rows == 0.0] = 1.0
     scaled /= rows[:, None]
     if not np.all(np.isfinite(scaled)):
         return None
-    if least_squares:
-        found = np.linalg.lstsq(scaled, rhs / rows, rcond=1e-12)[0]
-    else:
-        try:
-            found = np.linalg.solve(scaled, rhs / rows)
-        except np.linalg.LinAlgError:
-            return None
-    return columns * found if np.all(np.isfinite(found)) else None
+    found = columns * np.linalg.lstsq(scaled, rhs / rows, rcond=1e-12)[0]
+    return found if np.all(np.isfinite(found)) else None
 
 
 def correct(

@@ -27,7 +27,9 @@ from solver.contacts.kernels.system import (
     new_evaluation,
     new_receptance,
 )
-from solver.jit.fourier import Complex, Real
+from solver.jit.fourier import Complex, Integer, Real
+from solver.modes.kernels.assembly import fill_functionals, fill_motions, fill_slopes
+from solver.modes.kernels.dynamics import fill_pushes
 from solver.modes.structure import Dynamics, Structure, structure_of
 from solver.sensitivity.gradient import Amplitudes
 
@@ -77,6 +79,13 @@ class Equations:
         self.size = self.r * self.n
         self.span = system.span if system.span.shape[1] else None
         self._blocks = _block_places(balance)
+        nk, coordinates = self.structure.ks.size, self.structure.force.size
+        self._slopes = np.empty((nk, self.r, self.size), np.complex128)
+        # Changes of x by Re q, ω and the last unknown; c of q, of the equation before the last, of a.
+        self._pushed, self._rows = np.zeros((2, 3, nk, coordinates), np.complex128)
+        self._turned = np.zeros((nk, coordinates), np.complex128)
+        self._by_log_amplitude = np.zeros(self.size + BESIDES)
+        self._by_log_amplitude[-1] = -1.0
 
     def over(self, balance: Balance) -> Equations:
         """Return the same question to another balance of the scene."""
@@ -106,7 +115,7 @@ class Equations:
     def port_slopes(self) -> Real:
         """Return dF/dU of all ports less the shift where last evaluated, (nc, nc, n, n)."""
         nc, n = self.balance.n_ports, self.n
-        rows, columns, blocks = self._blocks
+        rows, columns, blocks = self._blocks.T
         G = np.zeros((nc, nc, n, n))
         G[rows, columns] = self.point.G[blocks]
         return G
@@ -151,11 +160,11 @@ class Equations:
 
     def _pushes(self, forces: Real, omega: float, q: complex, dynamics: Dynamics) -> tuple[Complex, Complex]:
         """Return φ − Lᴴ F + ρ M b q, (nk, N), and its derivative by ω."""
-        s, hat = self.structure, self.amplitudes
+        s = self.structure
         # Along an engine-order line loads and constant forces follow ω.
-        moved = hat.of(self.lead(self.point.dF_dp))
-        phi = -(s.back @ hat.of(forces).T[:, :, None])[:, :, 0]
-        by_omega = -(s.back @ moved.T[:, :, None])[:, :, 0]
+        moved = self.lead(self.point.dF_dp)
+        phi, by_omega = np.empty((2, s.ks.size, s.force.size), np.complex128)
+        fill_pushes(s.ks, s.back, forces, moved, phi, by_omega)
         if s.ks[0] == 0:
             phi[0] += s.constant * (s.level @ omega ** np.arange(3))
             by_omega[0] += s.constant * (s.level[1] + 2.0 * omega * s.level[2])
@@ -171,78 +180,40 @@ class Equations:
         log_amplitude: float, phase: Complex,
     ) -> Evaluated:  # fmt: skip
         """Put residual and Jacobian together."""
-        s, hat, size = self.structure, self.amplitudes, self.size
-        first, moved = s.first, (s.contact @ x[:, :, None])[:, :, 0]
-        mass = s.times(s.mass, x)
+        s, size = self.structure, self.size
+        first, ks = s.first, s.ks
+        mass, moved = s.times(s.mass, x), x[first]
         squared = max(float(np.vdot(x, mass).real), 1e-300)
-        residual = np.empty(size + BESIDES)
-        residual[:size] = (w - hat.coefficients(moved.T)).reshape(-1)
-        off = q - np.vdot(dynamics.b, x[first])
+        residual, J = np.empty(size + BESIDES), np.empty((size + BESIDES, size + BESIDES))
+        off = q - np.vdot(dynamics.b, moved)
         residual[size], residual[size + 1] = off.real, off.imag
-        residual[size + 2] = np.vdot(phase, x[first]).real
+        residual[size + 2] = np.vdot(phase, moved).real
         residual[size + 3] = 0.5 * math.log(squared) - log_amplitude
 
-        J = np.zeros((size + BESIDES, size + BESIDES))
+        pushes, rows, turned, rough = self._pushed, self._rows, self._turned, np.empty(size)
+        pushes[0, first] = dynamics.rho * dynamics.b
+        np.subtract(by_omega, s.times(dynamics.by_omega, x), out=pushes[1])
+        pushes[2] = self.by_last(x, dynamics, log_amplitude)
+        changes = dynamics.solve(pushes)
+        turned[first] = phase
+        rows[0, first], rows[1], rows[2] = dynamics.b, self._second_last(x, turned), mass / squared
+        fill_slopes(ks, self._blocks, self.point.G, self.balance.system.span, self._slopes)
         A = dynamics.receptance()
-        slopes = self.slopes()
-        dF = hat.of(slopes.transpose(0, 2, 3, 1)).transpose(0, 3, 1, 2).reshape(self.r, len(s.ks), size)
-        answered = np.einsum("kcd,dkj->ckj", A, dF)
-        J[:size, :size] = hat.coefficients(answered.transpose(0, 2, 1)).transpose(0, 2, 1).reshape(size, size)
-        J[np.arange(size), np.arange(size)] += 1.0
-
-        changes = np.empty((3, *x.shape), np.complex128)  # of x by Re q, ω, ζ
-        changes[0] = 0.0
-        changes[0, first] = dynamics.rho * dynamics.b
-        changes[1] = by_omega - s.times(dynamics.by_omega, x)
-        changes[2] = self.by_last(x, dynamics, log_amplitude)
-        changes = np.array([dynamics.solve(each) for each in changes])
-        seen = (s.contact @ changes[..., None])[..., 0]  # (3, nk, r)
-        for column, value in ((0, seen[0]), (1, 1j * seen[0]), (2, seen[1]), (3, seen[2])):
-            J[:size, size + column] = -hat.coefficients(value.T).reshape(-1)
-        turned = np.zeros_like(x)
-        turned[s.first] = phase
-        self._functionals(J, x, mass, squared, self._second_last(x, turned), dF, changes, dynamics)
-        by_log_amplitude = np.zeros(size + BESIDES)
-        by_log_amplitude[-1] = -1.0
-        reach = np.abs(A).max(axis=(1, 2)) if self.r else np.zeros(len(s.ks))
-        rough = np.repeat(reach, np.where(s.ks > 0, 2, 1)) * np.abs(forces).max(initial=0.0)
+        fill_motions(ks, s.contact, A, self._slopes, x, w, changes, forces, residual, J, rough)
+        fill_functionals(s.back, self._slopes, rows, dynamics.solve_adjoint(rows), changes, J)
         return Evaluated(
-            residual=residual, jacobian=J, by_log_amplitude=by_log_amplitude, x=x, forces=forces,
-            rough=np.concatenate([rough] * self.r) if self.r else rough[:0],
-            lag=float(np.linalg.norm(phase) * np.linalg.norm(x[first])),
-            unheld=bool(self.point.counts[UNHELD]),
-            dynamics=dynamics,
+            residual=residual, jacobian=J, by_log_amplitude=self._by_log_amplitude, x=x, forces=forces,
+            rough=rough, lag=math.sqrt(np.vdot(phase, phase).real * np.vdot(moved, moved).real),
+            unheld=bool(self.point.counts[UNHELD]), dynamics=dynamics,
         )  # fmt: skip
 
     def _second_last(self, _x: Complex, turned: Complex) -> Complex:
         """Return c (nk, N) of the equation before the last, Re Σ c_kᴴ x_k: `turned` is that of the phase."""
         return turned
 
-    def _functionals(
-        self, J: Real, x: Complex, mass: Complex, squared: float, second_last: Complex, dF: Complex,
-        changes: Complex, dynamics: Dynamics,
-    ) -> None:  # fmt: skip
-        """Fill the rows of q, of the phase and of the amplitude, each a sum cᴴ x over the harmonics."""
-        s, size = self.structure, self.size
-        rows = np.zeros((3, *x.shape), np.complex128)
-        rows[0, s.first], rows[1], rows[2] = dynamics.b, second_last, mass / squared
-        by_w = np.empty((3, size), np.complex128)
-        for i, row in enumerate(rows):
-            pull = np.einsum("kn,kna->ka", dynamics.solve_adjoint(row).conj(), s.back)
-            by_w[i] = -np.einsum("ka,akj->j", pull, dF)
-        by_rest = np.einsum("ikn,jkn->ij", rows.conj(), changes)  # (3, 3)
-        by = np.empty((3, size + BESIDES), np.complex128)
-        by[:, :size] = by_w
-        by[:, size], by[:, size + 1] = by_rest[:, 0], 1j * by_rest[:, 0]
-        by[:, size + 2 :] = by_rest[:, 1:]
-        J[size], J[size + 1] = -by[0].real, -by[0].imag
-        J[size, size] += 1.0
-        J[size + 1, size + 1] += 1.0
-        J[size + 2], J[size + 3] = by[1].real, by[2].real
 
-
-def _block_places(balance: Balance) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return row port, column port and number of every block of dF_dU."""
+def _block_places(balance: Balance) -> Integer:
+    """Return row port, column port and number of every block of dF_dU, (nb, 3)."""
     system = balance.system
     places = [
         (first + a, first + b, block + a * m + b)
@@ -252,5 +223,4 @@ def _block_places(balance: Balance) -> tuple[np.ndarray, np.ndarray, np.ndarray]
         for a in range(m)
         for b in range(m)
     ]
-    found = np.array(places, dtype=np.int64).reshape(-1, 3)
-    return found[:, 0], found[:, 1], found[:, 2]
+    return np.array(places, dtype=np.int64).reshape(-1, 3)

@@ -111,7 +111,7 @@ def slopes_at_rest(equations: Equations, w: Real, omega: float) -> Complex | Non
     here = int(cosine_position(ks, equations.structure.first))
     nc = balance.n_ports
     G = np.zeros((nc, nc), np.complex128)
-    rows, columns, blocks = equations._blocks
+    rows, columns, blocks = equations._blocks.T
     block = equations.point.dF_dU[blocks]
     # A force that is no function of the phase answers a cosine and a sine alike; the mean of both else.
     G[rows, columns] = 0.5 * (block[:, here, here] + block[:, here + 1, here + 1])

@@ -20,6 +20,7 @@ from solver.linear.assembly import linear_model
 from solver.linear.condensation import reduce_model
 from solver.linear.contact_table import port_stiffnesses
 from solver.matrices.normal_modes import hermitian, undamped_modes
+from solver.modes.kernels.dynamics import fill_stiffness, invert_modes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,30 +67,30 @@ class Structure:
         return self.K.ndim == 2
 
     def times(self, matrix: Complex, x: Complex) -> Complex:
-        """Return matrix @ x of each harmonic, x (nk, N)."""
+        """Return matrix @ x of each harmonic, x (…, nk, N)."""
         if matrix.ndim == 2:
             return matrix * x
-        return np.asarray((matrix @ x[:, :, None])[:, :, 0])
+        return np.asarray((matrix @ x[..., None])[..., 0])
 
     def at(self, omega: float, zeta: float, mode: int) -> Dynamics:
         """Return Z of all harmonics with mode number `mode` stiffened; raises LinAlgError if singular."""
-        shape = (-1, 1) if self.is_diagonal else (-1, 1, 1)
-        k = self.turns.reshape(shape)
-        drag = 2j * k * self.mass
-        Z = self.K + 1j * k * omega * self.C - (k * omega) ** 2 * self.M - zeta * omega**2 * drag
-        by_omega = 1j * k * self.C - 2.0 * k**2 * omega * self.M - 2.0 * zeta * omega * drag
+        Z, by_omega, by_zeta = np.empty((3, *self.K.shape), np.complex128)
+        flat = (self.ks.size, -1)
+        fill_stiffness(
+            self.turns, self.K.reshape(flat), self.C.reshape(flat), self.M.reshape(flat),
+            self.mass.reshape(flat), omega, zeta, Z.reshape(flat), by_omega.reshape(flat),
+            by_zeta.reshape(flat),
+        )  # fmt: skip
         b = self.carried[:, mode]
         rho = -1j * self.squares[mode]
         if self.is_diagonal:
-            Z[self.first] += rho * (b * b.conj())
-            if not np.all(Z):
+            if not invert_modes(Z, self.first, rho, b):
                 raise np.linalg.LinAlgError("Z is singular")
-            inverse = np.asarray(1.0 / Z, np.complex128)
         else:
             Z[self.first] += rho * np.outer(b, b.conj())
-            inverse = np.asarray(np.linalg.inv(Z), np.complex128)
+            Z = np.asarray(np.linalg.inv(Z), np.complex128)
         return Dynamics(
-            of=self, inverse=inverse, by_omega=by_omega, by_zeta=-(omega**2) * drag, b=b, rho=rho,
+            of=self, inverse=Z, by_omega=by_omega, by_zeta=by_zeta, b=b, rho=rho,
         )  # fmt: skip
 
     def nearest(self, omega: float, zeta: float) -> int:
@@ -122,14 +123,14 @@ class Dynamics:
     rho: complex
 
     def solve(self, phi: Complex) -> Complex:
-        """Return Z⁻¹ φ, (nk, N)."""
+        """Return Z⁻¹ φ, (…, nk, N)."""
         return self.of.times(self.inverse, phi)
 
     def solve_adjoint(self, eta: Complex) -> Complex:
-        """Return Z⁻ᴴ η, (nk, N)."""
+        """Return Z⁻ᴴ η, (…, nk, N)."""
         if self.inverse.ndim == 2:
             return self.inverse.conj() * eta
-        return np.asarray((np.swapaxes(self.inverse, 1, 2).conj() @ eta[:, :, None])[:, :, 0])
+        return np.asarray((np.swapaxes(self.inverse, 1, 2).conj() @ eta[..., None])[..., 0])
 
     def receptance(self) -> Complex:
         """Return L Z⁻¹ Lᴴ of the leading ports, (nk, r, r)."""
@@ -174,10 +175,11 @@ def structure_of(balance: Balance) -> Structure:
     constant = forces[0] if ks[0] == 0 else np.zeros(forces.shape[1], np.complex128)
     row = system.level[1 if system.constant_mean else 0]
     return Structure(
-        ks=ks, first=first, moving=moving, turns=np.maximum(ks, 1).astype(np.float64), K=K, C=C, M=M,
-        mass=mass, contact=np.ascontiguousarray(contact), back=np.ascontiguousarray(np.swapaxes(back, 1, 2)),
-        constant=constant, level=row, force=forces[first], observe=observe, shapes=shapes, modes=modes,
-        carried=carried, squares=squares,
+        ks=ks, first=first, moving=moving, turns=np.maximum(ks, 1).astype(np.float64),
+        K=np.array(K, np.complex128), C=np.array(C, np.complex128), M=np.array(M, np.complex128),
+        mass=np.array(mass, np.complex128), contact=np.ascontiguousarray(contact),
+        back=np.ascontiguousarray(np.swapaxes(back, 1, 2)), constant=constant, level=row,
+        force=forces[first], observe=observe, shapes=shapes, modes=modes, carried=carried, squares=squares,
     )  # fmt: skip
 
 

@@ -1,0 +1,1 @@
+"""Compiled loops of the equations of nonlinear modes."""
