@@ -10,7 +10,8 @@ from typing import Annotated, Any, ClassVar
 from pydantic import BaseModel, ConfigDict, Field
 
 Word = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+\z", max_length=100)]
-Size = Annotated[float, Field(strict=True, gt=0.0, le=1e15, allow_inf_nan=False)]
+# The least is small enough for every unit, and large enough for squares and quotients to be told.
+Size = Annotated[float, Field(strict=True, ge=1e-9, le=1e15, allow_inf_nan=False)]
 BLADE = "blade"
 """The DOF of the mode that vibrates."""
 _BELOW, _ABOVE = 0.8, 1.2

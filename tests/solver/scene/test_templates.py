@@ -119,6 +119,27 @@ def test_scenes_of_random_answers_are_planned_and_swept(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TEMPLATES)
+def test_answers_at_the_ends_of_their_ranges_make_a_scene_or_are_named(name: str) -> None:
+    chance = random.Random(f"ends of {name}")
+    properties = template_schema(TEMPLATES[name])["properties"]
+    ends = {
+        key: [given.get("minimum", given.get("exclusiveMinimum", 0.0)), given["maximum"]]
+        for key, given in properties.items()
+        if "maximum" in given
+    }
+    made = 0
+    for _ in range(200):
+        answers = {key: chance.choice(given) for key, given in ends.items() if chance.random() < 0.4}
+        try:
+            new_scene(name, **answers)
+        except solver.SceneError as refused:
+            assert all(issue.message for issue in refused.issues)
+        else:
+            made += 1
+    assert made > 0
+
+
+@pytest.mark.parametrize("name", TEMPLATES)
 def test_every_question_has_words_and_a_default(name: str) -> None:
     schema = template_schema(TEMPLATES[name])
     assert "required" not in schema
