@@ -57,6 +57,11 @@ def test_the_first_screen_holds_the_answer(profile: Profile, site: Site, found: 
     )
     expect(page.locator("#answer-error .small")).to_contain_text("% of the peak")
     expect(page.locator("#answer-certificate .large")).to_have_text("optimal")
+    # At an optimum inside its range the load changes nothing, and the peak grows as the force does (Euler).
+    shares = page.get_by_role("region", name="Sensitivities at the design").locator("tbody tr")
+    force = shares.filter(has_text="excitation.amplitude").locator("td").nth(2).text_content() or ""
+    assert float(force.removesuffix(" %")) == pytest.approx(1.0, abs=2e-3)
+    expect(shares.first).to_contain_text("%")
     for part in ("#answer-certificate", "#use-design", "#save-report"):
         box = page.locator(part).bounding_box()
         assert box is not None

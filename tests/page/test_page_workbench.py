@@ -22,8 +22,8 @@ TIMING = """async () => {
   const source = document.querySelector('link[rel=modulepreload][href$="base/timing.js"]').href;
   const { timing } = await import(source);
   const started = "2026-01-01T00:00:00Z", at = (s) => Date.parse(started) + 1000 * s;
-  return [[0.25, 12], [0.25, 720], [0, 5]].map(([progress, s]) => timing({ status: "running", progress, started }, at(s)))
-    .concat(timing({ status: "successful", progress: 1, started }, at(9)));
+  const runs = (progress, s) => timing({ status: "running", progress, started }, at(s));
+  return [runs(0.25, 12), runs(0.25, 720), runs(0, 5), timing({ status: "successful", started }, at(9))];
 }"""
 
 
@@ -168,7 +168,12 @@ def test_what_is_under_way_is_seen_in_a_fresh_tab(profile: Profile, site: Site) 
         page.click("#tab-data")
         expect(page.locator("#jobs-list")).to_contain_text("What others began is told with the runs.")
         said = page.evaluate(TIMING)
-        assert said == [" 25 %, 12 s, about 36 s more", " 25 %, 12 min 0 s, about 36 min 0 s more", " 0 %, 5 s", ""]
+        assert said == [
+            " 25 %, 12 s, about 36 s more",
+            " 25 %, 12 min 0 s, about 36 min 0 s more",
+            " 0 %, 5 s",
+            "",
+        ]
         row(page, job).get_by_role("button", name="Stop").click()
         expect(row(page, job)).to_contain_text("stopped")
     finally:
