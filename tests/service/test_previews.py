@@ -47,6 +47,9 @@ def test_sensitivities_are_differences_of_responses(shipped: httpx.Client) -> No
     values = {"damper.N0": 80.0}
     found = post(shipped, kind="sensitivities", set=values, limit=1.5).json()
     assert found["reached"]
+    units = {row["path"]: row["unit"] for row in found["rows"]}
+    told = {"damper.N0": "N", "damper.kt": "N/m", "damper.mu": "", "structure.k1": "N/m"}
+    assert {path: units[path] for path in told} == told
     shares = {row["path"]: row for row in found["rows"]}
     scene = solver.load_scene("two-dof").with_values(values)
     for path in ("damper.N0", "damper.kt", "excitation.amplitude"):

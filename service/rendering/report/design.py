@@ -127,16 +127,13 @@ def _sensitivities(given: Designed, after: Scene) -> str:
     if not found.reached:
         return f"<h2>Sensitivities</h2><p>{escape(told['status'])}</p>"
     rows: list[list[Any]] = [
-        [
-            row["path"],
-            parameter(row["path"], row["value"]),
-            _share(row["peak_percent"]),
-            _share(row["band_percent"]),
-        ]
+        [row["path"], f"{units.number(row['value'], 6)} {row['unit']}".rstrip(),
+         *map(_share, row["peaks_percent"]), _share(row["band_percent"])]
         for row in told["rows"][:_MOST_PARAMETERS]
-    ]
+    ]  # fmt: skip
     words = "Change for one per cent more of a parameter; those that matter most for the highest peak."
-    heads = ["parameter", "at the optimum", "highest peak", "band"]
+    peaks = [f"peak at {peak['at']:.6g} Hz" for peak in told["peaks"]]
+    heads = ["parameter", "at the optimum", *peaks, "band"]
     return f"<h2>Sensitivities</h2><p class=quiet>{words}</p>{table(heads, rows)}"
 
 

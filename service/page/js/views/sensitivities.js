@@ -3,7 +3,7 @@
 import { state } from "../base/address.js";
 import { byId, el, show, table } from "../base/dom.js";
 import { on } from "../base/events.js";
-import { length, number, quantity } from "../base/format.js";
+import { length, number } from "../base/format.js";
 import { previewer } from "../network/previews.js";
 
 const FIRST = 6;
@@ -45,7 +45,7 @@ function draw({ peaks, rows, left_out: without, band_hz: band, limit, n_harmonic
   const host = byId("design-sensitivities");
   if (!reached || !rows.length) return show(host, el("p", { class: "note" }, `Sensitivities: ${status}`));
   const heads = ["parameter", { text: "value", number: true }, ...peaks.map(({ at }) => ({ text: `peak at ${number(at, 5)} Hz`, number: true })), { text: "band", number: true }];
-  const lines = rows.map(({ path, value, peaks_percent: each, band_percent: width }) => [path, { text: quantity(path, value), number: true }, ...each.map(percent), percent(width)]);
+  const lines = rows.map(({ path, value, unit, peaks_percent: each, band_percent: width }) => [path, { text: `${number(value, 5)} ${unit}`.trim(), number: true }, ...each.map(percent), percent(width)]);
   const part = (some, name) => el("div", { class: "scroll", role: "region", "aria-label": name, tabindex: 0 }, table(heads, some, name));
   const of = [`For one per cent more of a parameter${band === null ? "" : `; the band is measured at ${length(limit)}`}.`, `${kept} harmonics.`,
     cases ? "Of the scene as it is set, without the load cases." : ""].filter(Boolean).join(" ");
