@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import re
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from solver.results.notes import FLAGS
 FOLDER = Path(page.__file__).resolve().parents[2] / "page"
 MODULES = sorted((FOLDER / "js").rglob("*.js"))
 LONGEST_FILE = 400
+MOST_COMPRESSED = 400_000
 
 
 def test_the_page_and_its_files_are_served_under_a_strict_policy(shipped: httpx.Client) -> None:
@@ -64,6 +66,12 @@ def test_modules_are_short_and_put_no_data_into_markup(path: Path) -> None:
     for word in ("innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval(", "new Function"):
         assert word not in text
     assert not re.search(r"https?://(?!www\.w3\.org/)", text)
+
+
+def test_the_code_of_the_page_is_small() -> None:
+    files = [path for path in FOLDER.rglob("*") if path.suffix in (".js", ".css", ".html", ".svg")]
+    assert {"main.js", "index.html", "base.css"} <= {path.name for path in files}
+    assert sum(len(gzip.compress(path.read_bytes())) for path in files) <= MOST_COMPRESSED
 
 
 def test_markup_has_no_inline_scripts_or_styles() -> None:
