@@ -10,12 +10,21 @@ from service.db.repositories import SweepRepository
 from service.jobs.arrays import decode
 from service.jobs.strict_json import digest
 from solver.results.dataset import Dataset
+from solver.scene.parameter_paths import structure_unit
 from solver.scene.scene import Scene
 from solver.views.columns import attributes
 from solver.views.parameter_units import parameter_unit
 from solver.views.to_dataset import point_variables
 
 _COLUMNS = ("parameter", "amplitude", "half_peak_to_peak", "mean", "residual")
+
+
+def _unit(path: str, scene: Scene | None) -> str:
+    """The unit of the parameter swept; a part of the structure has one only where the scene is known."""
+    owner, _, name = path.partition(".")
+    if owner != "structure":
+        return parameter_unit(path)
+    return "" if scene is None else structure_unit(scene.structure, name)
 
 
 def sweep_dataset(row: Sweep, repository: SweepRepository, scene: Mapping[str, Any] | None = None) -> Dataset:
@@ -30,14 +39,14 @@ def sweep_dataset(row: Sweep, repository: SweepRepository, scene: Mapping[str, A
     arrays = {name: decode(stored) for name, stored in repository.arrays(row.id).items()}
     names = [contact.name for contact in repository.parts([row.id])[row.id]]
     states = arrays.get("states")
-    variables = point_variables(
-        row.parameter, "SI" if row.parameter.startswith("structure.") else parameter_unit(row.parameter),
-        {name: arrays[name] for name in _COLUMNS if name in arrays},
-        arrays.get("observed"), None if states is None else (names, states),
-    )  # fmt: skip
     swept = None
     if scene is not None and digest(dict(scene)) == row.scene_hash:
         swept = Scene.from_dict(scene)
+    variables = point_variables(
+        row.parameter, _unit(row.parameter, swept),
+        {name: arrays[name] for name in _COLUMNS if name in arrays},
+        arrays.get("observed"), None if states is None else (names, states),
+    )  # fmt: skip
     notes = attributes(
         row.status, swept, parameter=row.parameter, harmonics=row.harmonics,
         observed=None if swept is None else swept.observe.dof, peak=row.peak, peak_at=row.peak_at,

@@ -47,6 +47,45 @@ class SweepPreview(Answer):
     states: dict[str, str] = Field(description="What every contact does at the highest peak.")
 
 
+class ParameterEffect(Answer):
+    """What one per cent more of a parameter does; null where that means nothing or is not known."""
+
+    path: str
+    unit: str
+    value: float
+    peaks_percent: list[float | None] = Field(description="Of every competing peak, in their order [%].")
+    band_percent: float | None = Field(description="Of the width of the resonance band [%].")
+
+
+class LeftOut(Answer):
+    """A parameter without a derivative."""
+
+    path: str
+    reason: str
+
+
+class Summit(Answer):
+    """A peak that competes to be the highest."""
+
+    value: float = Field(description="Amplitude [m].")
+    at: float = Field(description="Frequency [Hz].")
+
+
+class SensitivitiesPreview(Answer):
+    """Per cent of peaks and band for one per cent of each parameter, what matters most first."""
+
+    peaks: list[Summit] = Field(description="Those that compete, highest first.")
+    band_hz: float | None
+    limit: float | None = Field(description="Amplitude at which the band is measured [m].")
+    rows: list[ParameterEffect]
+    left_out: list[LeftOut]
+    peak_certificate: PeakCertificate
+    seconds: float
+    reached: bool
+    status: str
+    n_harmonics: int = Field(description="Kept; fewer than asked for where a whole disk takes too long.")
+
+
 class LinearResponse(Answer):
     """The response with a contact removed, or stuck."""
 

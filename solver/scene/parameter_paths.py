@@ -105,6 +105,10 @@ def share(part: _Named, name: str) -> float:
     return 1.0 if part.factor is None else part.factor
 
 
+_UNITS = {"m": "kg", "k": "N/m", "c": "N s/m"}
+_PROPORTIONAL_UNITS = dict(zip(PROPORTIONAL, ("s", "1/s"), strict=True))
+
+
 def has_parameter(contact: AnyContact, owner: str, key: str) -> bool:
     """Whether the path ``owner.key`` acts on a contact: its name or group, and a parameter of its law."""
     return owner in (contact.name, contact.group) and key in contact.PARAMETERS
@@ -137,6 +141,16 @@ def is_gas_path(scene: HasBodies, path: str) -> bool:
 def is_loss(structure: Structure, name: str) -> bool:
     """Whether a name is the loss factor of a structure that has one, and not of one of its parts."""
     return name == LOSS and structure.loss_factor > 0.0 and not _structure_parts(structure, name)
+
+
+def structure_unit(structure: Structure, name: str) -> str:
+    """The unit of the parameter ``structure.name``; empty of a group whose parts have different ones."""
+    if is_loss(structure, name):
+        return "1"
+    if isinstance(structure, MatricesStructure):
+        return _PROPORTIONAL_UNITS[name]
+    found = {_UNITS[_quantity(part)] for part in _structure_parts(structure, name)}
+    return found.pop() if len(found) == 1 else ""
 
 
 def check_path(scene: HasParts, path: str) -> None:

@@ -31,6 +31,12 @@ def downloaded(page: Page, selector: str) -> bytes:
     return Path(found.value.path()).read_bytes()
 
 
+def values(page: Page) -> dict[str, float]:
+    """The values that the address of a page sets."""
+    words = page.url.partition("set=")[2].partition("&")[0]
+    return {name: float(value) for name, _, value in (one.partition(":") for one in words.split(","))}
+
+
 def has_paths(page: Page, figure: str, count: int) -> None:
     expect(page.locator(f"#{figure} svg.chart g[clip-path] > path.series")).to_have_count(count)
 
@@ -77,6 +83,11 @@ def test_a_newcomer_presses_one_button_and_takes_results_away(profile: Profile, 
     expect(page.locator("#map-facts")).to_contain_text("least peak2.346 m at 104.79 N")
     has_paths(page, "response-figure", 3)
     has_paths(page, "front-figure", 1)
+    # At half power of each peak the highest peaks would have the narrowest bands: designs that damp nothing.
+    expect(page.locator("#front-status")).to_contain_text("the band at 1.659 m")
+    expect(page.locator("#front-limit")).to_have_value("1.659")
+    highest = page.locator("#front-facts tbody tr").first.locator("td").nth(1)
+    assert float((highest.text_content() or "nan").removesuffix(" m")) < 3.0
     the_map_zooms(page)
     for motion in ("path.stick", "path.slip", "circle.f7"):
         assert page.locator(f"#loops-figure g[clip-path] > {motion}").count() >= 1
@@ -104,6 +115,14 @@ def check_interference(page: Page) -> None:
     expect(rows.first).to_have_text("33 forward5501513.86 – 781.25meets")
     found = solver.interference_diagram(solver.load_scene("bladed-disk"), speed_rpm=11e3, up_to_hz=1800.0)
     assert rows.count() == len(found.crossings)
+    stiffness = page.locator("#slide-shroud-kt >> xpath=../span/input")
+    own = stiffness.input_value()
+    stiffness.fill("6e6")
+    stiffness.press("Tab")
+    expect(page.locator("#interference-stale")).to_contain_text("shroud.kt")
+    stiffness.fill(own)
+    stiffness.press("Tab")
+    expect(page.locator("#interference-stale")).to_be_hidden()
     figure = page.locator("#interference-figure svg.chart")
     expect(figure.locator("g[clip-path] > path.f2")).not_to_have_count(0)
     figure.press("End")
@@ -147,12 +166,26 @@ def check_clicks(page: Page) -> None:
 
 
 def test_sweeps_are_filtered_compared_and_shared(profile: Profile, site: Site) -> None:
-    for load in (50, 80, 120):
-        body = {"kind": "sweep", "scene": "two-dof", "set": {"damper.N0": load}}
+    for load, friction in ((50, 0.3), (80, 0.3), (120, 0.3), (110, 0.3), (110, 0.2)):
+        values = {"damper.N0": load, "damper.mu": friction}
+        body = {"kind": "sweep", "scene": "two-dof", "set": values}
         assert httpx.post(f"{site.url}/v1/jobs", json=body, headers={"Prefer": "wait=30"}).status_code == 200
     context, _ = profile
     page = visit(context, site, "?scene=two-dof")
     page.click("#library-filter summary")
+    page.fill("#filter-N0_min", "109")
+    page.fill("#filter-N0_max", "111")
+    page.press("#filter-N0_max", "Enter")
+    rows = page.locator("#library-table tbody tr")
+    expect(rows).to_have_count(2)
+    expect(rows.nth(0)).to_contain_text("damper 110 N, damper.mu 0.2")
+    expect(rows.nth(1)).to_contain_text("damper 110 N, damper.mu 0.3")
+    page.select_option("#filter-peak-unit", "mm")
+    page.fill("#filter-peak_max", "2400")
+    page.press("#filter-peak_max", "Enter")
+    expect(rows).to_have_count(1)
+    expect(rows).to_contain_text("damper 110 N")
+    page.fill("#filter-peak_max", "")
     page.fill("#filter-N0_min", "79")
     page.fill("#filter-N0_max", "121")
     page.fill("#filter-parameter", "frequency")
@@ -188,6 +221,14 @@ def test_the_response_follows_the_sliders_and_nothing_is_stored(profile: Profile
     page.get_by_label("f0, the force, number").fill("0.1")
     page.keyboard.press("Enter")
     expect(page.locator("#live-status")).to_contain_text("mm at")
+    # The chart tells millimetres, its file metres, as every other file does.
+    text = downloaded(page, "#live-figure button:text-is('CSV')").decode()
+    table = list(csv.reader(io.StringIO(text)))
+    assert [head.rpartition(" ")[2] for head in table[0]] == ["[Hz]", "[m]"]
+    page.wait_for_url("**excitation.amplitude:0.1**")
+    weak = solver.sweep(solver.load_scene("two-dof").with_values(values(page)))
+    assert weak.peak is not None
+    assert max(float(line[1]) for line in table[1:]) == pytest.approx(weak.peak.value, rel=1e-6)
     expect(page.locator("#structure-states")).to_contain_text("sticks")
     assert httpx.get(f"{site.url}/v1/jobs").json()["items"] == jobs
     page.get_by_role("button", name="Values of the scene").click()

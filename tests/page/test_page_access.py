@@ -28,6 +28,12 @@ CUT_OFF = """() => [...document.querySelectorAll("button, label, dd, p, h2, svg.
   .filter((node) => node.getBoundingClientRect().right > innerWidth + 1)
   .map((node) => node.outerHTML.slice(0, 120))
 """
+OVERLAPS = """() => [...document.querySelectorAll("svg.chart")].flatMap((chart) => {
+  const boxes = [...chart.querySelectorAll("text.soft")].map((node) => [node, node.getBoundingClientRect()]);
+  const meet = (a, b) => a.left < b.right && b.left < a.right && a.top + 2 < b.bottom && b.top + 2 < a.bottom;
+  return boxes.flatMap(([one, a], i) => boxes.slice(i + 1).filter(([other, b]) => other !== one && meet(a, b))
+    .map(([other]) => `${chart.getAttribute("aria-label")}: ${one.textContent} on ${other.textContent}`));
+})"""
 FOCUSABLE = (
     "a[href], summary, button:not([disabled], [tabindex='-1']), select, textarea, "
     "input:not([tabindex='-1']), [tabindex='0']"
@@ -78,6 +84,16 @@ def compute_further(page: Page) -> None:
     expect(page.locator("#modes-facts")).to_contain_text("most damping")
 
 
+def serious(page: Page) -> list[str]:
+    """What axe finds of the impacts that shut somebody out."""
+    return [
+        f"{one['id']}: {node['target']} {node['failureSummary']}"
+        for one in axe.Axe().run(page).response["violations"]
+        if one["impact"] in SERIOUS
+        for node in one["nodes"]
+    ]
+
+
 @pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.long)])
 def test_axe_finds_nothing_serious(browser: Browser, site: Site, studied: str, scheme: str) -> None:
     with opened(browser, site, color_scheme=scheme) as (context, _):
@@ -87,14 +103,37 @@ def test_axe_finds_nothing_serious(browser: Browser, site: Site, studied: str, s
         page.click("#edit-scene")
         expect(page.locator("#editor-status")).to_contain_text("Nothing is wrong")
         unfold(page)
-        found = axe.Axe().run(page).response["violations"]
-        serious = [
-            f"{one['id']}: {node['target']} {node['failureSummary']}"
-            for one in found
-            if one["impact"] in SERIOUS
-            for node in one["nodes"]
-        ]
-        assert serious == []
+        assert serious(page) == []
+
+
+@pytest.mark.parametrize("scheme", [pytest.param(one, marks=pytest.mark.long) for one in ("light", "dark")])
+def test_the_disk_is_for_everybody_too(browser: Browser, site: Site, scheme: str) -> None:
+    """Both diagrams of the disk and the editor of its scene: axe, keyboard, 200 %."""
+    with opened(browser, site, color_scheme=scheme) as (context, _):
+        page = context.new_page()
+        page.goto(f"{site.url}/?scene=bladed-disk&tab=disk&harmonics=3")
+        page.locator("html[data-ready]").wait_for(state="attached")
+        page.locator("#interference-form button").press("Enter")
+        expect(page.locator("#interference-facts tbody tr").first).to_be_visible()
+        assert serious(page) == []
+        page.reload()  # Tab begins at the beginning again
+        expect(page.locator("#interference-facts tbody tr").first).to_be_visible()
+        assert tab_through(page) == page.locator(FOCUSABLE).evaluate_all(
+            "all => all.filter(e => e.checkVisibility()).length"
+        )
+        for tab in page.get_by_role("tab").all():
+            tab.click()
+            expect(tab).to_have_attribute("aria-selected", "true")
+            assert serious(page) == [], tab.text_content()
+        page.click("#edit-scene")
+        expect(page.locator("#editor-status")).to_contain_text("Nothing is wrong")
+        assert serious(page) == []
+        page.click("#tab-disk")
+        page.set_viewport_size({"width": 640, "height": 450})
+        wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        assert wide <= 0
+        assert page.evaluate(CUT_OFF) == []
+        assert page.evaluate(OVERLAPS) == []
 
 
 def test_by_keyboard_alone(profile: Profile, site: Site, studied: str) -> None:
@@ -149,6 +188,8 @@ def test_zoomed_and_narrow_nothing_is_cut_off(
         expect(page.locator("#study")).to_be_in_viewport()
         cut = page.evaluate(CUT_OFF)
         assert cut == []
+        assert page.locator("svg.chart").count() >= 12
+        assert page.evaluate(OVERLAPS) == [], "numbers of an axis stand on one another"
 
 
 def test_the_theme_can_be_chosen_and_stays(profile: Profile, site: Site) -> None:

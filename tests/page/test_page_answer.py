@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ import solver
 expect = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed").expect
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, BrowserContext, Page
+    from playwright.sync_api import Browser, BrowserContext, Page, Route
 
 Profile = tuple["BrowserContext", Watch]
 LONG_MS = 120_000
@@ -57,6 +58,11 @@ def test_the_first_screen_holds_the_answer(profile: Profile, site: Site, found: 
     )
     expect(page.locator("#answer-error .small")).to_contain_text("% of the peak")
     expect(page.locator("#answer-certificate .large")).to_have_text("optimal")
+    # At an optimum inside its range the load changes nothing, and the peak grows as the force does (Euler).
+    shares = page.get_by_role("region", name="Sensitivities at the design").locator("tbody tr")
+    force = shares.filter(has_text="excitation.amplitude").locator("td").nth(2).text_content() or ""
+    assert float(force.removesuffix(" %")) == pytest.approx(1.0, abs=2e-3)
+    expect(shares.first).to_contain_text("%")
     for part in ("#answer-certificate", "#use-design", "#save-report"):
         box = page.locator(part).bounding_box()
         assert box is not None
@@ -82,6 +88,28 @@ def test_what_changed_is_said_on_every_card_and_renewed_there(
     set_value(page, "damper-mu", "0.3")
     expect(page.locator("#response-stale")).to_be_hidden()
     expect(page.locator("#design-stale")).to_contain_text("damper.mu 0.31, now 0.3")
+
+
+def test_as_good_and_of_which_case_are_said(profile: Profile, site: Site, found: str) -> None:
+    """A plateau and several cases are rare on two masses: they are told of a result that has them."""
+    context, _ = profile
+    page = context.new_page()
+
+    def changed(route: Route) -> None:
+        answer = route.fetch()
+        body = answer.json()
+        if "optimum" in (body.get("result") or {}):
+            peaks = [{**body["result"]["peak"], "case": name} for name in ("order 3", "order 4")]
+            held = {"case": "order 4", "what": "peak", **body["result"]["peak"]}
+            body["result"] |= {"plateau": {"damper.N0": [90.0, 120.0]}, "peaks": peaks, "held_by": held}
+        route.fulfill(response=answer, json=body)
+
+    page.route("**/results", changed)
+    page.goto(f"{site.url}/{found}")
+    page.locator("html[data-ready]").wait_for(state="attached")
+    facts = page.locator("#design-facts")
+    expect(facts).to_contain_text("damper.N0, as good90 N to 120 N")
+    expect(facts).to_contain_text(re.compile(r"held bypeak at [\d.]+ Hz.*\(of order 4\)"))
 
 
 def test_the_range_and_the_harmonics_make_a_design_stale_too(
@@ -137,8 +165,20 @@ def test_a_report_is_one_file_that_holds_the_answer(browser: Browser, site: Site
         with page.expect_download() as taken:
             page.click("#save-report")
         text = Path(taken.value.path()).read_text(encoding="utf-8")
+        with page.expect_download(timeout=LONG_MS) as sheets:
+            page.click("#save-pdf")
+        assert Path(sheets.value.path()).read_bytes().startswith(b"%PDF")
+        context.grant_permissions(["clipboard-read", "clipboard-write"])
+        page.click("#share")
+        expect(page.locator("#share")).to_have_text("Link copied")
+        link = page.evaluate("navigator.clipboard.readText()")
+        assert link == page.url
+        assert re.search(r"[?&]design=[0-9a-f-]{36}", link), "the link has the design"
     for words in ("104.79 N", "2.35 → 2.346 m", "stickslip design two-dof.toml", "held by", "in use"):
         assert words in text
-    assert text.count("<svg") >= 3
+    for words in ("Sensitivities", "excitation.amplitude", "Scene, drawn"):
+        assert words in text
+    assert re.search(rf"<p>[^<]*{date.today().year}[^<]*Scene two-dof", text), "the date"
+    assert text.count("<svg") >= 4
     assert not re.search(r'(?:src|href)="https?://', text)
     assert "<button" not in text

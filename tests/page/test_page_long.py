@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.long
 
 COLOURS = 256
+TRIES = 5
 VIEWS = (
     "structure",
     "live",
@@ -161,9 +162,13 @@ def test_the_page_opens_and_sliders_are_followed_in_time(browser: Browser, site:
         page = context.new_page()
         page.goto(f"{site.url}/?scene=two-dof")
         page.locator("html[data-ready][data-live]").wait_for(state="attached")
-        page.reload()
-        page.locator("html[data-ready][data-live]").wait_for(state="attached")
-        _, ready, _ = page.evaluate(OPENED)
-        rate = page.evaluate(SLIDE, [5.0, "damper-N0"])
-        assert ready < 1000.0, f"the page was ready after {ready:.0f} ms"
-        assert rate >= 15.0, f"{rate:.1f} responses a second"
+        opened_in, rates = [], []
+        # The best of some tries: a machine may have other work. What is wanted of an idle one is said by
+        # `python -m benchmarks page`: a second, and 30 responses a second.
+        for _ in range(TRIES):
+            page.reload()
+            page.locator("html[data-ready][data-live]").wait_for(state="attached")
+            opened_in.append(page.evaluate(OPENED)[1])
+            rates.append(page.evaluate(SLIDE, [2.0, "damper-N0"]))
+        assert min(opened_in) < 1000.0, f"the page was ready after {min(opened_in):.0f} ms"
+        assert max(rates) >= 20.0, f"{max(rates):.1f} responses a second"

@@ -65,6 +65,15 @@ def test_a_mode_is_followed_and_its_points_are_looked_at(profile: Profile, site:
     rows = saved.value.path().read_text().splitlines()
     assert len(rows) == mode.amplitude.size + 1
     assert float(rows[-1].split(",")[2]) == pytest.approx(mode.frequency_hz[-1], rel=1e-9)
+    page.click("#tab-response")
+    friction = page.locator("#slide-damper-mu >> xpath=../span/input")
+    friction.fill("0.35")
+    friction.press("Tab")
+    page.click("#tab-modes")
+    expect(page.locator("#modes-stale")).to_contain_text("damper.mu 0.3, now 0.35")
+    page.locator("#modes-stale button").click()
+    expect(page.locator("#modes-stale")).to_be_hidden()
+    assert request_of(site, page, "modes")["set"] == {"damper.mu": 0.35}
     page.reload()
     expect(page.locator("#modes-status")).to_contain_text("points in")
     expect(page.locator("#modes-to")).to_have_value("300")
@@ -95,6 +104,12 @@ def test_parameters_are_identified_from_what_is_pasted(profile: Profile, site: S
     row = page.get_by_role("region", name="Estimates").locator("tbody tr").first
     assert float(row.locator("td").nth(1).text_content() or "nan") == pytest.approx(0.27, rel=1e-3)
     expect(page.locator("#identify-response path.series")).to_have_count(2)
+    page.fill("#harmonics", "2")
+    page.press("#harmonics", "Tab")
+    expect(page.locator("#identify-stale")).to_contain_text("3 harmonics, now 2")
+    page.fill("#harmonics", "3")
+    page.press("#harmonics", "Tab")
+    expect(page.locator("#identify-stale")).to_be_hidden()
     page.click("#identify-robust-design")
     expect(page.locator("#tab-design")).to_have_attribute("aria-selected", "true")
     expect(page.locator("#problem-given")).to_contain_text("identified: damper.mu")

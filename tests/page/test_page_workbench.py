@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from datetime import date, timedelta
 from typing import TYPE_CHECKING, Any
 
 import httpx
@@ -15,6 +17,14 @@ if TYPE_CHECKING:
     from playwright.sync_api import BrowserContext, Page
 
 Profile = tuple["BrowserContext", Watch]
+# What is said of a job at a quarter after 12 s and after 12 min, just begun, and at its end.
+TIMING = """async () => {
+  const source = document.querySelector('link[rel=modulepreload][href$="base/timing.js"]').href;
+  const { timing } = await import(source);
+  const started = "2026-01-01T00:00:00Z", at = (s) => Date.parse(started) + 1000 * s;
+  const runs = (progress, s) => timing({ status: "running", progress, started }, at(s));
+  return [runs(0.25, 12), runs(0.25, 720), runs(0, 5), timing({ status: "successful", started }, at(9))];
+}"""
 
 
 def run_of(site: Site, **body: Any) -> str:
@@ -79,6 +89,11 @@ def test_a_project_gathers_runs_that_are_named_found_and_thrown_away(profile: Pr
         "it slips all the time",
         ["may", "rejected"],
     )
+    page.locator("#rail summary", has_text="Filter").click()
+    for since, count in ((date.today() + timedelta(days=2), 0), (date.today() - timedelta(days=2), 1)):
+        page.fill("#runs-since", since.isoformat())
+        page.locator("#runs-form").get_by_role("button", name="Show").click()
+        expect(mine).to_have_count(count)
     mine.locator("summary", has_text="Its sweeps").click()
     expect(mine.locator(".run-sweeps li")).to_have_count(1)
     expect(mine.locator(".run-sweeps li")).to_contain_text("damper 77.5 N: ")
@@ -147,7 +162,18 @@ def test_what_is_under_way_is_seen_in_a_fresh_tab(profile: Profile, site: Site) 
         page = visit(profile[0], site, "?scene=two-dof&tab=response")
         expect(page.locator("#runs-status")).to_contain_text("1 under way")
         expect(row(page, job)).to_contain_text("over damper.N0")
-        expect(row(page, job)).to_contain_text("%, ")
+        expect(row(page, job)).to_contain_text(re.compile(r"\d %, \d+ s"))
+        before = row(page, job).inner_text()
+        expect(row(page, job)).not_to_have_text(before)  # the time goes on where the share holds
+        page.click("#tab-data")
+        expect(page.locator("#jobs-list")).to_contain_text("What others began is told with the runs.")
+        said = page.evaluate(TIMING)
+        assert said == [
+            " 25 %, 12 s, about 36 s more",
+            " 25 %, 12 min 0 s, about 36 min 0 s more",
+            " 0 %, 5 s",
+            "",
+        ]
         row(page, job).get_by_role("button", name="Stop").click()
         expect(row(page, job)).to_contain_text("stopped")
     finally:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import re
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from solver.results.notes import FLAGS
 FOLDER = Path(page.__file__).resolve().parents[2] / "page"
 MODULES = sorted((FOLDER / "js").rglob("*.js"))
 LONGEST_FILE = 400
+MOST_COMPRESSED = 400_000
 
 
 def test_the_page_and_its_files_are_served_under_a_strict_policy(shipped: httpx.Client) -> None:
@@ -64,6 +66,33 @@ def test_modules_are_short_and_put_no_data_into_markup(path: Path) -> None:
     for word in ("innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval(", "new Function"):
         assert word not in text
     assert not re.search(r"https?://(?!www\.w3\.org/)", text)
+
+
+def luminance(colour: str) -> float:
+    """The relative luminance of a colour, by WCAG 2."""
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.03928 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def test_the_colours_of_the_text_of_a_scene_can_be_read() -> None:
+    """The text lies under the field that is typed in, where axe can not tell its ground."""
+    base, editor = ((FOLDER / "css" / name).read_text("utf-8") for name in ("base.css", "editor.css"))
+    used = re.findall(r"\.toml-\w+ \{ color: var\((--\w+)\)", editor)
+    assert len(used) >= 5
+    themes = [dict(re.findall(r"(--\w+): (#[0-9a-f]{6});", block)) for block in base.split("--ground:")[1:]]
+    assert len(themes) == 3, "light, dark by the system, dark by choice"
+    for theme in themes:
+        ground = luminance(theme["--field"])
+        for name in used:
+            light, dark = sorted((luminance(theme[name]), ground), reverse=True)
+            assert (light + 0.05) / (dark + 0.05) >= 4.5, f"{name} {theme[name]} on {theme['--field']}"
+
+
+def test_the_code_of_the_page_is_small() -> None:
+    files = [path for path in FOLDER.rglob("*") if path.suffix in (".js", ".css", ".html", ".svg")]
+    assert {"main.js", "index.html", "base.css"} <= {path.name for path in files}
+    assert sum(len(gzip.compress(path.read_bytes())) for path in files) <= MOST_COMPRESSED
 
 
 def test_markup_has_no_inline_scripts_or_styles() -> None:

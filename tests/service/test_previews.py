@@ -43,6 +43,29 @@ def test_a_sweep_is_that_of_the_solver_and_nothing_is_stored(shipped: httpx.Clie
     assert after == before
 
 
+def test_sensitivities_are_differences_of_responses(shipped: httpx.Client) -> None:
+    values = {"damper.N0": 80.0}
+    found = post(shipped, kind="sensitivities", set=values, limit=1.5).json()
+    assert found["reached"]
+    units = {row["path"]: row["unit"] for row in found["rows"]}
+    told = {"damper.N0": "N", "damper.kt": "N/m", "damper.mu": "", "structure.k1": "N/m"}
+    assert {path: units[path] for path in told} == told
+    shares = {row["path"]: row for row in found["rows"]}
+    scene = solver.load_scene("two-dof").with_values(values)
+    for path in ("damper.N0", "damper.kt", "excitation.amplitude"):
+        up, down = (
+            solver.sweep(scene.with_values({path: scene.value(path) * f}), limit=1.5) for f in (1.001, 0.999)
+        )
+        assert up.peak is not None
+        assert down.peak is not None
+        assert up.band is not None
+        assert down.band is not None
+        peak = 1e3 * (up.peak.value - down.peak.value) / (up.peak.value + down.peak.value)
+        band = 1e3 * (up.band.width - down.band.width) / (up.band.width + down.band.width)
+        assert shares[path]["peaks_percent"][0] == pytest.approx(peak, rel=1e-3, abs=1e-4)
+        assert shares[path]["band_percent"] == pytest.approx(band, rel=1e-3, abs=1e-4)
+
+
 def test_limits_are_the_linear_responses(shipped: httpx.Client) -> None:
     found = post(shipped, kind="limits", contact="damper").json()
     free, stuck = (found[name]["peaks"][0]["at"] for name in ("free", "stuck"))

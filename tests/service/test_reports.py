@@ -13,11 +13,18 @@ ROWS = "# damper.N0 = 80\nfrequency [Hz],amplitude [mm]\n1.0,1930\n1.1,2120\n1.2
 
 
 def test_a_report_is_a_page_or_a_pdf(shipped: httpx.Client) -> None:
-    job = shipped.post("/v1/jobs", json=DESIGN, headers={"Prefer": "wait=60"}).json()
+    project = shipped.post("/v1/projects", json={"name": "Stage 3", "notes": "Loads of May."}).json()
+    said = {"project": project["id"], "name": "narrow band", "notes": "for <the> review", "tags": ["may"]}
+    job = shipped.post("/v1/jobs", json={**DESIGN, **said}, headers={"Prefer": "wait=60"}).json()
     where = f"/v1/jobs/{job['id']}/report"
     page = shipped.get(where)
     assert page.headers["content-type"].startswith("text/html")
     assert f"{job['result']['optimum']['damper.N0']:.6g} N" in page.text
+    about = page.text.partition("<h2>")[0]
+    for words in ("Stage 3", "Loads of May.", "narrow band", "for &lt;the&gt; review", "may", "not named"):
+        assert words in about
+    dates = re.findall(r"(?:computed|report made)</th><td>(\d{4}-\d\d-\d\d \d\d:\d\d)", about)
+    assert len(dates) == 2
     sheets = shipped.get(where, headers={"Accept": "application/pdf"})
     assert sheets.headers["content-type"] == "application/pdf"
     assert sheets.headers["content-disposition"] == f'attachment; filename="report-{job["id"]}.pdf"'

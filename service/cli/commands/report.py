@@ -31,6 +31,7 @@ def report(
     """
     import solver
     from service.cli.commands.client.jobs import client_of
+    from service.rendering.report.about import about_run
     from service.rendering.report.sections import KINDS, Designed, problem_of_request
 
     target = inputs.output_path("--out", out, SUFFIXES)
@@ -43,9 +44,12 @@ def report(
             )
         answer = client.results(job)
         scene = solver.Scene.from_dict(client.job_scene(job))
+        run = client.run(job)
+        project = None if run.project is None else client.project(run.project)
     problem = problem_of_request(asked.request or {})
     if target is not None:
-        write(Designed(scene=scene, problem=problem, result=answer.result), target)
+        about = about_run(run, project)
+        write(Designed(scene=scene, problem=problem, result=answer.result, about=about), target)
         say(f"{target} is written")
 
 

@@ -12,7 +12,7 @@ from service.http.dependencies import CallerDependency, ServiceDependency, Typed
 from service.jobs.answering import PREVIEW
 from service.jobs.kinds.previews import PREVIEWS, PreviewRequest
 from service.jobs.kinds.registry.bodies import KIND, any_body, examples
-from service.schemas.preview_answers import LimitsPreview, PointPreview, SweepPreview
+from service.schemas.preview_answers import LimitsPreview, PointPreview, SensitivitiesPreview, SweepPreview
 
 router = APIRouter(prefix="/v1/previews", tags=["previews"], route_class=TypedRoute)
 
@@ -20,7 +20,9 @@ router = APIRouter(prefix="/v1/previews", tags=["previews"], route_class=TypedRo
 async def preview(
     body: PreviewRequest, service: ServiceDependency, caller: CallerDependency, request: Request
 ) -> Response:
-    """Compute `sweep`, `limits` or `point` within seconds. Nothing is stored, and sizes are limited.
+    """Compute `sweep`, `sensitivities`, `limits` or `point` within seconds.
+
+    Nothing is stored, and sizes are limited.
 
     Of a disk that is solved whole fewer harmonics are kept than asked for: the answer says how many. The
     limit `work` of a key holds here as for a job of the same points.
@@ -38,5 +40,8 @@ async def preview(
 
 takes_body(preview, any_body(PREVIEWS), examples(PREVIEWS), by=KIND)
 router.add_api_route(
-    "", preview, methods=["POST"], response_model=SweepPreview | LimitsPreview | PointPreview
+    "",
+    preview,
+    methods=["POST"],
+    response_model=SweepPreview | SensitivitiesPreview | LimitsPreview | PointPreview,
 )

@@ -14,6 +14,7 @@ from service.http.in_lane import drawing
 from service.http.routes.described import TEXT, media
 from service.queue.core import Service
 from service.rendering.representations import chosen
+from service.schemas.workbench_answers import ProjectAnswer, RunAnswer
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
@@ -50,8 +51,9 @@ def report(
     )
 
 
-def _designed(service: Service, caller: Caller, job_id: str) -> tuple[Json, Json, Json]:
-    """Scene, problem and result of a job that found an optimum."""
+def _designed(service: Service, caller: Caller, job_id: str) -> tuple[Json, Json, Json, Json]:
+    """Scene, problem and result of a job that found an optimum, and what is known of its run."""
+    from service.rendering.report.about import about_run
     from service.rendering.report.sections import KINDS, problem_of_request
 
     with service.database.reading():
@@ -62,4 +64,7 @@ def _designed(service: Service, caller: Caller, job_id: str) -> tuple[Json, Json
             )
         found = service.results(job_id, caller)
         scene = service.scene_of(job_id, caller)
-    return scene, problem_of_request(row.request or {}), found.result
+        run = service.runs.get(job_id, caller)
+        project = None if run.words.project is None else service.projects.get(run.words.project, caller)
+    about = about_run(RunAnswer.of_run(run), None if project is None else ProjectAnswer.of(project))
+    return scene, problem_of_request(row.request or {}), found.result, about

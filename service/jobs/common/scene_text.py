@@ -15,8 +15,9 @@ from service.jobs.registry import SceneSource
 from service.jobs.strict_json import MOST_DEPTH
 from solver.errors import Issue
 
-MOST_OF_TOML = 600_000
-"""Characters of a text in TOML, whose reader takes most of a second for so many."""
+MOST_OF_TOML = 1_200_000
+"""Characters of a text in TOML: a sector of finite elements with the matrices of its nodal diameters has a
+million. What takes long to read in so many meets the limit of time of an answer."""
 
 _WORD = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
 # Without the limit a key of n words takes a time of n².

@@ -66,6 +66,10 @@ class SweepPreviewRequest(PreviewRequest):
     )
 
 
+class SensitivitiesPreviewRequest(SweepPreviewRequest):
+    """Per cent of peaks and band for one per cent of each parameter; `limit` is that of the band [m]."""
+
+
 class LimitsPreviewRequest(PreviewRequest):
     """The linear responses between which friction works; `contact` is first removed, then stuck."""
 
@@ -159,6 +163,24 @@ def run_sweep(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldS
     return JobOutput(result=result, shortfall=None if branch.completed else branch.status.value)
 
 
+def run_sensitivities(spec: Mapping[str, Any], _progress: Progress, _should_stop: ShouldStop) -> JobOutput:
+    """Differentiate the peaks and the band by every parameter of the scene."""
+    import optim
+
+    found = optim.sensitivities(
+        Scene.from_dict(spec["scene"]), limit=spec["limit"], harmonics=spec["harmonics"]
+    )
+    kept = ("peaks", "band_hz", "limit", "left_out", "peak_certificate", "seconds", "reached", "status")
+    told = found.to_json()
+    of_a_row = ("path", "unit", "value", "peaks_percent", "band_percent")
+    rows: Sequence[Mapping[str, Any]] = told["rows"]  # type: ignore[assignment]
+    result = {key: told[key] for key in kept} | {
+        "rows": [{key: row[key] for key in of_a_row} for row in rows],
+        "n_harmonics": spec["harmonics"],
+    }
+    return JobOutput(result=result, shortfall=None if found.reached else found.status.value)
+
+
 def run_limits(spec: Mapping[str, Any], _progress: Progress, should_stop: ShouldStop) -> JobOutput:
     """Follow the response with the contact removed, and with it stuck."""
     scene = Scene.from_dict(spec["scene"])
@@ -220,7 +242,7 @@ def warm_up() -> None:
         return False
 
     spec = {"scene": scene.to_dict(), "harmonics": 3, "limit": None, "contact": None, "frequency_hz": 1.05}
-    for run in (run_sweep, run_limits, run_point):
+    for run in (run_sweep, run_sensitivities, run_limits, run_point):
         run(spec, _Silent(), nothing)
 
 
@@ -229,6 +251,10 @@ PREVIEWS = Registry(
         JobKind(
             name="sweep", summary="The frequency response over the scene's band.",
             request=SweepPreviewRequest, resolve=resolve_sweep, run=run_sweep,
+        ),
+        JobKind(
+            name="sensitivities", summary="Per cent of peaks and band for one per cent of each parameter.",
+            request=SensitivitiesPreviewRequest, resolve=resolve_sweep, run=run_sensitivities,
         ),
         JobKind(
             name="limits", summary="The linear responses with a contact removed and stuck.",

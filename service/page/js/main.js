@@ -26,6 +26,7 @@ import { startResponse, sweepView } from "./views/response.js";
 import { asked, current, listScenes, loadScene, shownScene, variedContacts } from "./scene/scenes.js";
 import { fillSettings, startSettings } from "./scene/settings.js";
 import { contactTable, drawStructure } from "./scene/structure.js";
+import { startSensitivities } from "./views/sensitivities.js";
 import { startStudies } from "./views/studies.js";
 import { startStudy } from "./views/study.js";
 import { startTheme } from "./base/theme.js";
@@ -217,6 +218,7 @@ function start() {
   startComparison();
   startJobs();
   startDesign();
+  startSensitivities();
   startLive();
   startResponse();
   startMap();

@@ -23,13 +23,15 @@ _ONE = threading.BoundedSemaphore(1)
 
 
 def report_apart(
-    scene: Mapping[str, Any], problem: Mapping[str, Any], result: Mapping[str, Any], form: str, seconds: float
-) -> bytes:
+    scene: Mapping[str, Any], problem: Mapping[str, Any], result: Mapping[str, Any],
+    about: Mapping[str, Any], form: str, seconds: float,
+) -> bytes:  # fmt: skip
     """The report of a design, as bytes of the form.
 
     Parameters
     ----------
-    scene, problem, result : as `service.rendering.report.sections.Designed` has them, the scene as tables.
+    scene, problem, result, about : as `service.rendering.report.sections.Designed` has them, the scene as
+        tables.
     form : one of `service.rendering.report.making.FORMS`.
     seconds : longest time it may take.
 
@@ -45,7 +47,8 @@ def report_apart(
     try:
         ours, theirs = mp.Pipe(duplex=False)
         with ours:
-            argument = {"scene": dict(scene), "problem": dict(problem), "result": dict(result), "form": form}
+            argument = {"scene": dict(scene), "problem": dict(problem), "result": dict(result),
+                        "about": dict(about), "form": form}  # fmt: skip
             process = start(_main, (theirs, argument, seconds), "report")
             theirs.close()
             try:
@@ -91,7 +94,8 @@ def _answer(given: Mapping[str, Any]) -> dict[str, str]:
     try:
         scene = Scene.from_dict(given["scene"])
         made = report_of(
-            Designed(scene=scene, problem=given["problem"], result=given["result"]), given["form"]
+            Designed(scene=scene, problem=given["problem"], result=given["result"], about=given["about"]),
+            given["form"],
         )
         return {"report": base64.b64encode(made).decode()}
     except (InputError, SolverError) as error:

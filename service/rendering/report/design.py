@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
+import optim
 from service.rendering.report.responses import Line, Sweeps, linear_lines
 from service.rendering.report.sections import (
     Designed,
@@ -18,12 +19,17 @@ from service.rendering.report.sections import (
     plan_section,
     response_section,
     scene_section,
+    title_section,
 )
 from service.rendering.tables.design import design_tables
+from solver.errors import SolverError
 from solver.results import units
+from solver.scene.scene import Scene
 from solver.views.parameter_units import parameter
 from solver.views.plots import style
 from solver.views.plots.html import image, page, pairs, table
+
+_MOST_PARAMETERS = 8
 
 
 def design_report(given: Designed) -> str:
@@ -51,11 +57,11 @@ def design_report(given: Designed) -> str:
     ]
     words = f"Amplitude of {scene.observe.dof} over frequency, as given and at the optimum{case.where}"
     parts = [
-        f"<h1>Damper of {escape(given.scene.name)}</h1>",
-        f"<p>{escape(chosen['status'])}</p>",
+        title_section(given, f"Damper of {given.scene.name}", chosen["status"]),
         _figures(given, chosen, lines, case.where),
         response_section(scene, lines, words),
         *_holds(given, chosen),
+        _sensitivities(given, after),
         *_trade_off(given.result),
         motion_section(lines[-1].branch),
         scene_section(given.scene),
@@ -109,6 +115,31 @@ def _holds(given: Designed, chosen: Json) -> list[str]:
     for one in tables:
         parts += [f"<h3>{escape(one.heading)}</h3>", table(list(one.columns), [list(r) for r in one.rows])]
     return parts
+
+
+def _sensitivities(given: Designed, after: Scene) -> str:
+    """What one per cent of each parameter does at the optimum: how exactly it has to be built."""
+    try:
+        found = optim.sensitivities(after, limit=given.problem.get("limit"), harmonics=given.harmonics)
+    except SolverError as error:
+        return f"<h2>Sensitivities</h2><p>Not known: {escape(str(error))}</p>"
+    told: Json = found.to_json()
+    if not found.reached:
+        return f"<h2>Sensitivities</h2><p>{escape(told['status'])}</p>"
+    rows: list[list[Any]] = [
+        [row["path"], f"{units.number(row['value'], 6)} {row['unit']}".rstrip(),
+         *map(_share, row["peaks_percent"]), _share(row["band_percent"])]
+        for row in told["rows"][:_MOST_PARAMETERS]
+    ]  # fmt: skip
+    words = "Change for one per cent more of a parameter; those that matter most for the highest peak."
+    peaks = [f"peak at {peak['at']:.6g} Hz" for peak in told["peaks"]]
+    heads = ["parameter", "at the optimum", *peaks, "band"]
+    return f"<h2>Sensitivities</h2><p class=quiet>{words}</p>{table(heads, rows)}"
+
+
+def _share(share: float | None) -> str:
+    # Added to 0: a share that rounds to nothing has no sign.
+    return "" if share is None else f"{round(share, 3) + 0.0:+.3f} %"
 
 
 def _trade_off(result: Json) -> list[str]:

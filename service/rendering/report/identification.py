@@ -5,7 +5,14 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-from service.rendering.report.sections import Designed, Json, plan_section, scene_section, versions
+from service.rendering.report.sections import (
+    Designed,
+    Json,
+    plan_section,
+    scene_section,
+    title_section,
+    versions,
+)
 from service.rendering.tables.identify import candidate_words, estimate_row, told_pairs
 from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
@@ -25,8 +32,7 @@ def identification_report(given: Designed) -> str:
     scene, found = given.scene, given.result
     name = f"Parameters of {scene.name} from measurements"
     parts = [
-        f"<h1>{escape(name)}</h1>",
-        f"<p>{escape(found['status'])}</p>",
+        title_section(given, name, found["status"]),
         _estimates(scene, found),
         *_fit(found),
         *_correlations(found),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 from typing import Any
 
 from optim.views.plots.designs import robust_figure
@@ -19,6 +18,7 @@ from service.rendering.report.sections import (
     plan_section,
     response_section,
     scene_section,
+    title_section,
 )
 from service.rendering.tables.robust import effort_pairs, side_lines, uncertain_rows
 from solver.continuation.branch import Branch
@@ -60,8 +60,7 @@ def robust_report(given: Designed) -> str:
     shown = _shown(lines)
     title = f"Robust damper of {given.scene.name}"
     parts = [
-        f"<h1>{escape(title)}</h1>",
-        f"<p>{escape(found['status'])}</p>",
+        title_section(given, title, found["status"]),
         _optima(given),
         _uncertain(found),
         _over_the_uncertainty(found),

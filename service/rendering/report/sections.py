@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import solver
 from service.jobs.registry import ABOUT_THE_RUN
+from service.rendering.report.about import about_section
 from service.rendering.report.responses import Line, comparison_figure
 from solver.continuation.branch import Branch
 from solver.results import units
@@ -19,6 +21,7 @@ from solver.scene.scene import Scene
 from solver.scene.toml import toml_text
 from solver.views.parameter_units import parameter
 from solver.views.plots.html import image, pairs, table
+from solver.views.plots.scenes import scene_figure
 
 Json = Mapping[str, Any]
 _PACKAGES = ("stickslip", "numpy", "scipy", "numba", "casadi", "cvxpy", "clarabel")
@@ -37,16 +40,25 @@ class Designed:
     result : mapping
         The JSON of `optim.DesignResult`, `optim.ParetoResult`, `optim.RobustResult` or
         `optim.Identification`.
+    about : mapping
+        What is known of the run, as `service.rendering.report.about.About`.
     """
 
     scene: Scene
     problem: Json
     result: Json
+    about: Json = field(default_factory=dict)
 
     @property
     def harmonics(self) -> int:
         """Highest harmonic kept."""
         return int(self.problem.get("harmonics", 11))
+
+
+def title_section(given: Designed, title: str, status: str) -> str:
+    """What the report is of, whose, from when, and how the search ended."""
+    about = about_section(given.about, datetime.now(UTC))
+    return f"<h1>{escape(title)}</h1>{about}<p>{escape(status)}</p>"
 
 
 KINDS = ("design", "pareto", "identify")
@@ -135,7 +147,10 @@ def scene_section(scene: Scene) -> str:
         ),
         ("observed", f"{scene.observe.dof}, {low:g} to {high:g} Hz"),
     ]
-    return f"<h2>Scene</h2>{pairs(about)}{table(['contact', 'between', 'as given'], contacts)}"
+    drawing = scene_figure(scene)
+    words = f"What {scene.name} consists of: springs, contacts that rub, the force, the double ring observed"
+    drawn = "" if drawing is None else image(drawing, words, f"{words}.")
+    return f"<h2>Scene</h2>{drawn}{pairs(about)}{table(['contact', 'between', 'as given'], contacts)}"
 
 
 def plan_section(scene: Scene, harmonics: int) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import pty
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -110,6 +111,16 @@ def test_people_read_values_with_units(run: Run, arguments: str, words: list[str
     status, out, err = run(arguments)
     assert (status, err) == (0, "")
     assert [word for word in words if word not in out] == []
+
+
+def test_a_design_of_several_cases_names_the_one_that_holds_it(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "problem.toml").write_text(
+        "harmonics = 3\n[variables]\n'damper.N0' = [80, 130]\n[[cases]]\nname = 'cruise'\n"
+        "[[cases]]\nname = 'take-off'\n[cases.set]\n'excitation.amplitude' = 150.0\n"
+    )
+    out = run("design", "two-dof", "--problem", "problem.toml")[1]
+    held = next(line for line in out.splitlines() if line.startswith("held by"))
+    assert re.search(r"peak at [\d.]+ Hz of take-off", held) or held.endswith("(of take-off)"), held
 
 
 BAD_SCENES = {

@@ -6,6 +6,7 @@ import html
 import re
 import sys
 import tomllib
+from datetime import datetime
 from pathlib import Path
 
 import pytest
@@ -44,6 +45,7 @@ def test_a_report_has_everything_and_gives_the_same_again(
         "Before and after",
         "What holds it",
         "At the peak",
+        "Sensitivities",
         "Scene",
         "Plan",
         "Versions",
@@ -51,7 +53,13 @@ def test_a_report_has_everything_and_gives_the_same_again(
         assert f">{heading}<" in page
     for words in ("multiplier", "KKT residual", "estimated error", "Limits", "@media print"):
         assert words in page
-    assert page.count("data:image/svg+xml;base64,") == 2
+    assert page.count("data:image/svg+xml;base64,") == 3
+    assert "What two-dof consists of" in page
+    assert f"{datetime.now().astimezone():%Y-%m-%d}" in page
+    # The load is held by the band, so that a little more of it changes the band; the peak grows as the force.
+    force = re.search(r"excitation\.amplitude.*?([+-]\d\.\d+) %", page, re.DOTALL)
+    assert force is not None
+    assert float(force[1]) > 0.5
     blocks = [html.unescape(block) for block in re.findall(r"<pre>(.*?)</pre>", page, re.DOTALL)]
     command, problem, scene = blocks
     (tmp_path / "problem.toml").write_text(problem)
@@ -132,7 +140,7 @@ def test_a_robust_design_has_a_report_and_a_picture(
             assert f">{heading}<" in page
         for words in ("from 0.2 to 0.4", "-20 to +20 %", "Scenarios that hold", "worst case", "KKT residual"):
             assert words in page
-        assert page.count("data:image/svg+xml;base64,") == 3
+        assert page.count("data:image/svg+xml;base64,") == 4
     numbers = [re.findall(r"<td class=short>([\d.]+ (?:N|m|Hz))</td>", page) for page in pages]
     assert len(numbers[0]) > 20
     assert numbers[0] == numbers[1]
@@ -214,8 +222,8 @@ def test_a_mistuned_robust_design_shows_its_worst_blade() -> None:
 def test_a_pdf_has_what_the_page_has(tmp_path: Path) -> None:
     made = design(tmp_path, "report.pdf").read_bytes()
     assert made.startswith(b"%PDF")
-    assert 1 <= len(re.findall(rb"/Type /Page\b", made)) <= 4
-    assert made.count(b"/Subtype /Image") >= 2, "the responses, and one period at the peak"
+    assert 2 <= len(re.findall(rb"/Type /Page\b", made)) <= 4
+    assert made.count(b"/Subtype /Image") >= 3, "responses, a period, the scene"
 
 
 def test_the_parts_of_a_page_are_read_back() -> None:

@@ -10,8 +10,10 @@ import pytest
 from mistuned_cases import VALUES, disk, with_mistuning
 from scene_cases import two_dof
 
-from solver import Scene, SceneError, SettingError, annulus, mistuned, solve, sweep
+from solver import Scene, SceneError, SettingError, annulus, load_scene, mistuned, solve, sweep
+from solver.balance.parameter import resolve
 from solver.linear.assembly import linear_model, structure_derivative
+from solver.scene.parameter_paths import PROPORTIONAL
 
 
 def grouped() -> Scene:
@@ -54,6 +56,18 @@ def test_derivatives_by_a_group(scene: Scene, name: str):
         np.testing.assert_allclose(derivative, expected, atol=1e-9)
     assert found.affine
     assert any(np.abs(d).max() > 0.5 for d in (found.dM, found.dC0, found.dK0))
+
+
+@pytest.mark.parametrize(
+    ("scene", "units"),
+    [
+        (grouped(), {"both": "N/m", "k1": "N/m"}),
+        (disk(), {"root": "N/m", "drag": "N s/m", "blade_mass": "kg"}),
+        (load_scene("fe-disk"), {PROPORTIONAL[0]: "s", PROPORTIONAL[1]: "1/s"}),
+    ],
+)
+def test_parts_have_the_units_of_their_values(scene: Scene, units: dict[str, str]):
+    assert {name: resolve(scene, f"structure.{name}").unit for name in units} == units
 
 
 def test_paths_set_before_or_after_writing_out():

@@ -10,8 +10,9 @@ import { dragged, joined, zoomButtons, zoomKey, zoomed } from "./zoom.js";
 const MARGIN_LEFT = 62;
 const DASHES = { dashed: "7 4", dotted: "2 4" };
 
-// What a chart shows: {x, y: {name, log, zero, low, high}, series: [{name, x, y, colour, dash, width, shape, bare}],
+// What a chart shows: {x, y: {name, unit, log, zero, low, high}, series: [{name, x, y, colour, dash, width, shape, bare}],
 // bands: [[low, high]], limits: [{y, name}], marks: [{x, y, text, shape, colour}]}.
+// `unit` is the {name, perMetre} of an axis of lengths: files have them in metres, as those of the service do.
 // Charts of the same `link` share the crosshair and the stretch that is zoomed.
 export function chart(host, { label, file, height = 300, onPick, legend = true, pickSeries = 0, link = "" }) {
   const read = el("p", { class: "chart-read", "aria-live": "polite" });
@@ -286,5 +287,9 @@ export function saving(self, file, label, canvas) {
 const columnsOf = (shown) =>
   shown.series.flatMap((line, i) => {
     const name = line.name || `series ${i + 1}`;
-    return [[`${name}: ${shown.x.name}`, line.x], [`${name}: ${shown.y.name}`, line.y]];
+    return [[shown.x, line.x], [shown.y, line.y]].map(([axis, values]) => [`${name}: ${inMetres(axis)}`, metres(axis, values)]);
   });
+
+const inMetres = ({ name, unit }) => (unit ? name.replace(`[${unit.name}]`, "[m]") : name);
+
+const metres = ({ unit }, values) => (unit ? values.map((v) => (v === null ? null : Number((v / unit.perMetre).toPrecision(15)))) : values);

@@ -41,7 +41,7 @@ export function responseOf(answer, more = []) {
   const { dof } = current.body.observe;
   return {
     x: { name: "frequency [Hz]" },
-    y: { name: `max |${dof}| [${scale.name}]`, zero: true, low: 0, pad: 0.14 },
+    y: { name: `max |${dof}| [${scale.name}]`, unit: scale, zero: true, low: 0, pad: 0.14 },
     series: [
       { name: more.length ? "with friction" : parts.unstable ? "stable" : "", x: points.parameter, y: up(parts.stable), colour: 1 },
       ...(parts.unstable ? [{ name: "not stable", x: points.parameter, y: up(parts.unstable), colour: 1, dash: "dashed" }] : []),

@@ -30,7 +30,7 @@ export function responsesChart(all) {
   const unit = lengthUnit(Math.max(...runs.map(({ data }) => largest(data))));
   return {
     x: { name: "frequency [Hz]", pad: 0.02 },
-    y: { name: `amplitude [${unit.name}]`, zero: true, pad: 0.08 },
+    y: { name: `amplitude [${unit.name}]`, unit, zero: true, pad: 0.08 },
     series: over(runs, "fit", "data", (x) => x, unit.perMetre),
     describe: (x, y) => `${number(x, 6)} Hz: ${number(y, 4)} ${unit.name} measured`,
   };
@@ -46,7 +46,7 @@ export function loopsChart(all) {
   const runs = all.filter(({ kind }) => kind === "loop");
   if (!runs.length) return null;
   const unit = lengthUnit(Math.max(...runs.map(({ x }) => largest(x))));
-  return { x: { name: `motion [${unit.name}]`, pad: 0.06 }, y: { name: "force [N]", pad: 0.06 }, series: over(runs, "fit", "data", (x) => x.map((v) => v * unit.perMetre), 1) };
+  return { x: { name: `motion [${unit.name}]`, unit, pad: 0.06 }, y: { name: "force [N]", pad: 0.06 }, series: over(runs, "fit", "data", (x) => x.map((v) => v * unit.perMetre), 1) };
 }
 
 const scrolled = (label, node) => el("div", { class: "scroll", role: "region", "aria-label": label, tabindex: 0 }, node);

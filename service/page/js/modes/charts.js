@@ -7,9 +7,9 @@ const GHOSTS = [7, 5, 4, 3];
 
 // The amplitude as it is looked at: of the mode, or as the observed motion.
 export function amplitudeOf(result, over) {
-  if (over === "modal") return { name: "modal amplitude a [√kg m]", x: result.amplitude, of: (point) => point.amplitude };
+  if (over === "modal") return { name: "modal amplitude a [√kg m]", x: result.amplitude, of: (point) => point.amplitude, unit: undefined };
   const unit = lengthUnit(largest(result.max_abs));
-  return { name: `max |${result.dof}| [${unit.name}]`, x: result.max_abs.map((v) => v * unit.perMetre), of: (point) => point.max_abs * unit.perMetre };
+  return { name: `max |${result.dof}| [${unit.name}]`, unit, x: result.max_abs.map((v) => v * unit.perMetre), of: (point) => point.max_abs * unit.perMetre };
 }
 
 const isLinear = (states) => states.every((state) => LINEAR.includes(state));
@@ -25,11 +25,11 @@ const describe = (result, i) =>
   `a ${number(result.amplitude[i], 4)} √kg m · max |${result.dof}| ${length(result.max_abs[i])} · ${number(result.frequency[i], 6)} Hz · ζ ${number(100 * result.damping_ratio[i], 4)} % · ${statesAt(result, i)}`;
 
 function curveOf(result, key, over, pins, factor = 1) {
-  const { name, x } = amplitudeOf(result, over);
+  const { name, unit, x } = amplitudeOf(result, over);
   const y = result[key].map((v) => (v === null ? null : factor * v));
   const stuck = result.states.map((states, i) => (isLinear(states) ? y[i] : null));
   return {
-    x: { name, log: true, pad: 0 },
+    x: { name, unit, log: true, pad: 0 },
     series: [
       { name: pins.length ? "now" : "contacts slip", x, y, colour: 1, shape: "circle", size: 2.2 },
       ...(stuck.some((v) => v !== null) ? [{ name: "linear", x, y: stuck, colour: 3, width: 4 }] : []),
@@ -75,7 +75,7 @@ export function performanceChart({ performance, dof }, by) {
   const least = loads ? performance.least : null;
   return {
     x: { name: loads ? "loads, × as they are" : "excitation, × as it is", log: true },
-    y: { name: `peak of |${dof}| [${unit.name}]`, log: true, pad: 0.06 },
+    y: { name: `peak of |${dof}| [${unit.name}]`, unit, log: true, pad: 0.06 },
     series: [
       { name: "from the mode", x: factors, y: peaks.map(up), colour: 1 },
       ...(exact.length ? [{ name: "whole responses", x: exact.map(({ x }) => x), y: exact.map(({ y }) => up(y)), colour: 2, width: 0, shape: "diamond", size: 4 }] : []),
@@ -99,7 +99,7 @@ export function loopChart({ motions }, at, contact) {
   const loop = motions.loops[contact];
   const unit = lengthUnit(largest(loop.motion[at]));
   return {
-    x: { name: `motion of ${loop.contact} [${unit.name}]`, pad: 0.06 },
+    x: { name: `motion of ${loop.contact} [${unit.name}]`, unit, pad: 0.06 },
     y: { name: "force [N]", pad: 0.08 },
     series: [{ name: "", x: loop.motion[at].map((v) => v * unit.perMetre), y: loop.force[at], colour: 1, width: 2.4 }],
   };

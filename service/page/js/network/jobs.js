@@ -161,7 +161,7 @@ function list() {
   const host = byId("jobs-list");
   const seen = [...(host.querySelector("ul")?.children ?? [])];
   if (rows.length && rows.length === seen.length && rows.every((row, i) => row === seen[i])) return;
-  show(host, rows.length ? el("ul", { class: "plain" }, rows) : el("p", { class: "note" }, "None yet."));
+  show(host, rows.length ? el("ul", { class: "plain" }, rows) : el("p", { class: "note" }, "None begun in this tab. What others began is told with the runs."));
 }
 
 function line(kind, job) {

@@ -99,7 +99,7 @@ function draw() {
   const limit = request.limit ?? null;
   plot.draw({
     x: { name: "resonance band [Hz]", pad: 0.06 },
-    y: { name: `highest peak [${unit.name}]`, log, pad: 0.12 },
+    y: { name: `highest peak [${unit.name}]`, unit, log, pad: 0.12 },
     series: [{ name: "front", x: points.map((p) => p.band_hz), y: points.map((p) => p.peak * unit.perMetre), colour: 1, shape: "circle", size: 4.5 }],
     limits: limit !== null && limit >= 0.5 * Math.min(...peaks) && limit <= 2 * Math.max(...peaks) ? [{ y: limit * unit.perMetre, name: "the band is measured here" }] : [],
     marks: chosen === null ? [] : [{ x: points[chosen].band_hz, y: points[chosen].peak * unit.perMetre, shape: "diamond", colour: 2, text: "loaded" }],

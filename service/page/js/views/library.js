@@ -13,9 +13,11 @@ import { current } from "../scene/scenes.js";
 
 const FILTERS = [
   ["scene", "Scene", "text"], ["parameter", "Parameter", "text"], ["contact", "Contact", "text"], ["N0_min", "N0 from [N]", "number"], ["N0_max", "N0 to [N]", "number"],
-  ["peak_max", "Peak up to [m]", "number"], ["band_hz_max", "Band up to [Hz]", "number"],
+  ["peak_max", "Peak up to", "number"], ["band_hz_max", "Band up to [Hz]", "number"],
 ];
 const SORTS = [["-created", "newest first"], ["peak", "lowest peak first"], ["band_hz", "narrowest band first"], ["-points", "most points first"]];
+// Lengths are asked for in the units in which tables and charts tell them.
+const METRES = { "m": 1, "mm": 1e-3, "µm": 1e-6 };
 const SIZE = 25;
 const FAR_APART = 4;
 const DASHES = [undefined, "dashed", "dotted"];
@@ -31,7 +33,8 @@ export function startLibrary() {
   plot = chart(byId("compare-figure"), { label: "Sweeps side by side", file: "compare", height: 320 });
   const form = byId("library-form");
   const inputs = FILTERS.map(([name, words, type]) =>
-    el("span", { class: "pair" }, el("label", { for: `filter-${name}` }, words), el("input", { id: `filter-${name}`, name, type, step: "any" })));
+    el("span", { class: "pair" }, el("label", { for: `filter-${name}` }, words), el("input", { id: `filter-${name}`, name, type, step: "any" }),
+      name === "peak_max" ? el("select", { id: "filter-peak-unit", "aria-label": "Unit of the peak" }, Object.keys(METRES).map((unit) => el("option", { value: unit }, unit))) : null));
   const sort = el("select", { id: "filter-sort", name: "sort" }, SORTS.map(([value, words]) => el("option", { value }, words)));
   show(form, inputs, el("span", { class: "pair" }, el("label", { for: "filter-sort" }, "Order"), sort), 
     el("span", { class: "pair" }, el("input", { id: "filter-intermediate", type: "checkbox", name: "all" }), el("label", { for: "filter-intermediate" }, "also those on the way to a design, a map or a front")),
@@ -50,10 +53,13 @@ export async function openLibrary() {
   await compare();
 }
 
+// A peak in metres, whatever its unit on the form.
+const asAsked = (name, text) => (name === "peak_max" ? String(Number((Number(text) * METRES[byId("filter-peak-unit").value]).toPrecision(12))) : text);
+
 function query() {
   const words = new URLSearchParams({ limit: SIZE });
   if (!byId("filter-intermediate").checked) words.set("intermediate", "false");
-  for (const [name, value] of new FormData(byId("library-form"))) if (name !== "all" && String(value).trim()) words.set(name, String(value).trim());
+  for (const [name, value] of new FormData(byId("library-form"))) if (name !== "all" && String(value).trim()) words.set(name, asAsked(name, String(value).trim()));
   return `/v1/sweeps?${words}`;
 }
 
@@ -80,18 +86,27 @@ async function list(address = null) {
 const loads = (sweep) =>
   Object.entries(sweep.contacts).map(([name, c]) => (c.N0 === null ? null : `${name} ${number(c.N0)} N`)).filter(Boolean).join(", ");
 
-const titleOf = (sweep) => `${sweep.scene}, ${loads(sweep) || sweep.parameter}`;
+// Loads, and whatever else tells a sweep from others that have the same loads: stiffness, friction, force, harmonics.
+function told(sweep, among) {
+  const own = loads(sweep);
+  const [mine, ...others] = [sweep, ...among.filter((one) => one.scene === sweep.scene && loads(one) === own)].map(
+    (one) => ({ ...valuesOf(one), harmonics: one.harmonics }));
+  const apart = Object.keys(mine).filter((path) => others.some((other) => other[path] !== mine[path]));
+  return [own, ...apart.map((path) => (path === "harmonics" ? `${mine[path]} harmonics` : `${path} ${quantity(path, mine[path])}`))].filter(Boolean).join(", ");
+}
+
+const titleOf = (sweep, among) => `${sweep.scene}, ${told(sweep, among) || sweep.parameter}`;
 
 function rows() {
   const line = (sweep) => {
-    const name = titleOf(sweep);
+    const name = titleOf(sweep, items);
     const box = el("input", { type: "checkbox", checked: state.compare.includes(sweep.id), "aria-label": `Compare ${name}` });
     box.addEventListener("change", () => choose(sweep.id, box.checked));
     return [
       box,
       sweep.scene,
       `${sweep.parameter} ${number(sweep.from)} … ${number(sweep.to)}`,
-      loads(sweep),
+      told(sweep, items),
       { text: sweep.peak ? length(sweep.peak.value) : "–", number: true },
       { text: sweep.peak ? quantity(sweep.parameter, sweep.peak.at) : "–", number: true },
       { text: sweep.band_hz === null ? "–" : number(sweep.band_hz), number: true },
@@ -100,7 +115,7 @@ function rows() {
       actions(sweep, name),
     ];
   };
-  const heads = ["compare", "scene", "over", "loads", { text: "peak", number: true }, { text: "at", number: true }, { text: "band [Hz]", number: true }, { text: "points", number: true }, "stored", "take"];
+  const heads = ["compare", "scene", "over", "values", { text: "peak", number: true }, { text: "at", number: true }, { text: "band [Hz]", number: true }, { text: "points", number: true }, "stored", "take"];
   show(byId("library-table"), items.length ? table(heads, items.map(line), "Stored sweeps") : null);
 }
 
@@ -189,16 +204,16 @@ function drawCompared(found) {
   const far = highest > FAR_APART * Math.min(...peaks.filter((peak) => peak > 0));
   plot.draw({
     x: { name: withUnit(found[0].parameter) },
-    y: { name: `amplitude [${unit.name}]`, zero: !far, log: far },
+    y: { name: `amplitude [${unit.name}]`, unit, zero: !far, log: far },
     series: found.map((sweep, i) => {
       const { parameter, amplitude } = throughPeak({ ...sweep.arrays, peak: sweep.peak });
-      return { name: titleOf(sweep), x: parameter, y: amplitude.map((v) => v * unit.perMetre), colour: 1 + (i % 7), dash: DASHES[i % 3] };
+      return { name: titleOf(sweep, found), x: parameter, y: amplitude.map((v) => v * unit.perMetre), colour: 1 + (i % 7), dash: DASHES[i % 3] };
     }),
   });
   const row = (name, of) => [name, ...found.map((sweep) => ({ text: of(sweep), number: true }))];
   show(
     byId("compare-facts"),
-    table(["", ...found.map((sweep) => ({ text: titleOf(sweep), number: true }))], [
+    table(["", ...found.map((sweep) => ({ text: titleOf(sweep, found), number: true }))], [
       row("highest peak", (s) => (s.peak ? length(s.peak.value) : "–")),
       row("at", (s) => (s.peak ? quantity(s.parameter, s.peak.at) : "–")),
       row("error estimate", (s) => (typeof s.error_estimate === "number" ? length(s.error_estimate) : "–")),

@@ -122,7 +122,7 @@ function drawHistory() {
   }
   plots.history.draw({
     x: { name: `time [${word}]` },
-    y: { name: `${current.body.observe.dof} [${unit.name}]`, pad: 0.06 },
+    y: { name: `${current.body.observe.dof} [${unit.name}]`, unit, pad: 0.06 },
     series,
   });
 }
@@ -142,7 +142,7 @@ function drawLoop() {
     const some = (values) => values.filter((_, i) => i % MARCH_EVERY === 0);
     pieces.push({ name: "time march", x: some(other.slip).map((v) => v * unit.perMetre), y: some(other.force), colour: 7, width: 0, shape: "circle", size: 2.6 });
   }
-  plots.loops.draw({ x: { name: `slip motion of ${contact.name} [${unit.name}]`, pad: 0.06 }, y: { name: "friction force [N]", pad: 0.06 }, series: pieces });
+  plots.loops.draw({ x: { name: `slip motion of ${contact.name} [${unit.name}]`, unit, pad: 0.06 }, y: { name: "friction force [N]", pad: 0.06 }, series: pieces });
   const choose = contacts.length > 1
     ? contacts.map((c, i) => el("button", { type: "button", "aria-pressed": String(i === chosen), onclick: () => { chosen = i; drawLoop(); } }, c.name))
     : [];
@@ -164,7 +164,7 @@ function drawHarmonics() {
   const shown = heights.map((v) => (v !== null && v > least ? v * unit.perMetre : null));
   plots.harmonics.draw({
     x: { name: "harmonic (0 is the mean)", whole: true, low: -0.5, high: found.harmonics.length - 0.5 },
-    y: { name: `amplitude [${unit.name}]`, log: true, pad: 0.08 },
+    y: { name: `amplitude [${unit.name}]`, unit, log: true, pad: 0.08 },
     series: [{ name: "amplitude", x: found.harmonics.map((_, i) => i), y: shown, colour: 1, bars: true, width: 0 }],
   });
 }

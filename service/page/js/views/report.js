@@ -7,8 +7,8 @@ import { state } from "../base/address.js";
 import { request as ask } from "../network/api.js";
 import { opened } from "../workbench/projects.js";
 
-const CHARTS = [["response", "Frequency response"], ["map", "Map"], ["front", "Peak against band"]];
-const FACTS = [["design-facts", "What holds the design"], ["response-facts", "Frequency response"], ["plan-facts", "Effects in use and left out"]];
+const CHARTS = [["structure", "Scene"], ["response", "Frequency response"], ["map", "Map"], ["front", "Peak against band"]];
+const FACTS = [["design-facts", "What holds the design"], ["design-sensitivities", "What one per cent does"], ["response-facts", "Frequency response"], ["plan-facts", "Effects in use and left out"]];
 const STYLE = "body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1b1f24;background:#fff}"
   + "dl{display:grid;grid-template-columns:max-content 1fr;gap:.1rem 1rem}dd{margin:0}dt{color:#505a66}svg{max-width:100%;height:auto}"
   + "th,td{text-align:left;padding:.2rem .8rem .2rem 0}.stale{color:#a3261b}pre{white-space:pre-wrap}li{list-style:none}";
@@ -26,7 +26,7 @@ function facts(id) {
 }
 
 function drawn(name) {
-  const drawing = byId(`${name}-figure`).querySelector("svg.chart");
+  const drawing = byId(`${name}-figure`).querySelector("svg.chart, svg[role=img]");
   if (!drawing || drawing.querySelector(".nothing")) return "";
   return svgText(drawing, byId(`${name}-figure`).querySelector(".canvas-host canvas"));
 }

@@ -18,13 +18,19 @@ const NOT_ASKED_AGAIN = ["kind", "fresh", "priority", "scene", "set", "harmonics
 const OF_THE_FORM = ["variables", "parameter", "from", "to", "steps", "frequencies", "ridge", "speeds_rpm", "orders", "band_hz"];
 const OWN_FORM = ["modes", "identify"];
 let studies = 0;
+// The amplitude [m] at which the band of the best design was measured.
+let bandAt = null;
 
 export function startStudy() {
   byId("study").addEventListener("click", study);
   on("renew", renew);
   on("front-wanted", front);
+  on("computed", ({ kind, result }) => {
+    if (kind === "design" && result.limit) bandAt = Number(result.limit.toPrecision(4));
+  });
   on("scene-left", () => {
     studies += 1;
+    bandAt = null;
     say("study-status", "");
   });
 }
@@ -43,7 +49,7 @@ function bodyOf(kind) {
     accuracy: () => ({ scene, set }),
     campbell: () => ({ ...body, ...campbellBody() }),
     interference: () => ({ scene, set, ...interferenceBody() }),
-    pareto: () => ({ ...body, variables: { [path]: [low, high] } }),
+    pareto: () => ({ ...body, variables: { [path]: [low, high] }, ...ofTheFront({ limit: bandAt }) }),
   };
   return bodies[kind]();
 }
@@ -56,11 +62,14 @@ function study() {
   state.at = null;
   write();
   say("study-status", `The jobs are under way: response, design, map, front, accuracy, Campbell diagram${isDisk() ? ", interference diagram" : ""}.`);
+  const mine = (studies += 1);
+  const designed = begin("design");
   const all = [
     begin("sweep").then(async (done) => done && (await referee(5))),
-    ...["design", "map", "accuracy", "campbell", ...(isDisk() ? ["interference"] : []), "pareto"].map((kind) => begin(kind)),
+    designed,
+    ...["map", "accuracy", "campbell", ...(isDisk() ? ["interference"] : [])].map((kind) => begin(kind)),
+    frontAfter(designed, mine),
   ];
-  const mine = (studies += 1);
   Promise.all(all).then((done) => {
     const short = done.filter((each) => !each).length;
     if (mine !== studies) return;
@@ -69,12 +78,20 @@ function study() {
   });
 }
 
+// The front after the best design, which tells a fixed amplitude for the band: at half power of each peak, the
+// highest peaks would have the narrowest bands, and the front would praise designs that damp nothing.
+async function frontAfter(designed, mine) {
+  say("front-status", "The front waits for the best design: its band is measured at half power of that peak.");
+  await designed;
+  return mine === studies && begin("pareto");
+}
+
 // The front again, with the amplitude at which the band is measured and as many designs as are asked for.
 function front({ limit, points }) {
   if (!readSettings()) return;
   const before = computedFor("pareto");
   const several = Object.keys(before?.variables ?? {}).length > 1 ? { variables: before.variables } : {};
-  begin("pareto", { ...bodyOf("pareto"), ...several, ...ofTheFront({ limit, points }) });
+  begin("pareto", { ...bodyOf("pareto"), limit: undefined, ...several, ...ofTheFront({ limit, points }) });
 }
 
 const ofTheFront = ({ limit, points }) => Object.fromEntries(Object.entries({ limit, points }).filter(([, value]) => value !== undefined && value !== null));
@@ -87,6 +104,6 @@ function renew(kind) {
   const before = computedFor(kind);
   const own = Object.fromEntries(Object.entries(before ?? {}).filter(([key]) => !NOT_ASKED_AGAIN.includes(key)));
   const further = Object.keys(before?.variables ?? {}).length > 1 || (kind === "design" && Object.keys(own).some((key) => !OF_THE_FORM.includes(key) || key === "speeds_rpm"));
-  begin(kind, further ? { ...asked(), ...own } : { ...bodyOf(kind), ...(kind === "pareto" ? ofTheFront(own) : {}) });
+  begin(kind, further ? { ...asked(), ...own } : { ...bodyOf(kind), ...(kind === "pareto" && before ? { limit: undefined, ...ofTheFront(own) } : {}) });
   return undefined;
 }
