@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from solver.errors import Issue, MissingExtraError, ResultFileError, SceneError, SettingError, SolverError
     from solver.marching.march import march
     from solver.marching.start import MarchStart
-    from solver.modes.controlled import HeldAmplitude, HeldStatus, held_amplitude
+    from solver.modes.driven.controlled import HeldAmplitude, HeldStatus, held_amplitude
+    from solver.modes.driven.phase_resonance import PhaseResonance, phase_resonance
     from solver.modes.gradient import ModeGradient, mode_gradient
     from solver.modes.limit_cycles import LimitCycle, LimitCycles, limit_cycles
     from solver.modes.nonlinear_mode import nonlinear_mode
-    from solver.modes.peak_correction import PeakCorrection, corrected_peak
-    from solver.modes.performance import PerformanceCurve, performance_curve
-    from solver.modes.phase_resonance import PhaseResonance, phase_resonance
+    from solver.modes.peaks.peak_correction import PeakCorrection, corrected_peak
+    from solver.modes.peaks.performance import PerformanceCurve, performance_curve
     from solver.modes.results import NonlinearMode, NonlinearModeStatus
     from solver.response.power_balance import PowerBalance, power_balance
     from solver.response.solution import Solution, SolutionStatus
@@ -126,14 +126,14 @@ _HOME = {
     "worst_slopes": "response.wear_nonsmooth", "Stretch": "continuation.segment",
     "joined": "continuation.segment", "LawParameter": "contacts.laws.history.definition",
     "register_law": "contacts.laws.history.register", "NonlinearMode": "modes.results",
-    "PerformanceCurve": "modes.performance", "performance_curve": "modes.performance",
+    "PerformanceCurve": "modes.peaks.performance", "performance_curve": "modes.peaks.performance",
     "LimitCycle": "modes.limit_cycles", "LimitCycles": "modes.limit_cycles",
     "limit_cycles": "modes.limit_cycles",
-    "HeldAmplitude": "modes.controlled", "HeldStatus": "modes.controlled",
-    "held_amplitude": "modes.controlled",
+    "HeldAmplitude": "modes.driven.controlled", "HeldStatus": "modes.driven.controlled",
+    "held_amplitude": "modes.driven.controlled",
     "ModeGradient": "modes.gradient", "mode_gradient": "modes.gradient",
-    "PeakCorrection": "modes.peak_correction", "corrected_peak": "modes.peak_correction",
-    "PhaseResonance": "modes.phase_resonance", "phase_resonance": "modes.phase_resonance",
+    "PeakCorrection": "modes.peaks.peak_correction", "corrected_peak": "modes.peaks.peak_correction",
+    "PhaseResonance": "modes.driven.phase_resonance", "phase_resonance": "modes.driven.phase_resonance",
     "NonlinearModeStatus": "modes.results", "nonlinear_mode": "modes.nonlinear_mode",
 }  # fmt: skip
 

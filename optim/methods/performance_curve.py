@@ -2,9 +2,9 @@
 
 Coulomb friction scales: where one variable sets the normal load of every contact, the peak at a load v is
 that of the load v₀ under v₀/v times the excitation, times v/v₀: one curve serves every design. Else a curve
-is followed for each, and its peak has an exact gradient (`solver.modes.peak_gradient`). One whole response
-at the optimum says how far the curve is off; the correction (`solver.modes.peak_correction`) estimates it
-without.
+is followed for each, and its peak has an exact gradient (`solver.modes.peaks.peak_gradient`). One whole
+response at the optimum says how far the curve is off; the correction (`solver.modes.peaks.peak_correction`)
+estimates it without.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from optim.problem.problem import Problem
 from optim.problem.variables import Real, Variable, by_variables, parameter_values, unscaled
 from optim.results.curve_check import CurveCheck
 from optim.results.design import DesignStatus
-from solver.modes.peak_correction import corrected_peak
-from solver.modes.peak_gradient import CurvePeak, peak_at_excitation
-from solver.modes.performance import PerformanceCurve
-from solver.modes.performance_range import performance_over
+from solver.modes.peaks.peak_correction import corrected_peak
+from solver.modes.peaks.peak_gradient import CurvePeak, peak_at_excitation
+from solver.modes.peaks.performance import PerformanceCurve
+from solver.modes.peaks.performance_range import performance_over
 from solver.results.watch import OnProgress, ShouldStop
 from solver.scene.scene import Scene
 

@@ -22,7 +22,7 @@ from solver.modes.corrector import Corrected, State, correct
 from solver.modes.curve import tangent_of
 from solver.modes.equations import Equations
 from solver.modes.nonlinear_mode import ModeProblem, pose
-from solver.modes.performance import grows_together
+from solver.modes.peaks.performance import grows_together
 from solver.modes.records import Record, Recorder
 from solver.modes.results import NonlinearMode
 from solver.response.stability.floquet import growth_of, scene_monodromy

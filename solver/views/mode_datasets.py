@@ -10,9 +10,9 @@ from solver.results.dataset import Dataset, Variable
 from solver.views.columns import AMPLITUDE, attributes, column, harmonics
 
 if TYPE_CHECKING:
-    from solver.modes.controlled import HeldAmplitude
-    from solver.modes.performance import PerformanceCurve
-    from solver.modes.phase_resonance import PhaseResonance
+    from solver.modes.driven.controlled import HeldAmplitude
+    from solver.modes.driven.phase_resonance import PhaseResonance
+    from solver.modes.peaks.performance import PerformanceCurve
     from solver.modes.results import NonlinearMode
 
 

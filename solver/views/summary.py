@@ -16,9 +16,9 @@ from solver.views.parameter_units import parameter
 if TYPE_CHECKING:
     from solver.continuation.branch import Branch
     from solver.marching.result import MarchResult
-    from solver.modes.controlled import HeldAmplitude
-    from solver.modes.performance import PerformanceCurve
-    from solver.modes.phase_resonance import PhaseResonance
+    from solver.modes.driven.controlled import HeldAmplitude
+    from solver.modes.driven.phase_resonance import PhaseResonance
+    from solver.modes.peaks.performance import PerformanceCurve
     from solver.modes.results import NonlinearMode
     from solver.response.solution import Solution
     from solver.response.stability.floquet import Stability

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import solver
-from solver.modes.peak_correction import corrected_peak
-from solver.modes.peak_gradient import peak_at_excitation
-from solver.modes.performance_range import performance_over
+from solver.modes.peaks.peak_correction import corrected_peak
+from solver.modes.peaks.peak_gradient import peak_at_excitation
+from solver.modes.peaks.performance_range import performance_over
 from tests.cases.random_scenes import random_scene
 
 LEVEL = "excitation.amplitude"

@@ -10,8 +10,8 @@ import pytest
 
 import solver
 from solver.modes.corrector import correct
+from solver.modes.driven.phase_resonance import Driven
 from solver.modes.nonlinear_mode import pose
-from solver.modes.phase_resonance import Driven
 from solver.modes.start import begin
 from tests.cases.mode_cases import one_mass, slider
 

@@ -21,13 +21,13 @@ from scipy.optimize import minimize_scalar
 from solver.errors import SettingError
 from solver.jit.fourier import Complex
 from solver.modes.corrector import Corrected, State, correct
-from solver.modes.held_amplitude import Held
+from solver.modes.driven.held_amplitude import Held
 from solver.modes.nonlinear_mode import pose
 from solver.modes.records import Recorder
 from solver.results.told import Piece
 
 if TYPE_CHECKING:
-    from solver.modes.performance import PerformanceCurve
+    from solver.modes.peaks.performance import PerformanceCurve
 
 _NEAREST, _FARTHEST = 2, 8  # half widths of the resonance looked at to both sides of it, at least and at most
 _CLOSE = 0.02  # of a half width, to which the frequency of the least force is sought: 2e-4 of the force

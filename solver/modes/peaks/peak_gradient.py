@@ -26,7 +26,7 @@ from solver.modes.equations import Evaluated
 from solver.modes.gradient import ModeSensitivities
 from solver.modes.limit_cycles import between
 from solver.modes.nonlinear_mode import pose
-from solver.modes.performance import PerformanceCurve, crossing
+from solver.modes.peaks.performance import PerformanceCurve, crossing
 from solver.results.told import Piece
 
 _SAME = 1e-10  # ln of the force within which it is the one asked for

@@ -16,8 +16,8 @@ from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
 from solver.modes.corrector import Corrected
 from solver.modes.curve import End, walk
+from solver.modes.driven.held_amplitude import Held, first_held, least_force
 from solver.modes.error_estimate import Wider
-from solver.modes.held_amplitude import Held, first_held, least_force
 from solver.modes.limit_cycles import stability_left_out
 from solver.modes.nonlinear_mode import LEAST, MOST_POINTS, pose
 from solver.modes.records import Record, Recorder
