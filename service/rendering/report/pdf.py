@@ -7,6 +7,7 @@ matplotlib.
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Callable, Sequence
 from datetime import date
 from importlib.metadata import version
@@ -141,6 +142,9 @@ def _laid_out(parts: Sequence[Part], width: float) -> list[Flowable]:
             heads.append(Paragraph(_safe(part.text), style))
             continue
         made = _flowables(part, width)
+        if heads and isinstance(part, Said):
+            heads += made  # a sentence under a heading stays with what it introduces
+            continue
         # Of a picture its caption stays with it too; what is long may be broken after its beginning.
         kept = len(made) if isinstance(part, Picture) else 1
         flow += [KeepTogether([*heads, *made[:kept]]), *made[kept:]] if heads or kept > 1 else made
@@ -279,4 +283,6 @@ def _text(part: Text, width: float) -> list[Flowable]:
 
 
 def _broken(line: str, most: int) -> list[str]:
-    return [line[i : i + most] for i in range(0, max(len(line), 1), most)]
+    """A line in pieces of the width, at spaces where there are any; what goes on is set in."""
+    inner = " " * (len(line) - len(line.lstrip()) + 4)
+    return textwrap.wrap(line, most, subsequent_indent=inner, break_on_hyphens=False) or [""]
