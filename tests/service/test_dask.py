@@ -279,6 +279,7 @@ def test_a_sweep_goes_on_behind_its_last_checkpoint(
     pace = {"checkpoint_seconds": 0.25, "progress_seconds": 0.01}
     with EmbeddedService(settings_on(tmp_path, service[1], **pace), BOTH) as embedded:
         queue, seen = embedded._service.queue, dict[int, list[tuple[float, float]]]()
+        at_work: list[str] = []
 
         def kept() -> list[tuple[int, int]]:
             if live := queue.live(job):
@@ -295,9 +296,9 @@ def test_a_sweep_goes_on_behind_its_last_checkpoint(
         job = embedded.submit("slow-sweep", body)
         until(kept)
         workers = queue._executor._cluster._client.run(os.getpid)
-        until(lambda: len(kept()) >= 2 and not busy())
-        until(busy)  # the next order has just begun
-        os.kill(workers[busy()[0]], signal.SIGKILL)
+        until(lambda: len(kept()) >= 2)
+        until(lambda: at_work.extend(busy()[:1]) or at_work)
+        os.kill(workers[at_work[0]], signal.SIGKILL)
         until(lambda: {attempt for _, attempt in kept()} == {1, 2})
         assert [part for part, _ in kept()] == list(range(len(kept()))), "nothing was kept twice"
         until(lambda: not kept() and embedded.job(job).status.finished)
