@@ -6,6 +6,7 @@ BIN := .venv/bin
 # Python is told to write none (PYTHONDONTWRITEBYTECODE) every process would take a second longer to start.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 BYTECODE := $(BIN)/python -m compileall -q -j 0 .venv/lib stickslip solver optim service migrations
+PACKAGES := .venv/.packages
 STAMP := .venv/.up-to-date
 DEV := .venv/.for-development
 # What pytest gets in addition, for example: make test PYTEST="-k march -x"
@@ -29,14 +30,22 @@ help:
 
 setup: $(STAMP)
 
-$(STAMP): pyproject.toml constraints.txt
+# The first kernels are compiled while the other packages are installed: pip keeps one core busy, no more.
+# What is imported is kept as bytecode, whatever PYTHONDONTWRITEBYTECODE says: else every process reads sources.
+$(PACKAGES): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 	  echo "stickslip needs Python 3.11 or newer, as in: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv .venv
-	$(PIP) --constraint constraints.txt setuptools
-	$(PIP) --constraint constraints.txt --no-build-isolation -e '.[fast]'
+	$(PIP) --constraint constraints.txt setuptools numpy scipy numba pydantic
+	@echo "Installing the other packages, and compiling the kernels of a first design: half a minute on two cores."
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m service.warm_up --first & kernels=$$!; \
+	  $(PIP) --constraint constraints.txt --no-build-isolation -e '.[fast]' || { kill $$kernels; exit 1; }; \
+	  wait $$kernels
+	@touch $@
+
+$(STAMP): $(PACKAGES)
 	$(BYTECODE)
-	@echo "Compiling the kernels on all cores: a minute or more on two, once."
+	@echo "Compiling the other kernels on all cores: half a minute on two, once."
 	$(BIN)/python -m service.warm_up
 	@touch $@
 
@@ -47,8 +56,10 @@ $(DEV): $(STAMP)
 	$(BYTECODE)
 	@touch $@
 
-demo: setup
-	$(BIN)/stickslip demo
+# The set-up is completed after it: the first optimum does not wait for what other scenes need.
+demo: $(PACKAGES)
+	PYTHONDONTWRITEBYTECODE= $(BIN)/stickslip demo
+	@$(MAKE) --no-print-directory setup
 
 # The kernels are compiled before, so that not every process does it. Four processes for two cores: tests of the
 # service also wait. They may write bytecode: what is read again by hundreds of processes, and the tests themselves.

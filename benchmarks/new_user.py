@@ -35,8 +35,8 @@ _CHANGE = re.compile(r"`((\w+) = [^`]+)`(?: takes the place of the line that beg
 _OPTIMUM = re.compile(r"^\s*\S+\.N0\s+[\d.]+ N\b")
 # What make says as it begins a stage.
 _STAGES = (
-    ("-m venv", "environment"), ("pip install", "packages"), ("compileall", "bytecode"),
-    ("service.warm_up", "kernels"), ("stickslip demo", "demo"),
+    ("-m venv", "environment"), ("pip install", "numerical packages"),
+    ("service.warm_up --first", "kernels beside the other packages"), ("stickslip demo", "demo"),
 )  # fmt: skip
 
 
@@ -101,7 +101,7 @@ def first_optimum() -> tuple[str, ...]:
     parts = ", ".join(f"{name} {end - at:.0f}" for (name, at), end in zip(begins, after, strict=True))
     how = (
         f"git clone, `{first}`: set-up {ready:.0f} s, compute {optimum - ready:.0f} s until «{said}» "
-        f"({parts}); pictures too after {ended:.0f} s, {used:.0f} s of processor time in all"
+        f"({parts}); pictures, and all compiled, after {ended:.0f} s, {used:.0f} s of processor time in all"
     )
     return ("first optimum after clone, nothing cached", "60", f"{optimum:.0f}", how)
 

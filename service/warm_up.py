@@ -1,10 +1,13 @@
 """Compile the kernels once, so that no later command waits for it: ``python -m service.warm_up``.
 
 Part of ``make setup`` and ``make test``. All cores compile at once; the machine code is cached on disk and
-serves every process from then on.
+serves every process from then on. With ``--first`` only what a response and a design of a scene like the
+paper's call is compiled, in half the time: ``make demo`` does the rest after its first optimum.
 """
 
 from __future__ import annotations
+
+import argparse
 
 import solver
 from service.jobs.kinds import warm_up
@@ -25,7 +28,14 @@ def functions_of_laws() -> None:
 
 def main() -> None:
     """Run each kind of computation once, on a small problem, and compile what they might call besides."""
-    compile_together([warm_up, referee, functions_of_laws])
+    parser = argparse.ArgumentParser(prog="python -m service.warm_up", description="Compile the kernels.")
+    parser.add_argument(
+        "--first", action="store_true", help="only what a response and a design with Coulomb friction call"
+    )
+    if parser.parse_args().first:
+        compile_together([warm_up], listed=False)
+    else:
+        compile_together([warm_up, referee, functions_of_laws])
 
 
 if __name__ == "__main__":

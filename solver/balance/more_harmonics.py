@@ -92,7 +92,8 @@ def _extended(balance: Balance, ks: Integer) -> System | None:
         ks=ks, which=np.array([structures[int(d)] for d in wanted], dtype=np.int64),
         modal_forces=_padded_rows(system.modal_forces, at, ks.size),
         forces=_padded_rows(system.forces, at, ks.size),
-        dforces=np.array([_padded_rows(each, at, ks.size) for each in system.dforces]).reshape(
+        # Of none at all numpy would make reals, for which every kernel would be compiled once more.
+        dforces=np.array([_padded_rows(each, at, ks.size) for each in system.dforces], np.complex128).reshape(
             (2, ks.size, -1) if system.dforces.size else (0, 0, 0)
         ),
     )  # fmt: skip

@@ -21,7 +21,7 @@ from numba.core import cgutils
 from numba.core.extending import lower_builtin, type_callable
 from numba.core.typing import signature
 
-from solver.jit.separate import call_at, loaded, made_address
+from solver.jit.separate import call_at, loaded, made_address, watching
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _WORD = ir.IntType(64)
@@ -64,13 +64,14 @@ class _Table:
         """Have a function of the contract called by a number: one that is no kernel and has no name."""
         self._addresses[number] = address
 
-    def under(self, _form: object) -> tuple[bytes, ...]:
-        """Return the names of the kernels that a call may need: those whose numbers are always the same."""
+    def announce(self, _form: object) -> None:
+        """Tell who watches of the kernels that a call may reach: those whose numbers are always the same."""
+        if (watcher := watching()) is None:
+            return
         form = self._form
-        places = (kernel.partition(":") for kernel in self._known)
-        return tuple(
-            pickle.dumps((module, name, tuple(form.args), form.return_type)) for module, _, name in places
-        )
+        for kernel in self._known:
+            module, _, name = kernel.partition(":")
+            watcher.listed(pickle.dumps((module, name, tuple(form.args), form.return_type)))
 
     def address(self, *_: object) -> int:
         """Return where the table lies."""

@@ -8,15 +8,18 @@ first time it is taken back from the pool, or waited for, and what waits in the 
 from __future__ import annotations
 
 import contextlib
+import gc
 import multiprocessing
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 
 from solver.jit.separate import make, watched
 
-MOST_PROCESSES = 4  # each compiles the short kernels for itself, and takes 200 MB
+MOST_PROCESSES = 4  # each compiles the short kernels for itself, and takes 600 MB at most
+# A compiler makes many objects that live for long: collected as often as usual they take 8 % of the time.
+_COLLECT = (20_000, 20, 1000)
 
 
 def cores() -> int:
@@ -24,12 +27,16 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def compile_together(calls: Sequence[Callable[[], object]], *, processes: int | None = None) -> None:
+def compile_together(
+    calls: Sequence[Callable[[], object]], *, listed: bool = True, processes: int | None = None
+) -> None:
     """Make these calls, each in one process, and compile every kernel that lies under them.
 
     Parameters
     ----------
     calls : functions of modules, so that another process finds them.
+    listed : whether kernels that are called by a number, such as those of contact laws, are compiled
+        although none of the calls gave their number.
     processes : how many; one for each core, up to `MOST_PROCESSES`, if left out.
 
     Raises
@@ -41,32 +48,53 @@ def compile_together(calls: Sequence[Callable[[], object]], *, processes: int | 
     spawning = multiprocessing.get_context("spawn")
     with contextlib.ExitStack() as stack:
         pool = None
+        stack.enter_context(_collecting_rarely())
         if count > 1:
-            pool = stack.enter_context(ProcessPoolExecutor(count - 1, mp_context=spawning))
+            pool = stack.enter_context(
+                ProcessPoolExecutor(
+                    count - 1, mp_context=spawning, initializer=gc.set_threshold, initargs=_COLLECT
+                )
+            )
             stack.callback(pool.shutdown, wait=False, cancel_futures=True)
-        team = _Team(pool)
+        team = _Team(pool, listed=listed)
         with watched(team):
             team.hand_out(calls[1:])
             calls[0]()
             team.finish()
 
 
+@contextlib.contextmanager
+def _collecting_rarely() -> Iterator[None]:
+    """Have garbage collected seldom until the block ends."""
+    before = gc.get_threshold()
+    gc.set_threshold(*_COLLECT)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
+
+
 class _Noted:
     """Keeps the names of the kernels called."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, also_listed: bool) -> None:
         self.names: list[bytes] = []
+        self._also_listed = also_listed
 
     def called(self, name: bytes) -> None:
         self.names.append(name)
+
+    def listed(self, name: bytes) -> None:
+        if self._also_listed:
+            self.names.append(name)
 
     def needed(self, name: bytes) -> None:
         """Nobody else makes it."""
 
 
-def _elsewhere(task: Callable[[], object] | bytes) -> list[bytes]:
+def _elsewhere(task: Callable[[], object] | bytes, listed: bool) -> list[bytes]:
     """Make a call or a kernel in a process of the pool; return the names of the kernels called there."""
-    noted = _Noted()
+    noted = _Noted(also_listed=listed)
     with watched(noted):
         if isinstance(task, bytes):
             make(task)
@@ -78,8 +106,8 @@ def _elsewhere(task: Callable[[], object] | bytes) -> list[bytes]:
 class _Team:
     """The tasks of all processes, from the view of the first."""
 
-    def __init__(self, pool: ProcessPoolExecutor | None) -> None:
-        self._pool = pool
+    def __init__(self, pool: ProcessPoolExecutor | None, *, listed: bool) -> None:
+        self._pool, self._also_listed = pool, listed
         self._lock = threading.Lock()
         self._seen: set[bytes] = set()
         self._open: dict[Callable[[], object] | bytes, Future[list[bytes]] | None] = {}
@@ -92,7 +120,9 @@ class _Team:
                     if task in self._seen:
                         continue
                     self._seen.add(task)
-                future = None if self._pool is None else self._pool.submit(_elsewhere, task)
+                future = None
+                if self._pool is not None:
+                    future = self._pool.submit(_elsewhere, task, self._also_listed)
                 self._open[task] = future
             if future is not None:
                 future.add_done_callback(self._more)
@@ -105,6 +135,11 @@ class _Team:
     def called(self, name: bytes) -> None:
         """Offer the kernel to the pool."""
         self.hand_out([name])
+
+    def listed(self, name: bytes) -> None:
+        """Offer the kernel to the pool if such ones are wanted."""
+        if self._also_listed:
+            self.hand_out([name])
 
     def needed(self, name: bytes) -> None:
         """Wait until the kernel is compiled if another process is at it; compile others meanwhile."""

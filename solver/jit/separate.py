@@ -48,6 +48,9 @@ class Watcher(Protocol):
     def called(self, name: bytes) -> None:
         """A call of this kernel was compiled."""
 
+    def listed(self, name: bytes) -> None:
+        """A call was compiled that reaches this kernel if its number is given."""
+
     def needed(self, name: bytes) -> None:
         """This kernel is about to run for the first time, and to be compiled if nobody did."""
 
@@ -68,9 +71,10 @@ class _Apart:
         """Return a name for the kernel with these types, by which any process finds it."""
         return kernel_name(self, form)
 
-    def under(self, form: Any) -> tuple[bytes, ...]:
-        """Return the names of the kernels that a call of it may need: its own."""
-        return (self.name(form),)
+    def announce(self, form: Any) -> None:
+        """Tell who watches that a call of it was compiled."""
+        if (watcher := watching()) is not None:
+            watcher.called(self.name(form))
 
     def result_of(self, arguments: tuple[types.Type, ...]) -> types.Type:
         """Return the type of the result; the kernel is compiled only where its annotation does not say."""
@@ -129,8 +133,7 @@ def _call(context: Any, builder: Any, form: Any, arguments: Any, kernel: _Apart)
 def loaded(context: Any, builder: Any, kernel: Any, form: Any) -> Any:
     """Emit the load of the address in a kernel's slot, which is filled if it is empty."""
     name = kernel_name(kernel, form)
-    for called in kernel.under(form):
-        announce(called)
+    kernel.announce(form)
     slot = _slot(builder.module, f"{kernel.__name__}.{zlib.crc32(name):08x}")
     address = builder.load_atomic(slot, "acquire", 8)
     filled = cgutils.alloca_once_value(builder, address)
@@ -159,12 +162,6 @@ def kernel_name(kernel: Any, form: Any) -> bytes:
     return pickle.dumps((kernel.__module__, kernel.__name__, tuple(form.args), form.return_type))
 
 
-def announce(name: bytes) -> None:
-    """Tell who watches that a call of a kernel was compiled."""
-    if _watcher is not None:
-        _watcher.called(name)
-
-
 def _slot(module: Any, name: str) -> Any:
     """Return the place of an address in this module: one for each kernel and types of its arguments."""
     name = f"slot.{name}"
@@ -188,6 +185,11 @@ def _ask(builder: Any, slot: Any, name: bytes) -> Any:
 
 _addresses: dict[bytes, int] = {}
 _watcher: Watcher | None = None
+
+
+def watching() -> Watcher | None:
+    """Return who is told of kernels, if anybody is."""
+    return _watcher
 
 
 @contextmanager

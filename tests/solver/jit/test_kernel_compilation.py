@@ -15,7 +15,9 @@ KERNELS = """
 from __future__ import annotations
 import numpy as np
 from solver.jit.separate import apart
+from numba import types
 from solver.jit.decorators import compiled
+from solver.jit.numbered import numbered
 
 @apart
 def half(x: float) -> float:
@@ -55,6 +57,18 @@ def broken(x: float) -> float:
 @compiled
 def sometimes(x: float) -> float:
     return broken(x) if x > 1e9 else x
+
+@numbered((types.float64,), types.float64, known=("little:half", "little:broken"))
+def by_number(number: int, x: float) -> float:
+    ...
+
+@compiled
+def chosen(x: float) -> float:
+    return by_number(0, x)
+
+@compiled
+def chosen_too(x: float) -> float:
+    return by_number(0, x) + x
 """
 
 
@@ -151,6 +165,30 @@ if __name__ == "__main__":
 """
     out, _ = said(python(tmp_path, program))
     assert out.splitlines() == ["True False", "False True"]
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_kernels_called_by_number_are_compiled_if_they_are_wanted(tmp_path: Path, processes: int) -> None:
+    program = f"""
+import little
+from solver.jit.parallel import compile_together
+
+def one():
+    assert little.by_number.number("little:half") == 0
+    assert little.chosen(3.0) == 1.5
+
+def two():
+    assert little.chosen_too(3.0) == 4.5
+
+if __name__ == "__main__":
+    compile_together([one], listed=False, processes={processes})
+    try:
+        compile_together([two], processes={processes})
+    except Exception as error:
+        print("no_such_function" in str(error))
+"""
+    out, _ = said(python(tmp_path, program))
+    assert out.splitlines() == ["True"]
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="users have temporary folders of their own there")

@@ -16,14 +16,22 @@ from solver.jit.separate import watched
 
 class Noted:
     def __init__(self) -> None:
+        self.called_ones: list[str] = []
         self.names: list[str] = []
 
     def called(self, name: bytes) -> None:
-        module, kernel, *_ = pickle.loads(name)
-        self.names.append(f"{module}:{kernel}")
+        self.called_ones.append(place(name))
+
+    def listed(self, name: bytes) -> None:
+        self.names.append(place(name))
 
     def needed(self, name: bytes) -> None:
         pass
+
+
+def place(name: bytes) -> str:
+    module, kernel, *_ = pickle.loads(name)
+    return f"{module}:{kernel}"
 
 
 def test_compiling_a_call_announces_every_law_of_the_package() -> None:
@@ -39,6 +47,7 @@ def test_compiling_a_call_announces_every_law_of_the_package() -> None:
         rest = types.Tuple([two, ks, one, ks, one, one, one, two, two, two, two, three, two])
         caller.compile((types.int64, rest))
     assert set(KERNELS) <= set(noted.names)
+    assert not set(KERNELS) & set(noted.called_ones), "which of them are called nobody knows yet"
 
 
 def test_what_is_no_kernel_of_the_contract_gets_no_number() -> None:
