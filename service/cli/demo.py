@@ -114,12 +114,15 @@ def run(folder: Path, cases: Sequence[Case] = CASES) -> list[Path]:
 def _designs(service: EmbeddedService, cases: Sequence[Case]) -> list[JobAnswer]:
     """Have the dampers designed, and say what came out."""
     specs = [{"scene": c.scene, "variables": {c.variable: list(c.bounds)}, "fresh": True} for c in cases]
-    groups = [[service.submit("design", spec)] for spec in specs]
-    with bars([f"design {case.scene}" for case in cases], "responses") as reporters:
-        ended = [group[0] for group in _follow(service, groups, reporters)]
-    for job in ended:
-        design_reports.design(service.results(job.id).result)
+    submitted = [service.submit("design", spec) for spec in specs]
+    ended = []
+    # Each is told as soon as it is there; the others are computed meanwhile.
+    for case, job in zip(cases, submitted, strict=True):
+        with bars([f"design {case.scene}"], "responses") as reporters:
+            ((done,),) = _follow(service, [[job]], reporters)
+        design_reports.design(service.results(done.id).result)
         say("")
+        ended.append(done)
     return ended
 
 
