@@ -18,6 +18,7 @@ def _cases() -> dict[str, Callable[[], None]]:
     from benchmarks import (
         against_peers,
         beam,
+        charts,
         cluster,
         designing,
         disk,
@@ -77,6 +78,7 @@ def _cases() -> dict[str, Callable[[], None]]:
         "pruning": service_pruning.pruning,
         "scale": service_scale.scale,
         "page": page.page,
+        "charts": charts.charts,
         "new-user": new_user.new_user,
         "cluster": cluster.mistuning_study,
         "mistuned": mistuned.mistuned_disks,

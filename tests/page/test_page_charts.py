@@ -52,7 +52,7 @@ def ends(page: Page, figure: str) -> tuple[float, float]:
 def path(page: Page, figure: str, index: int = 0) -> list[tuple[float, float]]:
     d = page.locator(f"#{figure}-figure svg.chart g[clip-path] > path.series").nth(index).get_attribute("d")
     assert d is not None
-    return [(float(x), float(y)) for x, y in re.findall(r"[ML](-?[\d.]+) (-?[\d.]+)", d)]
+    return [(float(x), float(y)) for x, y in re.findall(r"[ML](-?[\d.]+),(-?[\d.]+)", d)]
 
 
 def test_a_curve_goes_through_its_peak(profile: Profile, site: Site, swept: str) -> None:

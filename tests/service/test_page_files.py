@@ -68,6 +68,20 @@ def test_modules_are_short_and_put_no_data_into_markup(path: Path) -> None:
     assert not re.search(r"https?://(?!www\.w3\.org/)", text)
 
 
+def test_what_is_from_others_says_whose_it_is_and_how_it_is_made() -> None:
+    folder = FOLDER / "js" / "vendor"
+    head, told = ((folder / name).read_text("utf-8") for name in ("d3.js", "README.md"))
+    assert "Permission to use, copy, modify" in head.replace("\n// ", " ")
+    for package, version in re.findall(r"(d3-\w+)@([\d.]+)", told):
+        assert f"{package} {version}" in head.replace("\n// ", " ")
+    (exported,) = re.findall(r"export\{(.*?)\};?\s*$", head)
+    names = {each.rpartition(" as ")[2] for each in exported.split(",")}
+    wanted = re.findall(r"^export \{ (.*?) \} from", told, flags=re.MULTILINE)
+    assert names == {name for each in wanted for name in each.split(", ")}
+    used = "".join(path.read_text("utf-8") for path in (FOLDER / "js" / "charts").glob("*.js"))
+    assert all(re.search(rf"\b{name}\b", used) for name in names), "nothing is carried that is not used"
+
+
 def luminance(colour: str) -> float:
     """The relative luminance of a colour, by WCAG 2."""
     parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]

@@ -6,6 +6,7 @@ import { SHADES } from "../base/colours.js";
 import { el, show, svg } from "../base/dom.js";
 import { lengthUnit, number } from "../base/format.js";
 import { mapButtons, mapDragged, mapKey } from "./map_zoom.js";
+import { bisector } from "../vendor/d3.js";
 import { pathOf, plane, shape } from "./plane.js";
 import { joined } from "./zoom.js";
 
@@ -76,16 +77,13 @@ const pointOf = ({ shown, row, column }) => ({
   value: shown.rows[row][column],
 });
 
-// Values rise or fall: the two around the wanted one are found by halving.
+const rising = bisector((value) => value);
+const falling = bisector((value) => -value);
+
+// The place of the value next to the wanted one, of values that rise or fall.
 function nearest(values, wanted) {
   const up = values[values.length - 1] >= values[0];
-  let [low, high] = [0, values.length - 1];
-  while (high - low > 1) {
-    const middle = (low + high) >> 1;
-    if (values[middle] <= wanted === up) low = middle;
-    else high = middle;
-  }
-  return Math.abs(values[high] - wanted) < Math.abs(values[low] - wanted) ? high : low;
+  return up ? rising.center(values, wanted) : falling.center(values, -wanted);
 }
 
 function sized(drawing, width, height) {

@@ -1,6 +1,7 @@
 // The frame of a chart: paper, grid, axes with their names, and the box inside.
 
 import { svg } from "../base/dom.js";
+import { line } from "../vendor/d3.js";
 import { scale } from "./scales.js";
 
 const MARGIN = { left: 62, right: 14, top: 12, bottom: 44 };
@@ -42,6 +43,7 @@ function gridLines(box, xs, ys, lines) {
     const text = xs.names ? (xs.names[value] ?? "") : plain;
     const at = xs.at(value);
     nodes.push(svg("line", { class: lines ? "grid" : "axis", x1: at, x2: at, y1: lines ? box.top : box.bottom + 4, y2: box.bottom }));
+    if (!text) continue;
     // A number that would stand on its neighbour is left out; its line stays.
     const half = (LETTER * text.length) / 2;
     if (at - half < free) continue;
@@ -51,25 +53,20 @@ function gridLines(box, xs, ys, lines) {
   for (const { value, text } of ys.ticks((box.bottom - box.top) / PIXELS_A_TICK.y)) {
     const at = ys.at(value);
     nodes.push(svg("line", { class: lines ? "grid" : "axis", x1: lines ? box.left : box.left - 4, x2: lines ? box.right : box.left, y1: at, y2: at }));
-    nodes.push(svg("text", { class: "soft", x: box.left - 6, y: at + 4, "text-anchor": "end" }, text));
+    if (text) nodes.push(svg("text", { class: "soft", x: box.left - 6, y: at + 4, "text-anchor": "end" }, text));
   }
   return nodes;
 }
 
 // A path through points; gaps where a number is missing.
 export function pathOf(xs, ys, x, y) {
-  let d = "";
-  let pen = "M";
-  for (let i = 0; i < x.length; i += 1) {
-    const bad = x[i] === null || y[i] === null || (ys.log && y[i] <= 0) || (xs.log && x[i] <= 0);
-    if (bad || !Number.isFinite(x[i]) || !Number.isFinite(y[i])) {
-      pen = "M";
-      continue;
-    }
-    d += `${pen}${xs.at(x[i]).toFixed(1)} ${ys.at(y[i]).toFixed(1)}`;
-    pen = "L";
-  }
-  return d;
+  const drawn = (axis, value) => value !== null && Number.isFinite(value) && !(axis.log && value <= 0);
+  const path = line()
+    .defined((i) => drawn(xs, x[i]) && drawn(ys, y[i]))
+    .x((i) => xs.at(x[i]))
+    .y((i) => ys.at(y[i]))
+    .digits(1);
+  return path(x.map((_, i) => i)) ?? "";
 }
 
 const SHAPES = {

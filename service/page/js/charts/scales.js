@@ -1,59 +1,28 @@
-// Axes: from values to pixels, and where the ticks go.
+// Axes: from values to pixels, and where the ticks go. The scales are D3's.
 
 import { number } from "../base/format.js";
+import { scaleLinear, scaleLog } from "../vendor/d3.js";
 
-const STEPS = [1, 2, 2.5, 5, 10];
+const LEAST = 1e-300; // what a logarithmic axis draws nothing and less at
 
-export function linear(low, high, from, to) {
-  const span = high - low || 1;
+export function scale(log, low, high, from, to) {
+  const of = (log ? scaleLog() : scaleLinear()).domain([low, high > low ? high : low + 1]).range([from, to]);
   return {
     low,
     high,
-    log: false,
-    at: (value) => from + ((value - low) / span) * (to - from),
-    back: (pixel) => low + ((pixel - from) / (to - from)) * span,
-    ticks: (count) => linearTicks(low, high, count),
+    log: Boolean(log),
+    at: log ? (value) => of(Math.max(value, LEAST)) : of,
+    back: of.invert,
+    ticks: (count) => (log ? logTicks(of, count) : of.ticks(count).map(tick)),
   };
 }
 
-export function logarithmic(low, high, from, to) {
-  const [first, last] = [Math.log10(low), Math.log10(high)];
-  const span = last - first || 1;
-  return {
-    low,
-    high,
-    log: true,
-    at: (value) => from + ((Math.log10(Math.max(value, 1e-300)) - first) / span) * (to - from),
-    back: (pixel) => 10 ** (first + ((pixel - from) / (to - from)) * span),
-    ticks: (count) => logTicks(low, high, count),
-  };
-}
-
-export const scale = (log, ...ends) => (log ? logarithmic(...ends) : linear(...ends));
-
-export function linearTicks(low, high, count) {
-  const rough = (high - low) / Math.max(count, 1);
-  if (!(rough > 0)) return [tick(low)];
-  const power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * STEPS.find((each) => each * power >= rough * 0.85);
-  const found = [];
-  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + step * 1e-9; i += 1) found.push(tick(i * step));
-  return found;
-}
-
-function logTicks(low, high, count) {
-  const decades = Math.log10(high / low);
-  const every = Math.max(1, Math.ceil(decades / Math.max(count, 1)));
-  const inside = decades < 1.2 ? [1, 2, 3, 5, 7] : decades < 3.2 ? [1, 2, 5] : [1];
-  const found = [];
-  for (let power = Math.floor(Math.log10(low)); power <= Math.ceil(Math.log10(high)); power += 1) {
-    if (decades >= 3.2 && power % every !== 0) continue;
-    for (const digit of inside) {
-      const value = digit * 10 ** power;
-      if (value >= low * 0.9999 && value <= high * 1.0001) found.push(tick(value));
-    }
-  }
-  return found.length > 1 ? found : linearTicks(low, high, count);
+// Lines at the digits of each decade, with numbers at those there is room for; less than a decade has round numbers.
+function logTicks(of, count) {
+  const [low, high] = of.domain();
+  if (high / low < 5) return scaleLinear().domain([low, high]).ticks(count).map(tick);
+  const named = of.tickFormat(count, (value) => tick(value).text);
+  return of.ticks().map((value) => ({ value, text: named(value) }));
 }
 
 const tick = (value) => {
