@@ -208,7 +208,7 @@ def interference(page: Any) -> None:
     anew(page, "fe-disk", "&tab=disk")
     page.fill("#interference-speed", "11000")
     page.locator("#interference-form button").click()
-    page.locator("#interference-figure svg").wait_for()
+    page.locator("#interference-figure path.series").first.wait_for()
     page.locator("#interference").evaluate("card => card.scrollIntoView()")
 
 
