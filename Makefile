@@ -51,10 +51,12 @@ $(STAMP): $(PACKAGES)
 
 dev: $(DEV)
 
-$(DEV): $(STAMP)
-	$(PIP) -r constraints.txt
+$(DEV): $(PACKAGES)
+	$(BIN)/python -m service.warm_up & kernels=$$!; \
+	  $(PIP) -r constraints.txt || { kill $$kernels; exit 1; }; \
+	  wait $$kernels
 	$(BYTECODE)
-	@touch $@
+	@touch $(STAMP) $@
 
 # The set-up is completed after it: the first optimum does not wait for what other scenes need.
 demo: $(PACKAGES)

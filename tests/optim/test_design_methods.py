@@ -151,7 +151,8 @@ def test_a_response_with_one_peak_alone(method: str) -> None:
 SEVERAL = {"damper.N0": (20.0, 500.0), "damper.kt": (20.0, 40.0), "damper.N1_ratio": (0.0, 0.5)}
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(3, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("count", [2, 3])
 def test_minimax_and_ipopt_agree_with_several_variables(count: int) -> None:
     scene, variables = solver.load_scene("two-dof"), dict(list(SEVERAL.items())[:count])
     found = [optim.design(scene, variables=variables, method=method) for method in ("minimax", "ipopt")]

@@ -79,6 +79,7 @@ def two_loads(method: str = "auto") -> DesignResult:
     return optim.design(scene, variables=LOADS, harmonics=3, method=method)
 
 
+@pytest.mark.long
 def test_two_loads_do_not_end_where_the_bounds_are_better() -> None:
     """Both upper bounds give half the peak of a local optimum; the best lies on a ridge beside a plateau."""
     found = two_loads()

@@ -90,6 +90,7 @@ def test_what_is_dominated_is_said() -> None:
     assert dominated == (points[1], worse)
 
 
+@pytest.mark.long
 def test_two_variables_at_half_power() -> None:
     variables = {"damper.N0": (20.0, 500.0), "damper.N1_ratio": (0.0, 0.5)}
     result = optim.pareto_front(TWO, variables=variables, points=3, harmonics=3)

@@ -227,6 +227,7 @@ def test_a_limit_is_kept_in_every_scenario() -> None:
     assert (max(bands) <= 0.30 * (1.0 + 1e-5)) == (result.status is RobustStatus.OPTIMAL)
 
 
+@pytest.mark.long
 def test_a_limit_that_no_design_keeps_says_so() -> None:
     result = optim.robust_design(
         TWO,
@@ -274,6 +275,7 @@ def test_without_any_response_it_says_so() -> None:
     json.dumps(result.to_json(), allow_nan=False)
 
 
+@pytest.mark.long
 def test_a_search_that_runs_out_says_how_far_it_came(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("optim.robust.cutting_sets.MOST_CUTS", 1)
     open_gap = optim.robust_design(

@@ -121,6 +121,7 @@ samples = 2
 """
 
 
+@pytest.mark.long
 def test_a_robust_design_has_a_report_and_a_picture(
     server: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -43,7 +43,9 @@ ALONE: dict[str, dict[str, Any]] = {
 """What makes the contact rub and not press, beside neighbours that lie flat and move against each other."""
 
 
-@pytest.mark.parametrize("name", TEMPLATES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.long if name == "shroud" else ()) for name in TEMPLATES]
+)
 def test_without_friction_the_response_is_that_of_the_blade(name: str) -> None:
     """The resonance is F / (2 D k) at f sqrt(1 - 2 D²)."""
     flat = {} if name == "ground-damper" else {"blades": 500, "engine_order": 250}
