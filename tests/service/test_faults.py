@@ -104,7 +104,7 @@ def check_rows(site: Site) -> Counter[str]:
     return Counter(state.value for state in states.values())
 
 
-@pytest.mark.parametrize("number", [4, pytest.param(90, marks=pytest.mark.long)])
+@pytest.mark.parametrize("number", [7, pytest.param(90, marks=pytest.mark.long)])
 def test_one_service_on_sqlite(tmp_path: Path, number: int) -> None:
     site = Site(f"sqlite:///{tmp_path}/jobs.db", tmp_path, [free_port()])
     undergo(site, COMMON, number, seed=number)
@@ -118,7 +118,7 @@ def test_a_disk_that_is_full_for_a_while(tmp_path: Path, small_disk: Path, numbe
 
 
 # Four: the server's own, and those after which another service goes on with the jobs.
-@pytest.mark.parametrize("number", [2, pytest.param(100, marks=pytest.mark.long)])
+@pytest.mark.parametrize("number", [4, pytest.param(100, marks=pytest.mark.long)])
 def test_services_and_a_dispatcher_on_postgresql(cluster: Cluster, tmp_path: Path, number: int) -> None:
     with cluster.database(empty=False) as url:
         site = Site(url, tmp_path, [free_port(), free_port(), None])
