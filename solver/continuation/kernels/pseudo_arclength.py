@@ -54,6 +54,7 @@ from solver.jit.separate import apart
 from solver.linear.kernels.receptance import receptance
 
 _TINY = 64.0  # smallest steps: a step as short as this may turn as it likes
+_SHARP = 2.0**-8  # of the first step: a step longer than this does not turn back
 STRAIGHT_ON = 0.98  # cosine of the turn at a branch point; more than that is a step across a sharp peak
 CLEARLY = 0.1  # share of the accepted residual below which a point is more than nearly a solution
 FROZEN_FROM = 64  # unknowns from which old factors beat new ones (measured)
@@ -212,9 +213,17 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
         orientation, before = walk.numbers[ORIENTATION], walk.numbers[PIECE]
         if not _turn(system, linear, point, control, walk):
             return STALLED
-        if step <= _TINY * control.smallest_step and turned_back(system, control, walk):
-            undo(walk, orientation, before)
-            return STALLED
+        if turned_back(system, control, walk):
+            if step <= _TINY * control.smallest_step:
+                undo(walk, orientation, before)
+                return STALLED
+            if step > _SHARP * control.first_step:
+                # A turn of the curve, or a branch point passed in the same step, of which the sign tells
+                # nothing: a shorter step tells them apart. The factors belong to the point not taken.
+                undo(walk, orientation, before)
+                point.counts[AT_BRANCH_POINT] = 0
+                walk.numbers[STEP] = 0.5 * step
+                continue
         return RUNNING
     return STALLED
 

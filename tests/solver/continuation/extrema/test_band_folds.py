@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sampling import sampled
+from sampling import others_long, sampled
 from scipy.optimize import brentq
 
 from optim import sensitivities
 from optim.criteria.response_gradients import Sensitivity
-from solver import Branch, Scene, load_scene, sweep
+from solver import Branch, ContinuationSettings, Scene, load_scene, sweep
 
 DATA = Path(__file__).parents[3] / "data"
 
@@ -176,3 +176,17 @@ def test_slopes_of_random_folds(first: int) -> None:
 @pytest.mark.parametrize("first", range(0, 200, 20))
 def test_slopes_of_many_random_folds(first: int) -> None:
     assert sum(check_slopes(folded_scene(seed), 5, 3) for seed in range(first, first + 20)) > 10
+
+
+TURNS = (4, 15, 18, 40, 55, 93, 106, 119, 126, 128)  # seeds of branches that went back the way they came
+
+
+@pytest.mark.parametrize("seed", others_long(range(150), TURNS[::2]))
+def test_no_branch_goes_back_the_way_it_came(seed: int) -> None:
+    """Branch points and kinks in one step: the sign of the determinant alone does not tell where to go on."""
+    branch = sweep(folded_scene(seed), harmonics=5)
+    assert branch.completed
+    finer = sweep(folded_scene(seed), harmonics=5, settings=ContinuationSettings(largest_step=0.03))
+    assert branch.peak is not None
+    assert finer.peak is not None
+    assert branch.peak.value == pytest.approx(finer.peak.value, rel=1e-7)
