@@ -57,6 +57,7 @@ _TINY = 64.0  # smallest steps: a step as short as this may turn as it likes
 _SHARP = 2.0**-8  # of the first step: a step longer than this does not turn back
 STRAIGHT_ON = 0.98  # cosine of the turn at a branch point; more than that is a step across a sharp peak
 CLEARLY = 0.1  # share of the accepted residual below which a point is more than nearly a solution
+TOO_LONG = -1  # of a step: a shorter one is to be tried
 FROZEN_FROM = 64  # unknowns from which old factors beat new ones (measured)
 
 
@@ -210,22 +211,35 @@ def _step(system: System, linear: Receptance, point: Evaluation, control: Contro
         if last:
             _turn(system, linear, point, control, walk)
             return FINISHED
-        orientation, before = walk.numbers[ORIENTATION], walk.numbers[PIECE]
-        if not _turn(system, linear, point, control, walk):
-            return STALLED
-        if turned_back(system, control, walk):
-            if step <= _TINY * control.smallest_step:
-                undo(walk, orientation, before)
-                return STALLED
-            if step > _SHARP * control.first_step:
-                # A turn of the curve, or a branch point passed in the same step, of which the sign tells
-                # nothing: a shorter step tells them apart. The factors belong to the point not taken.
-                undo(walk, orientation, before)
-                point.counts[AT_BRANCH_POINT] = 0
-                walk.numbers[STEP] = 0.5 * step
-                continue
-        return RUNNING
+        went = _onward(system, linear, point, control, walk, step)
+        if went != TOO_LONG:
+            return went
     return STALLED
+
+
+@apart
+def _onward(
+    system: System, linear: Receptance, point: Evaluation, control: Control, walk: Walk, step: float
+) -> int:
+    """Turn the tangent at the point accepted; return RUNNING, STALLED, or TOO_LONG for a step taken back.
+
+    A determinant that changes its sign turns the tangent: at a fold or a corner rightly, at a branch point
+    passed in the same step wrongly. A shorter step tells them apart.
+    """
+    orientation, before = walk.numbers[ORIENTATION], walk.numbers[PIECE]
+    if not _turn(system, linear, point, control, walk):
+        return STALLED
+    if not turned_back(system, control, walk):
+        return RUNNING
+    if step <= _TINY * control.smallest_step:
+        undo(walk, orientation, before)
+        return STALLED
+    if step <= _SHARP * control.first_step:
+        return RUNNING
+    undo(walk, orientation, before)
+    point.counts[AT_BRANCH_POINT] = 0  # the factors belong to the point not taken
+    walk.numbers[STEP] = 0.5 * step
+    return TOO_LONG
 
 
 @apart
