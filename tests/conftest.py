@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import gc
 import os
+from collections import Counter
 from collections.abc import Generator, Iterator
 
 import pytest
@@ -23,6 +24,20 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.collect()
         gc.freeze()
         gc.enable()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Of the cases of a function marked `few(n)` every n-th runs by default, the others are long."""
+    seen: Counter[str] = Counter()
+    for item in items:
+        few = item.get_closest_marker("few")
+        if few is None:
+            continue
+        function = item.nodeid.partition("[")[0]
+        if seen[function] % few.args[0]:
+            item.add_marker(pytest.mark.long)
+        seen[function] += 1
 
 
 @pytest.fixture(scope="session")

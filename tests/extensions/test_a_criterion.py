@@ -81,6 +81,7 @@ def test_value_gradient_and_hessian_are_those_of_the_sum() -> None:
     assert row.second()[0, 0] == pytest.approx((slopes[1] - slopes[0]) / (2.0 * step), rel=1e-5)
 
 
+@pytest.mark.few(2)
 @pytest.mark.usefixtures("named")
 @pytest.mark.parametrize("method", ["minimax", "ipopt"])
 def test_it_is_minimised(method: str) -> None:
@@ -100,6 +101,7 @@ def test_it_is_minimised(method: str) -> None:
     assert found.to_json()["held_by"]["quantity"] == "rms amplitude"
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("named")
 def test_it_limits_the_least_peak() -> None:
     scene = solver.load_scene("two-dof")
@@ -114,6 +116,7 @@ def test_it_limits_the_least_peak() -> None:
     assert any(words.startswith("rms amplitude limit of") for words in found.active)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("named")
 def test_its_worst_case_is_minimised() -> None:
     uncertain = [{"damper.mu": mu} for mu in (0.28, 0.32)]
@@ -161,6 +164,7 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
         yield client
 
 
+@pytest.mark.long
 def test_the_service_computes_it(client: Client) -> None:
     body = {
         "kind": "design", "scene": "two-dof", "variables": {"damper.N0": [20, 400]}, "harmonics": 3,

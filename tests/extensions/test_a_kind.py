@@ -331,6 +331,7 @@ def test_the_check_of_the_documentation_sees_it() -> None:
     assert "| `map`, `mistuning`, `distortion` | computes the parts that are missing" in longer
 
 
+@pytest.mark.long
 def test_an_embedded_service_has_it_and_one_without_it_keeps_what_was_stored(tmp_path: Path) -> None:
     database = {"database": f"sqlite:///{tmp_path}/jobs.db", "workers": 1}
     with EmbeddedService(load_settings(**database, kinds=(ENTRY,))) as service:

@@ -103,6 +103,7 @@ def test_messages_name_it(files: Path) -> None:
         read_matrix(files / "broken.kband", "K")
 
 
+@pytest.mark.long
 def test_the_service_reads_uploads_of_it(http: httpx.Client) -> None:
     sent = {
         key: http.post("/v1/uploads", params={"name": f"disk.{key.lower()}band"}, content=text(matrix))

@@ -164,6 +164,7 @@ def test_a_force_that_is_no_float_is_told(register: Register) -> None:
         solver.solve(scene("whole"), frequency_hz=HZ, harmonics=3)
 
 
+@pytest.mark.long
 def test_the_command_and_the_service_know_it_by_the_environment(tmp_path: Path) -> None:
     paths = os.pathsep.join((str(ROOT), str(Path(__file__).parent)))
     named = {extensions.VARIABLE: json.dumps(["registering:SmoothFriction"]), "PYTHONPATH": paths}

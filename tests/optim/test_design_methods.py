@@ -29,6 +29,7 @@ def peak(scene: solver.Scene, path: str, value: float) -> float:
     return branch.peaks[0].value
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("method", METHODS)
 def test_the_methods_agree(name: str, method: str) -> None:
@@ -122,6 +123,7 @@ def test_the_optimum_is_in_proportion_to_the_force(f0: float, method: str) -> No
     assert scaled.peak.value / f0 == pytest.approx(one.peak.value / 100.0, rel=1e-10)  # type: ignore[union-attr]
 
 
+@pytest.mark.long
 def test_minimax_and_ipopt_agree_with_a_limit_on_the_band() -> None:
     scene = solver.load_scene("bladed-disk")
     found = [

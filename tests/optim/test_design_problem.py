@@ -87,6 +87,7 @@ def test_contacts_that_share_a_value_have_one_variable() -> None:
     assert highest(both) == pytest.approx(result.peak.value, rel=1e-12)  # type: ignore[union-attr]
 
 
+@pytest.mark.long
 def test_a_forbidden_range_keeps_the_resonance_out() -> None:
     """Speeds times the order: 45000 to 45900 revolutions a minute forbid 750 to 765 Hz to order 1."""
     scene, limit = solver.load_scene("bladed-disk"), 1.03e-4

@@ -118,6 +118,7 @@ def test_limits_that_do_not_bind_leave_the_optimum_as_it_is() -> None:
     assert limited.optimum["c0.N0"] == pytest.approx(free.optimum["c0.N0"], rel=1e-5)
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(
     "how", [{}, {"method": "minimax"}, {"method": "ipopt"}, {"start": {"c0.N0": 1500.0}}]
 )
@@ -147,6 +148,7 @@ def test_a_sharp_optimum_has_no_plateau() -> None:
     assert not found.warnings
 
 
+@pytest.mark.long
 def test_the_problem_of_the_docs_ends_in_its_best_basin_and_says_that_harmonics_are_few() -> None:
     raw = tomllib.loads(PROBLEM.read_text())
     found = optim.design(solver.load_scene(raw.pop("scene")), **raw)
@@ -205,6 +207,7 @@ def test_worst_cases_of_many_scenes(seed: int) -> None:
     check_robust(random_uncertain(seed))
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("asked", ["one", "two", "robust", "plateau"])
 def test_a_search_hears_that_it_shall_stop_within_a_second(asked: str) -> None:
     """Processor time from the first True to the end; asked early, in the middle, and late."""

@@ -78,6 +78,7 @@ def test_the_robust_optimum_stands_beside_the_nominal_one() -> None:
     assert len(held) == 2, "two scenarios are equally bad at this optimum"
 
 
+@pytest.mark.long
 def test_a_load_that_is_only_met_within_ten_per_cent() -> None:
     result = optim.robust_design(TWO, uncertain={"damper.N0": {"deviation": 0.1}}, variables=N0, samples=4)
     assert result.status is RobustStatus.OPTIMAL
@@ -118,6 +119,7 @@ def test_the_worst_of_samples_is_the_worst_of_them() -> None:
     assert result.robust.spread.peaks == pytest.approx(each, rel=1e-9)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("aim", ["mean", "quantile"])
 def test_mean_and_quantile_are_those_of_the_samples_and_least(aim: str) -> None:
     result = optim.robust_design(
@@ -213,6 +215,7 @@ def test_a_scenario_without_response_is_never_a_value() -> None:
         pessimise(broken, over, Aspect(quantity=PEAK, limited=False), ())
 
 
+@pytest.mark.long
 def test_a_limit_is_kept_in_every_scenario() -> None:
     result = optim.robust_design(
         TWO, uncertain={"damper.mu": [0.25, 0.35]}, variables=N0, limit=1.5, max_band_hz=0.30, samples=4
@@ -243,6 +246,7 @@ def test_a_limit_that_no_design_keeps_says_so() -> None:
     assert not result.robust.feasible
 
 
+@pytest.mark.long
 def test_without_friction_it_is_flat() -> None:
     result = optim.robust_design(
         TWO.with_values({"damper.mu": 0.0}), uncertain={"structure.k1": {"deviation": 0.1}}, variables=N0

@@ -46,6 +46,7 @@ def endless(site: Site) -> Iterator[str]:
     httpx.delete(f"{site.url}/v1/jobs/{job}")
 
 
+@pytest.mark.long
 def test_a_reload_goes_on_watching_and_two_tabs_do_not_disturb_each_other(
     profile: Profile, site: Site, endless: str
 ) -> None:

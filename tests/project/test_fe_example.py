@@ -58,6 +58,7 @@ def beside_docs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "docs").symlink_to(ROOT / "docs")
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("beside_docs")
 def test_the_page_runs_line_by_line(capsys: pytest.CaptureFixture[str]) -> None:
     said = {}

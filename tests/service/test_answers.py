@@ -145,6 +145,7 @@ def test_a_budget_that_is_used_up_fills_again() -> None:
     assert buckets.empty("eve", 60) == 0.0
 
 
+@pytest.mark.long
 def test_who_has_used_up_the_budget_is_told_when_to_ask_again() -> None:
     poor = Answers(
         RUNS, no_warm_up, AnswerLimits(workers=1, seconds=1.5, memory_bytes=2**26, budget_seconds=1)

@@ -267,6 +267,7 @@ def test_a_worker_killed_costs_an_attempt(
     until(lambda: threads_idle(embedded))
 
 
+@pytest.mark.long
 def test_a_sweep_goes_on_behind_its_last_checkpoint(
     service: tuple[EmbeddedService, DaskCluster], tmp_path: Path
 ) -> None:
@@ -318,6 +319,7 @@ def test_a_sweep_goes_on_behind_its_last_checkpoint(
         until(lambda: threads_idle(embedded))
 
 
+@pytest.mark.long
 def test_a_part_that_is_lost_is_computed_again_alone(
     service: tuple[EmbeddedService, DaskCluster],
 ) -> None:

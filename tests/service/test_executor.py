@@ -110,6 +110,7 @@ def test_attempts_wait_in_the_pipe_and_end_in_order(executor: LocalExecutor, hea
     heard.ends.clear()
 
 
+@pytest.mark.long
 def test_what_waits_behind_a_long_attempt_goes_back_to_the_queue(
     executor: LocalExecutor, heard: Heard
 ) -> None:
@@ -229,6 +230,7 @@ def test_workers_whose_fork_server_is_killed_compute_on_and_are_ended(heard: Hea
     assert not any(runs(pid) for pid in workers), "closing ends those too that an older one was the parent of"
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("forked")
 def test_a_process_is_started_though_the_fork_server_dies_at_it(tmp_path: Path) -> None:
     processes.start(os.getpid, (), "first").join()

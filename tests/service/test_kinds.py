@@ -85,6 +85,7 @@ def test_all_solutions_of_a_spring_that_bends_are_a_job(shipped: httpx.Client) -
     assert any(value == pytest.approx(3.3130, rel=1e-3) for value in lost)
 
 
+@pytest.mark.long
 def test_a_sweep_follows_the_branches_that_leave_it(shipped: httpx.Client) -> None:
     body = {"kind": "sweep", "scene": DUFFING, "harmonics": 7, "stability": True, "branches": True}
     job = finished(shipped, body)

@@ -112,6 +112,7 @@ def test_a_service_of_today_works_with_what_the_first_one_stored(old: str) -> No
         service.database.close()
 
 
+@pytest.mark.few(2)
 def test_what_several_owners_made_is_told_apart_no_more_below_the_keys(old: str) -> None:
     """Down from 0003: of two scenes of one name, and of two jobs of one key, one keeps it."""
     revisions.upgrade(old)
@@ -132,6 +133,7 @@ def test_what_several_owners_made_is_told_apart_no_more_below_the_keys(old: str)
     assert len(rows["job"]) == 9
 
 
+@pytest.mark.few(2)
 def test_what_is_said_of_runs_goes_with_its_tables_and_the_runs_stay(old: str) -> None:
     revisions.upgrade(old)
     service = Service(load_settings(database=old, workers=1))

@@ -201,6 +201,7 @@ def test_a_front_has_the_keys_of_a_design_but_its_own() -> None:
     assert theirs == {key for key in spec if key != "scene"}
 
 
+@pytest.mark.long
 def test_a_front_over_rest_is_that_of_python(shipped: httpx.Client) -> None:
     keys = {"variables": {"damper.N0": [20, 1000]}, "limit": 1.5, "points": 4, "harmonics": 3}
     body = {"kind": "pareto", "scene": "two-dof", **keys}
@@ -254,6 +255,7 @@ def test_every_argument_of_a_robust_design_is_a_key() -> None:
     assert keys <= set(DesignRequest.model_fields)
 
 
+@pytest.mark.long
 def test_a_robust_design_over_rest_is_that_of_python_and_is_stored(shipped: httpx.Client) -> None:
     keys = {
         "variables": {"damper.N0": [60, 200]}, "uncertain": {"damper.mu": [0.25, 0.35]}, "samples": 4,

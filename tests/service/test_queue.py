@@ -206,6 +206,7 @@ def test_workers_compute_with_one_thread_and_this_process_keeps_its_own(
     assert "MKL_NUM_THREADS" not in os.environ
 
 
+@pytest.mark.few(2)
 def test_stopping_gives_running_jobs_back_without_an_attempt(
     make_settings: MakeSettings, tmp_path: Path
 ) -> None:

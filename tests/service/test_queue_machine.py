@@ -280,6 +280,7 @@ def run(database: Database, examples: int, steps: int, phases: tuple[Phase, ...]
     run_state_machine_as_test(machine, settings=how)
 
 
+@pytest.mark.few(2)
 def test_the_queue_keeps_its_promises(module_database: Database) -> None:
     run(module_database, examples=40, steps=40)
 

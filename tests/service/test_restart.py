@@ -106,6 +106,7 @@ def test_a_service_killed_loses_nothing_and_leaves_no_worker(
     assert process.wait(PATIENCE) == 0
 
 
+@pytest.mark.long
 def test_workers_that_get_the_same_sigterm_as_their_service_cost_no_attempt(
     tmp_path: Path, port: int, client: Client, start: Start
 ) -> None:
@@ -128,6 +129,7 @@ def test_workers_that_get_the_same_sigterm_as_their_service_cost_no_attempt(
     assert (done.state, done.attempt) == (JobState.SUCCESSFUL, 1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "ends",
     [
@@ -226,6 +228,7 @@ def test_a_stop_waits_for_nobody(
     assert max(ended.values()) - asked < 3.0, "who waits is sent home at once, not after 3 s"
 
 
+@pytest.mark.long
 def test_what_the_end_of_a_service_interrupts_is_answered_503_and_can_be_repeated(
     port: int, client: Client, start: Start
 ) -> None:

@@ -142,6 +142,7 @@ def test_what_lost_its_sweeps_answers_nobody(database: Database) -> None:
     assert (again.state, again.result_of) == (JobState.ACCEPTED, None), "it is computed again"
 
 
+@pytest.mark.few(2)
 def test_no_transaction_takes_long(database: Database) -> None:
     """Megabytes of arrays, and a writer beside that never waits long."""
     heavy = JobOutput(result={}, sweeps=tuple(sweep(4000) for _ in range(40)))

@@ -303,6 +303,7 @@ def begun(client: httpx.Client, structure: dict[str, Any], **asked: Any) -> dict
     return found
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("keep", [{}, {"keep_modes": 3}], ids=["whole", "reduced"])
 def test_a_scene_of_a_sector_begins_as_import_begins_it(
     shipped: ServedClient, ids: dict[str, str], folder: Path, keep: dict[str, int],
@@ -388,6 +389,7 @@ def test_what_does_not_fit_a_sector_that_begins_is_named(shipped: ServedClient, 
     assert issue["pointer"].startswith("/excitation")
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
 def test_the_disk_of_the_documentation(
     shipped: ServedClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

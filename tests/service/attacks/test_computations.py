@@ -78,6 +78,7 @@ LONG = {
 }  # fmt: skip
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in ATTACKS]
 )
@@ -145,6 +146,7 @@ def test_another_client_is_answered_while_one_computes(site: Site) -> None:
     assert site.meanwhile([plan(masses(1000))] * 8, ask, at_once=2) == 200
 
 
+@pytest.mark.long
 def test_a_service_that_computes_ends_within_the_grace(tmp_path: Path) -> None:
     large = Attack("/v1/scenes", b'{"scene": {"a": [' + b"0.1234," * 490_000 + b"1]}}")
     with attacked(tmp_path) as site, site.sending([plan(masses(1000)), plan(masses(1000)), large]):

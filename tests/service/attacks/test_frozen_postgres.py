@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 
 import httpx
+import pytest
 from besieged import answered_in_time, besieged
 from postgresql_cluster import Cluster
 from service_helpers import until
@@ -41,6 +42,7 @@ def frozen(cluster: Cluster) -> Iterator[None]:
 in_time = partial(answered_in_time, seconds=ANSWER_SECONDS)
 
 
+@pytest.mark.long
 def test_a_frozen_server_is_answered_in_time_and_does_not_hold_up_the_end(
     cluster: Cluster, tmp_path: Path
 ) -> None:

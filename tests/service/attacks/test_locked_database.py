@@ -36,6 +36,7 @@ def locked(file: Path) -> Iterator[None]:
 in_time = partial(answered_in_time, seconds=ANSWER_SECONDS)
 
 
+@pytest.mark.long
 def test_a_foreign_lock_is_answered_in_time_and_does_not_hold_up_the_end(tmp_path: Path) -> None:
     job = {"kind": "iteration", "fresh": True}
     with besieged(tmp_path, database_seconds=DATABASE_SECONDS) as service:

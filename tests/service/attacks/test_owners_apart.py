@@ -21,6 +21,7 @@ BUSY = {**QUICK, "seconds": 600.0}
 MANY = 60
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [60, pytest.param(10_000, marks=pytest.mark.long)])
 def test_a_long_queue_of_one_owner_keeps_nobody_waiting(service: Besieged, number: int) -> None:
     other = Database(f"sqlite:///{service.folder}/jobs.db")
@@ -129,6 +130,7 @@ def pictures(service: Besieged, owner: str, number: int, paths: Sequence[str]) -
 Attack = Callable[[Besieged, str, int, Sequence[str]], None]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("attack", "path"), [(uploads, "/v1/jobs"), (pictures, "/v1/scenes/two-dof")])
 def test_uploads_and_pictures_leave_others_alone(service: Besieged, attack: Attack, path: str) -> None:
     attack(service, "ann", 12, [path])

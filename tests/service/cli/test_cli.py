@@ -279,6 +279,7 @@ def test_an_option_replaces_the_key_of_the_file(run: Run, tmp_path: Path) -> Non
     assert json.loads(out)["limit"] == 1.5
 
 
+@pytest.mark.long
 def test_a_robust_design_shows_both_optima_side_by_side(run: Run, tmp_path: Path) -> None:
     (tmp_path / "problem.toml").write_text(
         "samples = 4\nharmonics = 3\n[variables]\n'damper.N0' = [60, 200]\n"
@@ -293,6 +294,7 @@ def test_a_robust_design_shows_both_optima_side_by_side(run: Run, tmp_path: Path
     assert "bad.toml: /uncertain/damper.mu" in run("design two-dof --problem bad.toml")[2]
 
 
+@pytest.mark.long
 def test_a_front_is_that_of_the_design_layer(run: Run, tmp_path: Path) -> None:
     arguments = "pareto two-dof --variable damper.N0 20 1000 --limit 1.5 --points 4 --harmonics 3"
     status, out, _ = run(f"{arguments} --plot picture.svg --json")

@@ -83,6 +83,7 @@ def results() -> dict[str, Any]:
     }
 
 
+@pytest.mark.long
 def test_a_stored_result_is_drawn_as_the_computed_one() -> None:
     for kind, computed in results().items():
         page = result_figure(kind, computed.to_json(), [], lambda _: pytest.fail("no sweep is needed"))

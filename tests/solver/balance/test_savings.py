@@ -37,6 +37,7 @@ def frequencies(scene: Scene) -> list[float]:
     return [low + share * (high - low) for share in (0.13, 0.37, 0.61, 0.85)]
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("every", [2, pytest.param(1, marks=pytest.mark.long)])
 @pytest.mark.parametrize("switch", [*SWITCHES, "everything"])
 @pytest.mark.parametrize("index", range(len(SCENES)), ids=lambda index: SCENES[index].name)

@@ -59,6 +59,7 @@ def test_force_is_that_of_the_integrated_law():
     assert min(seen[SLIPPING], seen[LIFTING]) >= 2, seen
 
 
+@pytest.mark.long
 def test_extremes_are_the_integrated_law_too():
     compared = 0
     for kind, element in extreme_elements(3, 14):
@@ -169,6 +170,7 @@ def test_every_derivative_in_every_state():
     assert min(seen[state] for state in (STUCK, SLIPPING, LIFTING)) >= 4, seen
 
 
+@pytest.mark.long
 def test_derivatives_on_both_sides_of_every_change():
     changes = 0
     for element in random_elements(12, 5, top=5):

@@ -53,6 +53,7 @@ def assert_followed(seed: int) -> None:
         assert abs(branch.values[-1] - 310.0) < 2.0, seed
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("seed", range(3))
 def test_random_wedges_are_followed(seed: int) -> None:
     assert_followed(seed)

@@ -63,6 +63,7 @@ def blade_spring(name: str) -> np.ndarray:
     return part
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("name", ["tip_middle", "root_disk"])
 def test_a_mistuned_part_of_the_matrices_is_the_mistuned_spring(name: str) -> None:
     mistuning = {"of": [name], "values": FACTORS}

@@ -22,6 +22,7 @@ def agrees(given: Scene, frequency_hz: float, harmonics: int, *, rel: float) -> 
     assert solution.half_peak_to_peak == pytest.approx(marched.half_peak_to_peak, rel=rel)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("frequency_hz", others_long((250.0, 330.0, 420.0), keep=(330.0,)))
 def test_a_pressed_wedge_agrees_with_the_march(frequency_hz: float) -> None:
     given = Scene.from_dict(planar_wedge())
@@ -63,6 +64,7 @@ def test_a_block_in_space_agrees_with_the_march() -> None:
     agrees(given, 240.0, 25, rel=1e-6)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("limit", ["circle", "box"])
 def test_a_block_under_loads_that_move_agrees_with_the_march(limit: str) -> None:
     raw = block_in_space(law="coulomb-3d", limit=limit, kn=3e6, N0=60.0, prestressed=True)

@@ -39,6 +39,7 @@ def test_every_figure_has_a_script() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize(
     "script",
     [pytest.param(script, marks=pytest.mark.long if script.stem in SLOW else ()) for script in SCRIPTS],

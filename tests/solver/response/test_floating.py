@@ -243,6 +243,7 @@ def test_a_damper_that_sticks_now_and_then_in_a_disk():
     assert np.isnan(low) or high - low <= 1e3 * solution.half_peak_to_peak
 
 
+@pytest.mark.long
 def test_the_rest_of_a_branch_by_points():
     """A drive by points ends where the branch does, as ratcheting; where a part stands costs no steps."""
     held, driven = (pulled(two_blades(), dof, 5.0) for dof in ("b1", "d"))

@@ -77,6 +77,7 @@ def test_linear_limits_have_the_multipliers_of_their_poles(name: str):
     assert found.radius == pytest.approx(np.abs(expected).max(), rel=1e-11)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("scene", "frequency_hz", "harmonics"),
     [

@@ -244,6 +244,7 @@ WORST: dict[str, tuple[Scene, str, tuple[float, float], str]] = {
 }
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", sampled(WORST, 2))
 def test_the_worst_of_a_response_is_that_of_a_dense_grid(name: str) -> None:
     here, contact, (low, high), _ = WORST[name]

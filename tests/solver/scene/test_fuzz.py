@@ -203,6 +203,7 @@ def check_file(name: str, data: bytes, folder: Path) -> None:
 KNOWN = settings(parent=FEW, derandomize=True)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", FILES)
 def test_a_damaged_file_of_matrices(name: str, tmp_path: Path) -> None:
     @(KNOWN if name.endswith(".mat") else FEW)

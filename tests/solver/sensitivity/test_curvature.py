@@ -94,6 +94,7 @@ PEAKS: dict[str, tuple[Scene, float, tuple[str, ...]]] = {
 }  # fmt: skip
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     "case", others_long(PEAKS, keep=("two-dof", "two-dof, second peak", "bladed disk, separating"))
 )
@@ -102,6 +103,7 @@ def test_the_hessian_of_a_peak_equals_differences_through_the_sweep(case: str) -
     check_hessian_of_a_peak(scene, near, paths)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("half_power", [False, True])
 def test_band_edges_to_second_order(half_power: bool) -> None:
     """With a fixed limit, and with one that is a share of the peak."""

@@ -152,6 +152,7 @@ def test_everything_is_told_in_one_line() -> None:
     assert [one for one in shown if "\n" in repr(one) or len(repr(one)) > 2000] == []
 
 
+@pytest.mark.few(3)
 def test_a_result_draws_itself(result: Any) -> None:
     if isinstance(result, solver.Plan):
         return

@@ -71,6 +71,7 @@ def _ways(count: int, contacts: int, length: float) -> Way:
     )  # fmt: skip
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("damping", FORM)
 def test_what_is_said_not_to_be_exceeded_is_not(damping: str) -> None:
     """Short ways and long ones, limits below and above the largest motion: never wrong, and often told."""

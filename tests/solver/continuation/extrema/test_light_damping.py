@@ -43,6 +43,7 @@ def test_a_scene_with_a_narrow_resonance(name):
 
 
 # Every third has scenes of each of the kinds.
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", sampled([*range(SUITE), *HARD], 3, keep=HARD))
 def test_random_scene(seed):
     scene, _, harmonics = light_scene(seed)
@@ -128,6 +129,7 @@ def test_least_peak_over_a_load(name, share):
     check_least_peak(scene, path, share * load, 3.0 * load, 3)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("seed", [2, 3, 7, 13, 21, 22])
 def test_least_peak_of_a_random_scene(seed):
     scene, _, harmonics = light_scene(seed)

@@ -111,6 +111,7 @@ OTHERS = [
 ]
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("points", [15, pytest.param(121, marks=pytest.mark.long)])
 @pytest.mark.parametrize(("name", "path", "low", "high"), OTHERS)
 def test_other_parameters_against_brute_force(
@@ -140,6 +141,7 @@ def test_two_peaks_close_beside_each_other() -> None:
         assert highest(scene, "shroud.N0", float(value))[0] >= best.peak * (1.0 - 1e-8)
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("points", [13, pytest.param(81, marks=pytest.mark.long)])
 @pytest.mark.parametrize("ratio", [0.6, 1.5, 2.5])
 def test_loads_that_vary_as_far_as_separation(ratio: float, points: int) -> None:
@@ -168,6 +170,7 @@ def check_random(seed: int, points: int) -> None:
             assert branch.peak.value >= best.peak * (1.0 - 1e-8)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", others_long([2, 8, 14, 30, 34, 37, 48, 72], keep=(2, 30, 48, 72)))
 def test_random_scenes_against_brute_force(seed: int) -> None:
     check_random(seed, 13)

@@ -29,6 +29,7 @@ RANGES: dict[str, tuple[Scene, str, float, float]] = {
 }
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     "law",
     [law if law != "coulomb-3d" else pytest.param(law, marks=pytest.mark.long) for law in RANGES],
@@ -45,6 +46,7 @@ def test_the_least_peak_of_a_law_is_that_of_brute_force(law: str) -> None:
     assert min(around) == pytest.approx(best.peak, rel=1e-6)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("law", ["elastic-normal", "gap", pytest.param("coulomb-3d", marks=pytest.mark.long)])
 def test_a_track_of_a_law_is_the_highest_peak_of_sweeps(law: str) -> None:
     """Height and slope: the slope against differences of sweeps."""
