@@ -119,7 +119,7 @@ def test_a_disk_that_is_full_for_a_while(tmp_path: Path, small_disk: Path, numbe
 
 # Four: the server's own, and those after which another service goes on with the jobs.
 @pytest.mark.long
-@pytest.mark.parametrize("number", [4, pytest.param(100, marks=pytest.mark.long)])
+@pytest.mark.parametrize("number", [4, 100])
 def test_services_and_a_dispatcher_on_postgresql(cluster: Cluster, tmp_path: Path, number: int) -> None:
     with cluster.database(empty=False) as url:
         site = Site(url, tmp_path, [free_port(), free_port(), None])

@@ -43,7 +43,6 @@ def test_a_scene_with_a_narrow_resonance(name):
 
 
 # Every third has scenes of each of the kinds.
-@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", sampled([*range(SUITE), *HARD], 3, keep=HARD))
 def test_random_scene(seed):
     scene, _, harmonics = light_scene(seed)
