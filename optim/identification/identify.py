@@ -16,6 +16,7 @@ from optim.identification.fit.least_squares import LocalFit, Noise
 from optim.identification.fit.starts import MOST_STARTS, STARTS, Searched, search
 from optim.identification.identifiability import strong_correlations, untold
 from optim.identification.information import UNIFORM, Information, information
+from optim.identification.model_check import doubts
 from optim.identification.next_measurement import rank, read_candidates
 from optim.identification.reading import Given, read_data
 from optim.identification.result import Estimate, Identification, IdentifyStatus, NotReached
@@ -31,7 +32,7 @@ from solver.scene.scene import Scene
 
 _BOUND = 1e-6  # scaled distance from a bound within which an estimate lies on it
 _IMPLAUSIBLE = 200.0  # ratio of measured to computed amplitudes, over a whole run, that is a wrong unit
-_MOST_SCATTER = 0.25  # relative noise; responses of rigs repeat to a few per cent
+_MOST_SCATTER = 0.15  # relative noise; responses of rigs repeat to a few per cent
 _MISFIT = 2.0  # reduced χ² of given noise above which the model does not describe the data
 
 
@@ -100,7 +101,10 @@ def identify(
     _check_plausible(runs, found.best)
     level_known = found.best.level == 1.0
     info = information(runs, found.best, robust=robust, level_known=level_known)
-    result = _described(runs, found, found.best, info, level_known=level_known, noise=noise)
+    size = _misfit(info.reduced_chi2) if level_known else _scatter(found.best.level)
+    misfit = f"{size} {doubts(runs, found.best, robust=robust)}".strip()
+    level = found.best.level if not level_known else math.nan if noise is None else noise
+    result = _described(runs, found, found.best, info, misfit, level)
     ranked = rank(runs, found.best, info, conditions)
     return replace(result, candidates=ranked, seconds=time.perf_counter() - begun)
 
@@ -140,13 +144,13 @@ def _check_plausible(runs: Runs, best: LocalFit) -> None:
 
 
 def _described(
-    runs: Runs, found: Searched, best: LocalFit, info: Information, *, level_known: bool, noise: float | None
+    runs: Runs, found: Searched, best: LocalFit, info: Information, misfit: str, noise: float
 ) -> Identification:
-    """Return everything but the candidates."""
+    """Return everything but the candidates; intervals only of a model that describes the data."""
     unknowns, z = runs.unknowns, best.fitted.z
     covariance = info.covariance()
     slopes, values = unknowns.slopes(z), unknowns.values(z)
-    estimates = _estimates(runs.scene, unknowns, z, info)
+    estimates = _estimates(runs.scene, unknowns, z, info, doubtful=bool(misfit))
     in_units = covariance * np.outer(slopes, slopes)
     spread = np.sqrt(np.diag(covariance))
     missing = untold(runs.scene, unknowns, z, info, best.fitted.states)
@@ -154,12 +158,13 @@ def _described(
     status = IdentifyStatus.UNTOLD if missing else IdentifyStatus.KNOWN
     if left_out:
         status = IdentifyStatus.LEFT_OUT
+    if misfit:
+        status = IdentifyStatus.MODEL_DOUBTFUL
     if not best.converged:
         status = IdentifyStatus.NOT_CONVERGED
     by_path = unknowns.by_path(z)
     here = runs.scene.with_values(by_path)
     intervals = clipped(unknowns, np.array([one.interval for one in estimates]))
-    misfit = _misfit(info.reduced_chi2) if level_known else _scatter(best.level)
     others = [
         {**dict(zip(unknowns.names, unknowns.values(z_other).tolist(), strict=True)), "misfit": ratio}
         for z_other, ratio in found.others
@@ -167,11 +172,10 @@ def _described(
     return Identification(
         scene=runs.scene.name, status=status, estimates=estimates, covariance=in_units,
         correlation=covariance / np.outer(spread, spread),
-        noise=(math.nan if noise is None else noise) if level_known else best.level,
-        reduced_chi2=info.reduced_chi2, misfit=misfit, untold=missing,
+        noise=noise, reduced_chi2=info.reduced_chi2, misfit=misfit, untold=missing,
         correlated=strong_correlations(unknowns, info), candidates=(),
         runs=_curves(runs, best, covariance), not_reached=left_out,
-        uncertain=uncertain_table(here, unknowns, values, in_units, intervals, told=not missing),
+        uncertain=uncertain_table(here, unknowns, values, in_units, intervals, told=not (missing or misfit)),
         values=by_path, other_optima=tuple(others), starts=found.starts, agreeing=found.agreeing,
         evaluations=runs.evaluations, harmonics=runs.harmonics, seconds=0.0,
     )  # fmt: skip
@@ -200,12 +204,12 @@ def _scatter(level: float) -> str:
 
 
 def _estimates(
-    scene: Scene, unknowns: Unknowns, z: Real, info: Information
-) -> tuple[Estimate, ...]:  # fmt: skip
+    scene: Scene, unknowns: Unknowns, z: Real, info: Information, *, doubtful: bool
+) -> tuple[Estimate, ...]:
     """Return each unknown with its interval, which is symmetric in the scaled unknown."""
     factor, found, errors = info.quantile(), [], info.standard_errors().tolist()
     for i, variable in enumerate(unknowns.variables):
-        sd, told = errors[i], errors[i] < UNIFORM
+        sd, told = errors[i], errors[i] < UNIFORM and not doubtful
         value = variable.outside(float(z[i]))
         ends = [value + sign * factor * sd * variable.slope(value) for sign in (-1.0, 1.0)]
         if variable.logarithmic and told:

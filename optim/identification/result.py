@@ -24,6 +24,10 @@ class IdentifyStatus(Enum):
         "and which "
         "measurement would."
     )
+    MODEL_DOUBTFUL = (
+        "The fit is the best found, but what it leaves over is not noise: see the warning. No intervals are "
+        "given; mend the scene or the data, or look for another parameter as well."
+    )
     LEFT_OUT = (
         "The fit is the best found, but at some points measured no response was found; they do not count: "
         "try more "
@@ -53,7 +57,7 @@ class Estimate:
     interval : (float, float)
         Of 95 %; the bounds where the data do not tell it.
     told : bool
-        Whether data and priors tell more of it than its bounds.
+        Whether data and priors tell more of it than its bounds; of a model that is doubtful they do not.
     at_bound : bool
         Whether it lies on one of them.
     low, high : float
@@ -97,8 +101,9 @@ class Identification(Drawn):
         Mean square of the residuals over the noise; about 1 where the model describes the data and the noise
         was given, 1 by construction where it was not.
     misfit : str
-        What a large `reduced_chi2` of given noise says, or a `noise` found that is larger than measurements
-        have; else empty.
+        Why the model does not describe the data, see `optim.identification.model_check`: residuals that hang
+        together or that something held fixed would explain, above the noise given, or larger than
+        measurements scatter; else empty. No unknown is then told.
     untold : tuple of Untold
     correlated : tuple of (name, name, correlation)
     candidates : tuple of Candidate

@@ -65,8 +65,10 @@ def point_variables(
     """
     from solver.response.contact_response import state_of
 
+    # `max_abs` is the word that `solve` and measured data have for it; `amplitude` stays for who reads it.
+    columns = {**columns, **({"max_abs": columns["amplitude"]} if "amplitude" in columns else {})}
     told = {
-        "parameter": (unit, path), "amplitude": ("m", AMPLITUDE),
+        "parameter": (unit, path), "amplitude": ("m", AMPLITUDE), "max_abs": ("m", AMPLITUDE),
         "half_peak_to_peak": ("m", "(max x - min x) / 2"), "mean": ("m", "mean of the observed DOF"),
         "residual": ("", "relative residual"),
     }  # fmt: skip

@@ -96,6 +96,13 @@ class Measured(ABC):
     def to_json(self, fitted: Real, sd: Real) -> dict[str, object]:
         """Return data, fit and standard deviation of the fit, (n,) each, as curves for people."""
 
+    def curves(self, values: Real) -> Sequence[Real]:  # noqa: ARG002
+        """Return values of the observations, (n,), as curves in the order they were measured in.
+
+        None where their order means nothing.
+        """
+        return ()
+
     @property
     def unit_words(self) -> str:
         """What the observations are, with their unit."""

@@ -68,6 +68,10 @@ class ModeRun(Measured):
         """As the base says."""
         return self.sd
 
+    def curves(self, values: Real) -> Sequence[Real]:
+        """As the base says: frequencies and damping ratios over the amplitude."""
+        return tuple(values.reshape(-1, self.amplitude.size))
+
     @property
     def unit_words(self) -> str:
         """As the base says."""

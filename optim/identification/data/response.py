@@ -73,6 +73,10 @@ class ResponseRun(Measured):
         """As the base says."""
         return None if self.sd is None else np.repeat(self.sd, self.parts)
 
+    def curves(self, values: Real) -> Sequence[Real]:
+        """As the base says: amplitudes, or real and imaginary parts, over the frequency."""
+        return tuple(values.reshape(-1, self.parts).T)
+
     def sizes(self, values: Real) -> Real:
         """Return the amplitude of each point, (m,), of observations."""
         return np.asarray(np.linalg.norm(values.reshape(-1, self.parts), axis=1))
@@ -217,7 +221,9 @@ KIND = DataKind(
     columns=(
         Column("frequency", Dimension.FREQUENCY, "Of the excitation."),
         Column(
-            "amplitude", Dimension.MOTION, "Of one harmonic of the motion, the first unless `harmonic` says."
+            "amplitude",
+            Dimension.MOTION,
+            "Of one harmonic of the motion, the first unless `harmonic` says; `harmonic_3`: of the third.",
         ),
         Column("phase", Dimension.ANGLE, "By which that harmonic is ahead of the excitation."),
         Column("real", Dimension.MOTION, "Real part of the same, x = Re(x̂ e^{iωt}) under a force F cos ωt."),

@@ -18,6 +18,7 @@ from solver.jit.fourier import Integer
 from solver.wording import listing, nearest
 
 _PAIR = re.compile(r"^\s*#?\s*(?P<key>[A-Za-z_][\w.@-]*)\s*[=:]\s*(?P<value>.+?)\s*$")
+_HARMONIC = re.compile(r"harmonic_(?P<number>[1-9]\d*)")
 KIND_WORD = "kind"
 
 
@@ -77,7 +78,8 @@ def table_of(
     Parameters
     ----------
     source, place : where it stands.
-    heads : names with units; a name is one of `known_columns` or a parameter path.
+    heads : names with units; a name is one of `known_columns` or a parameter path; ``harmonic_3`` is the
+        amplitude of harmonic 3.
     columns : numbers of each.
     head : conditions and words for all rows.
     lines : of the rows; head_line : of the heads.
@@ -90,8 +92,11 @@ def table_of(
     known = known_columns()
     named: dict[str, Real] = {}
     units: dict[str, Unit] = {}
+    words = dict(head.words)
     for text, values in zip(heads, columns, strict=True):
         name, unit_text = split_head(text)
+        if told := _HARMONIC.fullmatch(name):
+            name, words["harmonic"] = "amplitude", told["number"]
         if name in named:
             raise DataError(source, name, "must be a column once", line=head_line, place=place)
         if name in paths:
@@ -109,6 +114,6 @@ def table_of(
             raise DataError(source, unit_text, wanted, line=head_line, column=name, place=place)
         named[name], units[name] = values * unit.factor, unit
     return Table(
-        source=source, columns=named, units=units, conditions=head.conditions, words=head.words,
+        source=source, columns=named, units=units, conditions=head.conditions, words=words,
         lines=np.zeros(0, np.int64) if lines is None else lines, place=place,
     )  # fmt: skip
