@@ -13,7 +13,8 @@ from solver.results.watch import ShouldStop
 
 CLAIMS = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.APPROXIMATE)
 MOST_HARMONICS = 60  # beyond that a design is not looked at with more
-_RUNGS = (2, 4)  # times the harmonics asked for; more of them cost more than a search was asked to
+_RUNGS = 4  # times the harmonics asked for, at most: more of them cost more than a search was asked to
+_FEW = 12  # harmonics that a search may have though it was asked for fewer
 
 
 def well_known(problem: Problem, evaluation: Evaluation) -> bool:
@@ -41,12 +42,12 @@ def with_enough(result: DesignResult, should_stop: ShouldStop) -> tuple[Problem 
     problem, evaluation, responses = result.problem, result.evaluation, 0
     if result.status not in CLAIMS or evaluation is None or well_known(problem, evaluation):
         return None, 0
-    for times in _RUNGS:
-        if times * problem.harmonics > MOST_HARMONICS or (should_stop is not None and should_stop()):
-            break
-        more = replace(problem, harmonics=times * problem.harmonics)
+    harmonics, most = 2 * problem.harmonics, max(_RUNGS * problem.harmonics, _FEW)
+    while harmonics <= min(most, MOST_HARMONICS) and not (should_stop is not None and should_stop()):
+        more = replace(problem, harmonics=harmonics)
         found = evaluate(more, result.optimum, gradients=False, should_stop=should_stop)
         responses += len(found.responses)
         if found.good and well_known(more, found):
             return replace(more, start=dict(result.optimum)), responses
+        harmonics *= 2
     return None, responses
