@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
@@ -13,6 +14,7 @@ from optim.criteria.evaluation import natural_scales
 from optim.criteria.linearised import conditions, model_of
 from optim.methods.afterwards import looked_after, settled_status
 from optim.methods.eased import Eased
+from optim.methods.enough_harmonics import honest, with_enough
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.global_look import WholeRange
 from optim.methods.kkt import FLAT_SLOPE, Local, LocalSearch
@@ -83,10 +85,33 @@ def solve_problem(
     if problem.method is Method.PERFORMANCE_CURVE:
         return _by_curve(problem, on_progress, should_stop)
     tally = Tally(on_progress)
-    found = looked_after(_solved(problem, tally.searching, should_stop, on_best), should_stop, tally.further)
+    found = _solved(problem, tally.searching, should_stop, on_best)
+    found = _with_enough_harmonics(found, tally, should_stop, on_best)
+    found = looked_after(found, should_stop, tally.further)
     if found.evaluation is not None:
         tally.tell(1.0)
     return found
+
+
+def _with_enough_harmonics(
+    found: DesignResult, tally: Tally, should_stop: ShouldStop, on_best: OnBest
+) -> DesignResult:
+    """Search again with more harmonics where those asked for leave the peak of the optimum in doubt."""
+    problem, responses = with_enough(found, should_stop)
+    spent = {
+        "evaluations": found.evaluations + responses, "work": found.work + responses,
+    }  # fmt: skip
+    if problem is None:
+        return replace(found, **spent)  # type: ignore[arg-type]
+    again = _solved(problem, tally.again(found.evaluations + responses), should_stop, on_best)
+    if again.status is DesignStatus.STOPPED:
+        return replace(found, status=DesignStatus.STOPPED, **spent)  # type: ignore[arg-type]
+    if again.evaluation is None or not again.evaluation.good:
+        return replace(found, **spent)  # type: ignore[arg-type]
+    return replace(
+        again, evaluations=again.evaluations + found.evaluations + responses,
+        work=again.work + found.work + responses, seconds=again.seconds + found.seconds,
+    )  # fmt: skip
 
 
 def _solved(
@@ -209,13 +234,14 @@ def _by_curve(problem: Problem, on_progress: OnProgress, should_stop: ShouldStop
     if evaluation is not None and evaluation.good:
         model = model_of(evaluation, problem.variables, evaluation.objective, natural_scales(problem))
         found = conditions(model, problem.variables)
-    return DesignResult(
+    result = DesignResult(
         problem=problem, method=Method.PERFORMANCE_CURVE, status=by_curve.status, evaluation=evaluation,
         conditions=found, basins=(), curve=by_curve.check,
         history=() if evaluation is None else (evaluation,),
         evaluations=0 if evaluation is None else 1, work=0.0 if evaluation is None else 1.0,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
+    return honest(result)
 
 
 def _of_tracked(problem: Problem, tracked: Tracked, seconds: float) -> DesignResult:

@@ -9,19 +9,19 @@ from dataclasses import replace
 from optim.criteria.evaluation import evaluate, natural_scales
 from optim.criteria.linearised import Conditions, conditions, model_of
 from optim.criteria.rows import Evaluation
+from optim.methods.enough_harmonics import MOST_HARMONICS, honest
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.kkt import KEPT, KKT_TOLERANCE
 from optim.methods.plateau import Plateau, Tick, nothing, plateau_of
 from optim.results.basins import Basin, Checked
 from optim.results.design import DesignResult, DesignStatus
 from optim.results.doubts import DOUBTFUL, open_peaks
-from optim.results.json import errors_of
+from optim.results.json import known_parts
 from solver.results.watch import ShouldStop
 
 HELD = 1e-7  # multiplier of a bound, relative objective per scaled variable, from which it holds the design
 MOST_CHECKED = 4
 MOST_AGAIN = 3  # times that a plateau leads to a better design
-MOST_HARMONICS = 60  # beyond that an optimum is not checked with twice as many
 
 
 def settled_status(found: Conditions) -> DesignStatus:
@@ -47,7 +47,7 @@ def looked_after(result: DesignResult, should_stop: ShouldStop, tick: Tick = not
             found = _checked(_level(found, should_stop, tick), should_stop, tick)
         except StoppedError:
             found = replace(found, status=DesignStatus.STOPPED)
-    return replace(_proven(found), seconds=result.seconds + time.perf_counter() - begun)
+    return replace(honest(_proven(found)), seconds=result.seconds + time.perf_counter() - begun)
 
 
 def _proven(result: DesignResult) -> DesignResult:
@@ -142,7 +142,7 @@ def _checked(result: DesignResult, should_stop: ShouldStop, tick: Tick) -> Desig
     few = result.problem.harmonics
     if result.evaluation is None or 2 * few > MOST_HARMONICS or result.status is DesignStatus.FLAT:
         return result
-    if not any(error > DOUBTFUL * peak for _, peak, error in errors_of(result.evaluation)):
+    if not any(known.relative > DOUBTFUL for _, known in known_parts(result.evaluation)):
         return result
     problem = replace(result.problem, harmonics=2 * few)
     designs = [result.optimum, *(dict(basin.values) for basin in result.basins[1:MOST_CHECKED])]

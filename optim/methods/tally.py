@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from solver.results.watch import OnProgress
 
 SEARCHED = 0.75  # share of the progress that the search has
@@ -24,11 +26,17 @@ class Tally:
     def __init__(self, on_progress: OnProgress) -> None:
         self._on_progress = on_progress
         self._count = self._afterwards = 0
+        self._searched = 0.0
 
     def searching(self, share: float, count: int) -> None:
         """Hear of the search: the `on_progress` to give to it."""
         self._count = count
-        self.tell(SEARCHED * share)
+        self._searched = max(self._searched, SEARCHED * share)
+        self.tell(self._searched)
+
+    def again(self, before: int) -> Callable[[float, int], None]:
+        """Return the `on_progress` of a search that follows after so many evaluations."""
+        return lambda share, count: self.searching(share, before + count)
 
     def further(self) -> None:
         """Hear of another evaluation after the search."""

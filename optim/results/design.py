@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import ClassVar
@@ -22,13 +22,14 @@ from optim.results.json import (
     basin_json,
     checked_json,
     conditions_json,
-    errors_of,
+    known_parts,
     looked_json,
     number,
     row_json,
 )
 from solver.continuation.branch import Branch
-from solver.results.base import Drawn
+from solver.results.base import Drawn, MadeOfResponses
+from solver.results.known import Known
 from solver.results.told import Piece
 from solver.results.views import Views
 
@@ -82,6 +83,11 @@ class DesignStatus(Enum):
         "`stickslip modes` where the curve ends."
     )
     TOO_MANY = "The largest number of responses was used up before the search settled: allow more."
+    NOT_KNOWN = (
+        "No better design is near with these harmonics, but its highest peak is not known within 5 %, and "
+        "more harmonics that the search may afford do not mend that: ask for more harmonics, or see what the "
+        "warnings say."
+    )
     STOPPED = "The search was stopped by the caller."
 
 
@@ -96,7 +102,7 @@ class DesignPeak(Piece):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class DesignResult(Drawn):
+class DesignResult(MadeOfResponses, Drawn):
     """The best design found.
 
     Attributes
@@ -184,11 +190,15 @@ class DesignResult(Drawn):
 
     @property
     def error_estimate(self) -> float:
-        """Estimated error [m] of the highest peak of the case that holds the optimum; NaN if not known."""
+        """Estimated error [m] of the highest peak of the case that holds the optimum; NaN if not known.
+
+        It is of the `measure` of `known`.
+        """
         held = self.held_by
         if held is None or self.evaluation is None:
             return math.nan
-        return next((e for case, _, e in errors_of(self.evaluation) if case == held.case), math.nan)
+        parts = dict(known_parts(self.evaluation))
+        return parts[held.case].error_estimate if held.case in parts else math.nan
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -278,7 +288,11 @@ class DesignResult(Drawn):
 
     VIEWS: ClassVar = Views("optim.views", "of_design", "design_dataset", "of_design")
 
-    def to_json(self) -> dict[str, object]:
+    def known_parts(self) -> Iterable[Known]:
+        """The response of each case over its band."""
+        return () if self.evaluation is None else [known for _, known in known_parts(self.evaluation)]
+
+    def own_json(self) -> dict[str, object]:
         """Return the result as one JSON object."""
         peak, evaluation = self.peak, self.evaluation
         peaks = () if evaluation is None else evaluation.peaks
@@ -287,6 +301,7 @@ class DesignResult(Drawn):
             "method": self.method.value,
             "optimum": dict(self.optimum),
             "peak": None if peak is None else {"value": peak.value, "at": peak.at},
+            "n_harmonics": self.problem.harmonics,
             "peaks": [{"value": p.value, "at": p.at_hz, "case": p.case} for p in peaks],
             "band_hz": self.band_hz,
             "limit": self.limit,
@@ -296,8 +311,8 @@ class DesignResult(Drawn):
             "held_by": None if self.held_by is None else row_json(self.held_by),
             "error_estimate": number(self.error_estimate),
             "errors": [
-                {"case": case, "peak": peak, "error_estimate": number(error)}
-                for case, peak, error in (() if evaluation is None else errors_of(evaluation))
+                {"case": case, "peak": number(known.value), **known.to_json()}
+                for case, known in (() if evaluation is None else known_parts(evaluation))
             ],
             "warnings": list(self.warnings),
             "plateau": {name: list(ends) for name, ends in self.plateau.items()},

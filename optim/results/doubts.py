@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 
 from optim.criteria.rows import Evaluation
 from optim.results.basins import Checked
-from optim.results.json import errors_of
+from optim.results.json import known_parts
+from solver.results.known import Known
 from solver.results.notes import flag_words
 
 DOUBTFUL = 0.1  # estimated error of a peak, relative, from which its harmonics are too few
+WELL_KNOWN = 0.05  # relative error of the highest peak up to which a design may be called the best
 
 
 def doubts_of(
@@ -52,11 +54,15 @@ def open_peaks(evaluation: Evaluation) -> list[str]:
 
 def _few_harmonics(evaluation: Evaluation, harmonics: int) -> list[str]:
     return [
-        f"too few harmonics: the estimated error of the peak of {case} is {100.0 * error / peak:.2g} % "
-        f"with {harmonics}: ask for more harmonics"
-        for case, peak, error in errors_of(evaluation)
-        if error > DOUBTFUL * peak
+        f"too few harmonics: the estimated error of the peak of {case} is {_share(known)} with {harmonics}: "
+        "ask for more harmonics"
+        for case, known in known_parts(evaluation)
+        if known.relative > WELL_KNOWN
     ]
+
+
+def _share(known: Known) -> str:
+    return f"{100.0 * known.relative:.2g} %" if math.isfinite(known.relative) else "not known"
 
 
 def _checked(checked: Sequence[Checked], optimum: Mapping[str, float], *, feasible: bool) -> list[str]:
@@ -77,5 +83,23 @@ def _checked(checked: Sequence[Checked], optimum: Mapping[str, float], *, feasib
 
 def _flags(evaluation: Evaluation) -> list[str]:
     """The flags of the responses, each once."""
-    flags = dict.fromkeys(flag for one in evaluation.responses for flag in one.branch.flags)
-    return flag_words(flags)
+    own = (flag for one in evaluation.responses for flag in one.branch.flags)
+    at_peaks = (flag for _, known in known_parts(evaluation) for flag in known.flags)
+    return flag_words(dict.fromkeys((*own, *at_peaks)))
+
+
+def doubt_of(evaluation: Evaluation, weights: Mapping[str, float]) -> float:
+    """Return by which share the highest weighted peak may be higher than it is, by the estimated errors.
+
+    Parameters
+    ----------
+    evaluation : of a design.
+    weights : of the cases.
+    """
+    parts = [(weights[case], known) for case, known in known_parts(evaluation)]
+    # Each in its own measure; a case far below the highest may be wrong by more.
+    top = max((weight * known.value for weight, known in parts), default=math.nan)
+    if not top > 0.0:
+        return 0.0
+    reached = max(weight * known.value * (1.0 + known.relative) for weight, known in parts)
+    return reached / top - 1.0

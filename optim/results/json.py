@@ -9,19 +9,25 @@ from optim.criteria.linearised import Conditions
 from optim.criteria.rows import Evaluation
 from optim.results.basins import Basin, Checked
 from solver.continuation.branch import Branch
+from solver.results.known import Known
 
 
-def bands_json(evaluation: Evaluation) -> list[dict[str, object]]:
-    """Return where the resonance band of each case lies; the first response of a case is that of its band."""
+def over_bands(evaluation: Evaluation) -> dict[str, Branch]:
+    """Return of each case the response over its band, which is its first."""
     first: dict[str, Branch] = {}
     for response in evaluation.responses:
         first.setdefault(response.case, response.branch)
+    return first
+
+
+def bands_json(evaluation: Evaluation) -> list[dict[str, object]]:
+    """Return where the resonance band of each case lies."""
     return [
         {
             "case": case, "limit": branch.band.limit, "width_hz": branch.band.width,
             "intervals_hz": [list(interval) for interval in branch.band.intervals],
         }
-        for case, branch in first.items()
+        for case, branch in over_bands(evaluation).items()
         if branch.band is not None
     ]  # fmt: skip
 
@@ -35,12 +41,9 @@ def row_json(row: Row) -> dict[str, object]:
     }  # fmt: skip
 
 
-def errors_of(evaluation: Evaluation) -> list[tuple[str, float, float]]:
-    """Return for the response of each case over its band its name, highest peak [m] and the error of that."""
-    first: dict[str, Branch] = {}
-    for response in evaluation.responses:
-        first.setdefault(response.case, response.branch)
-    return [(case, b.peak.value, b.error_estimate) for case, b in first.items() if b.peak is not None]
+def known_parts(evaluation: Evaluation) -> list[tuple[str, Known]]:
+    """Return for the response of each case over its band its name and how well its peak is known."""
+    return [(case, b.known) for case, b in over_bands(evaluation).items() if b.peak is not None]
 
 
 def looked_json(one: Evaluation) -> dict[str, object]:

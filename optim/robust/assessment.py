@@ -16,12 +16,16 @@ from optim.robust.risk_measure import rank_of
 from optim.robust.scenarios import Outcome
 from optim.robust.search import RobustSearch
 from optim.robust.worst_case import Aspect, UnknownScenarioError, pessimise
+from solver.results.known import worst_of
 
 CHECKED = 4  # of the samples, the worst, that the worst case is also climbed from
 
 
 def side_of(
-    search: RobustSearch, values: Mapping[str, float], drawn: Sequence[Scenario], known: Sequence[Scenario]
+    search: RobustSearch,
+    values: Mapping[str, float],
+    drawn: Sequence[Scenario],
+    scenarios: Sequence[Scenario],
 ) -> Side:
     """Return a design over the uncertainty.
 
@@ -30,18 +34,21 @@ def side_of(
     search : what is judged, and over what.
     values : the design.
     drawn : the samples.
-    known : scenarios that may be the worst.
+    scenarios : that may be the worst.
     """
     nominal = search.outcome(values, Scenario(), gradients=False)
     samples = [search.outcome(values, scenario, gradients=False) for scenario in drawn]
     peaks = [found.highest(PEAK) if found.good else None for found in samples]
-    worst, unknown = _worst(search, values, samples, known)
+    worst, unknown = _worst(search, values, samples, scenarios)
     peak, band = nominal.highest(PEAK), nominal.highest(BAND)
+    places = [Scenario()] if worst is None else [Scenario(), worst.scenario]
+    known = worst_of(search.known(values, scenario) for scenario in dict.fromkeys(places))
     return Side(
         values=dict(values), peak=math.nan if peak is None else peak.value,
         at_hz=math.nan if peak is None else peak.at_hz, band_hz=math.nan if band is None else band.value,
         worst=worst, spread=Spread(peaks=tuple(math.nan if row is None else row.value for row in peaks)),
-        feasible=unknown is None and _feasible(search, values, samples, known), unknown=unknown,
+        feasible=unknown is None and _feasible(search, values, samples, scenarios), unknown=unknown,
+        known=known,
     )  # fmt: skip
 
 

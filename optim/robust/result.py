@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
@@ -18,7 +18,9 @@ from optim.problem.words import Aim
 from optim.results.design import DesignResult
 from optim.robust.risk_measure import rank_of
 from optim.robust.scenarios import Outcome
-from solver.results.base import Drawn
+from solver.results.base import Drawn, MadeOfResponses
+from solver.results.known import NOTHING_KNOWN, Known
+from solver.results.order_statistics import quantile_json
 from solver.results.views import Views
 
 QUANTILES = (0.05, 0.5, 0.95)
@@ -55,6 +57,10 @@ class RobustStatus(Enum):
     NOT_CLOSED = (
         "The cuts did not close: worse scenarios than those the design was made for are left, the gap says "
         "by how much; narrow the uncertainty or use more harmonics."
+    )
+    NOT_KNOWN = (
+        "No better design is near with these harmonics, but its highest peak is not known within 5 %: ask "
+        "for more harmonics."
     )
     TOO_MANY = "The largest number of responses was used up before the search settled: allow more."
     STOPPED = "The search was stopped by the caller."
@@ -95,7 +101,7 @@ class Spread:
             "count": len(self.peaks),
             "mean": _number(self.mean),
             "deviation": _number(self.deviation),
-            "quantiles": [{"share": share, "peak": _number(self.quantile(share))} for share in shares],
+            "quantiles": [quantile_json("peak", self.quantile(share), self.peaks, share) for share in shares],
             "peaks": [_number(peak) for peak in self.peaks],
         }
 
@@ -118,6 +124,9 @@ class Side:
         Whether the limits are kept in every scenario that counts.
     unknown : Scenario or None
         The scenario that could not be computed, if the worst peak is not known for that.
+    known : Known
+        How well the highest peak is known, with every parameter at its nominal value and in the worst
+        scenario, whichever is less.
     """
 
     values: Mapping[str, float]
@@ -128,6 +137,7 @@ class Side:
     spread: Spread
     feasible: bool
     unknown: Scenario | None
+    known: Known = NOTHING_KNOWN
 
     @property
     def worst_peak(self) -> float:
@@ -153,6 +163,7 @@ class Side:
             "worst": worst,
             "samples": self.spread.to_json(quantile),
             "feasible": self.feasible,
+            **self.known.to_json(),
         }
 
 
@@ -179,7 +190,7 @@ class Cut:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class RobustResult(Drawn):
+class RobustResult(MadeOfResponses, Drawn):
     """The nominal and the robust optimum side by side.
 
     Attributes
@@ -254,7 +265,11 @@ class RobustResult(Drawn):
 
     VIEWS: ClassVar = Views("optim.views", "of_robust", "robust_dataset", "of_robust")
 
-    def to_json(self) -> dict[str, object]:
+    def known_parts(self) -> Iterable[Known]:
+        """The robust optimum, nominal and in its worst scenario; the nominal one where there is no other."""
+        return self.design.known_parts() if self.robust is None else (self.robust.known,)
+
+    def own_json(self) -> dict[str, object]:
         """Return the result as one JSON object."""
         found = self.conditions
         return {

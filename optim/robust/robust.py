@@ -31,6 +31,7 @@ from optim.problem.uncertainty_set import Scenario
 from optim.problem.words import Aim, Method
 from optim.results.best_so_far import OnBest
 from optim.results.design import DesignResult, DesignStatus
+from optim.results.doubts import WELL_KNOWN
 from optim.robust.assessment import side_of
 from optim.robust.cutting_sets import CLOSED, Progress, cutting_sets, sampled
 from optim.robust.result import RobustResult, RobustStatus, Side
@@ -149,6 +150,8 @@ def _run(
             search.problem, on_progress=count, should_stop=should_stop, on_best=search.nominal
         )
     )
+    # What is minimised over the uncertainty is judged with as many harmonics as the nominal optimum needs.
+    search.problem = replace(search.problem, harmonics=state.nominal.problem.harmonics)
     try:
         status = _search(search, drawn, state)
     except StoppedError as stop:
@@ -174,6 +177,8 @@ def _search(search: RobustSearch, drawn: tuple[Scenario, ...], state: _State) ->
         if unknown is not None:
             raise UnknownScenarioError(unknown)
         status = _honest(search, state, status)
+        if status is RobustStatus.OPTIMAL and state.sides["robust"].known.relative > WELL_KNOWN:
+            return RobustStatus.NOT_KNOWN
     return status
 
 

@@ -14,8 +14,11 @@ from optim.problem.cases import Case
 from optim.problem.problem import Problem
 from optim.problem.uncertainty_set import Coordinate, Scenario
 from optim.problem.variables import Real, Variable, parameter_values
+from optim.results.json import over_bands
 from solver.continuation.branches.observation import observing
 from solver.continuation.branches.sweep import sweep
+from solver.results.known import Known, worst_of
+from solver.studies.blades import blade_peaks
 
 ShouldStop = Callable[[], bool] | None
 
@@ -89,6 +92,24 @@ def outcome(
     )
 
 
+def known_in(
+    problem: Problem, values: Mapping[str, float], scenario: Scenario, should_stop: ShouldStop = None
+) -> Known:
+    """Return how well the highest peak of a design in a scenario is known: a response for each case.
+
+    Parameters
+    ----------
+    problem, values, scenario, should_stop : as in `outcome`.
+    """
+    design = parameter_values(problem.variables, values)
+    parts: list[Known] = []
+    for case in problem.cases:
+        nominal = case.scene.with_values(design)
+        chain = _Chain(problem, scenario, {path: nominal.value(path) for path in _touched(design, scenario)})
+        parts += chain.known(case, should_stop)
+    return worst_of(parts)
+
+
 def _touched(design: Mapping[str, float], scenario: Scenario) -> tuple[str, ...]:
     """Return every path whose value a design or a scenario sets."""
     uncertain = [path for coordinate, _ in scenario.settings for path in coordinate.paths]
@@ -114,14 +135,35 @@ class _Chain:
 
     def rows(self, case: Case, gradients: bool, should_stop: ShouldStop) -> tuple[list[Row], int]:
         """Return the rows of a case with their gradients by path, and the responses computed."""
-        disk, values = self._scenario.disk, self._values()
-        scene = case.scene if disk is None else disk.on(case.scene)
-        here = replace(case, scene=scene)
-        problem = replace(self._problem, variables=_single(values), cases=(here,))
-        if disk is not None and scene.structure.has_sectors and "@" not in scene.observe.dof:
-            return _of_all_blades(problem, here, values, gradients, should_stop)
+        problem, values = self._posed(case), self._values()
+        if self._of_every_blade(problem):
+            return _of_all_blades(problem, problem.cases[0], values, gradients, should_stop)
         evaluation = evaluate(problem, values, gradients=gradients, should_stop=should_stop)
         return list(evaluation.rows), len(evaluation.responses)
+
+    def known(self, case: Case, should_stop: ShouldStop) -> list[Known]:
+        """Return how well the peaks of a case are known."""
+        problem, values = self._posed(case), self._values()
+        if self._of_every_blade(problem):
+            scene = problem.cases[0].scene.with_values(values)
+            peaks = blade_peaks(
+                scene, harmonics=problem.harmonics, every_branch=False, should_stop=should_stop
+            )  # fmt: skip
+            return [peaks.highest]
+        evaluation = evaluate(problem, values, gradients=False, should_stop=should_stop)
+        return [branch.known for branch in over_bands(evaluation).values()]
+
+    def _posed(self, case: Case) -> Problem:
+        """Return the problem of one case in the scenario, every path a variable."""
+        disk = self._scenario.disk
+        here = case if disk is None else replace(case, scene=disk.on(case.scene))
+        return replace(self._problem, variables=_single(self._values()), cases=(here,))
+
+    def _of_every_blade(self, problem: Problem) -> bool:
+        """Return whether all blades of a mistuned disk count."""
+        scene = problem.cases[0].scene
+        mistuned = self._scenario.disk is not None and scene.structure.has_sectors
+        return mistuned and "@" not in scene.observe.dof
 
     def _members(self) -> Real:
         """Return d path / d variable, (n_variables, n_paths); its own derivatives are 0."""

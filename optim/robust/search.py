@@ -19,9 +19,10 @@ from optim.problem.words import Aim
 from optim.results.best_so_far import NOMINAL, BestSoFar, OnBest
 from optim.results.design import DesignStatus
 from optim.robust.risk_measure import aim_model
-from optim.robust.scenarios import Outcome, outcome, together
+from optim.robust.scenarios import Outcome, known_in, outcome, together
 from optim.robust.socp import solve_cone
 from optim.robust.worst_case import Aspect
+from solver.results.known import Known
 
 MOST_RESPONSES = 20_000
 USUAL = 200.0  # responses of a usual search; what is left is not known beforehand
@@ -88,6 +89,12 @@ class RobustSearch:
             raise StoppedError(DesignStatus.STOPPED)
         self._outcomes[place, scenario, gradients] = found
         self.count(found.responses)
+        return found
+
+    def known(self, values: Mapping[str, float], scenario: Scenario) -> Known:
+        """Return how well the highest peak of a design in a scenario is known."""
+        found = known_in(self.problem, values, scenario, self._should_stop)
+        self.count(len(self.problem.cases))
         return found
 
     def count(self, responses: int) -> None:

@@ -19,8 +19,9 @@ from optim.problem.numbers import number_pair
 from optim.studies.crossings import CampbellDiagram, CampbellStatus, Crossing, OrderResponse, Ranges
 from solver.balance.kernels.output import MAX_ABS
 from solver.balance.workspace import Workspace
-from solver.continuation.branch import Branch
+from solver.continuation.branch import Branch, Peak
 from solver.continuation.branches.sweep import sweep
+from solver.continuation.extrema.error_estimate import ErrorEstimator
 from solver.jit.fourier import Real
 from solver.results.default_bar import shows_progress
 from solver.results.watch import OnProgress, ShouldStop, part_of
@@ -28,6 +29,7 @@ from solver.scene.scene import Scene
 from solver.studies.natural_frequencies import natural_frequencies
 
 _MOST_ORDERS = 100
+_ROUNDING = 1e-9
 
 
 @shows_progress("campbell")
@@ -119,44 +121,84 @@ def _response(branch: Branch, order: int, speeds: Ranges, stuck: Real, free: Rea
     bands = () if branch.band is None else branch.band.intervals
     exceeded = _scaled(bands, per_hz)
     inside = tuple((max(a, c), min(b, d)) for a, b in exceeded for c, d in speeds if max(a, c) < min(b, d))
+    amplitudes = _Amplitudes(branch)
     peaks = sorted((peak for peak in branch.peaks if peak.interior), key=lambda peak: peak.at)
     top = max(branch.start, branch.stop)
     return OrderResponse(
         order=order, branch=branch, running_hz=_scaled(speeds, 1.0 / per_hz),
         limit=math.nan if branch.band is None else branch.band.limit, bands_hz=bands, exceeded_rpm=exceeded,
         exceeded_running_rpm=inside,
-        crossings=tuple(_crossing(peak.at, peak.value, order, speeds) for peak in peaks),
-        highest_running=_highest_running(branch, order, speeds),
+        crossings=tuple(_crossing(*amplitudes.of_peak(peak), order, speeds) for peak in peaks),
+        highest_running=_highest_running(amplitudes, order, speeds),
         stuck_hz=tuple(stuck[stuck <= top].tolist()), open_hz=tuple(free[free <= top].tolist()),
     )  # fmt: skip
 
 
-def _highest_running(branch: Branch, order: int, speeds: Ranges) -> Crossing | None:
+class _Amplitudes:
+    """Amplitudes of a response with their estimated errors, as (frequency [Hz], amplitude, error [m])."""
+
+    def __init__(self, branch: Branch) -> None:
+        self.branch = branch
+        self._workspace = Workspace.of(branch.balance)
+        self._estimator = ErrorEstimator(self._workspace)
+
+    def of_peak(self, peak: Peak) -> tuple[float, float, float]:
+        """Return a peak; of one that is no end the error is that across the branch."""
+        at = 2.0 * math.pi * peak.at
+        error = self._estimator.at(peak.solution, at, across=peak.interior)
+        return peak.at, peak.value, error.max_abs
+
+    def at(self, hertz: float) -> tuple[float, float, float] | None:
+        """Return the amplitude at a frequency of the response; None without a solution there."""
+        nearest = self.branch.solutions[int(np.argmin(np.abs(self.branch.values - hertz)))]
+        found = self._workspace.solve(2.0 * math.pi * hertz, nearest[:-1])
+        measured = self._workspace.measure(found.u, 2.0 * math.pi * hertz) if found.converged else None
+        if measured is None:
+            return None
+        error = self._estimator.at(found.u, 2.0 * math.pi * hertz)
+        return hertz, float(measured.values[MAX_ABS]), error.max_abs
+
+    @property
+    def elsewhere(self) -> float:
+        """What the response may reach at a place that it shows no peak at, by the harmonics left out [m].
+
+        It is in the error of the whole response, if that exceeds what its highest peak alone has.
+        """
+        peak, whole = self.branch.peaks[0], self.branch.error_estimate
+        alone = self.of_peak(peak)[2]
+        return peak.value + whole if whole > alone * (1.0 + _ROUNDING) else -math.inf
+
+
+def _highest_running(amplitudes: _Amplitudes, order: int, speeds: Ranges) -> Crossing | None:
     """Return the largest amplitude at running speeds: a peak there, or the response at an end of them."""
-    candidates = [(peak.value, peak.at) for peak in branch.peaks]
-    if len(branch.values):
-        workspace = Workspace.of(branch.balance)
-        low, high = float(branch.values.min()), float(branch.values.max())
-        for end in {order * speed / 60.0 for pair in speeds for speed in pair}:
-            if low <= end <= high:
-                nearest = branch.solutions[int(np.argmin(np.abs(branch.values - end)))]
-                found = workspace.solve(2.0 * math.pi * end, nearest[:-1])
-                measured = workspace.measure(found.u, 2.0 * math.pi * end) if found.converged else None
-                if measured is not None:
-                    candidates.append((float(measured.values[MAX_ABS]), end))
-    running = [one for one in candidates if _is_running(one[1] * 60.0 / order, speeds)]
+    branch = amplitudes.branch
+    if not branch.peaks:
+        return None
+    candidates = [amplitudes.of_peak(peak) for peak in branch.peaks]
+    low, high = float(branch.values.min()), float(branch.values.max())
+    for end in {order * speed / 60.0 for pair in speeds for speed in pair}:
+        found = amplitudes.at(end) if low <= end <= high else None
+        if found is not None:
+            candidates.append(found)
+    running = [one for one in candidates if _is_running(one[0] * 60.0 / order, speeds)]
     if not running:
         return None
-    value, at = max(running)
-    return _crossing(at, value, order, speeds)
+    at, value, _ = max(running, key=lambda one: one[1])
+    # A lower amplitude that is less well known may be the highest of all; one not known makes all unknown.
+    reached = [height + error for _, height, error in running] + [amplitudes.elsewhere]
+    error = max(reached) - value if all(map(math.isfinite, reached[:-1])) else math.nan
+    return _crossing(at, value, error, order, speeds)
 
 
-def _crossing(at_hz: float, amplitude: float, order: int, speeds: Ranges) -> Crossing:
+def _crossing(at_hz: float, amplitude: float, error: float, order: int, speeds: Ranges) -> Crossing:
     speed = at_hz * 60.0 / order
     inside = _is_running(speed, speeds)
     nearest = min((end for pair in speeds for end in pair), key=lambda end: abs(end - speed))
     margin = 0.0 if inside else abs(speed - nearest) / nearest
-    return Crossing(speed_rpm=speed, frequency_hz=at_hz, amplitude=amplitude, inside=inside, margin=margin)
+    return Crossing(
+        speed_rpm=speed, frequency_hz=at_hz, amplitude=amplitude, inside=inside, margin=margin,
+        error_estimate=error,
+    )  # fmt: skip
 
 
 def _is_running(speed: float, speeds: Ranges) -> bool:

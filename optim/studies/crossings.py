@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
 from solver.continuation.branch import Branch
-from solver.results.base import Drawn
+from solver.results.base import Drawn, MadeOfResponses
+from solver.results.known import Known
 from solver.results.views import Views
 from solver.scene.scene import Scene
 
@@ -42,6 +44,8 @@ class Crossing:
         Whether the speed is a running speed.
     margin : float
         Distance to the nearest running speed, relative to that; 0 inside.
+    error_estimate : float
+        Estimated error of the amplitude [m]; NaN if not known.
     """
 
     speed_rpm: float
@@ -49,6 +53,7 @@ class Crossing:
     amplitude: float
     inside: bool
     margin: float
+    error_estimate: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +77,8 @@ class OrderResponse:
     crossings : tuple of Crossing
         Every peak inside the range looked at, ascending.
     highest_running : Crossing or None
-        The largest amplitude at any running speed; None where the response does not reach one.
+        The largest amplitude at any running speed; None where the response does not reach one. Its error is
+        what any amplitude at a running speed may be higher by.
     stuck_hz, open_hz : tuple of float
         Undamped natural frequencies up to the end of the range with all contacts closed and stuck, and with
         all open [Hz]; of the order's nodal diameter if the structure is cyclic.
@@ -92,7 +98,7 @@ class OrderResponse:
 
     def to_json(self) -> dict[str, object]:
         """Return the response of the order as one JSON object."""
-        branch, highest = self.branch, self.highest_running
+        branch, highest, known = self.branch, self.highest_running, self.branch.known.to_json()
         return {
             "order": self.order,
             "range_hz": [branch.start, branch.stop],
@@ -111,14 +117,14 @@ class OrderResponse:
             "band_known": None
             if branch.band is None
             else branch.band.known and branch.peak_certificate.known,
-            "flags": list(branch.flags),
+            **{key: value for key, value in known.items() if key != "peaks_open"},
             "completed": branch.completed,
             "status": branch.status.value,
         }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class CampbellDiagram(Drawn):
+class CampbellDiagram(MadeOfResponses, Drawn):
     """Orders of a running speed against the resonances of a scene.
 
     Attributes
@@ -157,18 +163,30 @@ class CampbellDiagram(Drawn):
         """Whether the amplitude stays within the limit at every running speed; None if that is not known.
 
         Without a limit: whether no peak lies at a running speed. It is not known either where a peak may hide
-        between two points of a response, see `Branch.peak_certificate`.
+        between two points of a response, see `Branch.peak_certificate`, nor where the highest amplitude is
+        nearer to the limit than its estimated error, or has none.
         """
         if self.limit is None:
             meets = any(crossing.inside for one in self.orders for crossing in one.crossings)
         else:
             meets = any(one.exceeded_running_rpm for one in self.orders)
-        known = all(one.branch.peak_certificate.known for one in self.orders)
+        known = all(one.branch.peak_certificate.known and self._within(one) for one in self.orders)
         return False if meets else True if self.completed and known else None
+
+    def _within(self, one: OrderResponse) -> bool:
+        """Return whether the amplitude at running speeds stays within the limit whatever its error is."""
+        highest = one.highest_running
+        if self.limit is None or highest is None:
+            return True
+        return highest.error_estimate < self.limit - highest.amplitude
 
     VIEWS: ClassVar = Views("optim.views", "of_campbell", "campbell_dataset", "of_campbell")
 
-    def to_json(self) -> dict[str, object]:
+    def known_parts(self) -> Iterable[Known]:
+        """The response of every order."""
+        return [one.branch.known for one in self.orders]
+
+    def own_json(self) -> dict[str, object]:
         """Return the diagram as one JSON object."""
         return {
             "scene": self.scene.name,
@@ -190,6 +208,7 @@ def _crossing_json(crossing: Crossing) -> dict[str, object]:
         "amplitude": crossing.amplitude,
         "inside": crossing.inside,
         "margin": crossing.margin,
+        "error_estimate": _number(crossing.error_estimate),
     }
 
 

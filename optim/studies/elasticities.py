@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
@@ -26,7 +26,8 @@ from solver.continuation.branch import Branch, Peak
 from solver.continuation.branches.sweep import sweep
 from solver.continuation.extrema.extrema import HALF_POWER
 from solver.errors import SettingError
-from solver.results.base import Drawn
+from solver.results.base import Drawn, MadeOfResponses
+from solver.results.known import Known
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import check_in_annulus
 from solver.scene.parameter_paths import PHASE
@@ -76,7 +77,7 @@ class ParameterSensitivity:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class SensitivityResult(Drawn):
+class SensitivityResult(MadeOfResponses, Drawn):
     """Sensitivities of a design.
 
     Attributes
@@ -132,7 +133,11 @@ class SensitivityResult(Drawn):
 
     VIEWS: ClassVar = Views("optim.views", "of_sensitivities", "sensitivities_dataset", "of_sensitivities")
 
-    def to_json(self) -> dict[str, object]:
+    def known_parts(self) -> Iterable[Known]:
+        """The response."""
+        return (self.branch.known,)
+
+    def own_json(self) -> dict[str, object]:
         """Return the result as one JSON object."""
         band = self.branch.band
         return {

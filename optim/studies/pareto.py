@@ -23,6 +23,7 @@ from optim.criteria.linearised import ACTIVE, Model, bounds_held
 from optim.criteria.peak import PEAK
 from optim.criteria.rows import Evaluation
 from optim.errors import DesignError
+from optim.methods.enough_harmonics import honest
 from optim.methods.evaluator import Search, StoppedError
 from optim.methods.kkt import Local
 from optim.problem.keys import FEWEST_POINTS, POINTS, FrontKeys
@@ -45,7 +46,10 @@ JUMP = 0.01  # share of the band's range within which two neighbours need no poi
 RESIDUAL = 1e-6  # of the first-order conditions, relative objective per scaled variable
 NOTHING_TO_TRADE = 1e-6  # relative width of the front below which the two optima are one
 MOST_EVALUATIONS = 5000
-FOUND = (DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK, DesignStatus.LOCAL)
+FOUND = (
+    DesignStatus.OPTIMAL, DesignStatus.AT_BOUND, DesignStatus.KINK, DesignStatus.LOCAL,
+    DesignStatus.NOT_KNOWN,
+)  # fmt: skip
 
 
 @shows_progress("front")
@@ -95,7 +99,8 @@ def pareto_front(
         on_progress(1.0, max(front.reported, front.evaluations))
     kept, dominated = front_of(front.found)
     return ParetoResult(
-        problem=posed, status=status, ends=tuple(front.ends), points=kept, dominated=dominated,
+        problem=front.problem, status=_honest(front, status), ends=tuple(front.ends), points=kept,
+        dominated=dominated,
         missed=tuple(front.missed), evaluations=front.evaluations, seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
@@ -117,9 +122,16 @@ class _Front:
 
     def run(self) -> ParetoStatus:
         """Find both ends, then points between."""
-        narrow = replace(self.problem, weights={PEAK: 0.0, BAND: 1.0})
-        for problem in (self.problem, narrow):
+        for weights in (self.problem.weights, {PEAK: 0.0, BAND: 1.0}):
+            problem = replace(self.problem, weights=weights)
             end = solve_problem(problem, on_progress=self._report, should_stop=self._should_stop)
+            risen = end.problem.harmonics > self.problem.harmonics
+            self.problem = replace(self.problem, harmonics=end.problem.harmonics)
+            if risen and self.ends:
+                # All of a front is of the same harmonics: the other end is looked for again.
+                self.evaluations += len(end.history)
+                self.ends, self.found, self._pool = [], [], []
+                return self.run()
             self.ends.append(end)
             self._keep(end.history)
             if end.status is DesignStatus.STOPPED:
@@ -206,7 +218,7 @@ class _Front:
             history=tuple(search.history[1:]),
             evaluations=len(search.history) - 1, work=float(len(search.history) - 1), seconds=0.0,
         )  # fmt: skip
-        self.found.append(ParetoPoint.of(result, _slope(search, local, width)))
+        self.found.append(ParetoPoint.of(honest(result), _slope(search, local, width)))
 
     def _searched(
         self, search: Search, one: ParetoPoint, other: ParetoPoint, width: float, pool: list[Evaluation]
@@ -225,6 +237,13 @@ class _Front:
         local_search = local_search_of(search.problem.method)
         ends = [local_search(search, search.variables, evaluation, search.model) for evaluation in begin]
         return min(ends, key=lambda local: (local.standing, not local.settled))
+
+
+def _honest(front: _Front, status: ParetoStatus) -> ParetoStatus:
+    """Return the status of a front that is called whole only if the peaks of its points are known."""
+    whole = status in (ParetoStatus.COMPLETE, ParetoStatus.NO_TRADE_OFF)
+    doubtful = any(point.design.status is DesignStatus.NOT_KNOWN for point in front.found)
+    return ParetoStatus.NOT_KNOWN if whole and doubtful else status
 
 
 def _used(method: Method) -> Method:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
 from optim.problem.problem import Problem
 from optim.results.design import DesignResult
-from solver.results.base import Drawn
+from solver.results.base import Drawn, MadeOfResponses
+from solver.results.known import Known
 from solver.results.views import Views
 
 SAME = 1e-7  # relative distance within which two points are one
@@ -23,6 +24,10 @@ class ParetoStatus(Enum):
     PARTIAL = "Some points of the front were not found: no design tried keeps the band as narrow as that."
     NO_TRADE_OFF = "The least peak has the narrowest band too: there is nothing to trade, one design is best."
     NO_END = "An end of the front was not found; the status of that search says why and what to do."
+    NOT_KNOWN = (
+        "Every point of the front was found with these harmonics, but the peak of some is not known within "
+        "5 %: ask for more harmonics."
+    )
     STOPPED = "The search was stopped by the caller; the points found so far are given."
 
 
@@ -92,11 +97,12 @@ class ParetoPoint:
             "active": list(self.design.active),
             "optimality": _number(self.design.optimality),
             "status": self.design.status.value,
+            **self.design.known.to_json(),
         }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class ParetoResult(Drawn):
+class ParetoResult(MadeOfResponses, Drawn):
     """The front of peak against band.
 
     Attributes
@@ -144,7 +150,11 @@ class ParetoResult(Drawn):
 
     VIEWS: ClassVar = Views("optim.views", "of_front", "front_dataset", "of_front")
 
-    def to_json(self) -> dict[str, object]:
+    def known_parts(self) -> Iterable[Known]:
+        """Both ends and every point of the front."""
+        return [one.known for one in (*self.ends, *(point.design for point in self.points))]
+
+    def own_json(self) -> dict[str, object]:
         """Return the result as one JSON object."""
         return {
             "scene": self.problem.scene.name,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from solver.continuation.certificate import unsettled
 from solver.results import units
 from solver.results.told import Summary
 from solver.views.parameter_units import parameter
@@ -31,8 +30,6 @@ def of_design(result: DesignResult) -> Summary:
         pairs.append(("chosen by", result.chosen_by))
     if result.peak is not None:
         pairs.append(("peak", f"{units.length(result.peak.value)} at {result.peak.at:.6g} Hz"))
-    if not math.isnan(result.error_estimate):
-        pairs.append(("estimated error", units.length(result.error_estimate)))
     pairs += [("warning", words) for words in result.warnings]
     if result.band_hz is not None and result.limit is not None:
         pairs.append(("band", f"{result.band_hz:.4g} Hz above {units.length(result.limit)}"))
@@ -76,11 +73,10 @@ def of_campbell(diagram: CampbellDiagram) -> Summary:
         highest = one.highest_running
         text = "no response at running speeds"
         if highest is not None:
-            text = f"at most {units.length(highest.amplitude)}, at {highest.speed_rpm:.6g} rpm"
+            error = highest.error_estimate
+            known = "not known" if math.isnan(error) else units.length(error)
+            text = f"at most {units.length(highest.amplitude)} ± {known}, at {highest.speed_rpm:.6g} rpm"
         pairs.append((f"order {one.order}", text))
-    pairs += [
-        ("warning", reason) for reason in unsettled(one.branch.peak_certificate for one in diagram.orders)
-    ]
     pairs.append(("time", units.duration(diagram.seconds)))
     low, high = diagram.speeds_rpm[0][0], diagram.speeds_rpm[-1][1]
     return made(f"{diagram.scene.name}, {low:g} to {high:g} rpm", pairs, diagram.status.value)
@@ -94,7 +90,6 @@ def of_sensitivities(result: SensitivityResult) -> Summary:
             band = result.band_elasticity(row)
             text = f"peak {result.peak_elasticities(row)[0]:+.4f} %"
             pairs.append((row.path, text if math.isnan(band) else f"{text}, band {band:+.4f} %"))
-    pairs += [("warning", reason) for reason in unsettled([result.branch.peak_certificate])]
     pairs.append(("time", units.duration(result.seconds)))
     return made(f"{result.scene.name}, for 1 % more of each", pairs, result.status.value)
 

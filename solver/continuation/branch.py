@@ -16,6 +16,7 @@ from solver.continuation.certificate import PeakCertificate
 from solver.continuation.kernels.state import FINISHED, LEFT_RANGE, NO_START, STALLED
 from solver.jit.fourier import Integer, Real
 from solver.results.base import Drawn
+from solver.results.known import Known
 from solver.results.told import Piece
 from solver.results.views import Views, on_demand
 
@@ -250,6 +251,12 @@ class Branch(Drawn):
         if self.peak is None:
             return None
         return "mean_undetermined" in on_demand("solver.response.solve:peak_flags")(self)
+
+    @property
+    def known(self) -> Known:
+        """How well the highest peak is known; what is made of branches passes it on."""
+        found: Known = on_demand("solver.response.known:known_of")(self)
+        return found
 
     @property
     def folds(self) -> int:

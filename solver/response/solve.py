@@ -126,6 +126,11 @@ def describe(
 
 def peak_flags(branch: Branch) -> tuple[str, ...]:
     """Return the flags of the response at the highest peak of a branch that has one, see `Solution`."""
+    return peak_response(branch).flags
+
+
+def peak_response(branch: Branch) -> Solution:
+    """Return the response at the highest peak of a branch that has one, without its error estimate."""
     balance, (peak, *_) = branch.balance, branch.peaks
     scene, frequency_hz = balance.scene, peak.at
     if balance.parameter.kind is not Kind.FREQUENCY:
@@ -136,7 +141,7 @@ def peak_flags(branch: Branch) -> tuple[str, ...]:
         effects = replace(balance.effects, even_harmonics=int(balance.system.ks[0]) == 0)
         balance = build(scene, harmonics=balance.n_harmonics, effects=effects)
     found = PointSolution(converged=True, u=peak.solution, iterations=0, residual=0.0)
-    return describe(Workspace.of(balance), found, frequency_hz, time.perf_counter(), estimated=False).flags
+    return describe(Workspace.of(balance), found, frequency_hz, time.perf_counter(), estimated=False)
 
 
 def _law_fails(workspace: Workspace, u: Real, p: float) -> bool:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from solver.results.known import Known, worst_of
 from solver.results.told import Summary, Told
 from solver.results.views import Views
 
@@ -40,6 +43,47 @@ class Shown(Told):
     def to_xarray(self) -> xr.Dataset:
         """The result as arrays with coordinates, units and attributes; needs xarray (the extra ``data``)."""
         return self.to_dataset().to_xarray()
+
+
+class MadeOfResponses(Shown):
+    """Root of the results made of responses: their errors and flags are in every form it is given in.
+
+    A class says of which responses it is made, and gives the rest of its JSON; it cannot leave them out.
+    """
+
+    __slots__ = ()
+
+    @abstractmethod
+    def known_parts(self) -> Iterable[Known]:
+        """How well each of the responses is known that the numbers stand on."""
+
+    @abstractmethod
+    def own_json(self) -> dict[str, object]:
+        """Return the JSON object, without how well it is known."""
+
+    @property
+    def known(self) -> Known:
+        """How well the numbers are known: the largest error of a response relative to its peak, all flags."""
+        return worst_of(self.known_parts())
+
+    def summary(self) -> Summary:
+        """What is most worth knowing, in words and with units; the last line is the status."""
+        found = super().summary()
+        said = [pair for pair in self.known.pairs() if pair not in found.pairs]
+        return replace(found, pairs=(*found.pairs[:-1], *said, *found.pairs[-1:]))
+
+    def to_dataset(self) -> Dataset:
+        """The result as named arrays with dimensions, units and attributes; SI units."""
+        found = super().to_dataset()
+        told = {name: value for name, value in self.known.to_json().items() if value is not None}
+        notes: dict[str, Any] = {
+            name: " ".join(value) if isinstance(value, list) else value for name, value in told.items()
+        }
+        return replace(found, attributes={**found.attributes, **notes})
+
+    def to_json(self) -> dict[str, object]:
+        """Return the result as one JSON object."""
+        return {**self.own_json(), **self.known.to_json()}
 
 
 class Drawn(Shown):

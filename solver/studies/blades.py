@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -20,8 +20,9 @@ from solver.jit.fourier import Real
 from solver.jit.trig_polynomial import grid_size, grid_tables, on_grid
 from solver.response.solution import Solution
 from solver.response.time_history import motion
-from solver.results.base import Drawn
+from solver.results.base import Drawn, MadeOfResponses
 from solver.results.default_bar import shows_progress
+from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.views import Views
 from solver.scene.cyclic.annulus import annulus, sectors_needed
 from solver.scene.parts import LumpedStructure, Mass, MatricesStructure
@@ -66,7 +67,7 @@ class BladeAmplitudes(Drawn):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class BladePeaks(Drawn):
+class BladePeaks(MadeOfResponses, Drawn):
     """The highest peak of one DOF in every sector over a range of the frequency.
 
     Attributes
@@ -82,6 +83,8 @@ class BladePeaks(Drawn):
     branches : tuple of Branch
         The response of each blade, the same one where all are alike; without those that were not reached. Of
         the first blade alone where no more was asked for.
+    highest : Known
+        How well the highest peak of all is known.
     """
 
     dof: str
@@ -89,6 +92,7 @@ class BladePeaks(Drawn):
     at_hz: Real
     status: tuple[BranchStatus, ...]
     branches: tuple[Branch, ...]
+    highest: Known = NOTHING_KNOWN
 
     @property
     def largest(self) -> float:
@@ -110,6 +114,19 @@ class BladePeaks(Drawn):
         return observing(self.branches[0], f"{self.dof}@{self.worst}")
 
     VIEWS: ClassVar = Views("solver.views", "of_blade_peaks", "blade_peaks_dataset", "of_blade_peaks")
+
+    def known_parts(self) -> Iterable[Known]:
+        """The response of the blade with the highest peak."""
+        return (self.highest,)
+
+    def own_json(self) -> dict[str, object]:
+        """Return the peaks as one JSON object."""
+        numbers = {"peaks": self.value.tolist(), "at_hz": self.at_hz.tolist()}
+        return {
+            "dof": self.dof,
+            **{name: [x if math.isfinite(x) else None for x in row] for name, row in numbers.items()},
+            "status": [one.value for one in self.status],
+        }
 
     def magnification(self, tuned: BladePeaks) -> float:
         """The amplitude magnification factor: the highest peak relative to that of the tuned disk."""
@@ -165,7 +182,7 @@ def blade_peaks(
         on_progress=progress, should_stop=should_stop,
     )  # fmt: skip
     if len(names) > 1 and branch.completed and not every_branch:
-        return _highest(branch, name, names)
+        return _informed(_highest(branch, name, names))
     branches = [branch] * repeats
     for done, each in enumerate(names[1:], 1):
         if should_stop is not None and should_stop():
@@ -176,13 +193,20 @@ def blade_peaks(
             on_progress(_OF_THE_SWEEP + (1.0 - _OF_THE_SWEEP) * (done + 1.0) / len(names), done)
     missing = len(names) * repeats - len(branches)
     known = [each.peak if each.completed else None for each in branches] + [None] * missing
-    return BladePeaks(
+    found = BladePeaks(
         dof=name,
         value=np.array([math.nan if peak is None else peak.value for peak in known]),
         at_hz=np.array([math.nan if peak is None else peak.at for peak in known]),
         status=tuple(each.status for each in branches) + (BranchStatus.STOPPED,) * missing,
         branches=tuple(branches),
     )
+    return _informed(found)
+
+
+def _informed(peaks: BladePeaks) -> BladePeaks:
+    """Return the peaks with how well the highest is known."""
+    worst = peaks.worst_branch
+    return peaks if worst is None else replace(peaks, highest=worst.known)
 
 
 def _highest(branch: Branch, name: str, names: Sequence[str]) -> BladePeaks:

@@ -18,8 +18,11 @@ import numpy as np
 from solver.continuation.branch import Branch
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.results.base import Drawn
+from solver.response.known import relative_sum
+from solver.results.base import Drawn, MadeOfResponses
 from solver.results.default_bar import shows_progress
+from solver.results.known import Known
+from solver.results.order_statistics import quantile_json
 from solver.results.told import Piece
 from solver.results.views import Views
 from solver.results.watch import OnProgress, ShouldStop, part_of
@@ -60,12 +63,15 @@ class MistunedDisk(Piece):
         Of every blade; without the branches.
     magnification : float
         Its highest peak relative to that of the tuned disk; NaN if a blade's is not known.
+    magnification_error : float
+        Estimated error of that, by those of both peaks; NaN if it is not known.
     """
 
     seed: int
     factors: tuple[float, ...]
     peaks: BladePeaks
     magnification: float
+    magnification_error: float = math.nan
 
     @property
     def known(self) -> bool:
@@ -82,11 +88,15 @@ class MistunedDisk(Piece):
             "largest": self.peaks.largest if self.known else None,
             "worst_blade": self.peaks.worst if self.known else None,
             "magnification": _number(self.magnification),
+            "error_estimate": _number(self.peaks.highest.error_estimate),
+            "magnification_error": _number(self.magnification_error),
+            "measure": self.peaks.highest.measure,
+            "flags": list(self.peaks.highest.flags),
         }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class MistuningStudy(Drawn):
+class MistuningStudy(MadeOfResponses, Drawn):
     """What becomes of the highest peak when blades are not quite equal.
 
     Attributes
@@ -126,13 +136,23 @@ class MistuningStudy(Drawn):
         return np.array([disk.magnification for disk in self.disks if disk.known])
 
     @property
+    def mean_error(self) -> float:
+        """Estimated error of the mean magnification, by those of the peaks; NaN if one is not known."""
+        errors = [disk.magnification_error for disk in self.disks if disk.known]
+        return float(np.mean(errors)) if errors else math.nan
+
+    @property
     def worst(self) -> MistunedDisk | None:
         """The disk with the highest peak."""
         return max((d for d in self.disks if d.known), key=lambda disk: disk.magnification, default=None)
 
     VIEWS: ClassVar = Views("solver.views", "of_mistuning", "mistuning_dataset", "of_mistuning")
 
-    def to_json(self) -> dict[str, object]:
+    def known_parts(self) -> Iterable[Known]:
+        """The highest blades of the tuned disk and of every other."""
+        return (self.tuned.highest, *(disk.peaks.highest for disk in self.disks if disk.known))
+
+    def own_json(self) -> dict[str, object]:
         """Return the study as one JSON object."""
         factors, worst = self.magnifications, self.worst
         several = factors.size > 1
@@ -148,9 +168,11 @@ class MistuningStudy(Drawn):
             },
             "samples": [disk.to_json() for disk in self.disks],
             "mean": float(factors.mean()) if factors.size else None,
+            "mean_error": _number(self.mean_error),
+            "standard_error": float(factors.std(ddof=1) / math.sqrt(factors.size)) if several else None,
             "deviation": float(factors.std(ddof=1)) if several else None,
             "quantiles": [
-                {"share": share, "magnification": float(np.quantile(factors, share))}
+                quantile_json("magnification", float(np.quantile(factors, share)), factors.tolist(), share)
                 for share in (QUANTILES if factors.size else ())
             ],
             "worst": None if worst is None else worst.to_json(),
@@ -266,7 +288,8 @@ def joined_study(
     drawn = disk_factors(scene, of, spread, max(len(disks), 1), seed)
     found = [
         MistunedDisk(
-            seed=seed + k, factors=drawn[k], peaks=peaks, magnification=peaks.magnification(tuned)
+            seed=seed + k, factors=drawn[k], peaks=peaks, magnification=peaks.magnification(tuned),
+            magnification_error=peaks.magnification(tuned) * relative_sum(peaks.highest, tuned.highest),
         )
         for k, peaks in enumerate(disks if compared else ())
     ]  # fmt: skip

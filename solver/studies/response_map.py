@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import ClassVar
@@ -17,8 +17,12 @@ from solver.balance.workspace import Workspace
 from solver.continuation.parameter_scale import Scale, scale_of
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real
-from solver.results.base import Drawn
+from solver.response.known import known_of_solution
+from solver.response.solution import MEAN_UNDETERMINED
+from solver.response.solve import solve
+from solver.results.base import Drawn, MadeOfResponses
 from solver.results.default_bar import shows_progress
+from solver.results.known import NOTHING_KNOWN, Known
 from solver.results.views import Views
 from solver.results.watch import part_of
 from solver.scene.scene import Scene
@@ -31,6 +35,7 @@ MOST_POINTS = 4_000_000
 OF_THE_GRID = 0.7  # share of the progress, where the peaks are tracked too
 _WORK_OF_A_STRIP = 25_000  # frequencies × harmonics: 0.1 s, measured on bladed-disk
 _MOST_STRIPS = 256
+_SAME = 1e-6  # relative distance within which two solutions are one
 
 
 class MapStatus(Enum):
@@ -42,7 +47,7 @@ class MapStatus(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class ResponseMap(Drawn):
+class ResponseMap(MadeOfResponses, Drawn):
     """max|x| of the observed DOF over a parameter and the frequency.
 
     Attributes
@@ -61,6 +66,8 @@ class ResponseMap(Drawn):
         Of all points that are solved.
     given : Scene or None
         What it is of, with the values that stayed fixed; None if it was read from a file.
+    highest : Known
+        How well the highest point of the grid is known.
     """
 
     scene: str
@@ -77,6 +84,7 @@ class ResponseMap(Drawn):
     status: MapStatus
     seconds: float
     given: Scene | None = None
+    highest: Known = NOTHING_KNOWN
 
     @property
     def completed(self) -> bool:
@@ -85,7 +93,11 @@ class ResponseMap(Drawn):
 
     VIEWS: ClassVar = Views("solver.views", "of_map", "map_dataset", "of_map")
 
-    def to_json(self) -> dict[str, object]:
+    def known_parts(self) -> Iterable[Known]:
+        """The highest point of the grid, and the sweeps of the ridge."""
+        return (self.highest, *(() if self.ridge is None else self.ridge.known_parts()))
+
+    def own_json(self) -> dict[str, object]:
         """Return the map as one JSON object."""
         return {
             "scene": self.scene,
@@ -276,7 +288,22 @@ class MapGrid:
             n_harmonics=self.harmonics, largest_residual=float(solved.max(initial=0.0)),
             newton_iterations=sum(strip.newton_iterations for strip in strips),
             status=MapStatus.COMPLETED if whole else MapStatus.HOLES, seconds=seconds, given=self.scene,
+            highest=self._highest(table[:, :, MAX_ABS]),
         )  # fmt: skip
+
+    def _highest(self, amplitude: Real) -> Known:
+        """Return how well the highest point is known, solved for alone; not, if that leads elsewhere."""
+        if not np.isfinite(amplitude).any():
+            return NOTHING_KNOWN
+        row, column = np.unravel_index(int(np.nanargmax(amplitude)), amplitude.shape)
+        here = self.scene.with_values({self.scale.parameter.path: float(self.scale.spaced(self.steps)[row])})
+        hertz = float(self.band[column])
+        if hertz == 0.0:
+            return NOTHING_KNOWN
+        point = solve(here, frequency_hz=hertz, harmonics=self.harmonics, effects=self.effects)
+        known, height = known_of_solution(point), float(amplitude[row, column])
+        same = abs(point.max_abs - height) <= _SAME * height or MEAN_UNDETERMINED in known.flags
+        return known if same else Known(flags=known.flags)
 
 
 def map_grid(

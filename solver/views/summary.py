@@ -112,7 +112,6 @@ def of_track(track: PeakTrack) -> Summary:
     """The least highest peak, and what it took."""
     pairs = [
         *_least(track),
-        *(("warning", reason) for reason in track.peaks_open),
         ("points", f"{len(track.parameter)}, {track.sweeps} sweeps"),
         ("time", units.duration(track.seconds)),
     ]

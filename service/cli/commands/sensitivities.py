@@ -12,6 +12,7 @@ from service.cli.output_files import Outputs
 from service.cli.progress import patience
 from service.rendering.tables.text import print_table, say, show
 from solver.results import units
+from solver.results.known import known_pairs
 
 
 def sensitivities(
@@ -67,6 +68,8 @@ def _show(found: Mapping[str, Any]) -> None:
     certificate = found["peak_certificate"]
     if peaks and not certificate["known"]:
         say(f"there may be higher peaks. {certificate['reason']}")
+    for name, words in known_pairs(found, besides=("peaks_open",)) if peaks else ():
+        say(f"{name}: {words}")
     for one in found["left_out"]:
         say(f"left out: {one['path']}: {one['reason']}")
 

@@ -22,7 +22,7 @@ from service.jobs.common.scenes import (
 )
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import Amplitude, EndedResult, Table
+from service.jobs.kinds.registry.results import Amplitude, EndedResult, KnownResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, pointer
@@ -75,7 +75,7 @@ class CampbellRequest(HarmonicRequest):
     )
 
 
-class CampbellResult(EndedResult):
+class CampbellResult(KnownResult, EndedResult):
     """Crossings of every order with the peaks of its response, and speeds above the limit."""
 
     scene: str

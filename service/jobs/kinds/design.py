@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from pydantic import ConfigDict, RootModel
+from pydantic import ConfigDict, Field, RootModel
 
 import optim
 from optim.problem.keys import ROBUST, NominalAndRobustKeys, of_design
@@ -14,7 +14,7 @@ from service.jobs.common.records import design_record, robust_record, sweep_reco
 from service.jobs.common.scenes import refusal, require, resolve_scene, resolved
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import Amplitude, PeakAt, ReachedResult, Table
+from service.jobs.kinds.registry.results import Amplitude, KnownResult, PeakAt, ReachedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop, SweepRecord
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, pointer
@@ -52,13 +52,16 @@ class _DesignRequest(NominalAndRobustKeys, ProblemRequest):
 DesignRequest = of_design(_DesignRequest)
 
 
-class OptimumResult(ReachedResult):
+class OptimumResult(KnownResult, ReachedResult):
     """The best design of what is known: its values, its responses, and what holds it."""
 
     scene: str
     method: str
     optimum: dict[str, float]
     peak: PeakAt | None
+    n_harmonics: int = Field(
+        description="Highest harmonic kept; more than asked for where the peak needs them."
+    )
     peaks: list[Table]
     band_hz: float | None
     limit: Amplitude
@@ -66,7 +69,6 @@ class OptimumResult(ReachedResult):
     objective: float | None
     rows: list[Table]
     held_by: Table | None
-    error_estimate: Amplitude
     errors: list[Table]
     warnings: list[Any]
     plateau: Table
@@ -87,7 +89,7 @@ class OptimumResult(ReachedResult):
     broken: list[Table]
 
 
-class RobustResult(ReachedResult):
+class RobustResult(KnownResult, ReachedResult):
     """The best design in spite of what is not known, beside the best of what is."""
 
     scene: str

@@ -16,7 +16,7 @@ from service.jobs.common.scenes import refusal, require, resolve_scene, resolved
 from service.jobs.common.sizes import MOST_POINTS, balance_issues
 from service.jobs.kind_view import Json, KindView, ReadSweep, StoredSweep
 from service.jobs.kinds.peaks import PeaksResult
-from service.jobs.kinds.registry.results import Curve, EndedResult
+from service.jobs.kinds.registry.results import Curve, EndedResult, KnownResult
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
 from service.jobs.registry import JobKind, Resolved, SceneSource
@@ -63,7 +63,7 @@ class MapRequest(RangeRequest):
     )  # fmt: skip
 
 
-class MapResult(EndedResult):
+class MapResult(KnownResult, EndedResult):
     """The response on the grid, a row for each value of the parameter; null where it was not found."""
 
     scene: str

@@ -18,11 +18,12 @@ from service.jobs.common.records import packed, sweep_records, unpacked
 from service.jobs.common.scenes import FrequencyHz, HarmonicRequest, refusal, require, resolve_scene, resolved
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, annulus_issues, size_issues, whole_disk_dofs
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import EndedResult, Table
+from service.jobs.kinds.registry.results import EndedResult, KnownResult, Table
 from service.jobs.outputs import JobOutput, OnProgress, ShouldStop
 from service.jobs.parts import Part, PartOutput, Parts, PartStoppedError
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue, SceneError, SettingError, pointer
+from solver.results.known import Known
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ class MistuningRequest(HarmonicRequest):
     to: FrequencyHz | None = Field(default=None, description="Highest frequency [Hz]; the scene's band.")
 
 
-class MistuningResult(EndedResult):
+class MistuningResult(KnownResult, EndedResult):
     """The peaks of every blade of every disk, and how much higher they are than the tuned disk's."""
 
     scene: str
@@ -116,7 +117,9 @@ class MistuningResult(EndedResult):
     tuned: Table
     samples: list[Table]
     mean: float | None = Field(description="Of the magnification.")
-    deviation: float | None
+    mean_error: float | None = Field(description="Estimated error of the mean, by those of the peaks.")
+    standard_error: float | None = Field(description="Of the mean, as that of so many disks.")
+    deviation: float | None = Field(description="Standard deviation of the magnifications of the disks.")
     quantiles: list[Table]
     worst: Table | None
     n_harmonics: int
@@ -231,6 +234,7 @@ def run_part(
     return PartOutput(
         result={
             "dof": found[0].dof, "status": status, "sweeps": sweeps,
+            "known": [peaks.highest.to_json() for peaks in found],
             "largest": 0.0 if worst is None else worst.largest, "seconds": time.perf_counter() - begun,
         },
         arrays=arrays, points=0 if tuned else len(found), final=tuned and worst is None,
@@ -269,9 +273,9 @@ def _peaks(part: PartOutput) -> list[BladePeaks]:
     return [
         solver.BladePeaks(
             dof=part.result["dof"], value=value[i], at_hz=at_hz[i], branches=(),
-            status=tuple(solver.BranchStatus[name] for name in names),
+            status=tuple(solver.BranchStatus[name] for name in names), highest=Known.of_json(known),
         )
-        for i, names in enumerate(part.result["status"])
+        for i, (names, known) in enumerate(zip(part.result["status"], part.result["known"], strict=True))
     ]  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from service.jobs.common.records import sweep_record
 from service.jobs.common.scenes import require, resolve_scene, resolved
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import Amplitude, ReachedResult, Table
+from service.jobs.kinds.registry.results import Amplitude, KnownResult, ReachedResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.errors import Issue
@@ -45,7 +45,7 @@ def pareto_issues(scene: Scene, given: Mapping[str, Any]) -> list[Issue]:
     return problem_issues(scene, {key: value for key, value in given.items() if key != "points"})
 
 
-class ParetoResult(ReachedResult):
+class ParetoResult(KnownResult, ReachedResult):
     """The front: designs of which none has both a lower peak and a narrower band than another."""
 
     scene: str

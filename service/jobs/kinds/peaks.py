@@ -13,7 +13,7 @@ from service.jobs.common.records import sweep_records
 from service.jobs.common.scenes import require, resolve_scene, resolved
 from service.jobs.common.sizes import POINTS_OF_A_SWEEP, balance_issues
 from service.jobs.kind_view import Json, KindView, NothingToDrawError, ReadSweep, StoredSweep
-from service.jobs.kinds.registry.results import Curve, EndedResult, Table
+from service.jobs.kinds.registry.results import Curve, EndedResult, KnownResult, Table
 from service.jobs.outputs import JobOutput, Progress, ShouldStop
 from service.jobs.registry import JobKind, Resolved, SceneSource
 from solver.scene.examples import DISK_LOAD
@@ -42,7 +42,7 @@ class PeaksRequest(RangeRequest):
     )
 
 
-class PeaksResult(EndedResult):
+class PeaksResult(KnownResult, EndedResult):
     """The highest peak over the parameter, what competes with it, and where it is least."""
 
     scene: str
@@ -55,7 +55,6 @@ class PeaksResult(EndedResult):
     optimum: Table
     exchanges: list[Table]
     competing: list[Table]
-    peaks_open: list[Any]
     n_harmonics: int
     sweeps: int
     seconds: float

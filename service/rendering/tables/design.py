@@ -9,6 +9,7 @@ from typing import Any
 
 from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
+from solver.results.known import known_pairs
 from solver.views.parameter_units import parameter
 
 Json = Mapping[str, Any]
@@ -60,6 +61,7 @@ def front(found: Json) -> None:
         (
             *(parameter(name, point["values"][name]) for name in names),
             units.length(point["peak"]),
+            _error(point),
             f"{units.number(point['band_hz'])} Hz",
             "" if point["slope"] is None else units.length(abs(point["slope"]) * hertz),
             "" if point["hz_per_metre"] is None else f"{units.number(metres * point['hz_per_metre'])} Hz",
@@ -68,13 +70,20 @@ def front(found: Json) -> None:
         for index, point in enumerate(points)
     ]
     costs = (f"peak for {hertz:g} Hz less band", f"band for {units.length(metres)} less peak")
-    columns = (*names, "peak", "band", *costs, "")
+    columns = (*names, "peak", "error", "band", *costs, "")
     right = "".join(str(i) for i in range(min(len(columns) - 1, 10)))
     print_table(f"Front of {found['scene']}: peak against band", columns, rows, right=right)
     pairs = [("not found", f"band of {units.number(width)} Hz") for width in found["missed"]]
     pairs += [("end", end["status"]) for end in found["ends"] if not end["reached"]]
     effort = f"{found['evaluations']} designs in {units.duration(found['seconds'])}"
-    print_pairs("", [*pairs, ("effort", effort)])
+    print_pairs("", [*pairs, *known_pairs(found), ("effort", effort)])
+
+
+def _error(point: Json) -> str:
+    """The estimated error of the peak of a point; empty of an earlier version."""
+    if "error_estimate" not in point:
+        return ""
+    return "not known" if point["error_estimate"] is None else units.length(point["error_estimate"])
 
 
 def _price(size: float) -> float:
@@ -172,6 +181,8 @@ def _errors(found: Json) -> Pairs:
     """The estimated error of the peak that holds the design, and what makes numbers doubtful."""
     error = found.get("error_estimate")
     pairs = [] if error is None else [("estimated error", units.length(error))]
+    # The flags and open peaks are among the warnings.
+    pairs = [pair for pair in known_pairs(found, besides=("peaks_open",)) if pair[0] != "note"] or pairs
     return pairs + [("warning", words) for words in found.get("warnings", ())]
 
 

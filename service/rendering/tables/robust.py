@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from service.rendering.tables.quantiles import quantile_words
 from service.rendering.tables.text import print_pairs, print_table, say
 from solver.results import units
+from solver.results.known import known_pairs
 from solver.views.parameter_units import parameter
 
 Json = Mapping[str, Any]
@@ -49,6 +51,7 @@ def effort_pairs(found: Json) -> list[tuple[str, str]]:
         pairs.append(("gap of the cuts", f"{found['gap']:.1e}{whole}"))
     if found["optimality"] is not None:
         pairs.append(("KKT residual", f"{found['optimality']:.1e}"))
+    pairs += known_pairs(found)
     pairs += [("warning", words) for words in found.get("warnings", ())]
     if found["unknown"] is not None:
         pairs.append(("no response", found["unknown"]["words"]))
@@ -85,8 +88,8 @@ def _length(value: float | None) -> str:
 
 
 def _quantile(side: Json, share: float) -> str:
-    found = [q["peak"] for q in side["samples"]["quantiles"] if q["share"] == share]
-    return _length(found[0] if found else None)
+    found = [one for one in side["samples"]["quantiles"] if one["share"] == share]
+    return quantile_words(found[0], "peak", "samples", units.length) if found else _UNKNOWN
 
 
 _LINES: tuple[tuple[str, Callable[[Json], str]], ...] = (

@@ -7,6 +7,7 @@ from typing import Any
 
 from service.rendering.tables.text import print_pairs
 from solver.results import units
+from solver.results.known import known_pairs
 from solver.views.parameter_units import parameter
 
 Json = Mapping[str, Any]
@@ -38,9 +39,10 @@ def response_map(found: Json) -> None:
         place = f"{frequency:.6g} Hz, {path} {parameter(path, at)}"
         pairs.append(("highest of the grid", f"{units.length(value)} at {place}"))
     if found["ridge"] is not None:
-        pairs += [*_ridge(found["ridge"]), *_plateau(found["ridge"]), *_sure(found["ridge"])]
+        pairs += [*_ridge(found["ridge"]), *_plateau(found["ridge"])]
     else:
         pairs.append(("note", ON_THE_GRID))
+    pairs += _sure(found if "measure" in found else found["ridge"] or {})
     pairs.append(("time", units.duration(found["seconds"])))
     print_pairs(_title(found), pairs)
 
@@ -80,5 +82,6 @@ def _plateau(found: Json) -> Pairs:
 
 
 def _sure(found: Json) -> Pairs:
-    """Why it is not known of a response behind the result that no higher peak hides between its points."""
-    return [("warning", f"a response may have a higher peak. {why}") for why in found.get("peaks_open", ())]
+    """How well the peaks are known; of an earlier version, why a higher one may hide between points."""
+    older = [("warning", f"a response may have a higher peak. {why}") for why in found.get("peaks_open", ())]
+    return known_pairs(found) if "measure" in found else older

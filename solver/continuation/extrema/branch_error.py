@@ -88,7 +88,9 @@ def branch_error(
         return math.nan
     estimator, inside = ErrorEstimator(workspace), workspace.balance.parameter.inside
     errors = [
-        estimator.at(peak.solution, float(inside(peak.at)), across=True).max_abs for peak in _rivals(peaks)
+        # At an end of the branch nothing moves along: the error is that at a fixed λ.
+        estimator.at(peak.solution, float(inside(peak.at)), across=peak.interior).max_abs
+        for peak in _rivals(peaks)
     ]
     estimate = errors[0]
     if not math.isfinite(estimate):

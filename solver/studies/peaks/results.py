@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar
@@ -12,7 +12,8 @@ from solver.continuation.branch import Branch
 from solver.continuation.certificate import unsettled
 from solver.errors import SettingError
 from solver.jit.fourier import Real
-from solver.results.base import Drawn, Shown
+from solver.results.base import Drawn, MadeOfResponses
+from solver.results.known import Known
 from solver.results.told import Piece
 from solver.results.views import Views
 
@@ -113,7 +114,7 @@ class Basin(Piece):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class LeastPeak(Shown):
+class LeastPeak(MadeOfResponses):
     """Where the highest peak is least.
 
     Attributes
@@ -168,7 +169,11 @@ class LeastPeak(Shown):
             )
         return self.branch.plot(ax=ax)
 
-    def to_json(self) -> dict[str, object]:
+    def known_parts(self) -> Iterable[Known]:
+        """The response at the optimum."""
+        return () if self.branch is None else (self.branch.known,)
+
+    def own_json(self) -> dict[str, object]:
         """Return the optimum as one JSON object."""
         active = [{"frequency": a.frequency, "value": a.value, "slope": a.slope} for a in self.active]
         return {
@@ -200,7 +205,7 @@ class CompetingPeak:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class PeakTrack(Drawn):
+class PeakTrack(MadeOfResponses, Drawn):
     """The highest peak over a parameter.
 
     Attributes
@@ -253,7 +258,11 @@ class PeakTrack(Drawn):
 
     VIEWS: ClassVar = Views("solver.views", "of_track", "track_dataset", "of_track")
 
-    def to_json(self) -> dict[str, object]:
+    def known_parts(self) -> Iterable[Known]:
+        """Every sweep, and the response at the optimum."""
+        return (*(one.known for one in self.branches), *self.optimum.known_parts())
+
+    def own_json(self) -> dict[str, object]:
         """Return the track as one JSON object."""
         return {
             "scene": self.scene,

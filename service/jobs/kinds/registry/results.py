@@ -27,6 +27,21 @@ class PeakAt(BaseModel):
     at: float
 
 
+class KnownResult(KindResult):
+    """How well the peaks of a result that is made of responses are known: that of the least known one."""
+
+    measure: str = Field(
+        description="What the peak is judged by: max_abs, or half_peak_to_peak where its mean is free."
+    )
+    peak_max_abs: Amplitude
+    error_estimate: float | None = Field(description="Of max|x| of the peak [m].")
+    peak_half_peak_to_peak: Amplitude
+    half_peak_to_peak_error: Amplitude
+    relative_error: float | None = Field(description="Of the measure; null if it is not known.")
+    flags: list[str] = Field(description="What the responses assume or leave open.")
+    peaks_open: list[Any] = Field(description="Why of some responses a higher peak may hide between points.")
+
+
 class EndedResult(KindResult):
     """A result that says how the computation ended.
 

@@ -1,0 +1,132 @@
+"""How well the numbers of a result are known: one record for all that is made of responses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+from solver.results import units
+from solver.results.notes import flag_words
+from solver.results.told import Piece
+
+MAX_ABS, HALF_PEAK_TO_PEAK = "max_abs", "half_peak_to_peak"
+_NUMBERS = ("peak_max_abs", "error_estimate", "peak_half_peak_to_peak", "half_peak_to_peak_error")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Known(Piece):
+    """How well the highest peak of responses is known.
+
+    Attributes
+    ----------
+    measure : str
+        What it is to be judged by: ``max_abs``, or ``half_peak_to_peak`` where the mean is free, so that
+        max|x| depends on the history.
+    peak_max_abs, error_estimate : float
+        max|x| of the peak and its estimated error [m]; NaN if not known.
+    peak_half_peak_to_peak, half_peak_to_peak_error : float
+        The same of half peak to peak, where that is the measure; else NaN.
+    flags : tuple of str
+        What the responses assume or leave open, see `solver.results.notes.FLAGS`.
+    peaks_open : tuple of str
+        Why of some responses it is not known that no higher peak hides between their points.
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = dict.fromkeys(_NUMBERS, "m")
+
+    measure: str = MAX_ABS
+    peak_max_abs: float = math.nan
+    error_estimate: float = math.nan
+    peak_half_peak_to_peak: float = math.nan
+    half_peak_to_peak_error: float = math.nan
+    flags: tuple[str, ...] = ()
+    peaks_open: tuple[str, ...] = ()
+
+    @property
+    def value(self) -> float:
+        """The measure of the peak [m]; NaN without one."""
+        return self.peak_max_abs if self.measure == MAX_ABS else self.peak_half_peak_to_peak
+
+    @property
+    def error(self) -> float:
+        """Estimated error of that [m]; NaN if not known."""
+        return self.error_estimate if self.measure == MAX_ABS else self.half_peak_to_peak_error
+
+    @property
+    def relative(self) -> float:
+        """Estimated error relative to the peak; infinite if one of them is not known."""
+        if self.error == 0.0:
+            return 0.0
+        if not (math.isfinite(self.error) and self.value > 0.0):
+            return math.inf
+        return self.error / self.value
+
+    @classmethod
+    def of_json(cls, found: Mapping[str, Any]) -> Known:
+        """Return what `to_json` wrote."""
+        numbers: dict[str, Any] = {
+            name: math.nan if found[name] is None else found[name] for name in _NUMBERS
+        }
+        return cls(
+            measure=found["measure"], flags=tuple(found["flags"]), peaks_open=tuple(found["peaks_open"]),
+            **numbers,
+        )  # fmt: skip
+
+    def to_json(self) -> dict[str, object]:
+        """Return it as one JSON object."""
+        numbers = {name: getattr(self, name) for name in _NUMBERS} | {"relative_error": self.relative}
+        return {
+            "measure": self.measure,
+            **{name: value if math.isfinite(value) else None for name, value in numbers.items()},
+            "flags": list(self.flags),
+            "peaks_open": list(self.peaks_open),
+        }
+
+    def pairs(self) -> list[tuple[str, str]]:
+        """Return it in words, name and value a line."""
+        return known_pairs(self.to_json())
+
+
+NOTHING_KNOWN = Known()
+
+
+def worst_of(parts: Iterable[Known]) -> Known:
+    """Return the record of what is least known, with the flags and the reasons of all."""
+    every = list(parts)
+    if not every:
+        return NOTHING_KNOWN
+    worst = max(every, key=lambda one: one.relative)
+    flags = tuple(dict.fromkeys(flag for one in every for flag in one.flags))
+    reasons = tuple(dict.fromkeys(reason for one in every for reason in one.peaks_open))
+    return replace(worst, flags=flags, peaks_open=reasons)
+
+
+def known_pairs(found: Mapping[str, Any], *, besides: Sequence[str] = ()) -> list[tuple[str, str]]:
+    """Return in words what the JSON of a result says of itself; nothing of one of an earlier version.
+
+    Parameters
+    ----------
+    found : with the keys of `Known.to_json`.
+    besides : keys that are told elsewhere.
+    """
+    if "measure" not in found:
+        return []
+    pairs: list[tuple[str, str]] = []
+    if "error_estimate" not in besides:
+        for error, size, of in (
+            (found["error_estimate"], found["peak_max_abs"], "max|x|"),
+            (found["half_peak_to_peak_error"], found["peak_half_peak_to_peak"], "half peak to peak"),
+        ):
+            if error is not None:
+                share = f", {units.number(100.0 * error / size, 2)} %" if size else ""
+                pairs.append(("estimated error", f"{units.length(error)} of {of}{share}"))
+        if found["relative_error"] is None:
+            pairs.append(("estimated error", "not known"))
+    pairs += [("note", words) for words in flag_words(found["flags"])]
+    if "peaks_open" not in besides:
+        pairs += [
+            ("warning", f"a response may have a higher peak. {reason}") for reason in found["peaks_open"]
+        ]
+    return pairs
