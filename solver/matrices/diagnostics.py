@@ -140,7 +140,7 @@ def notes(found: MatrixSet, omega2: FloatArray) -> list[str]:
     ----------
     omega2 : of the model without contacts [rad²/s²].
     """
-    said = []
+    said = list(found.remarks)
     if found.held:
         said.append(f"{found.held} rows that a boundary condition holds were left out")
     rigid = rigid_body_modes(omega2)

@@ -56,6 +56,7 @@ READERS = (
         help="CalculiX, `*FREQUENCY, SOLVER=MATRIXSTORAGE`: stiffness and mass; `name.dof` beside them names "
         "the rows.",
         matrix=lambda path, _key: read_calculix(path),
+        global_rows=True,
         roles={".mas": "M", ".sti": "K"},
     ),
     Reader(

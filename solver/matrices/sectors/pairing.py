@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.matrices.readers.label import COMPONENTS, Label
-from solver.matrices.sectors.decks import Deck, positions
+from solver.matrices.decks.deck import Deck, frames, positions
+from solver.matrices.readers.label import COMPONENTS, OWN_COMPONENTS, Label
 from solver.matrices.sectors.elimination import Group, rotation
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ Pairs = list[tuple[int, int]]
 PAIR_BY = ("position", "order")
 NEAR = 0.01  # share of the least distance of two nodes within which they are one place
 _FEW = 10
+_SAME = 1e-4  # between frames, the sine of an angle that comes of rounded places
 
 
 def paired(
@@ -121,8 +122,16 @@ def _check_all(
     )
 
 
-def groups(pairs: Pairs, found: MatrixSet) -> tuple[list[Group], list[Group]]:
+def groups(
+    pairs: Pairs, found: MatrixSet, turn: NDArray[np.float64] | None = None
+) -> tuple[list[Group], list[Group]]:
     """Rows of the pairs: the three displacements and, where there are any, the three rotations of each node.
+
+    Rows along axes of the nodes' own are scalars, where those axes turn with the sector.
+
+    Parameters
+    ----------
+    turn : (3, 3) rotation by the pitch; needed for such rows.
 
     Raises
     ------
@@ -147,6 +156,30 @@ def groups(pairs: Pairs, found: MatrixSet) -> tuple[list[Group], list[Group]]:
                 raise ValueError(f"node {held} has no DOFs and its partner {free} has: hold both, or neither")
             low.append(one)
             high.append(other)
+        ours, theirs = _scalars(pair, rows, found.deck, turn)
+        low += ours
+        high += theirs
     if not low:
         raise ValueError("no node of the boundaries has a DOF in the matrices")
     return low, high
+
+
+def _scalars(
+    pair: tuple[int, int], rows: Mapping[Label, int], deck: Deck | None, turn: NDArray[np.float64] | None
+) -> tuple[list[Group], list[Group]]:
+    """Rows along axes of the nodes' own."""
+    ours, theirs = ([rows.get(Label(node, c), -1) for c in OWN_COMPONENTS] for node in pair)
+    if max(*ours, *theirs) < 0:
+        return [], []
+    same = [row < 0 for row in ours] == [row < 0 for row in theirs]
+    if same and deck is not None and turn is not None:
+        low, high = frames(deck, pair)
+        if np.abs(turn @ low - high).max() <= _SAME:
+            kept = [i for i, row in enumerate(ours) if row >= 0]
+            return [(ours[i],) for i in kept], [(theirs[i],) for i in kept]
+    held = pair[0] if max(ours) >= 0 else pair[1]
+    raise ValueError(
+        f"node {held} of the boundaries is held along an axis of its own, which does not turn with the sector "
+        f"as that of its partner in the pair {pair[0]}, {pair[1]}: hold both in one cylindrical system about "
+        "the axis of the disk, or along the axis"
+    )
