@@ -37,8 +37,8 @@ def in_global(found: MatrixSet, deck: Deck | None) -> MatrixSet:
         return replace(found, deck=deck)
     if found.labels is None:
         raise ValueError(
-            f"node {min(deck.systems)} of the deck moves along axes of its own, and the files do not tell the "
-            "nodes of their rows: give a file of labels (`mapping`)"
+            f"node {min(deck.systems)} of the deck moves along axes of its own, and the files do not tell "
+            "the nodes of their rows: give a file of labels (`mapping`)"
         )
     vectors = _vectors(found.labels, deck)
     nodes = [label // 2 for label in vectors]
@@ -46,11 +46,14 @@ def in_global(found: MatrixSet, deck: Deck | None) -> MatrixSet:
     labels = list(found.labels)
     entries: list[tuple[int, int, float]] = []
     kept: set[int] = set()
-    for (key, rows), R in zip(vectors.items(), axes, strict=True):
+    spans = [_span(R, sorted(rows), lost=found.global_rows)
+             for rows, R in zip(vectors.values(), axes, strict=True)]  # fmt: skip
+    # Where one node of a system cannot be turned its partner on the other boundary must stay as well.
+    whole = {id(deck.systems[node]) for node, span in zip(nodes, spans, strict=True) if span is None}
+    for (key, rows), R, span in zip(vectors.items(), axes, spans, strict=True):
         node, about = divmod(key, 2)
         here = sorted(rows)
-        span = _span(R, here, lost=found.global_rows)
-        if span is None:
+        if span is None or (len(here) < 3 and id(deck.systems[node]) in whole):
             kept.add(node)
             for i in here:
                 labels[rows[i]] = Label(node, OWN_COMPONENTS[3 * about + i])
@@ -80,7 +83,7 @@ def _vectors(labels: tuple[Label, ...], deck: Deck) -> dict[int, Rows]:
 
 
 def _span(R: NDArray[np.float64], here: list[int], *, lost: bool) -> list[int] | None:
-    """The components along global axes that span the same motions as those of some rows; None: there are none.
+    """The components along global axes that span the motions of some rows; None: there are none.
 
     Parameters
     ----------

@@ -122,8 +122,9 @@ def read_matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:
     except MatrixFileError as error:
         raise SceneError([_issue(MAPPING, str(error))]) from error
     key = NODES if own is not None else f"cyclic/{NODES}"
+    deck = read_nodes(joined if own is None else own, folder, key)
     try:
-        found = in_global(found, read_nodes(joined if own is None else own, folder, key))
+        found = in_global(found, deck)
     except ValueError as error:
         raise SceneError([_issue(key, f"`{NODES}`: {error}")]) from error
     if isinstance(tables.get("dofs"), dict):

@@ -57,8 +57,8 @@ class AnsysDeck:
         name = parts[0][:4]
         if name in _OTHERS:
             raise FormatError(
-                f"line {line}: {parts[0]} makes or changes nodes, which is not read: write the finished nodes "
-                "by CDWRITE, DB"
+                f"line {line}: {parts[0]} makes or changes nodes, which is not read: write the finished "
+                "nodes by CDWRITE, DB"
             )
         try:
             if name == "N":
@@ -102,7 +102,9 @@ class AnsysDeck:
     def _local(self, parts: list[str]) -> None:
         """LOCAL,KCN,KCS,x,y,z,angles,PAR1,PAR2, which makes it the active one; or as CDWRITE writes it."""
         written = parts[1].startswith("R")
-        number, kind = (int(text) for text in parts[3:5]) if written else (int(text or 0) for text in parts[1:3])
+        number, kind = (
+            (int(text) for text in parts[3:5]) if written else (int(text or 0) for text in parts[1:3])
+        )
         numbers = [real(text) for text in parts[5:] if written] or [real(text) for text in parts[3:]]
         numbers += [0.0] * (8 - len(numbers))
         before = self._known.get(number, GLOBAL)

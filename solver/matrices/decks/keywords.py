@@ -179,7 +179,9 @@ class KeywordDeck:
         shift[: len(first)] = first[:3]
         if second:
             if len(second) != 7:
-                raise block.refusal(f"must be turned about two points by an angle: 7 numbers, got {len(second)}")
+                raise block.refusal(
+                    f"must be turned about two points by an angle: 7 numbers, got {len(second)}"
+                )
             a, b = np.array(second[:3]), np.array(second[3:6])
             if not np.any(a != b):
                 raise block.refusal("must be turned about a line through two points, which are the same")
@@ -243,7 +245,7 @@ def _lines(file: DeckFile) -> Iterator[tuple[int, str]]:
         if not text or text.startswith("**"):
             continue
         if open_line is not None:
-            number, text = open_line[0], open_line[1] + text  # noqa: PLW2901
+            number, text = open_line[0], open_line[1] + text
         open_line = None
         if text.startswith("*") and text.endswith(","):
             open_line = number, text

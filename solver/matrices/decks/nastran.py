@@ -141,9 +141,7 @@ def _entries(file: DeckFile) -> Iterator[_Entry]:
     lines = file.lines()
     begins = [i for i, line in enumerate(lines) if re.match(r"\s*BEGIN\b", line, re.IGNORECASE)]
     if len(begins) > 1:
-        raise FormatError(
-            f"line {begins[1] + 1} begins further bulk data: give a deck of one structure, without superelements"
-        )
+        raise FormatError(f"line {begins[1] + 1} begins further bulk data: give a deck without superelements")
     current: _Entry | None = None
     for number, line in enumerate(lines[begins[0] + 1 if begins else 0 :], begins[0] + 2 if begins else 1):
         text = line.split("$")[0].expandtabs(8).rstrip()
@@ -151,7 +149,9 @@ def _entries(file: DeckFile) -> Iterator[_Entry]:
             continue
         if text.startswith("="):
             raise FormatError(f"line {number} repeats an entry (=), which is not read: write every GRID")
-        head = re.split(r"[,\s]", text.strip() if text[0] == " " and text[:8].strip() else text, maxsplit=1)[0]
+        head = re.split(r"[,\s]", text.strip() if text[0] == " " and text[:8].strip() else text, maxsplit=1)[
+            0
+        ]
         name = head.rstrip("*").upper()
         if name == "" or head[0] in "+*":
             if current is not None:

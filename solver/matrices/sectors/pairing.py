@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -147,8 +147,19 @@ def groups(
     low: list[Group] = []
     high: list[Group] = []
     for pair in pairs:
-        for components in (COMPONENTS[:3], COMPONENTS[3:]):
-            one, other = (tuple(rows.get(Label(node, c), -1) for c in components) for node in pair)
+        for about in (slice(0, 3), slice(3, 6)):
+            own = [tuple(rows.get(Label(node, c), -1) for c in OWN_COMPONENTS[about]) for node in pair]
+            one, other = (tuple(rows.get(Label(node, c), -1) for c in COMPONENTS[about]) for node in pair)
+            if max(map(max, own)) >= 0:
+                ours, theirs = _scalars(
+                    pair,
+                    [a if max(a) >= 0 else b for a, b in zip(own, (one, other), strict=True)],
+                    found.deck,
+                    turn,
+                )
+                low += ours
+                high += theirs
+                continue
             if max(one) < 0 and max(other) < 0:
                 continue
             if max(one) < 0 or max(other) < 0:
@@ -156,30 +167,23 @@ def groups(
                 raise ValueError(f"node {held} has no DOFs and its partner {free} has: hold both, or neither")
             low.append(one)
             high.append(other)
-        ours, theirs = _scalars(pair, rows, found.deck, turn)
-        low += ours
-        high += theirs
     if not low:
         raise ValueError("no node of the boundaries has a DOF in the matrices")
     return low, high
 
 
 def _scalars(
-    pair: tuple[int, int], rows: Mapping[Label, int], deck: Deck | None, turn: NDArray[np.float64] | None
+    pair: tuple[int, int], rows: list[Group], deck: Deck | None, turn: NDArray[np.float64] | None
 ) -> tuple[list[Group], list[Group]]:
-    """Rows along axes of the nodes' own."""
-    ours, theirs = ([rows.get(Label(node, c), -1) for c in OWN_COMPONENTS] for node in pair)
-    if max(*ours, *theirs) < 0:
-        return [], []
-    same = [row < 0 for row in ours] == [row < 0 for row in theirs]
-    if same and deck is not None and turn is not None:
+    """Rows of two nodes along axes of their own, each with that of its partner."""
+    ours, theirs = rows
+    if [row < 0 for row in ours] == [row < 0 for row in theirs] and deck is not None and turn is not None:
         low, high = frames(deck, pair)
         if np.abs(turn @ low - high).max() <= _SAME:
             kept = [i for i, row in enumerate(ours) if row >= 0]
             return [(ours[i],) for i in kept], [(theirs[i],) for i in kept]
-    held = pair[0] if max(ours) >= 0 else pair[1]
     raise ValueError(
-        f"node {held} of the boundaries is held along an axis of its own, which does not turn with the sector "
-        f"as that of its partner in the pair {pair[0]}, {pair[1]}: hold both in one cylindrical system about "
-        "the axis of the disk, or along the axis"
+        f"node {pair[0]} of the boundaries or its partner {pair[1]} is held along an axis of its own, "
+        "which does not turn with the sector: hold both in one cylindrical system about the axis of the disk, "
+        "or along it"
     )
