@@ -116,8 +116,11 @@ def put_together(
 def _joined(parts: Mapping[str, Labelled], paths: Mapping[str, Path], mapping: Path | None) -> MatrixSet:
     if all(part.labels is not None for part in parts.values()):
         return _together(parts)
-    sizes = {key: part.matrix.shape[0] for key, part in parts.items()}
-    matrices = {key: part.matrix for key, part in parts.items()}
+    most = max(part.matrix.shape[0] for part in parts.values())
+    matrices = {
+        key: part.matrix if part.sized else _with_empty(part.matrix, most) for key, part in parts.items()
+    }
+    sizes = {key: matrix.shape[0] for key, matrix in matrices.items()}
     if len(set(sizes.values())) > 1:
         return _apart(matrices)
     found = mapping or next((name for name in map(labels_beside, paths.values()) if name), None)
@@ -133,6 +136,11 @@ def _joined(parts: Mapping[str, Labelled], paths: Mapping[str, Path], mapping: P
             )
             raise MatrixFileError(f"{str(found)!r} names {len(labels)} rows, the matrices have {size}{twice}")
     return _apart(matrices, labels)
+
+
+def _with_empty(matrix: coo_array, size: int) -> coo_array:
+    """The matrix with empty rows behind its own."""
+    return coo_array((matrix.data, (matrix.row, matrix.col)), shape=(size, size))
 
 
 def _apart(
