@@ -215,13 +215,16 @@ def _resolve(scene: dict[str, Any]) -> dict[str, Any]:
     from solver.matrices.sectors.decks import check_alone
     from solver.matrices.values import as_json
 
-    cyclic = scene["structure"].get("cyclic")
-    if isinstance(cyclic, dict) and isinstance(cyclic.get("nodes"), str):
+    for key in ("cyclic/nodes", "nodes"):
+        table = scene["structure"].get("cyclic") if key.startswith("cyclic") else scene["structure"]
+        name = table.get("nodes") if isinstance(table, dict) else None
+        if not isinstance(name, str):
+            continue
         try:
-            check_alone(Path(cyclic["nodes"]))
+            check_alone(Path(name))
         except FormatError as error:
-            message = f"`nodes`: {cyclic['nodes']!r}: {error}"
-            raise SceneError([Issue(pointer="/structure/cyclic/nodes", message=message)]) from error
+            message = f"`nodes`: {name!r}: {error}"
+            raise SceneError([Issue(pointer=f"/structure/{key}", message=message)]) from error
     tables = with_files(scene, Path())["structure"]
     if not isinstance(tables, dict):
         raise TypeError(f"the structure is {type(tables).__name__}")

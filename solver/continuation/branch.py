@@ -52,6 +52,10 @@ class BranchStatus(Enum):
         "drifts a little further every period. Press it harder, take away what pulls it to one side, or hold "
         "it by a spring."
     )
+    UNDAMPED = (
+        "Beyond the last point there is a resonance and no damping, so that nothing bounds the response: give the structure "
+        "some (damping_ratio = 0.001, say)."
+    )
 
 
 ENDINGS = {

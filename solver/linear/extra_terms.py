@@ -184,7 +184,7 @@ def _terms(
         total.add(entry, entry.k + spin**2 * entry.k_omega2, entry.c + spin * entry.g)
     own = coordinates.own
     if own is not None:
-        total.add_own(*own.skew)
+        total.add_own(*own.skew, 1.0 + 1j * loss)
         total.add_own(own.K_omega2, own.G, spin**2, spin)
     return total.terms(loss)
 
@@ -192,6 +192,15 @@ def _terms(
 def hysteretic(n: int, loss_factor: float) -> ExtraTerms:
     """Return structural damping alone, of n coordinates."""
     return _Sum(np.eye(n), ()).terms(loss_factor)
+
+
+def terms_by_loss(coordinates: Coordinates) -> ExtraTerms | None:
+    """Return the derivative by the loss factor of what K has beside its symmetric part; None: nothing."""
+    if coordinates.own is None or not coordinates.own.skew[0]:
+        return None
+    total = _Sum(coordinates.shapes, ())
+    total.add_own(coordinates.own.skew[0], (), 1j)
+    return total.terms()
 
 
 def terms_by_gas(scene: Scene, name: str, coordinates: Coordinates) -> ExtraTerms:
@@ -252,7 +261,7 @@ class _Sum:
         self._at(self._K, entry.offset)[:] += k * np.outer(on, of)
         self._at(self._C, entry.offset)[:] += c * np.outer(on, of)
 
-    def add_own(self, K: Blocks, C: Blocks, by: float = 1.0, by_c: float = 1.0) -> None:
+    def add_own(self, K: Blocks, C: Blocks, by: complex = 1.0, by_c: complex = 1.0) -> None:
         """Add multiples of the structure's own matrices, in front of the coordinates of bodies."""
         for to, blocks, factor in ((self._K, K, by), (self._C, C, by_c)):
             for offset, matrix in blocks:

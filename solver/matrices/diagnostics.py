@@ -11,6 +11,7 @@ from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
 from solver.matrices.load_set import MatrixSet
+from solver.matrices.sectors.elimination import Elimination
 from solver.matrices.validation import ASYMMETRY, one_triangle
 
 FloatArray = NDArray[np.float64]
@@ -23,12 +24,13 @@ _PENALTY = 1e30  # a stiffness that stands for a boundary condition
 _INDEFINITE = 1e-6  # smallest eigenvalue of M scaled to a unit diagonal, negative beyond rounding
 
 
-def refuse(found: MatrixSet, *, reduced: bool) -> None:
+def refuse(found: MatrixSet, *, reduced: bool, gone: Elimination | None = None) -> None:
     """Raise for matrices that are no structure.
 
     Parameters
     ----------
     reduced : whether rows without mass will be condensed out.
+    gone : how the high boundary of a sector follows the low one, which joins their masses.
 
     Raises
     ------
@@ -73,6 +75,8 @@ def refuse(found: MatrixSet, *, reduced: bool) -> None:
             "penalty: leave such DOFs out of the export (Abaqus: FORMAT=MATRIX INPUT, which tells them)"
         )
     bare = np.flatnonzero(mass == 0.0)
+    if gone is not None:
+        bare = gone.kept[gone.of(M).own.diagonal() == 0.0]
     if bare.size and not reduced:
         raise ValueError(
             f"`M` must be positive definite, but {_rows(found, bare)} without mass: reduce the model "
@@ -140,7 +144,7 @@ def notes(found: MatrixSet, omega2: FloatArray) -> list[str]:
     ----------
     omega2 : of the model without contacts [rad²/s²].
     """
-    said = []
+    said = list(found.remarks)
     if found.held:
         said.append(f"{found.held} rows that a boundary condition holds were left out")
     rigid = rigid_body_modes(omega2)

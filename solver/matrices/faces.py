@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
-from solver.matrices.sectors.decks import Deck, positions
+from solver.matrices.decks.deck import Deck, positions
 
 _NEAR = 0.01  # share of the least distance of two nodes of a face within which nodes are one place
 _FLAT = 1e-3  # a face thinner than this share of its length is a line

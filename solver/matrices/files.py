@@ -40,7 +40,9 @@ def read_labelled(path: Path, key: str) -> Labelled:
     """
     found = _read(path, lambda reader: _matrix(reader, path, key))
     if isinstance(found, Labelled):
-        return Labelled(matrix=_checked(found.matrix, path), labels=found.labels, held=found.held)
+        return Labelled(
+            matrix=_checked(found.matrix, path), labels=found.labels, held=found.held, sized=found.sized
+        )
     return Labelled(matrix=_checked(found if issparse(found) else np.asarray(found), path))
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
@@ -15,8 +16,11 @@ from solver.matrices.labels import label as parsed
 from solver.matrices.labels import labels_beside, read_labels
 from solver.matrices.readers.label import Label
 from solver.matrices.readers.numbers_in_text import FormatError
-from solver.matrices.readers.registry import label_suffixes
+from solver.matrices.readers.registry import label_suffixes, reader_of
 from solver.matrices.readers.triplets import Labelled
+
+if TYPE_CHECKING:
+    from solver.matrices.decks.deck import Deck
 
 PART = "parts/"  # begins the key of a part of the structure, such as a blade, beside M, K and C
 
@@ -35,12 +39,21 @@ class MatrixSet:
         Rows left out because a boundary condition holds them.
     parts : dict
         Stiffness of parts of the structure, sparse, by their names.
+    global_rows : bool
+        Whether the rows are along the global axes, whatever frames a deck gives to nodes.
+    deck : Deck or None
+        Where the nodes are, if it was given; displacements have been turned out of its frames.
+    remarks : tuple of str
+        What was done to the rows and should be known.
     """
 
     matrices: dict[str, coo_array]
     labels: tuple[Label, ...] | None = None
     held: int = 0
     parts: dict[str, coo_array] = field(default_factory=dict)
+    global_rows: bool = False
+    deck: Deck | None = None
+    remarks: tuple[str, ...] = ()
 
     def row(self, label: Label) -> int | None:
         """The row of a label (zero-based); None if there is none."""
@@ -96,10 +109,18 @@ def put_together(
     MatrixFileError
         A file of labels that cannot be used.
     """
+    own = all(reader_of(path).global_rows for path in paths.values())
+    return replace(_joined(parts, paths, mapping), global_rows=own)
+
+
+def _joined(parts: Mapping[str, Labelled], paths: Mapping[str, Path], mapping: Path | None) -> MatrixSet:
     if all(part.labels is not None for part in parts.values()):
         return _together(parts)
-    sizes = {key: part.matrix.shape[0] for key, part in parts.items()}
-    matrices = {key: part.matrix for key, part in parts.items()}
+    most = max(part.matrix.shape[0] for part in parts.values())
+    matrices = {
+        key: part.matrix if part.sized else _with_empty(part.matrix, most) for key, part in parts.items()
+    }
+    sizes = {key: matrix.shape[0] for key, matrix in matrices.items()}
     if len(set(sizes.values())) > 1:
         return _apart(matrices)
     found = mapping or next((name for name in map(labels_beside, paths.values()) if name), None)
@@ -115,6 +136,11 @@ def put_together(
             )
             raise MatrixFileError(f"{str(found)!r} names {len(labels)} rows, the matrices have {size}{twice}")
     return _apart(matrices, labels)
+
+
+def _with_empty(matrix: coo_array, size: int) -> coo_array:
+    """The matrix with empty rows behind its own."""
+    return coo_array((matrix.data, (matrix.row, matrix.col)), shape=(size, size))
 
 
 def _apart(
@@ -179,4 +205,4 @@ def in_si(found: MatrixSet, units: str) -> MatrixSet:
         {key: coo_array(scale @ csr_array(matrix) @ scale) for key, matrix in given.items()}
         for given in (found.matrices, found.parts)
     )
-    return MatrixSet(matrices=scaled, labels=found.labels, held=found.held, parts=parts)
+    return replace(found, matrices=scaled, parts=parts)

@@ -14,14 +14,15 @@ from solver.matrices.file_units import METRES, UNITS
 from solver.matrices.files import MatrixFileError, read_labelled, read_modes
 from solver.matrices.labels import label
 from solver.matrices.load_set import PART, MatrixSet, in_si, put_together
+from solver.matrices.node_frames import in_global
 from solver.matrices.reduction.craig_bampton import Reduced, craig_bampton
-from solver.matrices.sectors.loading import sector_kept
+from solver.matrices.sectors.loading import read_nodes, sector_kept
 from solver.matrices.sectors.reduction import ReducedSector
 from solver.matrices.validation import DofTable
 from solver.matrices.values import MOST_DOFS, Matrix, Modes
 
 KEEP_MODES = "keep_modes"
-MAPPING, IN_UNITS = "mapping", "units"
+MAPPING, IN_UNITS, NODES = "mapping", "units", "nodes"
 _MATRICES = ("M", "K", "C", "G", "K_omega2")
 _SKEW = {"K": "skew K", "C": "skew C"}  # what their symmetric parts leave
 
@@ -86,7 +87,8 @@ def _orders(raw: Mapping[str, object]) -> list[int]:
 def read_matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:
     """The matrices that the files of a structure hold, in SI units.
 
-    `mapping` and `units` are taken out of `tables`, and labels among its DOFs become rows.
+    `mapping`, `units` and `nodes` are taken out of `tables`, and labels among its DOFs become rows. Rows are
+    along the global axes, whatever frames the deck gives to nodes (`nodes`, or that of `cyclic`).
 
     Raises
     ------
@@ -103,6 +105,8 @@ def read_matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:
     if units not in UNITS:
         known = ", ".join(UNITS)
         raise SceneError([_issue(IN_UNITS, f"`{IN_UNITS}` must be one of {known}, got {units!r}")])
+    cyclic = tables.get("cyclic")
+    own, joined = tables.pop(NODES, None), cyclic.get(NODES) if isinstance(cyclic, dict) else None
     if not paths:
         return MatrixSet(matrices={})
     issues, parts = [], {}
@@ -117,6 +121,12 @@ def read_matrices(tables: dict[str, Any], folder: Path) -> MatrixSet:
         found = in_si(put_together(parts, paths, None if mapping is None else folder / mapping), units)
     except MatrixFileError as error:
         raise SceneError([_issue(MAPPING, str(error))]) from error
+    key = NODES if own is not None else f"cyclic/{NODES}"
+    deck = read_nodes(joined if own is None else own, folder, key)
+    try:
+        found = in_global(found, deck)
+    except ValueError as error:
+        raise SceneError([_issue(key, f"`{NODES}`: {error}")]) from error
     if isinstance(tables.get("dofs"), dict):
         tables["dofs"] = {name: _row(name, row, found) for name, row in tables["dofs"].items()}
     return found

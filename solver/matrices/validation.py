@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
@@ -152,8 +153,15 @@ def check_matrices(
     modes: Modes | None,
     dofs: DofTable,
     others: Mapping[str, Matrix],
+    *,
+    joined: bool = False,
 ) -> None:
-    """Raise ValueError unless matrices or modes are there, of one size that has the rows of the DOFs."""
+    """Raise ValueError unless matrices or modes are there, of one size that has the rows of the DOFs.
+
+    Parameters
+    ----------
+    joined : whether boundaries of a sector are to be joined first, before M must be definite.
+    """
     given = {key: value for key, value in (("M", M), ("K", K), ("C", C)) if value is not None}
     given |= others
     if modes is not None and given:
@@ -168,12 +176,13 @@ def check_matrices(
     for name, row in dofs.write().items():
         if row >= size:
             raise ValueError(f"`dofs`: {name!r} must have a row from 0 to {size - 1}, got {row}")
-    if M is not None:
-        _check_definite(M)
+    if M is not None and not joined:
+        check_definite(M.array)
 
 
-def _check_definite(M: Matrix) -> None:
-    diagonal = np.diag(M.array)
+def check_definite(M: NDArray[Any]) -> None:
+    """Raise ValueError unless a mass matrix, symmetric or Hermitian, is positive definite."""
+    diagonal = np.diag(M).real
     if diagonal.min() <= 0.0:
         row = int(diagonal.argmin())
         raise ValueError(
@@ -181,7 +190,7 @@ def _check_definite(M: Matrix) -> None:
             "a DOF without mass must be condensed out first"
         )
     try:
-        np.linalg.cholesky(M.array)
+        np.linalg.cholesky(M)
     except np.linalg.LinAlgError as error:
-        least = float(np.linalg.eigvalsh(M.array)[0])
+        least = float(np.linalg.eigvalsh(M)[0])
         raise ValueError(f"`M` must be positive definite, got the eigenvalue {least:g}") from error

@@ -35,6 +35,10 @@ class SolutionStatus(Enum):
         "There is no periodic motion: a part that contacts alone hold ratchets, it drifts a little further "
         "every period. Press it harder, take away what pulls it to one side, or hold it by a spring."
     )
+    UNDAMPED = (
+        "At this frequency there is a resonance and no damping, so that nothing bounds the response: give the structure "
+        "some (damping_ratio = 0.001, say)."
+    )
     LAW_FAILED = (
         "The law of a contact gives no finite force that repeats from period to period for a motion tried: "
         "look at its functions and parameters, or give it more samples."

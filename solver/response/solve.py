@@ -28,6 +28,7 @@ from solver.linear.condensation import loose_ports
 from solver.response.contact_response import OPENS, ContactResponse, ContactState, contact_responses
 from solver.response.history_dependence import has_another_solution, history_of
 from solver.response.solution import HISTORY_DEPENDENT, MEAN_UNDETERMINED, Solution, SolutionStatus
+from solver.linear.undamped import undamped_resonance
 from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -190,9 +191,12 @@ def _flags(
 
 def _failure(balance: Balance, frequency_hz: float, found: PointSolution, seconds: float) -> Solution:
     nothing = np.full(2 * balance.highest_harmonic + 1, np.nan)
+    status = SolutionStatus.RATCHETS if found.ratchets else SolutionStatus.NOT_CONVERGED
+    if not found.ratchets and undamped_resonance(balance.scene, frequency_hz, balance.system.ks):
+        status = SolutionStatus.UNDAMPED
     return Solution(
         scene=balance.scene, frequency_hz=frequency_hz, n_harmonics=balance.n_harmonics,
-        status=SolutionStatus.RATCHETS if found.ratchets else SolutionStatus.NOT_CONVERGED,
+        status=status,
         max_abs=math.nan, half_peak_to_peak=math.nan, mean=math.nan,
         harmonics=np.full(balance.highest_harmonic + 1, np.nan), observed=nothing, contacts=(), flags=(),
         residual=found.residual, error_estimate=math.nan, newton_iterations=found.iterations, seconds=seconds,

@@ -169,7 +169,8 @@ class MatricesStructure(Part):
         if self.sectors is not None:
             check_sector(self, spinning)
         if self.diameters is None:
-            check_matrices(self.M, self.K, self.C, self.modes, self.dofs, spinning)
+            joined = self.sectors is not None
+            check_matrices(self.M, self.K, self.C, self.modes, self.dofs, spinning, joined=joined)
         if self.damping_ratio is not None and self.modes is not None and self.modes.damping_ratio is not None:
             raise ValueError(
                 f"`damping_ratio` = {self.damping_ratio!r} is given beside that of `modes`: keep one of them"

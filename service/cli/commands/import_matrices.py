@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.importing.files import Sources, deck_file, dof_table, read_sources, rows_of, sources
+from service.cli.importing.files import (
+    Sources,
+    deck_file,
+    dof_table,
+    read_sources,
+    relative,
+    rows_of,
+    sources,
+)
 from service.cli.importing.options import (
     Axis,
     Contacts,
@@ -67,6 +75,8 @@ if TYPE_CHECKING:
     from solver.matrices.load_set import MatrixSet
     from solver.scene.scene import Scene
 
+_RATIO = 0.001  # of a structure whose files hold no damping, which would have no bound at resonance
+
 
 def import_scene(
     files: Files,
@@ -119,8 +129,14 @@ def import_scene(
             "[structure.parts]"
         )
     found = sources(files, mapping, units, mistune)
-    given = read_sources(found)
-    faces = Patches(patches, deck, units, None if of is None else (of.sectors, of.axis), tolerance)
+    given = read_sources(found, deck)
+    faces = Patches(
+        patches,
+        None if given is None else given.deck,
+        units,
+        None if of is None else (of.sectors, of.axis),
+        tolerance,
+    )
     table = dof_table(dofs, found, given, patches=bool(patches))
     made = faces.made(given, table)
     table |= made.dofs
@@ -134,9 +150,15 @@ def import_scene(
             structure = written.table(target)
             table = dict(written.rows)
         else:
-            _checked(given, reduced=keep_modes is not None)
             kept = {} if keep_modes is None else {"keep_modes": keep_modes}
-            structure |= kept if of is None else _joined(given, of, target, kept)
+            gone = None if of is None else _gone(given, of)
+            _checked(given, reduced=keep_modes is not None, gone=gone)
+            structure |= kept if of is None else {"sectors": of.sectors, "cyclic": of.joined(target) | kept}
+            if of is None and given is not None and given.remarks and deck is not None:
+                structure["nodes"] = relative(deck, target)
+        undamped = not _damped(found)
+        if undamped:
+            structure["damping_ratio"] = _RATIO
         driven = excitation(forces, excite, next(iter(table)))
         raw = _Parts(
             target=target, structure={**structure, "dofs": table}, excitation=driven, observe=observe,
@@ -146,9 +168,10 @@ def import_scene(
         frequencies = [math.sqrt(max(float(value), 0.0)) / (2.0 * math.pi) for value in omega2]
         scene = _write(target, raw.table(band(start, stop, frequencies)), found, written)
         undo.pop_all()
-    _report(
-        scene, target, frequencies, written, given, [*_notes(given, omega2), *found_by_position(of)], as_json
-    )
+    said = [*_notes(given, omega2), *found_by_position(of)]
+    if undamped:
+        said.append(f"the files hold no damping: the scene has damping_ratio = {_RATIO:g}; put yours there")
+    _report(scene, target, frequencies, written, given, said, as_json)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -191,22 +214,31 @@ def _reduced(
     return reduce(given, rows_of(table, given), modes, up_to, path)
 
 
-def _joined(given: MatrixSet | None, of: Disk, target: Path, kept: dict[str, int]) -> dict[str, object]:
-    """The keys of a sector whose files the scene refers to."""
+def _gone(given: MatrixSet | None, of: Disk) -> Any:
+    """How the high boundary of a sector follows whose files the scene refers to."""
     if given is None:
         raise InputError("`--sectors` is for matrices, not for modes")
-    checked_boundaries(given, of)
-    return {"sectors": of.sectors, "cyclic": of.joined(target) | kept}
+    size = int(next(iter(given.matrices.values())).shape[0])
+    return checked_boundaries(given, of).elimination(size, of.sectors)
 
 
-def _checked(given: MatrixSet | None, *, reduced: bool) -> None:
+def _damped(found: Sources) -> bool:
+    """Whether the files hold damping."""
+    from solver.matrices.files import read_modes
+
+    return "C" in found.roles or (
+        "modes" in found.roles and read_modes(found.roles["modes"]).damping_ratio is not None
+    )
+
+
+def _checked(given: MatrixSet | None, *, reduced: bool, gone: Any) -> None:
     """Refuse what is no structure."""
     from solver.matrices.diagnostics import refuse
 
     if given is None:
         return
     try:
-        refuse(given, reduced=reduced)
+        refuse(given, reduced=reduced, gone=gone)
     except ValueError as error:
         raise InputError(f"`FILES`: {error}") from error
 
@@ -288,9 +320,9 @@ def _report(
     if written is not None:
         pairs += written.pairs()
     pairs += [("note", note) for note in notes]
-    missing = "a damping" if scene.contacts else "[[contacts]] and a damping"
+    todo = "look at the damping" if scene.contacts else "add [[contacts]], look at the damping"
     pairs += [
         ("compare", "frequencies and mass with those of your program; else see --units"),
-        ("next", f"add {missing} in the file, then `stickslip plan`"),
+        ("next", f"{todo} in the file, then `stickslip plan`"),
     ]
     print_pairs(f"Scene {scene.name} in {target}", pairs)

@@ -101,18 +101,25 @@ def _parts(texts: Sequence[str] | None) -> dict[str, Path | None]:
     return found
 
 
-def read_sources(found: Sources) -> MatrixSet | None:
-    """The matrices in SI units, checked for size; None for modes."""
+def read_sources(found: Sources, deck: Path | None) -> MatrixSet | None:
+    """The matrices in SI units, along the global axes whatever frames the deck has; None for modes."""
     from solver.matrices.files import MatrixFileError
     from solver.matrices.load_set import PART, in_si, read_set
+    from solver.matrices.node_frames import in_global
+    from solver.matrices.readers.numbers_in_text import FormatError
+    from solver.matrices.sectors.decks import read_deck
 
     if "modes" in found.roles:
         return None
     parts = {PART + name: path for name, path in found.parts.items() if path is not None}
     try:
-        return in_si(read_set(found.roles | parts, found.mapping), found.units)
+        given = in_si(read_set(found.roles | parts, found.mapping), found.units)
     except MatrixFileError as error:
         raise InputError(f"`FILES`: {error}") from error
+    try:
+        return in_global(given, None if deck is None else read_deck(deck, elements=True))
+    except (FormatError, OSError, ValueError) as error:
+        raise InputError(f"`--nodes`: {error}") from error
 
 
 def deck_file(text: str | None) -> Path | None:

@@ -11,8 +11,7 @@ from service.cli.importing.parts import split
 from service.errors import InputError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
+    from solver.matrices.decks.deck import Deck
     from solver.matrices.load_set import MatrixSet
 
 GROUND = "ground"
@@ -43,7 +42,7 @@ class Patches:
     Parameters
     ----------
     texts : such as ``shroud=AHEAD:BEHIND@next,normal=y,kt=1e7,kn=2e7,mu=0.3,N0=100``.
-    deck : the input deck with positions and sets, or None.
+    deck : positions and sets, or None.
     units : of the deck.
     turn : sectors and axis of a disk, for faces that touch the next sector.
     tolerance : distance within which nodes touch, in the units of the deck.
@@ -55,7 +54,7 @@ class Patches:
     """
 
     def __init__(
-        self, texts: Sequence[str] | None, deck: Path | None, units: str,
+        self, texts: Sequence[str] | None, deck: Deck | None, units: str,
         turn: tuple[int, Sequence[float]] | None, tolerance: float | None,
     ) -> None:  # fmt: skip
         self._dampers: list[dict[str, Any]] = []
@@ -68,13 +67,7 @@ class Patches:
             raise InputError(
                 "`--patch` needs --nodes DECK, the deck with the positions and the sets of nodes"
             )
-        from solver.matrices.readers.numbers_in_text import FormatError
-        from solver.matrices.sectors.decks import read_deck
-
-        try:
-            self._deck = read_deck(deck)
-        except (FormatError, OSError) as error:
-            raise InputError(f"`--nodes`: {error}") from error
+        self._deck = deck
         for text in texts:
             self._add(text)
 
@@ -105,7 +98,7 @@ class Patches:
     def _members(self, name: str, end: str) -> list[int] | None:
         if end == GROUND:
             return None
-        found = self._deck.sets.get(end.upper())
+        found = self._deck.sets.get(end.strip('"').upper())
         if found is None:
             known = ", ".join(sorted(self._deck.sets)) or "none"
             raise InputError(f"`--patch` {name!r}: the deck has no set {end!r}; it has {known}")

@@ -63,6 +63,8 @@ class Written:
                            if held else "none"),
             ("good to", f"{quality.good_to_hz:.5g} Hz: frequencies up to there are estimated 0.1 % exact; "
                         "harmonics that matter should lie below"),
+            ("errors", "first frequencies too high by "
+                       + (", ".join(f"{e:.1e}" for e in quality.system_error[:6]) or "nothing")),
             ("mass carried", f"{100 * least[0]:.1f} % of the inertia or more (least for {least[1]})"),
             ("static check", f"residual {quality.static_residual:.1e}"),
         ]  # fmt: skip

@@ -75,7 +75,7 @@ def disk(
 
     Parameters
     ----------
-    patches : whether there are patches, which take --nodes and --tolerance too.
+    patches : whether there are patches, which take --tolerance too.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def disk(
         "--low": low, "--high": high, "--axis": axis, "--engine-order": engine_order,
     }  # fmt: skip
     if not patches:
-        others |= {"--nodes": nodes, "--tolerance": tolerance}
+        others |= {"--tolerance": tolerance}
     if sectors is None:
         given = next((name for name, value in others.items() if value is not None), None)
         if given is not None:
@@ -176,7 +176,8 @@ class WrittenSector:
         ]  # fmt: skip
         for n, quality, seconds in zip(found.matrices.diameters, found.quality, found.seconds, strict=True):
             first = ", ".join(f"{f:.6g}" for f in quality.system_hz[:4])
-            told.append((f"diameter {n}", f"{first} Hz, …; {seconds:.1f} s"))
+            high = f"too high by {max(quality.system_error[:4].tolist(), default=0.0):.1e} of it at most"
+            told.append((f"diameter {n}", f"{first} Hz, …, {high}; {seconds:.1f} s"))
         return told
 
 
@@ -248,7 +249,14 @@ def checked_boundaries(given: MatrixSet, of: Disk, metres: float = 1.0) -> Any:
 
 def found_by_position(of: Disk | None) -> list[str]:
     """What to know of boundaries that were not named."""
-    if of is None or of.low is not None:
+    if of is None:
+        return []
+    if of.nodes is None:
+        return [
+            "there is no deck: the rows are taken to be along the global axes; if nodes have frames of their "
+            "own (GRID field 7, NBLOCK angles, *TRANSFORM), give it with --nodes"
+        ]
+    if of.low is not None:
         return []
     return [
         "the boundaries were found by position: faces that only touch the next sector, as of shrouds, lie "

@@ -26,7 +26,7 @@ from solver.scene.scene import Scene, load_scene, shipped_scenes
 MOST_SET = 1000
 UPLOAD = "upload:"
 """What stands before the id of an upload where a scene file names a file."""
-FILE_KEYS = ("M", "K", "C", "G", "K_omega2", "modes", "mapping", "diameters")
+FILE_KEYS = ("M", "K", "C", "G", "K_omega2", "modes", "mapping", "diameters", "nodes")
 """Of a structure of kind `matrices`; files also stand in its tables `cyclic` and `parts`."""
 
 Place = tuple[str, ...]

@@ -13,6 +13,7 @@ import numpy as np
 
 from solver.balance.balance import Balance, build
 from solver.balance.kernels.output import MAX_ABS
+from solver.balance.parameter import Kind
 from solver.balance.simplifications import Effects
 from solver.balance.workspace import Workspace
 from solver.continuation.branch import ENDINGS, Branch, BranchStatus, Peak
@@ -32,6 +33,7 @@ from solver.continuation.segment import Stretch, go_on_from, joined, rows_of, st
 from solver.continuation.settings import ContinuationSettings
 from solver.errors import SettingError
 from solver.jit.fourier import Integer, Real, to_full
+from solver.linear.undamped import undamped_resonance
 from solver.results.default_bar import shows_progress
 from solver.scene.bodies.paths import SPEED
 from solver.scene.parameter_paths import FREQUENCY
@@ -309,6 +311,10 @@ def _finish(
     """Put the stretches together, polish the peaks and measure the band."""
     balance = workspace.balance
     whole = joined(stretches)
+    if status in (BranchStatus.STALLED, BranchStatus.NO_START) and balance.parameter.kind is Kind.FREQUENCY:
+        at_end = balance.parameter.outside(float(whole.solutions[-1, -1])) if len(whole.solutions) else start
+        if undamped_resonance(balance.scene, at_end, balance.system.ks):
+            status = BranchStatus.UNDAMPED
     survey = _survey(workspace, whole)
     at = band_limit(limit, survey.peaks, balance.parameter.kind)
     band = None if at is None else survey.band(at)

@@ -80,7 +80,7 @@ def _coordinate(data: NDArray[np.float64], lines: list[str]) -> Labelled:
         )
     if size > MOST_ROWS:
         raise FormatError(f"a matrix may have {MOST_ROWS} rows, got {size}")
-    return Labelled(matrix=coo_array(mirrored(rows, columns, data[:, 2], size)))
+    return Labelled(matrix=coo_array(mirrored(rows, columns, data[:, 2], size)), sized=False)
 
 
 def _places(

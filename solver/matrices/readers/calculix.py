@@ -31,7 +31,7 @@ def read_calculix(path: Path) -> Labelled:
     size = int(max(rows.max(), columns.max())) + 1
     if size > MOST_ROWS:
         raise FormatError(f"a matrix may have {MOST_ROWS} rows, got {size}")
-    return Labelled(matrix=mirrored(rows, columns, data[:, 2], size))
+    return Labelled(matrix=mirrored(rows, columns, data[:, 2], size), sized=False)
 
 
 def _labels(path: Path) -> tuple[Label, ...]:
@@ -56,6 +56,7 @@ READERS = (
         help="CalculiX, `*FREQUENCY, SOLVER=MATRIXSTORAGE`: stiffness and mass; `name.dof` beside them names "
         "the rows.",
         matrix=lambda path, _key: read_calculix(path),
+        global_rows=True,
         roles={".mas": "M", ".sti": "K"},
     ),
     Reader(

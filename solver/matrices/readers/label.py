@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 COMPONENTS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
+OWN_COMPONENTS = ("U1", "U2", "U3", "UR1", "UR2", "UR3")
+"""Along and about the axes of a node's own frame, where it could not be turned into the global one."""
 
 
 class Label(NamedTuple):
@@ -19,7 +21,7 @@ class Label(NamedTuple):
     @property
     def rotation(self) -> bool:
         """Whether it is an angle."""
-        return self.component in COMPONENTS[3:]
+        return self.component in COMPONENTS[3:] + OWN_COMPONENTS[3:]
 
     @property
     def place(self) -> tuple[int, int, str]:

@@ -53,6 +53,8 @@ class Reader:
         Reads the labels of all rows, in order.
     nodes : callable or None
         Reads positions and sets of nodes, a `solver.matrices.sectors.decks.Deck`.
+    global_rows : bool
+        Whether rows are along the global axes whatever frames a deck gives to nodes, as in CalculiX.
     roles : mapping
         Ending to ``M``, ``K`` or ``C``, where the ending tells which matrix a file holds.
 
@@ -73,6 +75,7 @@ class Reader:
     modes: Callable[[Path], dict[str, Any]] | None = None
     labels: Callable[[Path], tuple[Label, ...]] | None = None
     nodes: Callable[[Path], Any] | None = None
+    global_rows: bool = False
     roles: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -24,11 +24,14 @@ class Labelled:
         Node and component of each row, where the file tells.
     held : frozenset of Label
         Rows that a boundary condition holds, which are no DOFs.
+    sized : bool
+        Whether the file tells how many rows there are; else empty ones at the end do not show.
     """
 
     matrix: coo_array
     labels: tuple[Label, ...] | None = None
     held: frozenset[Label] = frozenset()
+    sized: bool = True
 
 
 def mirrored(

@@ -20,6 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.matrices.decks.coordinates import about_axis as rotation
+
 FloatArray = NDArray[np.float64]
 Group = tuple[int, ...]  # rows of a vector's three components (-1: held), or the one row of a scalar
 _LEFT = 1e-9  # component of a turned displacement that counts as none where a boundary condition holds it
@@ -46,14 +48,6 @@ def phase_factor(diameter: int, sectors: int) -> complex | float:
         return 1.0 if diameter % sectors == 0 else -1.0
     angle = 2.0 * math.pi * (diameter % sectors) / sectors
     return complex(math.cos(angle), math.sin(angle))
-
-
-def rotation(axis: Sequence[float], angle: float) -> FloatArray:
-    """The rotation by an angle [rad] about an axis through the origin, (3, 3) (Rodrigues)."""
-    k = np.asarray(axis, dtype=np.float64)
-    k = k / np.linalg.norm(k)
-    cross = np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,7 +15,7 @@ from solver.matrices.load_set import MatrixSet
 from solver.matrices.readers.numbers_in_text import FormatError
 from solver.matrices.readers.reader import MatrixFileError
 from solver.matrices.sectors.decks import Deck, read_deck
-from solver.matrices.sectors.elimination import Elimination, Group, elimination
+from solver.matrices.sectors.elimination import Elimination, Group, elimination, rotation
 from solver.matrices.sectors.outline import SectorOutline, outline_of
 from solver.matrices.sectors.pairing import PAIR_BY, Pairs, groups, paired
 from solver.matrices.sectors.parts import WHOLE
@@ -84,11 +84,11 @@ def boundaries(
         raise _refusal("pair_by", f"`pair_by` must be one of {', '.join(PAIR_BY)}, got {pair_by!r}")
     if tolerance is not None and not (isinstance(tolerance, int | float) and tolerance > 0.0):
         raise _refusal("tolerance", f"`tolerance` must be a distance > 0, got {tolerance!r}")
-    deck = _deck(given.get("nodes"), folder)
+    deck = found.deck or read_nodes(given.get("nodes"), folder)
     low, high = (_nodes(key, given.get(key), deck) for key in ("low", "high"))
     try:
         pairs = paired(deck, low, high, axis, sectors, pair_by=pair_by, tolerance=tolerance)
-        ours, theirs = groups(pairs, found)
+        ours, theirs = groups(pairs, found, rotation(axis, 2.0 * math.pi / sectors))
     except ValueError as error:
         raise _refusal("low", str(error)) from error
     return Boundaries(
@@ -111,17 +111,25 @@ def _is_direction(given: Sequence[object]) -> bool:
     return len(numbers) == len(given) and 0.0 < math.hypot(*numbers) < math.inf
 
 
-def _deck(name: object, folder: Path) -> Deck | None:
+def read_nodes(name: object, folder: Path, pointer: str = "cyclic/nodes") -> Deck | None:
+    """The deck that a key of a scene file names; None without one.
+
+    Raises
+    ------
+    SceneError
+        It cannot be read.
+    """
     if name is None:
         return None
     if not isinstance(name, str):
-        raise _refusal("nodes", f"`nodes` must be the name of a deck, got {name!r}")
+        raise _refusal("nodes", f"`nodes` must be the name of a deck, got {name!r}", pointer)
     try:
         return read_deck(folder / name, elements=True)
     except FormatError as error:
-        raise _refusal("nodes", f"`nodes`: {name!r}: {error}") from error
+        raise _refusal("nodes", f"`nodes`: {name!r}: {error}", pointer) from error
     except OSError as error:
-        raise _refusal("nodes", f"`nodes`: {name!r} cannot be read: {error.strerror or error}") from error
+        why = error.strerror or error
+        raise _refusal("nodes", f"`nodes`: {name!r} cannot be read: {why}", pointer) from error
 
 
 def _nodes(key: str, given: object, deck: Deck | None) -> list[int] | None:
@@ -134,10 +142,11 @@ def _nodes(key: str, given: object, deck: Deck | None) -> list[int] | None:
         raise _refusal(key, f"`{key}` must be the name of a set or a list of nodes, got {given!r}")
     if deck is None:
         raise _refusal("nodes", f"`nodes` is missing: the deck that has the set {given!r}")
-    if given.upper() not in deck.sets:
+    name = given.strip().strip('"').upper()
+    if name not in deck.sets:
         known = ", ".join(sorted(deck.sets)[:20]) or "none"
         raise _refusal(key, f"`{key}`: there is no set {given!r} of nodes in the deck; known: {known}")
-    return list(dict.fromkeys(deck.sets[given.upper()]))
+    return list(dict.fromkeys(deck.sets[name]))
 
 
 def sector_kept(
@@ -277,5 +286,5 @@ def _dense(found: MatrixSet) -> dict[str, object]:
     return dense
 
 
-def _refusal(key: str, message: str) -> SceneError:
-    return SceneError([Issue(pointer=f"/structure/cyclic/{key}", message=message)])
+def _refusal(key: str, message: str, pointer: str | None = None) -> SceneError:
+    return SceneError([Issue(pointer=f"/structure/{pointer or f'cyclic/{key}'}", message=message)])

@@ -16,7 +16,7 @@ from pydantic_core import CoreSchema, core_schema
 from solver.matrices.sectors.elements import drawn_edges
 
 if TYPE_CHECKING:
-    from solver.matrices.sectors.decks import Deck
+    from solver.matrices.decks.deck import Deck
 
 MOST_POINTS = 10_000
 MOST_EDGES = 20_000

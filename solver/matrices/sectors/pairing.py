@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.matrices.readers.label import COMPONENTS, Label
-from solver.matrices.sectors.decks import Deck, positions
+from solver.matrices.decks.deck import Deck, frames, positions
+from solver.matrices.readers.label import COMPONENTS, OWN_COMPONENTS, Label
 from solver.matrices.sectors.elimination import Group, rotation
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ Pairs = list[tuple[int, int]]
 PAIR_BY = ("position", "order")
 NEAR = 0.01  # share of the least distance of two nodes within which they are one place
 _FEW = 10
+_SAME = 1e-4  # between frames, the sine of an angle that comes of rounded places
 
 
 def paired(
@@ -121,8 +122,16 @@ def _check_all(
     )
 
 
-def groups(pairs: Pairs, found: MatrixSet) -> tuple[list[Group], list[Group]]:
+def groups(
+    pairs: Pairs, found: MatrixSet, turn: NDArray[np.float64] | None = None
+) -> tuple[list[Group], list[Group]]:
     """Rows of the pairs: the three displacements and, where there are any, the three rotations of each node.
+
+    Rows along axes of the nodes' own are scalars, where those axes turn with the sector.
+
+    Parameters
+    ----------
+    turn : (3, 3) rotation by the pitch; needed for such rows.
 
     Raises
     ------
@@ -138,8 +147,19 @@ def groups(pairs: Pairs, found: MatrixSet) -> tuple[list[Group], list[Group]]:
     low: list[Group] = []
     high: list[Group] = []
     for pair in pairs:
-        for components in (COMPONENTS[:3], COMPONENTS[3:]):
-            one, other = (tuple(rows.get(Label(node, c), -1) for c in components) for node in pair)
+        for about in (slice(0, 3), slice(3, 6)):
+            own = [tuple(rows.get(Label(node, c), -1) for c in OWN_COMPONENTS[about]) for node in pair]
+            one, other = (tuple(rows.get(Label(node, c), -1) for c in COMPONENTS[about]) for node in pair)
+            if max(map(max, own)) >= 0:
+                ours, theirs = _scalars(
+                    pair,
+                    [a if max(a) >= 0 else b for a, b in zip(own, (one, other), strict=True)],
+                    found.deck,
+                    turn,
+                )
+                low += ours
+                high += theirs
+                continue
             if max(one) < 0 and max(other) < 0:
                 continue
             if max(one) < 0 or max(other) < 0:
@@ -150,3 +170,20 @@ def groups(pairs: Pairs, found: MatrixSet) -> tuple[list[Group], list[Group]]:
     if not low:
         raise ValueError("no node of the boundaries has a DOF in the matrices")
     return low, high
+
+
+def _scalars(
+    pair: tuple[int, int], rows: list[Group], deck: Deck | None, turn: NDArray[np.float64] | None
+) -> tuple[list[Group], list[Group]]:
+    """Rows of two nodes along axes of their own, each with that of its partner."""
+    ours, theirs = rows
+    if [row < 0 for row in ours] == [row < 0 for row in theirs] and deck is not None and turn is not None:
+        low, high = frames(deck, pair)
+        if np.abs(turn @ low - high).max() <= _SAME:
+            kept = [i for i, row in enumerate(ours) if row >= 0]
+            return [(ours[i],) for i in kept], [(theirs[i],) for i in kept]
+    raise ValueError(
+        f"node {pair[0]} of the boundaries or its partner {pair[1]} is held along an axis of its own, "
+        "which does not turn with the sector: hold both in one cylindrical system about the axis of the disk, "
+        "or along it"
+    )

@@ -8,9 +8,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from solver.matrices.sectors.diameters import DiameterMatrices
-from solver.matrices.sectors.elimination import elimination
+from solver.matrices.sectors.elimination import Elimination, elimination
 from solver.matrices.sectors.parts import PartMatrices
-from solver.matrices.validation import DofTable
+from solver.matrices.validation import DofTable, check_definite
 from solver.matrices.values import Matrix, Modes
 
 _REAL = 1e-9  # imaginary part, relative to the largest entry, that counts as none
@@ -83,6 +83,7 @@ def check_sector(sector: Sector, spinning: Collection[str]) -> None:
             away = np.setdiff1d(np.arange(sector.M.size), found.kept).tolist()
             _check_kept(sector.dofs, set(away))
             _check_parts(sector.parts, sector.M.size)
+            _check_mass(sector.M, found, count)
         return
     if sector.M is not None or low is not None or high is not None:
         raise ValueError(
@@ -112,6 +113,21 @@ def _check_kept(dofs: DofTable, away: set[int]) -> None:
                 f"`dofs`: {name!r} is row {row}, on the high boundary: name the DOF of the low boundary that "
                 "it is paired with; in contacts it is NAME@next"
             )
+
+
+def _check_mass(M: Matrix, found: Elimination, count: int) -> None:
+    """Raise ValueError unless M is positive definite once the high boundary has joined the low one."""
+    try:
+        check_definite(M.array)
+    except ValueError:
+        joined = found.of(M.array)
+        for n in range(count // 2 + 1):
+            try:
+                check_definite(joined.at(n, count))
+            except ValueError as error:
+                raise ValueError(
+                    f"{error} (boundaries joined, at nodal diameter {n}, rows without the high one)"
+                ) from error
 
 
 def _check_parts(parts: PartMatrices | None, size: int) -> None:
