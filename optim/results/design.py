@@ -64,7 +64,8 @@ class DesignStatus(Enum):
     )
     NO_RESPONSE = (
         "The frequency response could not be computed over the whole band for any design tried: "
-        "use more harmonics or a narrower band."
+        "use more harmonics or a narrower band, and some damping where there is none (nothing bounds a "
+        "resonance then)."
     )
     NOT_TRACKED = (
         "The peaks could not be followed over the whole range; the best design seen is given: use the method "

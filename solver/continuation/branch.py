@@ -53,8 +53,8 @@ class BranchStatus(Enum):
         "it by a spring."
     )
     UNDAMPED = (
-        "Beyond the last point there is a resonance and no damping, so that nothing bounds the response: give the structure "
-        "some (damping_ratio = 0.001, say)."
+        "Beyond the last point there is a resonance and no damping, so that nothing bounds the "
+        "response: give the structure some (damping_ratio = 0.001, say)."
     )
 
 

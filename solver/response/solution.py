@@ -36,8 +36,8 @@ class SolutionStatus(Enum):
         "every period. Press it harder, take away what pulls it to one side, or hold it by a spring."
     )
     UNDAMPED = (
-        "At this frequency there is a resonance and no damping, so that nothing bounds the response: give the structure "
-        "some (damping_ratio = 0.001, say)."
+        "At this frequency there is a resonance and no damping, so that nothing bounds the "
+        "response: give the structure some (damping_ratio = 0.001, say)."
     )
     LAW_FAILED = (
         "The law of a contact gives no finite force that repeats from period to period for a motion tried: "

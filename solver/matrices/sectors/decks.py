@@ -79,8 +79,9 @@ READERS = (
         name="a deck",
         suffixes=(".inp", ".cdb"),
         word="inp",
-        help="CalculiX, Abaqus (`*NODE`, `*NSET`), Ansys (`NBLOCK`, `N`, `CMBLOCK`): positions, sets and frames "
-        "of nodes, for the boundaries of a sector of a disk; Nastran (`GRID`) too, uploaded with `?format=inp`.",
+        help="CalculiX, Abaqus (`*NODE`, `*NSET`), Ansys (`NBLOCK`, `N`, `CMBLOCK`): positions, sets and "
+        "frames of nodes, for the boundaries of a sector of a disk; Nastran (`GRID`) too, uploaded with "
+        "`?format=inp`.",
         nodes=read_deck,
     ),
 )

@@ -184,6 +184,6 @@ def _scalars(
             return [(ours[i],) for i in kept], [(theirs[i],) for i in kept]
     raise ValueError(
         f"node {pair[0]} of the boundaries or its partner {pair[1]} is held along an axis of its own, "
-        "which does not turn with the sector: hold both in one cylindrical system about the axis of the disk, "
-        "or along it"
+        "which does not turn with the sector: hold both in one cylindrical system about the axis of the "
+        "disk, or along it"
     )
